@@ -7,6 +7,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compare.names import site_name
 from ..diagnose.learned.along import GIVEN
@@ -22,9 +23,14 @@ from ..quantity import scale
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Array = NDArray[np.float64]
+
 
 BESIDE = 18
 """Characters in a line of the legend beside a surface."""
+
+ROOM = 0.05
+"""Of the axis, above the highest value and below the lowest one."""
 
 FINE = 1000
 """Points at which a closed form is drawn: a ripple turns between two knots."""
@@ -122,6 +128,7 @@ def _draw_surface(axes: Axes, found: LearnedCurve) -> None:
             across * s[~known], up * y[k][~known], color=colour, lw=0.0, marker="o", ms=3.5,
             markerfacecolor="white",
         )  # fmt: skip
+    _show_values(axes, up * y, up * half)
     _name_axes(axes, curve, along, unit)
     axes.legend(
         frameon=False, labelcolor=GREY, fontsize=9, title_fontsize=9,
@@ -144,6 +151,7 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
         name = in_words(named, curve) if named else f"nearest form: {best.name}"
         fine = np.linspace(s[0], s[-1], FINE)
         axes.plot(across * fine, up * best.at(fine), color=VERMILION, lw=1.4, ls="--", label=name)
+    _show_values(axes, up * y, up * half)
     for given in (value for name, value in curve.memory if name in GIVEN):
         axes.axvline(across * given, color=PALE, lw=1.0)
     _name_axes(axes, curve, along, unit)
@@ -152,6 +160,24 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
         frameon=False, labelcolor=GREY, fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.13),
         ncols=2, borderpad=0.0, borderaxespad=0.0, columnspacing=1.2,
     )  # fmt: skip
+
+
+def _show_values(axes: Axes, y: Array, half: Array) -> None:
+    """Let the axis show all values and their bands, but of a band no more than the values span.
+
+    A value that the runs hardly tell would else flatten all others.
+
+    Parameters
+    ----------
+    axes : with the curve, or the curves of a surface
+    y, half : values and half the widths of their bands, as drawn
+    """
+    low, high = float(y.min()), float(y.max())
+    span = max(high - low, float(np.median(half)))
+    bottom = max(float((y - half).min()), low - span)
+    top = min(float((y + half).max()), high + span)
+    room = ROOM * (top - bottom) or 1.0
+    axes.set_ylim(bottom - room, top + room)
 
 
 def _name_axes(axes: Axes, curve: Curve, along: str, unit: str) -> None:

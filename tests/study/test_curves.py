@@ -22,6 +22,7 @@ from bristle.errors import StudyError
 from bristle.identify.fit import Model, Problem
 from bristle.physics.effect import EFFECTS
 from bristle.study import curves
+from bristle.study.curve_picture import draw_curve
 from bristle.study.curves import learn_effect
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects
@@ -289,3 +290,15 @@ def test_the_hidden_formula_comes_back_and_the_study_goes_on_with_it(study):
     again = learn_effect(Study(study.folder))
     assert again.file is None
     assert "Nothing was learned" in again.sentences()[0]
+
+
+def test_a_value_that_the_runs_hardly_tell_flattens_no_others():
+    found = found_of("")
+    assert found.curve is not None
+    y = np.array(found.curve.values)
+    wild = (*found.std[:-1], 100.0 * float(np.ptp(y)))
+    (axes,) = draw_curve(replace(found, std=wild), ()).figure.axes
+    low, high = axes.get_ylim()
+    (line,) = [one for one in axes.lines if one.get_label() == "learned"]
+    shown = np.ptp(line.get_ydata())
+    assert 1.0 <= (high - low) / shown <= 3.5
