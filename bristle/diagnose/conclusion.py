@@ -17,6 +17,9 @@ from .low_pass import low_pass_text
 from .rule import BENCH
 from .verdict import Diagnosis
 
+LAYER = "layer"
+"""The site beside which a building's damper stands, as a rule."""
+
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
 NOT_DRIVEN = "Neither voltage nor current was recorded: a drive that changed would look like this."
 
@@ -47,6 +50,9 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     findings : by site, the damper's last
     about : what else is known of the runs
     """
+    if about.force == "measured" and about.beside_layer:
+        damper = findings.get(DAMPER)
+        findings = {site: _after_the_force(found, damper) for site, found in findings.items()}
     reconstructed = about.force == "reconstructed" and about.beside_layer
     renewed = [fault for found in findings.values() for fault in found.sensors]
     again = {(one.channel, one.fault) for one in renewed}
@@ -87,6 +93,21 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
         unknown.coordinate if unknown else "", sites,
         tuple(one for one in alike if one not in EFFECTS), about.force, about.noise,
     )  # fmt: skip
+
+
+def _after_the_force(found: Finding, damper: Finding | None) -> Finding:
+    """Return what the layer shows, no verdict where the damper's runs contradict each other.
+
+    The measured force is in its equilibrium, and so is what is wrong with it.
+    """
+    waits = damper is not None and damper.kind == "insufficient"
+    if found.site != LAYER or found.kind != "unknown" or not waits:
+        return found
+    why = (
+        f"{Z} = {found.z_before:.2f}, by an equilibrium that has the damper's force in it; that is "
+        "to be set right first."
+    )
+    return replace(found, kind="insufficient", reasons=(why,))
 
 
 def _kind_of(kinds: Sequence[str], named: Sequence[str], rivals: Sequence[str]) -> str:
@@ -133,7 +154,7 @@ def _untestable(
 def _site_of(effect: str, site: str) -> str:
     """Return where an effect is that was found at a site: in the layer if it is the structure's."""
     known = EFFECTS.get(effect)
-    return "layer" if site == "damper" and known and known.site == "structure" else site
+    return LAYER if site == DAMPER and known and known.site == "structure" else site
 
 
 def lookalikes(effects: tuple[str, ...]) -> dict[str, str]:

@@ -10,6 +10,7 @@ import pytest
 
 from bristle.cli.diagnose import _next
 from bristle.diagnose.candidates import judge
+from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.decision import OTHER_FORM
 from bristle.diagnose.finding import Finding
 from bristle.diagnose.inconsistent_runs import contradicted, groups, inconsistent_runs, odd_run
@@ -155,3 +156,20 @@ def test_a_verdict_stays_where_no_run_is_odd():
 def test_after_runs_that_allow_no_verdict_comes_another_diagnosis():
     verdict = {"kind": "insufficient", "effects": [], "laws": [{"law": "dahl"}], "findings": []}
     assert _next(verdict, Path("rig")).endswith("measure it again,  then bristle diagnose rig")
+
+
+@pytest.mark.parametrize(
+    ("force", "damper", "kind"),
+    [
+        ("measured", "insufficient", "insufficient"),
+        ("measured", "none", "unknown"),
+        ("reconstructed", "insufficient", "unknown"),
+    ],
+)
+def test_the_layer_waits_for_a_measured_force_that_contradicts_itself(force, damper, kind):
+    nan = float("nan")
+    layer = Finding("layer", "unknown", (), 2.2, 2.2, 0.0, nan, reasons=("It errs.",))
+    other = Finding("damper", damper, (), 4.0, 4.0, 0.0, nan, reasons=("One run is odd.",))
+    told = conclude({"layer": layer, "damper": other}, About(force=force))
+    assert told.kind == kind
+    assert ("set right first" in " ".join(told.reasons)) == (kind == "insufficient")
