@@ -91,7 +91,7 @@ def learn(
     learning : those that decide which one is tried
     """
     rule = rule or opened.rule
-    before, train, held_out = opened.before, opened.searched, opened.held_out
+    before, train = opened.before, opened.searched
     residual = residual_of(train, before.model)
     worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
     promised = promises(residual, parts, along, learning)
@@ -103,12 +103,12 @@ def learn(
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
         return LearnedCurve(name, None, (), before, None, (), why)
-    fitted = _best_first(_fitted(chosen, name, before.model, train, held_out), learning)
+    fitted = _best_first(_fitted(chosen, name, before.model, opened), learning)
     if fitted[0].trial.train > rule.clean:
         model = with_law_of(before.model, fitted[0])
         surface = _explained(before, fitted[0], rule) < learning.enough
         tried = _second_look(residual_of(train, model), fitted, (parts, along), surface, learning)
-        more = _fitted(tried, name, model, train, held_out)
+        more = _fitted(tried, name, model, opened)
         fitted = _best_first([*fitted, *more], learning)
     fitted[0] = _finer(fitted[0], name, opened, learning)
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
@@ -164,7 +164,7 @@ def _finer(best: Fitted, name: str, opened: Opening, learning: LearnRule) -> Fit
         return best
     again = Promise(curve.finer(), best.loss)
     model = with_law_of(opened.before.model, best)
-    (found,) = _fitted([again], name, model, opened.searched, opened.held_out)
+    (found,) = _fitted([again], name, model, opened)
     return found if found.loss <= learning.finer * best.loss else best
 
 
@@ -192,46 +192,54 @@ def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRul
     return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""
 
 
-def _fitted(
-    chosen: Sequence[Promise], name: str, base: Model, train: Problem, held_out: Problem
-) -> list[Fitted]:
-    """Return the curves fitted with everything else."""
+def _fitted(chosen: Sequence[Promise], name: str, base: Model, opened: Opening) -> list[Fitted]:
+    """Return the curves fitted with everything else, from a model's values."""
     texts = {
         f"{name}_{k}": effect_text(f"{name}_{k}", one.curve, "a trial")
         for k, one in enumerate(chosen)
     }
     count = Count("fitting a curve", len(chosen))
     with defined(texts):
-        train, held_out = train.of(train.runs), held_out.of(held_out.runs)
+        train, held_out = (one.of(one.runs) for one in (opened.searched, opened.held_out))
 
         def fitted(one: tuple[str, Promise]) -> Fitted:
             own, promise = one
-            found = _inside(promise.curve, own, base, train, held_out)
+            found = _inside(promise.curve, own, (base, opened.before.model), train, held_out)
             count.done(promise.curve.words())
             return replace(found, trial=_renamed(found.trial, own, name))
 
         return in_threads(fitted, list(zip(texts, chosen, strict=True)))
 
 
-def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Problem) -> Fitted:
+def _inside(
+    curve: Curve, own: str, models: tuple[Model, Model], train: Problem, held_out: Problem
+) -> Fitted:
     """Return a curve fitted inside a model, as the effect `own`.
 
     From what the scan says of it; where that leaves more error than no curve, from none.
+
+    Parameters
+    ----------
+    curve : as the scan has it
+    own : name of its effect, which is defined
+    models : the one that the scan was made beside, and the present one
+    train, held_out : runs to fit to, and those that decide
     """
+    base, present = models
     entries = [f"{own}.{entry}" for entry in curve.entries]
     values = dict(zip(entries, begun(curve), strict=True))
     memory = {f"{own}.{n}": value for n, value in curve.memory}
     joined = replace(base, effects=(*base.effects, own))
-    laws = _laws(base, train)
 
-    def fitted_from(values: dict[str, float]) -> Model:
+    def fitted_from(values: dict[str, float], beside: Model) -> Model:
+        laws = _laws(beside, train)
         starts = (replace(joined, values={**law, **memory, **values}) for law in laws)
         ends = [refine(start, train, SWEEPS) for start in starts]
         return min(ends, key=lambda end: _error(train, end))
 
-    model = fitted_from(values)
-    if _error(train, model) > _error(train, base):  # the scan, which is linear, misled it
-        model = fitted_from(dict.fromkeys(entries, 0.0))
+    model = fitted_from(values, base)
+    if _error(train, model) > _error(train, present):  # the scan, which is linear, misled it
+        model = fitted_from(dict.fromkeys(entries, 0.0), present)
     std = intervals_of(train, model).std
     fitted = replace(
         curve, values=tuple(model.value(entry) for entry in entries),

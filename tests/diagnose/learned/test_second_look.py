@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 
 from bristle.diagnose.candidates import Trial
+from bristle.diagnose.learned import fit as learned_fit
 from bristle.diagnose.learned.closed import closed_forms
+from bristle.diagnose.learned.curve import Curve
+from bristle.diagnose.learned.effect_file import effect_text
 from bristle.diagnose.learned.fit import Fitted, with_law_of
 from bristle.diagnose.learned.residual import residual_of
 from bristle.diagnose.learned.rule import LEARN
 from bristle.diagnose.learned.screen import promises
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, fit
+from bristle.physics.user import defined
 
 STEP = 0.002  # s
 T = STEP * np.arange(6000)
@@ -71,3 +75,15 @@ def test_a_ripple_of_a_dozen_periods_in_the_stroke_is_found_with_its_pitch(pitch
     assert form.form.name == "ripple"
     assert form.left < 0.5 * LEARN.follows
     assert form.values[2] == pytest.approx(pitch, rel=0.02)
+
+
+def test_a_fit_that_the_second_scan_misleads_begins_from_the_present_model(monkeypatch):
+    problem = sweeps(lambda x, F: F)
+    present = Model("bingham", (), VALUES)
+    far = replace(present, values={**VALUES, "f_c": 20.0})
+    curve = Curve("force", "displacement", (), (-0.01, 0.0, 0.01), (5.0, 0.0, 5.0))
+    monkeypatch.setattr(learned_fit, "refine", lambda start, train, sweeps: start)
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        found = learned_fit._inside(curve, "learned_9", (far, present), problem, problem)
+    assert found.trial.train == pytest.approx(1.0, abs=0.05)
+    assert found.curve.values == (0.0, 0.0, 0.0)
