@@ -265,6 +265,14 @@ def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Stu
         assert one.limit is not None
         assert one.limit.named == pytest.approx(told[row.name].named, rel=1e-6)
         assert quantity(told[row.name].named, one.sized.unit, 2, fine=True) in row.what
+    stribeck = purposes.effects[1]
+    assert stribeck.limit is not None
+    assert stribeck.limit.named is not None
+    allowed = 3.0 * stribeck.limit.named  # as where the model errs
+    erring = replace(stribeck, limit=replace(stribeck.limit, largest=allowed))
+    others = replace(purposes, effects=(purposes.effects[0], erring, purposes.effects[2]))
+    row = outcomes(others, found.asked, found.known, found.known)[1]
+    assert f"named above {quantity(allowed, '1', 2, fine=True)}" in row.what
 
 
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
