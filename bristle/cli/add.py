@@ -46,6 +46,8 @@ def main(arguments: argparse.Namespace) -> int:
 
 def text(added: Added, folder: Path) -> str:
     """Return what adding did, as text."""
+    from ..study.laws import law_command
+
     found = added.identified
     before, after = found.before, found.after
     lines = [f"Step {added.step.number}: {added.step.what} ({added.step.why})", ""]
@@ -68,6 +70,11 @@ def text(added: Added, folder: Path) -> str:
             interval = f"+- {plain(half, 2)}" if half is not None else row["how"]
             value = plain(row["value"], 5)
             lines.append(f"  {row['name']:28} {value:>12} {row['unit']:10} {interval}")
+    if added.other_law:
+        lines += [
+            "", f"The verdict is about the law {added.other_law}; this model has "
+            f"{found.model.law}. To take that law:  {law_command(folder, added.other_law)}",
+        ]  # fmt: skip
     if "z_holdout" in after and after["z_holdout"] >= before["z_holdout"]:
         lines += ["", "The error on runs not seen did not fall:  " + command("undo", folder)]
     return "\n".join([*lines, "", f"Next:  {command('diagnose', folder)}"])

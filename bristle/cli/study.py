@@ -201,7 +201,9 @@ def _print_new(created: Created) -> None:
     )
     for guess in created.guesses:
         turned = "turned" if guess.sign < 0 else ""
-        print(f"  {guess.channel:28} {guess.column} [{guess.unit}] {turned}".rstrip())
+        told = guess.column.endswith((f"[{guess.unit}]", f"({guess.unit})"))
+        column = guess.column if told else f"{guess.column} [{guess.unit}]"
+        print(f"  {guess.channel:28} {column} {turned}".rstrip())
         print(f"  {'':28}   {guess.reason}")
         if guess.doubt:
             print(f"  {'':28}   doubtful: {guess.doubt}")

@@ -14,6 +14,7 @@ from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
 from ..findings import command, unknown
 from ..identify.bench import compile_ahead
+from ..physics.forms import joined_form
 from ..physics.laws import law_names
 from ..progress import tell, telling
 from .history import Step
@@ -123,15 +124,23 @@ def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Added:
-    """What adding an effect did: the identification with it, and the step in the history."""
+    """What adding an effect did: the identification with it, and the step in the history.
+
+    `other_law` the law that the verdict on the effects is about where the model has another one,
+    else "".
+    """
 
     effects: tuple[str, ...]
     identified: Identified
     step: Step
+    other_law: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
-        return {**self.identified.as_dict(), "added": list(self.effects), "step": self.step.number}
+        return {
+            **self.identified.as_dict(), "added": list(self.effects), "step": self.step.number,
+            "other_law": self.other_law,
+        }  # fmt: skip
 
 
 def add_effects(
@@ -160,14 +169,15 @@ def add_effects(
     if identified is None:
         identified = identify_with(study, names, found.values if found is not None else {})
     names = _named_here(study, names)
-    verdict = study.verdict()
-    if not why:
-        agreed = verdict is not None and set(names) <= set(verdict.get("effects", []))
-        why = f"verdict: {verdict['kind']}" if agreed and verdict else "by hand"
+    verdict = study.verdict() or {}
+    agreed = bool(verdict) and set(names) <= set(verdict.get("effects", []))
+    why = why or (f"verdict: {verdict['kind']}" if agreed else "by hand")
+    law = joined_form(verdict["law"], verdict["command"]) if agreed and "law" in verdict else ""
+    other_law = law if law != identified.model.law else ""
     step = study.add_step(
         "add " + ", ".join(names), why, identified.model, identified.before, identified.after
     )
-    return Added(names, replace(identified, step=step), step)
+    return Added(names, replace(identified, step=step), step, other_law)
 
 
 def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]) -> Identified:

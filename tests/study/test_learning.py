@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 
 import pandas as pd
 import pytest
 
 from bristle.cli import main
+from bristle.cli.add import text
 from bristle.diagnose import Diagnosis
 from bristle.errors import RecordError, StudyError
 from bristle.study import learning
@@ -142,6 +144,28 @@ def test_adding_tells_the_error_of_the_model_as_it_was(study):
     added = add_effects(study, ["gas_spring"])
     assert added.step.before["z_holdout"] == pytest.approx(last.after["z_holdout"], rel=1e-3)
     assert added.step.before["z_holdout"] > 3.0 * added.step.after["z_holdout"]
+
+
+def test_adding_tells_where_the_verdict_is_about_another_law(study):
+    study.write_verdict({**study.verdict(), "law": "lugre", "command": "linear"})
+    added = add_effects(study, ["gas_spring"])
+    assert added.as_dict()["other_law"] == "lugre"
+    told = text(added, study.folder)
+    assert "The verdict is about the law lugre; this model has bingham." in told
+    assert "--law lugre" in told
+
+
+def test_what_the_verdict_is_about_needs_no_word(study):
+    added = add_effects(study, ["gas_spring"])
+    assert added.other_law == ""
+    assert "The verdict is about" not in text(added, study.folder)
+
+
+def test_a_unit_in_the_title_of_a_column_is_not_told_twice(study, tmp_path, capsys):
+    files = [str(path) for path in sorted((study.folder / "data").glob("*.csv"))]
+    assert main(["study", "new", str(tmp_path / "again"), "--data", *files]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"^  force +force \[N\]$", told, re.MULTILINE)
 
 
 def test_an_effect_that_nobody_knows_is_refused(study, capsys):
