@@ -25,9 +25,10 @@ from bristle.diagnose.damper import is_organised
 from bristle.diagnose.decision import decide
 from bristle.diagnose.evidence import BLOCK, parts_of
 from bristle.diagnose.faults import instruments_of
-from bristle.diagnose.opening import Insufficient, Trials, opening
+from bristle.diagnose.opening import Insufficient, opening
 from bristle.diagnose.rule import BENCH, DecisionRule
 from bristle.diagnose.sites import look_at
+from bristle.diagnose.trials import Trials
 from bristle.identify.fit import Model
 from bristle.identify.structure import structure_problems
 from bristle.resources import cache_folder

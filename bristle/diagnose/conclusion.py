@@ -54,10 +54,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
         damper = findings.get(DAMPER)
         findings = {site: _after_the_force(found, damper) for site, found in findings.items()}
     reconstructed = about.force == "reconstructed" and about.beside_layer
-    renewed = [fault for found in findings.values() for fault in found.sensors]
-    again = {(one.channel, one.fault) for one in renewed}
-    first = [one for one in about.sensors if (one.channel, one.fault) not in again]
-    sensors = (*first, *_of_load_cell(findings), *renewed)
+    sensors = _sensors(findings, about)
     parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
     named: list[str] = []
     rivals: list[str] = []
@@ -78,13 +75,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
         sites |= dict.fromkeys(shown, "sensor")
     effects = tuple(dict.fromkeys([*named, *rivals]))
     unknown = next((part for part in parts if part.kind == "unknown"), None)
-    reasons = [
-        *_reasons(parts, kind),
-        *filter(None, map(low_pass_text, parts)),
-        *(text for part in parts for text in effect_words(part)),
-        *about.notes,
-        *(_without_load_cell(a) for a in alike.values()),
-    ]
+    reasons = [*_told(parts, kind, about), *(_without_load_cell(a) for a in alike.values())]
     if kind == "unknown" and not about.driven:
         reasons.append(NOT_DRIVEN)
     return Diagnosis(
@@ -93,6 +84,24 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
         unknown.coordinate if unknown else "", sites,
         tuple(one for one in alike if one not in EFFECTS), about.force, about.noise,
     )  # fmt: skip
+
+
+def _sensors(findings: Mapping[str, Finding], about: About) -> tuple[SensorFault, ...]:
+    """Return the faults of all sensors; what a site tells anew takes the place of the first."""
+    renewed = [fault for found in findings.values() for fault in found.sensors]
+    again = {(one.channel, one.fault) for one in renewed}
+    first = [one for one in about.sensors if (one.channel, one.fault) not in again]
+    return (*first, *_of_load_cell(findings), *renewed)
+
+
+def _told(parts: Sequence[Finding], kind: str, about: About) -> list[str]:
+    """Return why the verdict is what it is, and what else is to be said of sites and runs."""
+    return [
+        *_reasons(parts, kind),
+        *filter(None, map(low_pass_text, parts)),
+        *(text for part in parts for text in effect_words(part)),
+        *about.notes,
+    ]
 
 
 def _after_the_force(found: Finding, damper: Finding | None) -> Finding:

@@ -13,9 +13,10 @@ from ..physics.effect import EFFECTS
 from .candidates import Trial, judge
 from .decision import Decision, Z, as_noise, decide, gained
 from .finding import Finding, of_decision
-from .opening import Opening, Progress, Trials, silent
+from .opening import Opening, Progress, silent
 from .rule import BENCH, SITE, DecisionRule
 from .sites import better, equals
+from .trials import Trials
 from .zero import free_zero, renewed_zero, zero_fault
 
 

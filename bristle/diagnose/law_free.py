@@ -22,16 +22,9 @@ from .inconsistent_runs import contradicted
 from .law_choice import Pair, choose, equivalents, search, simplest
 from .law_trials import LawTrial, not_finite, try_laws
 from .law_verdict import LawVerdict
-from .opening import (
-    Insufficient,
-    Opening,
-    Progress,
-    Trials,
-    bench_data,
-    opened_with,
-    silent,
-)
+from .opening import Insufficient, Opening, Progress, bench_data, opened_with, silent
 from .rule import BENCH, DecisionRule
+from .trials import Trials
 from .verdict import Diagnosis
 
 

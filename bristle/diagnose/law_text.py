@@ -37,11 +37,14 @@ def law_name(row: Row) -> str:
 def law_sentences(verdict: Row) -> list[str]:
     """Return which law the runs prefer, and what explains them as well.
 
-    None of a law given, or where the runs allow no verdict.
+    None of a law given; where the runs allow no verdict, only which laws were not tried.
     """
     rows = verdict.get("laws") or []
-    if not rows or verdict.get("kind") == "insufficient":
+    if not rows:
         return []
+    unfit = [str(name) for name in verdict.get("laws_left_out") or []]
+    if verdict.get("kind") == "insufficient":
+        return [left_out(unfit)] if unfit else []
     own = (verdict["law"], verdict["command"])
     mine = next(row for row in rows if (row["law"], row["command"]) == own)
     z = short_z(mine.get("z_with_effects", mine["z_holdout"]))
@@ -57,7 +60,7 @@ def law_sentences(verdict: Row) -> list[str]:
             f"Of {count} laws it is the simplest that explains the runs: "
             f"{law_name(mine)}{with_what} has {Z} = {z} on held-out runs."
         ]
-    if unfit := [str(name) for name in verdict.get("laws_left_out") or []]:
+    if unfit:
         out.append(left_out(unfit))
     equal = [_pair_name(row) for row in verdict.get("equivalent") or []]
     if equal:

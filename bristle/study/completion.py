@@ -11,11 +11,12 @@ from ..diagnose.candidates import Trial
 from ..diagnose.decision import missing
 from ..progress import tell
 from .added_runs import other_data
-from .curves import LearnedEffect, learn_effect
+from .curves import learn_effect
 from .history import Step
 from .identification import identify_study
 from .identified import Identified
 from .laws import law_or_all
+from .learned_effect import LearnedEffect
 from .learning import (
     Say,
     add_effects,

@@ -13,7 +13,8 @@ from bristle.diagnose.candidates import judge
 from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.decision import OTHER_FORM
 from bristle.diagnose.finding import Finding
-from bristle.diagnose.inconsistent_runs import contradicted, groups, inconsistent_runs, odd_run
+from bristle.diagnose.inconsistent_runs import contradicted, groups, inconsistent_runs
+from bristle.diagnose.odd_run import odd_run
 from bristle.diagnose.opening import Opening
 from bristle.identify.fit import fit, identify
 from bristle.identify.site_fit import joined

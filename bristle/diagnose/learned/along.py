@@ -70,10 +70,11 @@ class Along:
     `name` and `unit` as in a verdict; `words` for sentences; `needs` the signals that a hook reads
     for it, `source` their expression there; `history` gives it (n,) of a run and its memory's
     parameters, of which `memory` has the names; `states` and `advance` are the memory of the hook,
-    `starts` as in `Effect`. `value` is the source of the curve's value where it is not that of one
-    signal, `formula` what the signal then is. `named` says whether a formula may take the place of
-    a curve along it; `contains` the signal whose curves are special cases of those along it.
-    `measured` says whether it is a channel of the runs, which the model does not know.
+    `starts` as in `Effect`. What changes with the direction does so over the speed SLOW in the
+    hook, and at once in the history. `value` is the source of the curve's value where it is not
+    that of one signal, `formula` what the signal then is. `named` says whether a formula may take
+    the place of a curve along it; `contains` the signal whose curves are special cases of those
+    along it. `measured` says whether it is a channel of the runs, which the model does not know.
     """
 
     name: str

@@ -98,8 +98,7 @@ def learn(
     if len(along) > 1:
         promised += surfaces(residual, parts, along, learning)
         promised.sort(key=lambda one: learning.weighed(one.loss, one.curve))
-    found = [one for one in promised if one.loss <= worth]
-    chosen = distinct(found, TRIED, learning.near)
+    chosen = distinct([one for one in promised if one.loss <= worth], TRIED, learning.near)
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
         return LearnedCurve(name, None, (), before, None, (), why)
@@ -201,19 +200,18 @@ def _fitted(chosen: Sequence[Promise], name: str, base: Model, opened: Opening) 
     count = Count("fitting a curve", len(chosen))
     with defined(texts):
         train, held_out = (one.of(one.runs) for one in (opened.searched, opened.held_out))
+        there = replace(opened, problem=train, part=None, held_out=held_out)
 
         def fitted(one: tuple[str, Promise]) -> Fitted:
             own, promise = one
-            found = _inside(promise.curve, own, (base, opened.before.model), train, held_out)
+            found = _inside(promise.curve, own, base, there)
             count.done(promise.curve.words())
             return replace(found, trial=_renamed(found.trial, own, name))
 
         return in_threads(fitted, list(zip(texts, chosen, strict=True)))
 
 
-def _inside(
-    curve: Curve, own: str, models: tuple[Model, Model], train: Problem, held_out: Problem
-) -> Fitted:
+def _inside(curve: Curve, own: str, base: Model, opened: Opening) -> Fitted:
     """Return a curve fitted inside a model, as the effect `own`.
 
     From what the scan says of it; where that leaves more error than no curve, from none.
@@ -222,10 +220,10 @@ def _inside(
     ----------
     curve : as the scan has it
     own : name of its effect, which is defined
-    models : the one that the scan was made beside, and the present one
-    train, held_out : runs to fit to, and those that decide
+    base : the model that the scan was made beside
+    opened : runs to fit to and those that decide, with the present model
     """
-    base, present = models
+    train, present = opened.problem, opened.before.model
     entries = [f"{own}.{entry}" for entry in curve.entries]
     values = dict(zip(entries, begun(curve), strict=True))
     memory = {f"{own}.{n}": value for n, value in curve.memory}
@@ -250,7 +248,7 @@ def _inside(
         model = replace(
             model, values={**model.values, **dict(zip(entries, fitted.values, strict=True))}
         )
-    trial = judge(model, train, held_out)
+    trial = judge(model, train, opened.held_out)
     deviations = tuple(std.get(entry, 0.0) for entry in entries)
     return Fitted(fitted, deviations, trial, _left_out(train, model))
 

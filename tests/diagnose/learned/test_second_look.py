@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnose.candidates import Trial
+from bristle.diagnose.candidates import Trial, judge
 from bristle.diagnose.learned import fit as learned_fit
 from bristle.diagnose.learned.closed import closed_forms
 from bristle.diagnose.learned.curve import Curve
@@ -16,6 +16,7 @@ from bristle.diagnose.learned.fit import Fitted, with_law_of
 from bristle.diagnose.learned.residual import residual_of
 from bristle.diagnose.learned.rule import LEARN
 from bristle.diagnose.learned.screen import promises
+from bristle.diagnose.opening import Opening
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, fit
 from bristle.physics.user import defined
@@ -84,6 +85,7 @@ def test_a_fit_that_the_second_scan_misleads_begins_from_the_present_model(monke
     curve = Curve("force", "displacement", (), (-0.01, 0.0, 0.01), (5.0, 0.0, 5.0))
     monkeypatch.setattr(learned_fit, "refine", lambda start, train, sweeps: start)
     with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
-        found = learned_fit._inside(curve, "learned_9", (far, present), problem, problem)
+        opened = Opening(judge(present, problem, problem), problem, problem)
+        found = learned_fit._inside(curve, "learned_9", far, opened)
     assert found.trial.train == pytest.approx(1.0, abs=0.05)
     assert found.curve.values == (0.0, 0.0, 0.0)
