@@ -4,6 +4,11 @@ numba asks for callees that are compiled themselves. Here the globals of a funct
 every plain function among them is compiled, so that the laws stay free of any decorator. numba's
 own cache checks one source file only and would keep an edited effect's old force: so the folder of
 the cache is named by the digest of all functions that are compiled together.
+
+Machine code that is read from disk finds its callees by their names, in whatever code is there
+already. numba tells namesakes apart by a number that counts anew in each process: after a new
+effect, code from another process called the functions of the library without it. So every name
+ends in that digest.
 """
 
 from __future__ import annotations
@@ -84,6 +89,9 @@ _OPTIONS = {"error_model": "numpy", "_nrt": False, "pipeline_class": _Compiler}
 # Callees are never called from Python.
 _CALLEE = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
+NAMING = "names end in the digest"
+"""How functions are named in machine code: what was named otherwise is not read."""
+
 _NUMBERS = (bool, int, float, str, tuple)
 
 
@@ -137,12 +145,13 @@ def compiled(
         Whether to keep the machine code on disk.
     """
     _import_the_rest()
-    folder = _folder(function) if keep else None
+    name = digest(function)
+    folder = _folder(name) if keep else None
     with _FOLDER:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder or "")
         try:
-            root = _closed(function, {}, inline)
+            root = _closed(function, {}, inline, name)
             return numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
         finally:
             numba.config.CACHE_DIR = before
@@ -193,13 +202,13 @@ def library_text(
 
 def kept(function: Callable[..., Any]) -> bool:
     """Return whether machine code of a function is on disk, or cannot be kept there."""
-    folder = _folder(function)
+    folder = _folder(digest(function))
     return folder is None or any(folder.rglob("*.nbi"))
 
 
-def _folder(function: Callable[..., Any]) -> Path | None:
-    """Return where machine code is kept, or None where nothing can be written."""
-    folder = cache_folder() / "numba" / digest(function)
+def _folder(name: str) -> Path | None:
+    """Return where machine code of a digest is kept, or None where nothing can be written."""
+    folder = cache_folder() / "numba" / name
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -210,7 +219,7 @@ def _folder(function: Callable[..., Any]) -> Path | None:
 def digest(function: Callable[..., Any]) -> str:
     """Return the digest of a function and all that it calls, 16 hexadecimal digits."""
     content = hashlib.sha256()
-    for text in (numba.__version__, np.__version__, sys.version):
+    for text in (NAMING, numba.__version__, np.__version__, sys.version):
         content.update(text.encode())
     for reached in _reached(function, set()):
         # numba's files name the modules of their functions and cannot be read without them.
@@ -246,8 +255,18 @@ def _parts(code: CodeType) -> Iterator[bytes]:
             yield repr(constant).encode()
 
 
-def _closed(function: Any, done: dict[int, Any], inline: tuple[str, ...]) -> FunctionType:
-    """Return a copy of a function in whose globals every plain function is compiled."""
+def _closed(
+    function: Any, done: dict[int, Any], inline: tuple[str, ...], end: str = ""
+) -> FunctionType:
+    """Return a copy of a function in whose globals every plain function is compiled.
+
+    Parameters
+    ----------
+    function : what is copied
+    done : compiled functions by the `id` of the plain one, filled
+    inline : as in `compiled`
+    end : of the names of the copies in machine code
+    """
     namespace = dict(function.__globals__)
     for name in _names(function.__code__):
         value = namespace.get(name)
@@ -255,7 +274,9 @@ def _closed(function: Any, done: dict[int, Any], inline: tuple[str, ...]) -> Fun
             if id(value) not in done:
                 short = f"{value.__module__.rpartition('.')[2]}.{value.__qualname__}"
                 how = "always" if short in inline else "never"
-                done[id(value)] = numba.njit(inline=how, **_CALLEE)(_closed(value, done, inline))
+                done[id(value)] = numba.njit(inline=how, **_CALLEE)(
+                    _closed(value, done, inline, end)
+                )
             namespace[name] = done[id(value)]
         elif value is _MAKES_TUPLE:
             namespace[name] = _record
@@ -263,7 +284,7 @@ def _closed(function: Any, done: dict[int, Any], inline: tuple[str, ...]) -> Fun
         function.__code__, namespace, function.__name__, function.__defaults__, function.__closure__
     )
     copy.__module__ = function.__module__
-    copy.__qualname__ = function.__qualname__
+    copy.__qualname__ = f"{function.__qualname__}_{end}" if end else function.__qualname__
     return copy
 
 

@@ -147,3 +147,38 @@ def test_what_numba_imports_first_is_not_imported_beside_a_thread_that_compiles(
         assert done == []
     thread.join(60.0)
     assert done == [1, 1]
+
+
+NAMESAKES = """
+import sys
+
+import namesakes
+from bristle.jit import compiled
+
+LONG = "    x = math.sin(x) if x > 1.0 else x\\n" * 60  # too long to be inlined
+
+found = []
+for factor in sys.argv[1:]:
+    exec(f"def inner(x):\\n{LONG}    return {factor} * x\\n", namesakes.__dict__)
+    found.append(compiled(namesakes.outer)(1.0))
+print(found)
+"""
+
+
+def test_machine_code_that_is_read_calls_its_own_functions_not_their_namesakes(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "namesakes.py").write_text(
+        "import math\n\n\ndef outer(x):\n    return inner(x) + 1.0\n"
+    )
+    paths = os.pathsep.join([str(tmp_path), str(PACKAGE.parent)])
+    own = {**os.environ, "PYTHONPATH": paths, "BRISTLE_CACHE": str(tmp_path / "cache")}
+
+    def told(*factors: str) -> str:
+        order = [sys.executable, "-c", NAMESAKES, *factors]
+        done = subprocess.run(order, env=own, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    assert told("2.0") == "[3.0]"  # each compiles in a process of its own, where numba counts anew
+    assert told("5.0") == "[6.0]"
+    assert told("2.0", "5.0") == "[3.0, 6.0]"  # both are read

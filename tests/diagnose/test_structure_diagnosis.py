@@ -7,7 +7,7 @@ import pytest
 from shaken import building, friction, measured, shake
 
 from bristle.diagnose import damper as of_damper
-from bristle.diagnose import diagnose_rig, equilibrium, opening
+from bristle.diagnose import diagnose_rig, equilibrium, trials
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.conclusion import About, conclude, lookalikes
 from bristle.diagnose.decision import Decision
@@ -250,7 +250,7 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
         asked.append(given)
         return [trial(("gas_spring",), z)]
 
-    monkeypatch.setattr(opening, "try_all", search)
+    monkeypatch.setattr(trials, "try_all", search)
     none = StructureProblem([])
     inside = Opening(trial((), z, train), none, none, part=none, rule=INSIDE, scope=IN_BUILDING)
     found, _ = of_damper.look_at_damper(inside)
