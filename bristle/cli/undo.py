@@ -27,7 +27,7 @@ def main(arguments: argparse.Namespace) -> int:
 
         print(json.dumps({"undone": asdict(undone), "now": asdict(now)}, indent=2))
         return 0
-    kept = study.history.folder / "undone" / f"{undone.number:03d}"
+    kept = study.history.undone(undone.number)
     print(f'{study.folder}: step {undone.number}, "{undone.what}", is taken back ({kept}).')
     print(f'The model is that of step {now.number} again, "{now.what}".')
     return 0

@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -156,6 +157,17 @@ class History:
         self.recover()
         return last
 
+    def undone(self, number: int) -> Path:
+        """Return the folder of the step of a number that was taken back last."""
+        *_, last = takewhile(Path.is_dir, self._places_undone(number))
+        return last
+
+    def _places_undone(self, number: int) -> Iterator[Path]:
+        """Yield where steps of a number that are taken back go: 001, then 001_2, 001_3 ..."""
+        name = self.path(number).name
+        for again in count(1):
+            yield self.folder / "undone" / (name if again == 1 else f"{name}_{again}")
+
     def begin_anew(self, first: int | None) -> Path:
         """Set aside all that was found from the data, and put the draft of study.toml in place.
 
@@ -198,9 +210,8 @@ class History:
             number = int(unfinished["undo"])
             self._make_present(max((n for n in self.numbers() if n < number), default=0))
             if self.path(number).is_dir():
-                kept = self.folder / "undone" / self.path(number).name
+                kept = next(one for one in self._places_undone(number) if not one.exists())
                 kept.parent.mkdir(exist_ok=True)
-                shutil.rmtree(kept, ignore_errors=True)
                 self.path(number).replace(kept)
         if "channels" in unfinished:
             set_aside(self.study, int(unfinished["channels"]), int(unfinished["first"]))

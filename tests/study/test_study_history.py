@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 from made import bench_run, write, write_runs
 
+from bristle.cli import main
 from bristle.errors import RecordError
 from bristle.study import Study, StudyError, create_study, new_model
 from bristle.study.history import History
@@ -86,6 +88,20 @@ def test_steps_and_undo(study: Study) -> None:
     with pytest.raises(StudyError, match="nothing to undo"):
         again.undo()
     assert (study.folder / "history" / "undone" / "002" / "model.toml").is_file()
+
+
+def test_each_step_that_is_undone_is_kept(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
+    model = study.model().with_effect("gas_spring")
+    for name, what in (("001", "first"), ("001_2", "second"), ("001_3", "third")):
+        study = Study(study.folder)
+        study.add_step(what, "to see", model)
+        assert main(["undo", str(study.folder)]) == 0
+        kept = study.folder / "history" / "undone" / name
+        assert f"({kept})" in capsys.readouterr().out
+    undone = study.folder / "history" / "undone"
+    files = sorted(undone.glob("*/step.json"))
+    whats = [json.loads(file.read_text())["what"] for file in files]
+    assert whats == ["first", "second", "third"]
 
 
 def test_hand_edits_are_steps_that_undo_brings_back(study: Study) -> None:
