@@ -6,13 +6,14 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
+from itertools import count
 from keyword import iskeyword
 
+from ..data.files import write_whole
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.learned.closed import closed_forms
 from ..diagnose.learned.closed_fit import close
-from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.effect_file import effect_text
 from ..diagnose.learned.fit import learn
 from ..diagnose.learned.place import Place
@@ -64,11 +65,10 @@ def learn_effect(
     """
     for why in study.usable_effects():
         tell(f"left out: {why}")
-    name = name or _free_name(study)
+    given, name = name, name or _free_name(study)
     if not name.isidentifier() or iskeyword(name):
         raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
-    if name in EFFECTS or (study.effects_folder / f"{name}.py").exists():
-        raise StudyError(f'an effect is named "{name}" already. Another name is right.')
+    _refuse_taken(study, name)
     site, opened = _opened(study, at)
     refuse_elsewhere(parts, along, Place(site), study.settings.beside)
     found = learn(opened, name, parts=parts, along=along)
@@ -83,33 +83,43 @@ def learn_effect(
     learned = LearnedEffect(found, forms, closed, site=told)
     flaw = ""
     for one in [learned, replace(learned, closed=None)] if closed is not None else [learned]:
-        text = _text(study, one, found.curve)
-        flaw = flaw_of(name, text)
+        flaw = flaw_of(name, _text(study, one, name))
         if not flaw:
-            return _written(study, one, text) if write else one
+            return _written(study, one, given) if write else one
     why = f"{found.curve.words().capitalize()} can be no effect: {flaw}"
     return replace(learned, closed=None, found=replace(found, refused=why))
 
 
-def _text(study: Study, learned: LearnedEffect, curve: Curve) -> str:
-    """Return the text of a learned effect's file."""
-    name, closed = learned.name, learned.closed
+def _text(study: Study, learned: LearnedEffect, name: str) -> str:
+    """Return the text of a learned effect's file; its name may be another than in the fit."""
+    curve, closed = learned.found.curve, learned.closed
+    assert curve is not None
     if closed is not None:
         values = closed.trial.model.values  # of an effect that has no file yet
-        memory = tuple((n, values[f"{name}.{n}"]) for n, _ in curve.memory)
+        memory = tuple((n, values[f"{learned.name}.{n}"]) for n, _ in curve.memory)
         curve = replace(curve, memory=memory)
     origin = f"{LEARNED} {study.name}, {date.today().year}"
     return effect_text(name, curve, origin, closed.formula if closed else None)
 
 
-def _written(study: Study, learned: LearnedEffect, text: str) -> LearnedEffect:
-    """Write a learned effect's file, its picture, and what the report says of it."""
-    name = learned.name
-    file = study.effects_folder / f"{name}.py"
+def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
+    """Write a learned effect's file, its picture, and what the report says of it.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    learned : the effect
+    given : the name that its user gave it, "" for the next free one
+    """
     with study.writing():
-        file.parent.mkdir(exist_ok=True)
-        file.write_text(text, encoding="utf-8")
+        # A fit takes minutes, in which another process may have taken the name.
+        if given:
+            _refuse_taken(study, given)
+        name = given or _free_name(study)
+        file, text = study.effects_folder / f"{name}.py", _text(study, learned, name)
+        write_whole(file, text)
         remember_made(file, text)
+    learned = replace(learned, found=replace(learned.found, name=name))
     drawn = curve_png(learned.found, learned.forms, learned.closed)
     picture = study.write_report(f"{name}.png", drawn)
     told = json.dumps(learned.as_dict(), indent=2, ensure_ascii=False)
@@ -156,9 +166,14 @@ def _wanted(study: Study, there: Sequence[str]) -> list[str]:
 
 
 def _free_name(study: Study) -> str:
-    number = 1
-    while (
-        study.effects_folder / f"learned_{number}.py"
-    ).exists() or f"learned_{number}" in EFFECTS:
-        number += 1
-    return f"learned_{number}"
+    """Return the first of learned_1, learned_2 ... that no effect has."""
+    return next(name for k in count(1) if not _is_taken(study, name := f"learned_{k}"))
+
+
+def _refuse_taken(study: Study, name: str) -> None:
+    if _is_taken(study, name):
+        raise StudyError(f'an effect is named "{name}" already. Another name is right.')
+
+
+def _is_taken(study: Study, name: str) -> bool:
+    return name in EFFECTS or (study.effects_folder / f"{name}.py").exists()

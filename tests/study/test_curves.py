@@ -113,6 +113,38 @@ def test_a_learned_curve_is_an_effect_of_the_study(study, learned):
     assert again.file.name == "learned_2.py"
 
 
+def beside(monkeypatch, study, name: str = "") -> None:
+    """Let another process learn a curve of the same study while a first one is learned."""
+    learn = curves.learn
+
+    def slow(opened, own, **options):
+        monkeypatch.setattr(curves, "learn", learn)
+        learn_effect(Study(study.folder), name=name)
+        return learn(opened, own, **options)
+
+    monkeypatch.setattr(curves, "learn", slow)
+
+
+def test_of_two_curves_learned_at_once_each_has_a_name(study, learned, monkeypatch):
+    learned()
+    beside(monkeypatch, study)
+    first = learn_effect(study)
+    assert first.file == study.effects_folder / "learned_2.py"
+    assert first.name == "learned_2"
+    assert study.usable_effects() == []
+    assert "learned_2 is an added force" in first.sentences()[0]
+    for name in ("learned_1", "learned_2"):
+        assert f'name = "{name}"' in (study.effects_folder / f"{name}.py").read_text()
+        assert json.loads((study.reports_folder / f"{name}.json").read_text())["name"] == name
+
+
+def test_a_name_that_was_taken_meanwhile_is_refused(study, learned, monkeypatch):
+    learned()
+    beside(monkeypatch, study, "bore")
+    with pytest.raises(StudyError, match='an effect is named "bore" already'):
+        learn_effect(study, name="bore")
+
+
 def test_what_is_refused_leaves_the_study_as_it_was(study, learned):
     learned("The best curve does not lower the error.")
     before = sorted(path.name for path in study.folder.rglob("*"))
