@@ -82,6 +82,11 @@ def no_device(channel: str, devices: Sequence[str]) -> str:
     return f'{channel}: there is no device "{found[0]}"; there are {", ".join(devices)}'
 
 
+def is_smooth(channel: str) -> bool:
+    """Return whether a channel never jumps: a displacement, velocity or drift, not a force."""
+    return channel.endswith(("displacement", "velocity")) or channel.startswith("drift")
+
+
 def channel_unit(channel: str) -> str:
     """Return the SI unit of a channel.
 

@@ -35,6 +35,9 @@ FAULTS = {
 }
 """Faults that can be set right, and what their value is."""
 
+TIMING = ("clock", "delay")
+"""Those of a channel's time; see `timing`."""
+
 
 LEFT_OUT = 'leave it out: role = "exclude" in its [[runs]] of study.toml'
 """How a run is left out, for what names a run that does not belong."""
@@ -87,7 +90,7 @@ def wrong_value(fault: str, value: float) -> str:
 def set_right(
     channels: Mapping[str, Array], step: float, corrections: Sequence[Correction]
 ) -> dict[str, Array]:
-    """Return channels (n,) as they would be without their faults.
+    """Return channels (n,) as they would be without their faults, those of their time left in.
 
     Parameters
     ----------
@@ -101,7 +104,7 @@ def set_right(
         own = [one for one in corrections if one.channel == name]
         lines = [one.value for one in own if one.fault == "line" and one.value < 0.5 / step]
         y = without_lines(y, step, lines) if lines else y
-        for kind in ("bias", "gain", "sign", "clock", "delay", *LIMITS):
+        for kind in ("bias", "gain", "sign", *LIMITS):
             for one in own:
                 y = _without(y, step, one) if one.fault == kind else y
         out[name] = y
@@ -117,8 +120,10 @@ def _without(y: Array, step: float, correction: Correction) -> Array:
         return y / value
     if correction.fault == "sign":
         return -y
-    if correction.fault in LIMITS:
-        return limited(y, step, correction.fault, value)
-    at = np.arange(len(y), dtype=float)
-    shown = at * (1.0 + value) if correction.fault == "clock" else at + value / step
-    return np.interp(shown, at, y)
+    return limited(y, step, correction.fault, value)
+
+
+def gain_of(corrections: Sequence[Correction], channel: str) -> float:
+    """Return what a channel shows by what it should show, by its corrections: 1 without any."""
+    gains = [one.value for one in corrections if (one.channel, one.fault) == (channel, "gain")]
+    return float(np.prod(gains))

@@ -8,7 +8,7 @@ new step, and a sample whose neighbours jump is not judged.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 from ..quantity import plain
-from .channels import DRIVE
+from .channels import DRIVE, is_smooth
 from .noise import SHORTEST, Noise, estimate_noise, is_switched
 from .sampling import Even
 from .table import Array
+from .timing import InTime
 
 Flags = NDArray[np.bool_]
 
@@ -39,11 +40,12 @@ _JUMPS = 4.0  # standard deviations by which samples about one leave a line wher
 
 @dataclass(frozen=True, eq=False)
 class Decimated:
-    """Pieces with fewer samples; `lost` of each piece says by channel where samples jump (n,).
+    """Pieces with fewer samples; `lost` of each piece says by channel where they tell nothing (n,).
 
-    `gain` is by channel what the filter leaves of white noise, where there was one; `noise` of each
-    piece that before the filter, of channels whose noise is not white behind it. `notes` says what
-    was done, none where nothing was.
+    They jump there, or the record of a channel that was moved in time has ended. `gain` is by
+    channel what filter and interpolation leave of white noise, where there was one; `noise` of each
+    piece that before them, of channels whose noise is not white behind them. `notes` says what was
+    done, none where nothing was.
     """
 
     even: Even
@@ -53,7 +55,7 @@ class Decimated:
     notes: tuple[str, ...] = ()
 
 
-def decimated(even: Even, rate: float) -> Decimated:
+def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimated:
     """Return evenly spaced pieces with fewer samples, and what was done about it.
 
     Commands keep every so many values, for they switch. The others go through a linear-phase
@@ -64,6 +66,7 @@ def decimated(even: Even, rate: float) -> Decimated:
     ----------
     even : as recorded
     rate : Hz that is enough; 0 leaves all as it is
+    moved : of each piece, what is known of its channels that were moved in time
 
     Raises
     ------
@@ -71,22 +74,27 @@ def decimated(even: Even, rate: float) -> Decimated:
         If too few samples would be left.
     """
     recorded = even.sampling.rate
+    moved = moved or [InTime(channels) for _, channels, _ in even.pieces]
     if rate <= 0.0 or recorded < FAST * rate * (1.0 - 1e-6):
-        return Decimated(even, [{} for _ in even.pieces])
+        left = {name: one.noise_left(name) for one in moved for name in one.between}
+        return Decimated(even, [one.lost for one in moved], left, [one.noise for one in moved])
     every = int(recorded / rate + 1e-6)
     pieces, lost, noise = [], [], []
     gain: dict[str, float] = {}
-    for time, channels, measured in even.pieces:
+    for (time, channels, measured), shift in zip(even.pieces, moved, strict=True):
         if len(time) // every < SHORTEST:
             continue
         taps = {name: _taps(name, y, every) for name, y in channels.items()}
         kept = {name: _filtered(y, taps[name])[::every].copy() for name, y in channels.items()}
         pieces.append((time[::every], kept, _all_within(measured, every)[::every]))
         short = {name: channels[name] for name, own in taps.items() if own is _short(every)}
-        noise.append({name: estimate_noise(y) for name, y in short.items()})
+        noise.append({n: shift.noise.get(n) or estimate_noise(y) for n, y in short.items()})
         jumps = {name: _jumps(y, every, noise[-1][name].std) for name, y in short.items()}
         lost.append({name: flags for name, flags in jumps.items() if flags.any()})
-        gain |= {name: float(np.sqrt(np.sum(own**2))) / own.sum() for name, own in taps.items()}
+        for name, flags in shift.lost.items():
+            beyond = ~_all_within(~flags, every)[::every]
+            lost[-1][name] = lost[-1].get(name, beyond) | beyond
+        gain |= {name: shift.noise_left(name, own) for name, own in taps.items()}
     if not pieces:
         raise RecordError(
             f"at {plain(rate)} Hz fewer than {SHORTEST} samples would be left of "
@@ -120,8 +128,7 @@ def _taps(name: str, y: Array, every: int) -> Array:
     """
     if name in DRIVE or is_switched(y):
         return _NONE
-    smooth = name.endswith(("displacement", "velocity")) or name.startswith("drift")
-    return _long(every) if smooth else _short(every)
+    return _long(every) if is_smooth(name) else _short(every)
 
 
 def _filtered(y: Array, taps: Array) -> Array:

@@ -20,7 +20,7 @@ from ..errors import RecordError, UnitError
 from ..shown import shown
 from ..units import conversion
 from .channels import DRIVE, ChannelSpec, at_device, channel_unit
-from .corrections import Correction, set_right
+from .corrections import Correction, gain_of, set_right
 from .decimate import decimated
 from .extra import Extra, found_in, read_extra
 from .guess import guess_channels, specs, too_few_rows
@@ -30,6 +30,7 @@ from .read import read_table
 from .sampling import Even, Sampling, evenly
 from .spikes import Spike, spikes_of, spikes_text
 from .table import Array, Table, table_from_frame
+from .timing import InTime, in_time
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -292,16 +293,16 @@ def measurements_of(
         extra = extra.beside(TEMPERATURE, time, warm, channel_unit(TEMPERATURE))
     even = evenly(time, values, table.lines, table.source, table.place)
     notes += [*extra.notes, *even.notes, *_what_is_missing([*values, *known.levels])]
+    even, moved = _set_right(even, known.corrections)
     if known.corrections:
-        even = _set_right(even, known.corrections)
         notes.append(f"corrected: {'; '.join(one.text for one in known.corrections)}")
-    fewer = decimated(even, known.rate)
+    fewer = decimated(even, known.rate, moved)
     even, notes = fewer.even, [*notes, *fewer.notes]
     out = []
     stem = known.name or stem_of(table.source)
     for number, (piece, parts, measured) in enumerate(even.pieces, 1):
         name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
-        noise, facts = _noise(table, channels, parts, estimate)
+        noise, facts = _noise(table, channels, parts, estimate, known.corrections)
         if fewer.gain:
             _behind_filter(fewer.gain, fewer.noise[number - 1], noise, facts)
         for channel, level in known.levels.items():
@@ -317,14 +318,21 @@ def measurements_of(
     return out
 
 
-def _set_right(even: Even, corrections: tuple[Correction, ...]) -> Even:
-    """Return pieces whose channels are set right."""
-    step = even.sampling.step
+def _set_right(even: Even, corrections: tuple[Correction, ...]) -> tuple[Even, list[InTime]]:
+    """Return pieces whose channels are set right, and what is known of those moved in time."""
+    step, start = even.sampling.step, float(even.pieces[0][0][0])
+    moved = [
+        in_time(
+            set_right(channels, step, corrections), dict.fromkeys(channels, measured), step,
+            corrections, float(time[0]) - start,
+        )
+        for time, channels, measured in even.pieces
+    ]  # fmt: skip
     pieces = [
-        (time, set_right(channels, step, corrections), known)
-        for time, channels, known in even.pieces
+        (time, one.channels, measured)
+        for (time, _, measured), one in zip(even.pieces, moved, strict=True)
     ]
-    return replace(even, pieces=pieces)
+    return replace(even, pieces=pieces), moved
 
 
 def _masked(spikes: tuple[Spike, ...]) -> list[str]:
@@ -387,8 +395,9 @@ def _in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
 
 
 def _noise(
-    table: Table, channels: Mapping[str, ChannelSpec], parts: dict[str, Array], estimate: bool
-) -> tuple[dict[str, float], dict[str, Noise | None]]:
+    table: Table, channels: Mapping[str, ChannelSpec], parts: dict[str, Array], estimate: bool,
+    corrections: tuple[Correction, ...] = (),
+) -> tuple[dict[str, float], dict[str, Noise | None]]:  # fmt: skip
     noise: dict[str, float] = {}
     facts: dict[str, Noise | None] = {}
     for channel, values in parts.items():
@@ -396,7 +405,8 @@ def _noise(
         if spec.noise is not None:
             column = table.find(spec.column)
             unit = spec.unit or (column.unit.name if column.unit else "")
-            noise[channel] = spec.noise * conversion(unit, channel_unit(channel))[0]
+            given = spec.noise * conversion(unit, channel_unit(channel))[0]
+            noise[channel] = given / gain_of(corrections, channel)
             facts[channel] = None
         elif estimate:
             found = estimate_noise(values)
@@ -408,12 +418,12 @@ def _behind_filter(
     gains: Mapping[str, float], before: Mapping[str, Noise],
     noise: dict[str, float], facts: dict[str, Noise | None],
 ) -> None:  # fmt: skip
-    """Change the noise of decimated channels into that behind the anti-alias filter.
+    """Change the noise of channels into that behind an anti-alias filter or an interpolation.
 
     Parameters
     ----------
-    gains : by channel, what the filter leaves of white noise
-    before : by channel, the noise before the filter, where it was estimated
+    gains : by channel, what filter and interpolation leave of white noise
+    before : by channel, the noise before them, where it was estimated
     noise, facts : of the channels as they are now, changed in place
     """
     for channel, gain in gains.items():

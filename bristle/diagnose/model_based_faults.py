@@ -22,7 +22,6 @@ from ..identify.threads import in_threads
 from ..physics.effect import EFFECTS, Effect, effects_of
 from ..quantity import quantity
 from .candidates import Trial, joinable, judge, short_search
-from .corrected import earlier
 from .faults import SensorFault
 from .rule import DRIVE, DecisionRule
 
@@ -246,7 +245,13 @@ def _advanced(run: Run, late: float, draws: bool = True) -> Run:
     if draws:
         moved = moved.copy()
         for one in moved:
-            one[:, 3] = earlier(one[:, 3], samples)
+            one[:, 3] = _ahead(one[:, 3], samples)
     known = np.arange(len(run.V)) < len(run.V) - samples
     measured = known if run.measured is None else known & run.measured
-    return replace(run, V=earlier(run.V, samples), draws=moved, measured=measured)
+    return replace(run, V=_ahead(run.V, samples), draws=moved, measured=measured)
+
+
+def _ahead(values: Array, samples: float) -> Array:
+    """Return a signal (n,) moved ahead in time by a number of samples, its last value held."""
+    at = np.arange(len(values), dtype=float)
+    return np.interp(at + samples, at, values)
