@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
-from ..identify.search import HUBER_AT_ONE, losses, z_scale
+from ..identify.search import HUBER_AT_ONE, losses, mean_loss, z_scale
 from .patterns import LEVEL, Finder, ResidualPattern
 from .prediction import RunPrediction
 from .scale import rms
@@ -132,12 +132,14 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
 
 def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
     """Return the error over some runs."""
-    residual = np.concatenate([one.residual for one in predictions])
-    sigma = np.concatenate([one.sigma[one.skip :] for one in predictions])
-    own = np.concatenate([np.full(len(one.residual), one.noise) for one in predictions])
-    tried = [one.numerical[one.skip :] for one in predictions if one.numerical is not None]
+    residual = np.concatenate([one.residual[one.judged] for one in predictions])
+    sigma = np.concatenate([one.sigma[one.skip :][one.judged] for one in predictions])
+    own = np.concatenate([np.full(one.judged.sum(), one.noise) for one in predictions])
+    tried = [
+        one.numerical[one.skip :][one.judged] for one in predictions if one.numerical is not None
+    ]
     moved = np.concatenate(tried) if len(tried) == len(predictions) else np.full(1, np.nan)
-    measured = np.concatenate([one.measured[one.skip :] for one in predictions])
+    measured = np.concatenate([one.measured[one.skip :][one.judged] for one in predictions])
     return RunError(
         name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
         rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
@@ -149,9 +151,9 @@ def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, f
     """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
     loss = losses(np.concatenate(list(normalised)))
     blocks = finder.blocks
-    counts = np.bincount(blocks.label)
-    means = np.bincount(blocks.label, weights=loss) / np.maximum(counts, 1)
-    mean = float(loss.mean())
+    counts = np.bincount(blocks.label, weights=loss > 0.0)
+    means = np.bincount(blocks.label, weights=loss)[counts > 0] / counts[counts > 0]
+    mean = mean_loss(loss)
     std = float(np.std(means)) / np.sqrt(max(len(means) - 1, 1))
     low, high = max(mean - 1.96 * std, 0.0), mean + 1.96 * std
     return float(np.sqrt(low / HUBER_AT_ONE)), float(np.sqrt(high / HUBER_AT_ONE))

@@ -67,6 +67,12 @@ class RunPrediction:
         return (error if self.known is None else np.where(self.known, error, 0.0))[self.skip :]
 
     @property
+    def judged(self) -> NDArray[np.bool_]:
+        """Which of the samples after the skipped ones count (n - skip,)."""
+        known = np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
+        return known[self.skip :]
+
+    @property
     def normalised(self) -> Array:
         """The residual over the noise expected of a true model."""
         return over_noise(self.residual, self.sigma[self.skip :])

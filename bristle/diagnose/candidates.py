@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
-from ..identify.residuals import Expected, errors, residuals
-from ..identify.search import loss, losses, z_of, z_scale
+from ..identify.residuals import Expected, plain_rms, residuals
+from ..identify.search import loss, losses, mean_loss, z_of, z_scale
 from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
 from ..identify.threads import in_threads
@@ -85,11 +85,10 @@ def judge(
     fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
     z = residuals(held_out, model, expected)
     own = residuals(train, model, fitted)
-    raw = np.concatenate(errors(held_out, model, expected))
     lost = losses(z)
     return Trial(
-        model, z_scale(own), z_of(float(np.mean(lost))),
-        float(np.sqrt(np.mean(raw**2))), lost, z, noise is None,
+        model, z_scale(own), z_of(mean_loss(lost)),
+        plain_rms(held_out, model, expected), lost, z, noise is None,
     )  # fmt: skip
 
 
@@ -161,7 +160,7 @@ def short_search(
     else:
         found = [searched(one, QUICK) for one in some]
     best = min(found, key=lambda one: one.cost).model
-    return Candidate(best, float(np.mean(loss(residuals(context.train, best, context.expected)))))
+    return Candidate(best, mean_loss(loss(residuals(context.train, best, context.expected))))
 
 
 def _starts(

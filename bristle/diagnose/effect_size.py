@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..data.command_limits import jumps
 from ..identify.model import Model, Problem
 from ..identify.residuals import BLOCK, Expected, drawn_noise, residuals
-from ..identify.search import HUBER, losses
+from ..identify.search import HUBER, losses, mean_loss
 from ..identify.search_context import Search
 from ..identify.start_grid import initial_guesses
 from ..physics.drive import DRIVES, unit_for
@@ -190,7 +190,7 @@ class Known:
 
     def scatter(self, direction: Array) -> float:
         """Return the standard deviation of a direction's (n,) product with the residual."""
-        if float(np.mean(np.minimum(self.plain**2, HUBER**2))) > self.rule.misfit**2:
+        if mean_loss(np.minimum(self.plain**2, HUBER**2)) > self.rule.misfit**2:
             sums = np.add.reduceat(direction * self.left, np.arange(0, len(direction), BLOCK))
             return float(np.linalg.norm(sums))
         own, drawn = self.noise

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 
 from ..identify.fit import Model, Problem
 from ..identify.model import steady, without
-from ..identify.residuals import errors
+from ..identify.residuals import plain_rms
 from ..identify.search import z_scale
 from ..identify.search_context import Search, refine
 from ..identify.starts import start_models
@@ -226,7 +226,6 @@ def _joins(effect: str, law: str) -> bool:
 def _row(law: str, model: Model, train: Problem, held_out: Problem) -> LawTrial:
     expected = train.expectation(model), held_out.expectation(model)
     trial = replace(judge(model, train, held_out, expected), refined=True)
-    raw = np.concatenate(errors(train, model, expected[0]))
     edges = np.cumsum([len(run.force) - run.skip for run in held_out.runs])[:-1]
     z_runs = tuple(z_scale(part) for part in np.split(trial.residual, edges))
-    return LawTrial(law, trial, float(np.sqrt(np.mean(raw**2))), z_runs)
+    return LawTrial(law, trial, plain_rms(train, model, expected[0]), z_runs)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..data.command_limits import LIMITS, limited
 from ..identify.model import Model, Problem, Run
 from ..identify.residuals import Expected, residuals
-from ..identify.search import HUBER, descend, loss
+from ..identify.search import HUBER, descend, loss, mean_loss
 from ..identify.search_context import Search, refine
 from ..physics.drive import DRIVES
 from ..quantity import plain, quantity
@@ -79,7 +79,7 @@ def limited_drive(
     if before.z < 1.0 + rule.gain or not _moving(train):
         return None
     expected = train.expectation(before.model)
-    at_first = float(np.mean(loss(residuals(train, before.model, expected))))
+    at_first = mean_loss(loss(residuals(train, before.model, expected)))
     looked = [_looked_at(kind, before.model, train, expected) for kind in LIMITS]
     able = [one for one in looked if one and promise(one.cost, at_first) > rule.promise]
     if not able:
@@ -145,7 +145,7 @@ def _looked_at(kind: str, model: Model, train: Problem, expected: Expected) -> _
         size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
         theta = np.clip(search.start - step, search.low, search.high)
-        cost = float(np.mean(loss(here + J @ (theta - search.start))))
+        cost = mean_loss(loss(here + J @ (theta - search.start)))
         if best is None or cost < best.cost:
             best = replace(limit, model=search.at(theta), cost=cost)
     return best

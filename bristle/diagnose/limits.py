@@ -38,10 +38,9 @@ def detectable(
     z : error over noise of the model; where it is below `BELOW`, the expected noise is too large
         and hides more
     """
-    force = np.concatenate([run.force[run.skip :] for run in problem.runs])
-    weight = np.concatenate(
-        [1.0 / sigma[run.skip :] for run, (_, sigma, _) in zip(problem.runs, expected, strict=True)]
-    )
+    pairs = zip(problem.runs, expected, strict=True)
+    force = np.concatenate([run.force[run.skip :][run.judged] for run in problem.runs])
+    weight = np.concatenate([1.0 / one[1][run.skip :][run.judged] for run, one in pairs])
     # Noise as the residual sees it: a residual of share s has the excess s^2 mean(F^2/sigma^2).
     ratio = float(np.sqrt(np.mean(force**2) * np.mean(weight**2)))
     noise = z if z < BELOW else 1.0

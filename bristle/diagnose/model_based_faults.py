@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import steady
-from ..identify.search import HUBER_AT_ONE, losses
+from ..identify.search import HUBER_AT_ONE, losses, mean_loss
 from ..identify.search_context import refine, residuals
 from ..identify.start_grid import SearchContext, ranked_guesses
 from ..identify.threads import in_threads
@@ -113,7 +113,7 @@ def promise(cost: float, before: float) -> float:
 
 
 def _loss(model: Model, problem: Problem) -> float:
-    return float(np.mean(losses(residuals(problem, model, problem.expectation(model)))))
+    return mean_loss(losses(residuals(problem, model, problem.expectation(model))))
 
 
 # --- the zero of the force ----------------------------------------------------------------------

@@ -30,7 +30,7 @@ from .model import (
 )  # fmt: skip
 from .residuals import Expected
 from .scaled import Scaled
-from .search import descend, loss
+from .search import descend, loss, mean_loss
 from .starts import start_model, start_models
 from .threads import in_threads
 from .watch import share_of, watched
@@ -109,7 +109,7 @@ def fit(
     expected = expectation or problem.expectation(model)
     scaled = Scaled(problem, model, expected)
     if not scaled.names:
-        cost = float(np.mean(loss(scaled.residuals(np.zeros(0)))))
+        cost = mean_loss(loss(scaled.residuals(np.zeros(0))))
         return Fit(model, {}, cost)
     with watched(problem, scaled.at, partial(share_of, problem, expected)) as accepted:
         found = descend(
@@ -184,7 +184,7 @@ def intervals_of(problem: Problem, model: Model) -> Fit:
     model : with its values
     """
     scaled = Scaled(problem, model, problem.expectation(model))
-    cost = float(np.mean(loss(scaled.residuals(scaled.start))))
+    cost = mean_loss(loss(scaled.residuals(scaled.start)))
     found = Fit(model, {}, cost)
     return _with_intervals(found, scaled, scaled.start) if scaled.names else found
 

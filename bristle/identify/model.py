@@ -68,6 +68,13 @@ class Run:
     extra: Mapping[str, Extra] = field(default_factory=dict)
     force_draws: Array | None = None
 
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """Which of the samples after `skip` were measured (n - skip,)."""
+        if self.measured is None:
+            return np.ones(max(0, len(self.force) - self.skip), dtype=bool)
+        return self.measured[self.skip :]
+
     def of(self, part: slice) -> Self:
         """Return the run with these of its samples; `dt` and `skip` stay what they were."""
         rest = 0 if part.start else len(range(self.rest)[part])

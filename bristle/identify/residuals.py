@@ -98,14 +98,29 @@ def _constant(problem: Problem, found: list[Array], expected: Expected) -> float
 
 
 def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
-    """Return the normalised residuals (n,) of all runs, one run after the other."""
-    parts = [
-        over_noise(error, sigma[run.skip :])
-        for error, run, (_, sigma, _) in zip(
-            errors(problem, model, expected), problem.runs, expected, strict=True
-        )
-    ]
+    """Return the normalised residuals (n,) of all runs, one run after the other.
+
+    That of a sample that was not measured is 0.
+    """
+    parts = []
+    for error, run, (_, sigma, _) in zip(
+        errors(problem, model, expected), problem.runs, expected, strict=True
+    ):
+        z = over_noise(error, sigma[run.skip :])
+        parts.append(z if run.measured is None else np.where(run.judged, z, 0.0))
     return np.concatenate(parts)
+
+
+def plain_rms(problem: Problem, model: Model, expected: Expected) -> float:
+    """Return the RMS of the error over all samples that were measured, each with the same say [N].
+
+    Parameters
+    ----------
+    problem, model, expected : as of `errors`
+    """
+    pairs = zip(errors(problem, model, expected), problem.runs, strict=True)
+    judged = np.concatenate([error[run.judged] for error, run in pairs])
+    return float(np.sqrt(np.mean(judged**2))) if len(judged) else 0.0
 
 
 def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:

@@ -63,8 +63,17 @@ def loss(z: Array) -> Array:
 
 def losses(z: Array) -> Array:
     """Return the robust loss of each normalised residual (n,), spikes cut at `CUT`."""
-    limit = CUT * max(1.0, float(np.median(np.abs(z))) / 0.6745) if len(z) else CUT
+    judged = np.abs(z[z != 0.0])
+    limit = CUT * max(1.0, float(np.median(judged)) / 0.6745) if len(judged) else CUT
     return loss(np.clip(z, -limit, limit))
+
+
+def mean_loss(each: Array) -> float:
+    """Return the mean of losses (n,) over the samples that are judged.
+
+    A sample that was not measured has a residual, and a loss, of exactly 0.
+    """
+    return float(each.sum()) / max(1, int(np.count_nonzero(each)))
 
 
 def z_of(mean_loss: float) -> float:
@@ -78,7 +87,7 @@ def z_scale(z: Array) -> float:
     Huber's loss with k = 2 (Huber 1964, Ann. Math. Statist. 35, 73-101): the errors of a sign law
     near v = 0 are not Gaussian, and a plain RMS reads 2 for the truth.
     """
-    return z_of(float(np.mean(losses(z)))) if len(z) else float("nan")
+    return z_of(mean_loss(losses(z))) if len(z) else float("nan")
 
 
 def descend(
@@ -112,7 +121,8 @@ def descend(
     """
     theta = np.clip(theta, low, high)
     r = residuals(theta)
-    cost = float(np.mean(loss(r)))
+    judged = max(1, int(np.count_nonzero(r)))
+    cost = float(np.sum(loss(r))) / judged
     if accepted:
         accepted(theta, r, cost)
     if not len(theta):
@@ -123,12 +133,14 @@ def descend(
         weight = np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-12))
         weighted = J * weight[:, None]
         normal, gradient = weighted.T @ J, weighted.T @ r
-        tried = _try(residuals, (theta, cost), normal, gradient, damping, (low, high), not secants)
+        tried = _try(
+            residuals, (theta, cost, judged), normal, gradient, damping, (low, high), not secants
+        )
         damping = tried.damping
         if tried.moved:
             if accepted:
                 accepted(tried.theta, tried.r, tried.cost)
-            gain, promised = cost - tried.cost, tried.promised / len(r)
+            gain, promised = cost - tried.cost, tried.promised / judged
             change = tried.theta - theta
             slow = gain < tolerance * cost
             small = small + 1 if slow else 0
@@ -156,19 +168,20 @@ class _Tried:
 
 
 def _try(
-    residuals: Callable[[Array], Array], here: tuple[Array, float], normal: Array, gradient: Array,
-    damping: float, bounds: tuple[Array, Array], patient: bool,
+    residuals: Callable[[Array], Array], here: tuple[Array, float, int], normal: Array,
+    gradient: Array, damping: float, bounds: tuple[Array, Array], patient: bool,
 ) -> _Tried:  # fmt: skip
     """Return the first damped step that lowers the cost; one try only where not `patient`.
 
-    `here` is theta and its cost, `bounds` the lowest and highest values of theta (p,).
+    `here` is theta, its cost and how many residuals that is the mean of; `bounds` the lowest and
+    highest values of theta (p,).
     """
-    (theta, cost), (low, high) = here, bounds
+    (theta, cost, judged), (low, high) = here, bounds
     for _ in range(8 if patient else 1):
         step = _step(normal, gradient, damping, theta, low, high)
         trial = np.clip(theta - step, low, high)
         found = residuals(trial)
-        now = float(np.mean(loss(found)))
+        now = float(np.sum(loss(found))) / judged
         if now < cost:
             taken = theta - trial
             promised = float(gradient @ taken - 0.5 * taken @ normal @ taken)

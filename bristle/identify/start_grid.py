@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..physics.effect import EFFECTS, Sizes
 from ..physics.laws import LAWS
 from .fit import Model, Problem
-from .search import HUBER, loss
+from .search import HUBER, loss, mean_loss
 from .search_context import Expected, Search, residuals
 
 Array = NDArray[np.float64]
@@ -132,7 +132,7 @@ class SearchContext:
     def __init__(self, base: Model, train: Problem) -> None:
         self.base, self.train = base, train
         self.expected = train.expectation(base)
-        self.cost = float(np.mean(loss(residuals(train, base, self.expected))))
+        self.cost = mean_loss(loss(residuals(train, base, self.expected)))
         self._screening: dict[str, ScreeningData] = {}
         self._lock = Lock()
 
@@ -219,10 +219,10 @@ def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
     whole = Search(screening.problem, start, screening.expected, [*base, *added])
-    best = Candidate(start, float(np.mean(loss(here))), moves)
+    best = Candidate(start, mean_loss(loss(here)), moves)
     for share in STEPS:
         theta = np.clip(whole.start - share * step, whole.low, whole.high)
-        cost = float(np.mean(loss(whole.residuals(theta))))
+        cost = mean_loss(loss(whole.residuals(theta)))
         if cost < best.cost:
             there = whole.at(theta)
             if not moves or _moves(there, effect, screening):

@@ -209,10 +209,17 @@ def _thinned(problem: Problem, cutoff: float) -> Problem:
 
 
 def filtered_errors(problem: Problem, model: Model, cutoff: float = CUTOFF) -> list[Array]:
-    """Return per run the error (n - skip,) [N] of the force, both low-passed."""
-    errors = [run.force - problem.predict(model, run) for run in problem.runs]
+    """Return per run the error (n - skip,) [N] of the force, both low-passed.
+
+    A sample that was not measured has none, neither of its own nor through the low-pass.
+    """
+    errors = [_judged(run, run.force - problem.predict(model, run)) for run in problem.runs]
     passed = low_passed(errors, [run.dt for run in problem.runs], cutoff)
     return [error[run.skip :] for error, run in zip(passed, problem.runs, strict=True)]
+
+
+def _judged(run: Run, error: Array) -> Array:
+    return error if run.measured is None else np.where(run.measured, error, 0.0)
 
 
 def force_rms(runs: list[Run], cutoff: float = CUTOFF) -> float:
