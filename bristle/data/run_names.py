@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import PurePosixPath
+from pathlib import Path
 
 from .measurement import stem_of
 
@@ -28,7 +28,7 @@ def names_of_files(files: Sequence[str], ends: Sequence[str] = ()) -> list[str]:
     """
     ends = ends or [""] * len(files)
     forms = [
-        [f"{form}{end}" for form in (stem_of(file), PurePosixPath(file).name, file)]
+        [f"{form}{end}" for form in (stem_of(file), Path(file).name, file)]
         for file, end in zip(files, ends, strict=True)
     ]
     longer = [0] * len(files)

@@ -12,7 +12,7 @@ from ..data.labels import label_text
 from ..draw.style import percent
 from ..quantity import plain, quantity
 from ..quantity import with_interval as with_interval
-from ..study.reading import name_of_run
+from ..study.reading import names_of_runs
 from ..study.run_file import TEST
 
 if TYPE_CHECKING:
@@ -86,8 +86,9 @@ def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str]
                 *([_known(study, run)] if labelled else []),
             ]
         )  # fmt: skip
+    names = names_of_runs(study.settings)
     for one in study.settings.excluded:
-        rows.append([name_of_run(one), "left out", *["-"] * (len(header) - 2)])
+        rows.append([names[one.file, one.piece], "left out", *["-"] * (len(header) - 2)])
     return header, rows
 
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from ..data.files import other_schema, read_json, write_json
-from ..data.measurement import stem_of
+from ..data.run_names import names_of_files
 from ..errors import StudyError
 from ..findings import command
 
@@ -82,11 +82,12 @@ def behind_data(study: Study) -> str:
 
 def other_data(study: Study) -> str:
     """Return the sentence that tells how the data are others than the model knows, "" if not."""
-    if names := [stem_of(file) for file in unknown_to_model(study)]:
-        what = "run was" if len(names) == 1 else "runs were"
-        return (
-            f"{len(names)} {what} added after the present model was identified: {', '.join(names)}."
-        )
+    if files := unknown_to_model(study):
+        every = list(dict.fromkeys(run.file for run in study.settings.runs))
+        names = dict(zip(every, names_of_files(every), strict=True))
+        what = "run was" if len(files) == 1 else "runs were"
+        new = ", ".join(names[file] for file in files)
+        return f"{len(files)} {what} added after the present model was identified: {new}."
     numbers = study.history.numbers()
     known = study.history.data_of(numbers[-1]) if len(numbers) > 1 else ""
     if not known or known == study.settings.data:  # "": its step does not tell

@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 
 from ..data.channels import ChannelSpec, channel_unit, device_channel, is_channel
 from ..data.guess import Guess, guess_channels, specs
-from ..data.measurement import Measurement, measurements_of
+from ..data.measurement import Measurement, measurements_of, stem_of
 from ..data.model import StudyModel, new_model, read_model
 from ..data.read import files_in, read_table
+from ..data.run_names import is_part, names_of_files
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
 from ..findings import unknown, written
@@ -139,8 +140,9 @@ def runs_of(train: list[Measurement], holdout: list[Measurement]) -> Runs:
     StudyError
         If a run that is held out is also one to fit to.
     """
-    train, idle = usable(train)
-    holdout, other = usable(holdout)
+    named = _with_own_names([*train, *holdout])
+    train, idle = usable(named[: len(train)])
+    holdout, other = usable(named[len(train) :])
     notes = (*idle, *other, *_guessed([*train, *holdout]))
     if not holdout:
         sources = list(dict.fromkeys(one.source for one in train))
@@ -154,6 +156,18 @@ def runs_of(train: list[Measurement], holdout: list[Measurement]) -> Runs:
         notes = (f"Every third run is held out: {names}. holdout=... names others.", *notes)
     refuse_twins(train, holdout)
     return Runs(train, holdout, (*notes, *twins_within(train), *twins_within(holdout)))
+
+
+def _with_own_names(runs: Sequence[Measurement]) -> list[Measurement]:
+    """Return runs of which no two have one name, as far as their files have other ones."""
+    files = list(dict.fromkeys(run.source for run in runs))
+    names = dict(zip(files, names_of_files(files), strict=True))
+    return [
+        replace(run, name=names[run.source] + run.name.removeprefix(stem))
+        if is_part(run.name, stem := stem_of(run.source))
+        else run
+        for run in runs
+    ]
 
 
 def model_of(given: Given | None, effects: str | Sequence[str], default: str) -> StudyModel:

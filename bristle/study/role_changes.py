@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..errors import StudyError
-from .reading import name_of_run
+from .reading import names_of_runs
 from .run_file import EXCLUDE, ROLES, RunFile
 from .settings import Settings
 
@@ -28,15 +28,16 @@ def roles_by_place(
         If there is no such run or role, or too few runs would be left for training or held out.
     """
     every = (*settings.runs, *settings.excluded)
+    names = names_of_runs(settings)
     known: dict[str, RunFile] = {}
     for run in every:
-        known |= {name_of_run(run): run, run.name: run}
+        known |= {names[run.file, run.piece]: run, run.name: run}
     found: dict[tuple[str, int], str] = {}
     for name, role in roles.items():
         if role not in (*ROLES, EXCLUDE):
             raise StudyError(f'role "{role}" of {name}; there are {", ".join((*ROLES, EXCLUDE))}.')
         if name not in known:
-            there = ", ".join(name_of_run(run) for run in every)
+            there = ", ".join(names.values())
             raise StudyError(f'{path}: no run is called "{name}"; there are {there}.')
         found[known[name].file, known[name].piece] = role
     _refuse_too_few(path, [found.get((run.file, run.piece), run.role) for run in every])
