@@ -127,4 +127,4 @@ def _why_hidden(sized: Sized) -> str:
     problem = known.problem
     held = all(steady(problem.of([run])) for run in problem.runs)
     still = held and "V" in EFFECTS[sized.name].needs
-    return "the command does not move" if still else "this motion does not excite it"
+    return "the command is constant" if still else "this motion does not excite it"

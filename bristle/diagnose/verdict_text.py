@@ -224,7 +224,8 @@ LIMITS = ("effect", "still possible (95 %)", "of the force", "to be named from, 
 
 LIMITS_NOTES = (
     "Still possible: the size that these runs do not exclude, law and known effects refitted.",
-    "Of the force: what such an effect leaves of it; - where the sampling tells no smaller size.",
+    "Of the force: what such an effect leaves of it; -: not resolved by the sampling step, or the "
+    "reason stands in the row.",
     "To be named from: the size at which 9 of 10 verdicts would name it, as the rule predicts.",
 )
 

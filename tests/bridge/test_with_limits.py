@@ -43,7 +43,7 @@ def verdict(*limits: dict[str, Any], kind: str = "none", effects: tuple[str, ...
 
 SPRING = limit("gas_spring", "k", STIFF)
 SMALL = limit("quadratic_damping", "c_2", 1e-6)
-HIDDEN = {"effect": "coil_lag", "why": "the command does not move"}
+HIDDEN = {"effect": "coil_lag", "why": "the command is constant"}
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ SPRING = {
     "effect": "gas_spring", "parameter": "k", "unit": "N/m", "side": "below", "limit95": 40.0,
     "others": {}, "moved": {"c_0": -3.0, "f_c": -9.0, "gone": 1.0},
 }  # fmt: skip
-LAG = {**SPRING, "effect": "coil_lag", "why": "the command does not move"}
+LAG = {**SPRING, "effect": "coil_lag", "why": "the command is constant"}
 CORE = {
     **SPRING, "effect": "saturation", "parameter": "V_s", "side": "above", "limit95": 20.0,
     "others": {"shape": 2.0}, "moved": {},

@@ -172,7 +172,7 @@ def test_what_hides_an_effect_is_told():
     model = refine(Model("bingham", (), VALUES, ("f_v", "c_v")), problem)
     still = Known(problem, model, problem.expectation(model), 6000)
     found = {one.effect: one for one in effect_limits(still, ("coil_lag", SPRING), ("coil_lag",))}
-    assert found["coil_lag"].why == "the command does not move"
+    assert found["coil_lag"].why == "the command is constant"
     assert found[SPRING].why == ""
     sprung = {**VALUES, "gas_spring.k": 50.0, "gas_spring.k_3": 1e4}
     both = Model("bingham", (SPRING,), sprung, ("f_v", "c_v", "gas_spring.k_2"))

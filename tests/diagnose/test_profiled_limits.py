@@ -57,7 +57,7 @@ def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: Known) -> Non
 
 
 def test_what_has_no_size_stays_as_it_is(known: Known) -> None:
-    hidden = EffectLimit("coil_lag", why="the command does not move")
+    hidden = EffectLimit("coil_lag", why="the command is constant")
     coarse = EffectLimit("backlash", "gap", "m", largest=1e-6, coarse=True)
     assert profiled(known, [hidden, coarse]) == (hidden, coarse)
 
