@@ -25,8 +25,14 @@ SCENARIOS_KEPT = 64
 """Scenarios that a process keeps loaded: one per combination of records, steps and the like."""
 
 
+def _loaded(plan: Plan, overrides: Mapping[str, Value]) -> Scenario:
+    """Return a plan's scenario with values in place of its own, kept for the runs that follow."""
+    return _kept(plan.scenario, plan.content, tuple(overrides.items()))
+
+
 @lru_cache(maxsize=SCENARIOS_KEPT)
-def _loaded(file: Path, overrides: tuple[tuple[str, Value], ...]) -> Scenario:
+def _kept(file: Path, _content: str, overrides: tuple[tuple[str, Value], ...]) -> Scenario:
+    # The digest of the files is a part of the key: in a notebook they change between ensembles.
     return load_scenario(file, dict(overrides))
 
 
@@ -38,7 +44,7 @@ def prepare(plan: Plan) -> None:
     ScenarioError
         If the engine cannot run the scenario.
     """
-    scenario = _loaded(plan.scenario, tuple(plan.fixed.items()))
+    scenario = _loaded(plan, plan.fixed)
     if plan.engine == "compiled":
         from ..simulate.coupled import simulate
 
@@ -90,7 +96,7 @@ def scenario_of(plan: Plan, values: Mapping[str, Value], scratch: Path) -> Scena
     places = {varied.name: varied.place for varied in plan.varied}
     places = dict.fromkeys(values, "parameter") | places
     overrides = plan.fixed | {k: v for k, v in values.items() if places[k] == "scenario"}
-    scenario = _loaded(plan.scenario, tuple(overrides.items()))
+    scenario = _loaded(plan, overrides)
     parameters: dict[str, dict[str, Any]] = {}
     numbers: dict[str, dict[str, Any]] = {}
     for name, value in values.items():

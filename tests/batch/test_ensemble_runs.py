@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pandas as pd
 import pytest
 
 import bristle
+from bristle import resources
 from bristle.batch import Ensemble, pool, read_ensemble, worker
 from bristle.batch.plan import Outcome, Output, Plan
 from bristle.batch.quantiles import LEVELS, failures
@@ -53,6 +55,25 @@ def test_a_varied_building_is_the_building_of_that_file(write: Write, tmp_path: 
     overrides |= {"structure.building": str(building), "run.stop": 0.5}
     frame = bristle.run("half_sine_pulse", overrides, engine="compiled")
     assert row[PEAK] == frame["structure.floor2_acceleration_absolute"].abs().max()
+
+
+def test_a_scenario_that_changed_is_read_again_in_the_same_process(
+    write: Write, tmp_path: Path
+) -> None:
+    mine = tmp_path / "mine_scenario.toml"
+    stock = (resources.scenarios_folder() / "half_sine_pulse.toml").read_text()
+    mine.write_text(stock)
+    path = write(
+        ("half_sine_pulse", mine.name),
+        ('[set]\n"run.stop" = 0.5\n', ""),
+        ('"structure.building.masses.2" = { uniform = [1.1, 1.4] }\n', ""),
+    )
+    before = read_ensemble(path)
+    assert worker.scenario_of(before, before.values(0), tmp_path).stop == 10.0
+    mine.write_text(re.sub(r"(?m)^stop = .*$", "stop = 1.0", stock))
+    after = read_ensemble(path)
+    assert after.digest() != before.digest()
+    assert worker.scenario_of(after, after.values(0), tmp_path).stop == 1.0
 
 
 def test_records_steps_and_components_may_vary(write: Write, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ SPRING = {
     "others": {}, "moved": {"sigma_a": -5.0},
 }  # fmt: skip
 TINY = {**SPRING, "effect": "quadratic_damping", "parameter": "c_2", "limit95": 1e-9, "moved": {}}
-HIDDEN = {"effect": "coil_lag", "why": "the command does not move"}
+HIDDEN = {"effect": "coil_lag", "why": "the command is constant"}
 
 
 def a_model(*effects: str) -> StudyModel:
