@@ -217,11 +217,15 @@ class _Reader:
     ) -> tuple[Varied, ...]:
         """Return what varies, the parameters that are drawn together first."""
         joint = identified.varied() if identified is not None else ()
-        for one in varied:
-            if any(one.name == other.name for other in joint):
-                self.error(
-                    ("vary", one.name), f'"{one.name}" is drawn by [identified]; one is right.'
-                )
+        drawn = {one.name for one in joint}
+        for table in ("vary", "set"):
+            for name in self._table(table):
+                if plain_target(name) in drawn:
+                    self.error(
+                        (table, name),
+                        f'"{name}" is drawn by [identified], so that a value here would have no '
+                        f"effect; leave it out of [{table}].",
+                    )
         return (*joint, *varied)
 
     def _whole(self, key: str, default: int, low: int, high: int) -> int:
@@ -335,9 +339,14 @@ class _Reader:
 
 def split(name: str, base: Scenario) -> tuple[Component | None, str]:
     """Return the component that a name begins with, and the rest of the name."""
+    first, _, rest = plain_target(name).partition(".")
+    return next((c for c in base.components if c.name == first), None), rest
+
+
+def plain_target(name: str) -> str:
+    """Return a name in its short form: "damper.f_c" of "components.damper.parameters.f_c"."""
     first, _, rest = name.removeprefix("components.").partition(".")
-    found = next((c for c in base.components if c.name == first), None)
-    return found, rest.removeprefix("parameters.")
+    return f"{first}.{rest.removeprefix('parameters.')}" if rest else first
 
 
 def place_of(name: str, base: Scenario, engine: str) -> str:
