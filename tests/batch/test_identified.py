@@ -261,7 +261,15 @@ def test_the_command_tells_the_parts_and_continues(
         (('model = "my_rig"', 'model = "nothing"'), "there is no such file"),
         (('"my_rig"', '"my_rig"\ncomponent = "dampr"'), 'no component "dampr"'),
         (('"my_rig"', '"my_rig"\ncomponent = "structure"'), "has no parameter sigma_a"),
-        ((MASSES, SIGMA), r'"damper.sigma_a" is drawn by \[identified\]'),
+        ((MASSES, SIGMA), r'"damper.sigma_a" is drawn by \[identified\].*leave it out of \[vary\]'),
+        (
+            (MASSES, SIGMA.replace("damper.", "damper.parameters.")),
+            r'"damper.parameters.sigma_a" is drawn by \[identified\]',
+        ),
+        (
+            ('"run.stop" = 0.5', '"run.stop" = 0.5\n"damper.sigma_0" = 999.0'),
+            r':\d+: "damper.sigma_0" is drawn by \[identified\].*leave it out of \[set\]',
+        ),
     ],
 )
 def test_a_wrong_section_is_refused(
