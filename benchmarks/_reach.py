@@ -160,7 +160,7 @@ def beside(found: Found, rows: Sequence[Row]) -> list[Beside]:
 def markdown(found: Sequence[Beside]) -> list[str]:
     """Return the lines of the table and of what belongs to it."""
     lines = [
-        "### Beside what can be reached",
+        "### Beside reference models",
         "",
         "| set | law given | law free | learned | floor (which) | ratio |",
         "|---|---|---|---|---|---|",

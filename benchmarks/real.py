@@ -92,13 +92,13 @@ def markdown(found: Sequence[Row], beside: Sequence[_reach.Beside] = ()) -> str:
                 f"The bare law by least squares leaves {row.least_squares:.1%}. The force's noise, "
                 f"as estimated: {row.noise}."
             )
-        lines += ["", f"- **Said**: {row.words}", f"- **Reference**: {row.reference}."]
+        lines += ["", f"- **Verdict**: {row.words}", f"- **Reference**: {row.reference}."]
         if row.after > row.before:
             lines.append(
                 "- **Doubt**: z falls and the plain error rises. The named effect fits the many "
                 "quiet samples and misses the others. Do not trust it."
             )
-        lines.append(f"- **Worth**: {row.worth}")
+        lines.append(f"- **Evidence**: {row.worth}")
     return "\n".join([*lines, ""])
 
 

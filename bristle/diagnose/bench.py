@@ -81,7 +81,7 @@ class BenchRuns:
         bends = tells_a_bend(self._train)
         laws = try_laws(opened.searched, opened.held_out, judged.model, bends=bends)
         other = better_law(judged, laws, opened.rule)
-        told = NOT_THE_LAW if other is None else other.sentence()
+        told = NOT_THE_LAW if other is None else other.sentence(added=finding.kind != "unknown")
         return replace(finding, other_law=other, reasons=(*finding.reasons, told))
 
     def about(self) -> About:

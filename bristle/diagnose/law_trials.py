@@ -119,13 +119,24 @@ class OtherLaw:
     z: float
     share: float
 
-    def sentence(self) -> str:
-        """Return how much of the error is the form of the law."""
+    def sentence(self, *, added: bool = False) -> str:
+        """Return how much of the error is the form of the law.
+
+        Parameters
+        ----------
+        added : whether both laws have the effects of the verdict; otherwise the error is that of
+            the present model, of which an effect may explain the same part
+        """
         plain, form, _ = split_form(self.law)
         bent = f" with a {form} command" if form not in ("", LINEAR_FORM) else ""
+        lead, rest = (
+            ("With the same effects", "what then remains above the noise")
+            if added
+            else ("Without a further effect", "what is missing")
+        )
         return (
-            f"The law {plain}{bent} leaves {Z} = {short_z(self.z)}: {100.0 * self.share:.0f} % of "
-            "what exceeds the noise is the form of the law."
+            f"{lead}, the law {plain}{bent} leaves {Z} = {short_z(self.z)}: its form alone "
+            f"explains {100.0 * self.share:.0f} % of {rest}."
         )
 
     def as_dict(self) -> dict[str, Any]:

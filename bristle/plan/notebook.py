@@ -17,7 +17,9 @@ _RUNS = ["run", "for", "what"]
 def plan_html(plan: Plan) -> str:
     """Return a plan as HTML: its tests, what they will show, and the picture of the first one."""
     runs = plan.runs() if plan.worth else []
-    rows = [[run.name, "fitting" if run.role == "train" else "judging", run.about] for run in runs]
+    rows = [
+        [run.name, "training" if run.role == "train" else "held out", run.about] for run in runs
+    ]
     told = [one.cells() for one in plan.outcomes]
     title = f"Tests for {plan.study or 'a new rig'}"
     return html.fragment(

@@ -44,7 +44,7 @@ def plan_text(plan: Plan, limits: list[str]) -> str:
     lines += ["", "## Runs", ""]
     lines += ["| run | for | what |", "|---|---|---|"]
     lines += [
-        f"| [{run.name}]({run.name}.csv) | {'fitting' if run.role == 'train' else 'judging'} | "
+        f"| [{run.name}]({run.name}.csv) | {'training' if run.role == 'train' else 'held out'} | "
         f"{run.about} |"
         for run in plan.runs()
     ]

@@ -34,7 +34,8 @@ def plan_section(study: Study) -> str:
         else f"{folder.name} holds tests for the rig's controller, one file each."
     )
     runs = [
-        [run.name, "fitting" if run.role == "train" else "judging", run.about] for run in plan.runs
+        [run.name, "training" if run.role == "train" else "held out", run.about]
+        for run in plan.runs
     ]
     return html.section(
         "Planned tests" if performed else "Next tests",

@@ -70,8 +70,12 @@ def test_how_much_of_an_error_is_the_form_of_the_law_is_told():
     assert other is not None
     assert (other.law, other.z, other.share) == ("tanh[quadratic]", 2.0, pytest.approx(0.625))
     assert other.sentence() == (
-        "The law tanh with a quadratic command leaves error / noise (z) = 2.00: 62 % of what "
-        "exceeds the noise is the form of the law."
+        "Without a further effect, the law tanh with a quadratic command leaves error / noise (z) "
+        "= 2.00: its form alone explains 62 % of what is missing."
+    )
+    assert other.sentence(added=True) == (
+        "With the same effects, the law tanh with a quadratic command leaves error / noise (z) = "
+        "2.00: its form alone explains 62 % of what then remains above the noise."
     )
     assert other.as_dict()["command"] == "quadratic"
     assert better_law(judged, laws[2:]) is None

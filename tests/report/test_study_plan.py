@@ -32,7 +32,7 @@ def test_a_study_without_a_plan_has_no_section(tmp_path: Path) -> None:
 
 def test_a_plan_is_the_next_tests_until_its_runs_are_in_the_study(study: SimpleNamespace) -> None:
     page = plan_section(study)  # type: ignore[arg-type]
-    for part in ("Next tests", "a sine of 1 mm", "fitting", "1 ms"):
+    for part in ("Next tests", "a sine of 1 mm", "training", "1 ms"):
         assert part in page
     study.settings.runs = [SimpleNamespace(file="data/plan_1.csv")]
     assert "are measured" in plan_section(study)  # type: ignore[arg-type]
