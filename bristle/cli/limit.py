@@ -1,8 +1,8 @@
 """Compute the smallest peak or RMS that any voltage of a scenario's damper can give.
 
-The ground motion is known in advance; the voltage is free between zero and its largest value. No
-controller can get below this limit: the gap between a controller and the limit is the possible
-gain.
+The ground motion is known in advance; the voltage is free between zero and its largest value. The
+limit is the best voltage that the search found: the gap between a controller and the limit is the
+possible gain. No controller gets below the lower bound.
 """
 
 from __future__ import annotations
