@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--law",
-        help="all: search for the law together with its missing effects (default if no law was "
-        "chosen); the model's law: keep it",
+        help="all: search for the law together with its missing effects (default on a test bench "
+        "if no law was chosen); the model's law: keep it",
     )
     parser.add_argument(
         "--limits", action="store_true",

@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--law",
-        help="another law than the model's: bingham, lugre, ..._standard; all: keep the model's "
-        "law, and compare all laws",
+        help="another law than the model's, see `bristle laws`; all: keep the model's law, and "
+        "compare all laws on a test bench",
     )
     parser.add_argument(
         "--command",

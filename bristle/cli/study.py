@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from ._roles import add_roles
 
 if TYPE_CHECKING:
     from ..study.create import Created
-    from ..study.data_check import DataCheck
+    from ..study.joined_corrections import RunCorrections
 
 HELP = "make and change studies of measurements: new, extend, check, roles, channels, auto"
 _OLD = "first-look"
@@ -42,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     auto.add_argument(
         "--law",
-        help="all: search for the law together with its effects (default if no law was chosen); a "
-        "name: begin with that law",
+        help="all: search for the law together with its effects (default on a test bench if no law "
+        "was chosen); a name: begin with that law",
     )
     auto.add_argument(
         "--greedy", action="store_true",
@@ -224,6 +225,7 @@ def _check(arguments: argparse.Namespace) -> int:
     from ..draw.style import png
     from ..progress import Progress
     from ..study.data_check import check_data
+    from ..study.joined_corrections import joined_corrections
     from ..study.study import Study
 
     if arguments.action == _OLD:
@@ -240,16 +242,21 @@ def _check(arguments: argparse.Namespace) -> int:
     total = len(study.settings.runs)
     with Progress("checking the data", total, True) as progress:
         found = check_data(study, progress.show)
+    apart: list[str] = []
     if arguments.correct and found.corrections():
-        study = study.with_corrections(found.corrections())
+        sizes = {run.name: len(run.time) for run in found.runs}
+        joined = joined_corrections(study.folder, study.settings, found.corrections(), sizes)
+        study = study.with_corrections({run.name: run.corrections for run in joined})
+        apart = [text for run in joined for text in run.apart]
         if not arguments.json:
-            _print_corrections(found)
+            _print_corrections(joined)
         found = check_data(study)
     picture = study.write_report("data_check.png", png(found.page(), 110))
     if arguments.json:
         import json
 
         answer = {**found.as_dict(), "picture": str(picture.absolute())}
+        answer |= {"not_corrected": apart} if apart else {}
         print(json.dumps(answer, indent=2, ensure_ascii=False))
     else:
         print(found.text())
@@ -259,12 +266,18 @@ def _check(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _print_corrections(found: DataCheck) -> None:
-    """Print what is set right from now on, run by run."""
-    print("From now on, by study.toml:")
-    for run, corrections in found.corrections().items():
-        for one in corrections:
-            print(f"  {run}: {one.text}.")
+def _print_corrections(joined: Sequence[RunCorrections]) -> None:
+    """Print what is set right from now on, run by run, then what cannot be."""
+    if any(run.corrections for run in joined):
+        print("From now on, by study.toml:")
+    for run in joined:
+        for one in run.corrections:
+            print(f"  {run.name}: {one.text}.")
+        for note in run.notes:
+            print(f"    {note}")
+    for run in joined:
+        for text in run.apart:
+            print(text)
     print()
 
 
