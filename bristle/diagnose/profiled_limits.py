@@ -61,31 +61,52 @@ def profiled(known: Known, limits: Sequence[EffectLimit]) -> tuple[EffectLimit, 
 def _checked(known: Known, limit: EffectLimit) -> EffectLimit:
     """Return a limit at which the likelihood of a model fitted there has fallen far enough.
 
-    Twice its logarithm is a parabola over the size, through none of the effect, half the size and
-    the size; its end is the next size.
+    Of an effect that may have either sign it is the larger one of both.
     """
     sized = Sized(limit.effect, known)
     assert limit.largest is not None
-    apart = (TWO_SIDED if sized.signed else ONE_SIDED) ** 2
     first = sized.size_of(limit.largest)
-    none, size = _fitted(sized, sized.without()), first
+    signs = (1.0, -1.0) if sized.signed else (1.0,)
+    none = _fitted(sized, sized.without())
+    size = max(abs(_end(sized, none, sign * first)) for sign in signs) or first
+    share = None if limit.share is None else limit.share * size / first
+    moved = known.moved(sized.change(size))
+    return replace(limit, largest=sized.value(size), share=share, moved=moved, profiled=True)
+
+
+def _end(sized: Sized, none: Array, size: float) -> float:
+    """Return the size at which a likelihood has fallen so far below its best, on one side of none.
+
+    Twice its logarithm is a parabola over the size, through none of the effect, half the size and
+    the size; its end is the next size.
+
+    Parameters
+    ----------
+    sized : the effect
+    none : (n,) residuals without it
+    size : looked at first, negative for the other sign
+    """
+    apart = (TWO_SIDED if sized.signed else ONE_SIDED) ** 2
+    size = sized.size_of(sized.value(size))  # bounds may differ from side to side
     for _ in range(TURNS):
         half, whole = (
             _fitted(sized, sized.with_value(sized.value(part * size))) for part in (0.5, 1.0)
         )
-        asked = apart * _scatter(known, whole - none) ** 2
+        if np.array_equal(whole, none):
+            return 0.0  # it has one sign alone
+        asked = apart * _scatter(sized.known, whole - none) ** 2
         rises = [2.0 * float(np.sum(loss(left) - loss(none))) for left in (half, whole)]
         bend = 2.0 * (rises[1] - 2.0 * rises[0])
         slope = rises[1] - bend
         if bend <= 0.0:
             break  # no parabola: impacts decide
-        end = (sqrt(4.0 * bend * asked) - slope) / (2.0 * bend)
+        # Where the likelihood falls from none on, none is the best of this side.
+        fallen = 4.0 * bend * asked + max(slope, 0.0) ** 2
+        end = (sqrt(fallen) - slope) / (2.0 * bend)
         if abs(end - 1.0) <= NEAR or sized.ended(size * end):
             break
         size *= float(np.clip(end, 1.0 / FARTHEST, FARTHEST))
-    share = None if limit.share is None else limit.share * size / first
-    moved = known.moved(sized.change(size))
-    return replace(limit, largest=sized.value(size), share=share, moved=moved, profiled=True)
+    return size
 
 
 def _fitted(sized: Sized, model: Model) -> Array:

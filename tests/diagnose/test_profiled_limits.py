@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,11 @@ TRUE = Model("bingham", values={"f_c": 5.0, "c_0": 20.0, "v_n": 100.0}, fixed=("
 
 @pytest.fixture(scope="module")
 def known() -> Known:
+    return known_with(TRUE, 0.0)
+
+
+def known_with(other: Model, share: float) -> Known:
+    """Return what limits are found with, for runs that have a share of what `other` has more."""
     rng = np.random.default_rng(3)
     runs = []
     for k, f in enumerate((1.0, 2.3)):
@@ -28,7 +34,9 @@ def known() -> Known:
             f"run_{k}", 0.004, x, v, np.gradient(v, t), np.zeros_like(t), np.zeros_like(t), 0.2,
             np.zeros((2, len(t), 4)),
         )  # fmt: skip
-        force = Problem([one]).predict(TRUE, one) + 0.2 * rng.standard_normal(len(t))
+        problem = Problem([one])
+        force, more = problem.predict(TRUE, one), problem.predict(other, one)
+        force = force + share * (more - force) + 0.2 * rng.standard_normal(len(t))
         runs.append(Run(**{**one.__dict__, "force": force}))
     problem = Problem(runs)
     model = refine(TRUE, problem)
@@ -41,6 +49,26 @@ def test_where_all_is_linear_the_profile_agrees(known: Known) -> None:
     assert found.profiled
     assert not limit.profiled
     assert found.largest == pytest.approx(limit.largest, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("effect", "amount", "share"),
+    [
+        ("gas_spring", {"k": 0.4}, -1.0),
+        ("gas_spring", {"k": 0.4}, 2.0),
+        ("asymmetry", {"ratio": 0.002}, -2.0),
+        ("asymmetry", {"ratio": 0.002}, 2.0),
+    ],
+)
+def test_the_profile_agrees_on_either_side_of_none(
+    effect: str, amount: dict[str, float], share: float
+) -> None:
+    values = {f"{effect}.{name}": value for name, value in amount.items()}
+    other = replace(TRUE, effects=(effect,), values={**TRUE.values, **values})
+    there = known_with(other, share)
+    limit = limit_of(Sized(effect, there))
+    (found,) = profiled(there, [limit])
+    assert found.largest == pytest.approx(limit.largest, rel=0.1)
 
 
 def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: Known) -> None:
