@@ -27,6 +27,7 @@ from ..trust import can_do_without, load
 from ..version import __version__
 from .added_runs import behind_data
 from .history import History, Step
+from .joined_corrections import joined_corrections
 from .new import make_folder, parse_channel
 from .reading import place_of_run, read_runs
 from .role_changes import roles_by_place
@@ -310,17 +311,18 @@ class Study:
 
         Parameters
         ----------
-        found : corrections by the name of the run, or of a part of it
+        found : corrections by the name of the run, or of a part of it: a run has one of each
+            channel and fault, the mean of those of its parts
 
         Raises
         ------
         StudyError
-            If no run has such a name.
+            If no run has such a name, or no single value is right for all parts of a run.
         """
-        places: dict[tuple[str, int], list[Correction]] = {}
-        for name, corrections in found.items():
-            known = places.setdefault(place_of_run(self.folder, self.settings, name), [])
-            known += [one for one in corrections if not any(map(one.is_like, known))]
+        joined = joined_corrections(self.folder, self.settings, found)
+        if apart := [text for run in joined for text in run.apart]:
+            raise StudyError(f"{self.folder / 'study.toml'}: {' '.join(apart)}")
+        places = {run.place: run.corrections for run in joined}
         return self._with_settings(lambda text: with_corrections(text, places))
 
     def with_excluded(self, names: Sequence[str]) -> Study:
