@@ -135,7 +135,7 @@ class ClosedLoop:
         first, share = next(iter(least.parts.items()))
         open_effect = first not in CAUSES
         said = (
-            f"Least known of the peaks is that of {name_of(least.response)} in {least.run}: "
+            f"The least certain peak is that of {name_of(least.response)} in {least.run}: "
             f"{least.told()}; {percent(share, 0)} of the band's variance is "
             f"{first}{', which the runs do not exclude' if open_effect else ''}."
         )

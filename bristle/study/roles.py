@@ -117,7 +117,7 @@ def _every_third(names: list[str]) -> tuple[list[str], str]:
     """Return roles of which every third is held out, and the note that says so."""
     return (
         ["holdout" if k % 3 == 1 else "train" for k in range(len(names))],
-        "every third run is held out; change role in study.toml if another choice is better",
+        "every third run is held out; bristle study roles changes that",
     )
 
 

@@ -110,7 +110,7 @@ def test_a_band_without_open_effects_says_so() -> None:
     one = Predicted("run", "drift1", "peak", None, 1.1, band, parts=parts)
     said = ClosedLoop((one,), 20).sentences()
     assert said[1] == (
-        "Least known of the peaks is that of drift1 in run: 1100 mm, 95 % band 1000 to 1200 mm; "
+        "The least certain peak is that of drift1 in run: 1100 mm, 95 % band 1000 to 1200 mm; "
         "95 % of the band's variance is the parameters."
     )
     assert said[2] == "No effect that the runs do not exclude widens the bands by much."
