@@ -36,11 +36,12 @@ class EffectLimit:
     `largest` is the size of `parameter` [SI] that they still allow at 95 %, its lower limit where
     the effect vanishes as it grows (`falls`); `share` the part of the force RMS that such an effect
     leaves once law and known effects are fitted again. `named` and `named_share` are those from
-    which 9 of 10 verdicts would name the effect, None beyond the parameter's bounds. `coarse`: the
-    steps of the integration tell no smaller size, and shares have no meaning. `others` are the
-    values of the effect's other parameters for which all this holds, and `moved` says by how much
-    [SI] such an effect moves the model's own parameters in a fit. `profiled`: the model was fitted
-    again at the limit. `why` says why the runs cannot show the effect; the sizes are then None.
+    which 9 of 10 verdicts would name the effect, at least those that the runs still allow; None
+    beyond the parameter's bounds. `coarse`: the steps of the integration tell no smaller size, and
+    shares have no meaning. `others` are the values of the effect's other parameters for which all
+    this holds, and `moved` says by how much [SI] such an effect moves the model's own parameters in
+    a fit. `profiled`: the model was fitted again at the limit. `why` says why the runs cannot show
+    the effect; the sizes are then None.
     """
 
     effect: str

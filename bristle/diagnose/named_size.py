@@ -45,10 +45,12 @@ def named_distance(samples: int, held_out: int, rule: DecisionRule = BENCH) -> f
 def named_size(sized: Sized, least: float) -> tuple[float | None, float | None]:
     """Return the value and the share of the force from which 9 of 10 verdicts name an effect.
 
+    Both are None where that is beyond the parameter's bounds.
+
     Parameters
     ----------
     sized : the effect
-    least : where it is looked at first
+    least : the size that the runs still allow
     """
     known = sized.known
     wanted = named_distance(len(known.plain), known.held_out, known.rule)
@@ -56,6 +58,10 @@ def named_size(sized: Sized, least: float) -> tuple[float | None, float | None]:
     if size is not None and known.judging is not None:
         wanted /= max(_shown_there(sized, size), UNSHOWN)
         size = _distant(sized, size, wanted)
+    if size is not None and size <= least:
+        # Where the model errs, the runs allow sizes that they would name beside a true one.
+        size = None if sized.ended(least) else least
+        wanted = float(np.linalg.norm(known.beyond(sized.change(least))))
     return (None, None) if size is None else (sized.value(size), wanted / known.size)
 
 

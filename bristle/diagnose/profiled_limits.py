@@ -71,7 +71,10 @@ def _checked(known: Known, limit: EffectLimit) -> EffectLimit:
     size = max(abs(_end(sized, none, sign * first)) for sign in signs) or first
     share = None if limit.share is None else limit.share * size / first
     moved = known.moved(sized.change(size))
-    return replace(limit, largest=sized.value(size), share=share, moved=moved, profiled=True)
+    found = replace(limit, largest=sized.value(size), share=share, moved=moved, profiled=True)
+    if limit.named is not None and sized.size_of(limit.named) < size:
+        return replace(found, named=found.largest, named_share=share)
+    return found
 
 
 def _end(sized: Sized, none: Array, size: float) -> float:

@@ -68,6 +68,18 @@ def test_what_is_named_is_far_above_what_is_allowed_and_leaves_the_gain_of_the_r
     assert 1.02 < z < 1.05
 
 
+@pytest.mark.parametrize(("name", "value"), [(SPRING, 200.0), ("saturation", 2.0)])
+def test_what_is_named_is_no_less_than_what_is_allowed_where_the_model_errs(known, name, value):
+    sized = Sized(name, known)
+    there = replace(sized.with_value(value), values={**known.model.values, **{sized.key: value}})
+    runs = [replace(run, force=known.problem.predict(there, run)) for run in known.problem.runs]
+    problem = known.problem.of(runs)
+    model = refine(known.model, problem, 6)
+    limit = limit_of(Sized(name, Known(problem, model, problem.expectation(model), 6000)))
+    assert limit.named == limit.largest
+    assert limit.named_share == pytest.approx(limit.share)
+
+
 def test_what_is_named_is_what_the_runs_that_decide_show(known):
     sized = Sized(SPRING, known)
     alone = limit_of(sized).named

@@ -84,6 +84,14 @@ def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: Known) -> Non
     assert dict(found.moved) == pytest.approx(dict(limit.moved), rel=0.2)
 
 
+def test_what_is_named_is_no_less_than_a_limit_that_was_moved(known: Known) -> None:
+    limit = limit_of(Sized("gas_spring", known))
+    assert limit.largest is not None
+    less = replace(limit, named=0.1 * limit.largest, named_share=1e-9)
+    (found,) = profiled(known, [less])
+    assert (found.named, found.named_share) == (found.largest, found.share)
+
+
 def test_what_has_no_size_stays_as_it_is(known: Known) -> None:
     hidden = EffectLimit("coil_lag", why="the command is constant")
     coarse = EffectLimit("backlash", "gap", "m", largest=1e-6, coarse=True)
