@@ -19,6 +19,12 @@ Array = NDArray[np.float64]
 LENGTH = 12.0
 """Length of a proposed run [s]."""
 
+PER_PERIOD = 20.0
+"""Samples in a period of the motion at the least, as tests of `bristle plan` have them."""
+
+SPIKES = 0.999
+"""Share of the samples whose acceleration the largest one is taken of: the others may be noise."""
+
 ZERO = 0.02
 """Share of the largest voltage below which the smallest is zero, but for its noise."""
 
@@ -46,7 +52,7 @@ class Experiment:
         """Return the run as a sentence of an experiment's plan."""
         if self.deviations < rule.tells:
             return (
-                "No run within the strokes, speeds and levels of the "
+                "No run within the strokes, speeds, accelerations and levels of the "
                 f"{self.drive.name} so far would distinguish them: at best the forces "
                 f"differ by {self.deviations:.1f} standard deviations over "
                 f"{LENGTH:g} s. Use a wider range."
@@ -91,11 +97,12 @@ class Experiment:
 def separating(models: Sequence[Model], problem: Problem) -> Experiment:
     """Return the run that separates rival models best, within what the rig has done already.
 
-    Amplitudes, speeds and levels of the command stay within those of the runs at hand.
+    Amplitudes, speeds, accelerations and levels of the command stay within those of the runs at
+    hand, frequencies within what their sampling shows.
     """
     rivals = [_Rival(model, problem) for model in models]
     noise = float(np.median([run.noise for run in problem.runs]))
-    dt = problem.runs[0].dt
+    dt = min(run.dt for run in problem.runs)
     plans = []
     for plan in _plans(problem):
         run = _run(plan, dt, noise)
@@ -108,7 +115,6 @@ def separating(models: Sequence[Model], problem: Problem) -> Experiment:
 
 def _plans(problem: Problem) -> list[Experiment]:
     x_top = max(float(np.max(np.abs(run.x - run.x.mean()))) for run in problem.runs)
-    v_top = max(float(np.max(np.abs(run.v))) for run in problem.runs)
     V_low = min(float(run.V.min()) for run in problem.runs)
     V_top = max(float(run.V.max()) for run in problem.runs)
     V_low = 0.0 if abs(V_low) < ZERO * V_top else V_low
@@ -116,11 +122,20 @@ def _plans(problem: Problem) -> list[Experiment]:
     drives += [((V_low, V_top), 0.25), ((V_low, V_top), 2.0)] if V_top > V_low else []
     plans = []
     for amplitude in (x_top, 0.3 * x_top, 0.1 * x_top):
-        top = v_top / (2.0 * np.pi * amplitude)
+        top = _highest(problem, amplitude)
         for low, high in ((0.05 * top, top), (0.1 * top, 0.1 * top), (top, top)):
             kind = DRIVES[problem.runs[0].drive]
             plans += [Experiment(amplitude, low, high, *drive, drive=kind) for drive in drives]
     return plans
+
+
+def _highest(problem: Problem, amplitude: float) -> float:
+    """Return the highest frequency [Hz] of a motion of an amplitude [m] that the rig can do."""
+    v_top = max(float(np.max(np.abs(run.v))) for run in problem.runs)
+    a_top = max(float(np.quantile(np.abs(run.a), SPIKES)) for run in problem.runs)
+    rate = 1.0 / min(run.dt for run in problem.runs)
+    moved = min(v_top / amplitude, float(np.sqrt(a_top / amplitude))) / (2.0 * np.pi)
+    return min(moved, rate / PER_PERIOD)
 
 
 def _run(plan: Experiment, dt: float, noise: float) -> Run:

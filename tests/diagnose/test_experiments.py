@@ -9,8 +9,8 @@ import pytest
 from test_starts import LAW, recorded_rig
 
 from bristle.diagnose.corrected import corrected
-from bristle.diagnose.experiments import _contrast, _run, separating
-from bristle.identify.fit import Model, Problem
+from bristle.diagnose.experiments import _contrast, _plans, _run, separating
+from bristle.identify.fit import Model, Problem, Run
 from bristle.identify.prepare import prepare
 
 N = 1000
@@ -60,6 +60,24 @@ def test_a_plan_stays_within_what_the_rig_has_done():
     assert V.max() <= max(r.V.max() for r in problem.runs)
     assert plan.sentence().startswith("Run a s")
     assert "Use a wider range" in replace(plan, deviations=1.0).sentence()
+
+
+@pytest.mark.parametrize(("steps", "highest"), [((0.01, 0.01), 5.0), ((0.01, 0.001), 25.3)])
+def test_no_plan_is_faster_than_its_samples_or_than_the_rig_was(steps, highest):
+    runs = [_sine(0.01, 8.0, dt) for dt in steps]
+    plans = _plans(Problem(runs))
+    assert max(plan.high for plan in plans) == pytest.approx(highest, rel=1e-2)
+    top = max(float(np.abs(run.a).max()) for run in runs)
+    for plan in plans:
+        assert np.abs(plan.signals(0.001)[2]).max() <= 1.001 * top
+
+
+def _sine(amplitude: float, frequency: float, dt: float) -> Run:
+    """Return a run of a sine [m, Hz]."""
+    t, w = np.arange(0.0, 12.0, dt), 2.0 * np.pi * frequency
+    x = amplitude * np.sin(w * t)
+    v = amplitude * w * np.cos(w * t)
+    return Run("r", dt, x, v, -w * w * x, np.ones_like(x), 90.0 * v, 0.05, np.zeros((0, len(x), 4)))
 
 
 def _run_of(samples: int):
