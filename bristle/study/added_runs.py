@@ -11,6 +11,7 @@ from ..data.files import other_schema, read_json, write_json
 from ..data.run_names import names_of_files
 from ..errors import StudyError
 from ..findings import command
+from .data_digest import other_than
 
 if TYPE_CHECKING:
     from .study import Study
@@ -90,9 +91,10 @@ def other_data(study: Study) -> str:
         return f"{len(files)} {what} added after the present model was identified: {new}."
     numbers = study.history.numbers()
     known = study.history.data_of(numbers[-1]) if len(numbers) > 1 else ""
-    if not known or known == study.settings.data:  # "": its step does not tell
+    other = other_than(known, study.data, study.settings) if known else ""
+    if not other:
         return ""
     return (
-        "Runs, their roles, corrections or channels in study.toml are no longer those that the "
-        "present model was identified with."
+        f"{other[:1].upper()}{other[1:]} are no longer those that the present model was "
+        "identified with."
     )

@@ -112,6 +112,7 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     given : the name that its user gave it, "" for the next free one
     """
     with study.writing():
+        study.refuse_if_changed()
         # A fit takes minutes, in which another process may have taken the name.
         if given:
             _refuse_taken(study, given)

@@ -26,6 +26,7 @@ from ..shown import shown
 from ..trust import can_do_without, load
 from ..version import __version__
 from .added_runs import behind_data
+from .data_digest import building_in, data_digest, other_than
 from .history import History, Step
 from .joined_corrections import joined_corrections
 from .new import make_folder, parse_channel
@@ -44,6 +45,9 @@ OF_MODEL = ("identify.png", "identify.json", "compare.png", "report.html")
 
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
+
+
+_AGAIN = "Nothing is written; run this again (in Python, open the study again first)."
 
 
 class Study:
@@ -99,6 +103,7 @@ class Study:
         self.own_effects = load(self.effects_folder, trust=trust)
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
+        self._seen_data = ""
 
     own_effects: list[Loaded]
     """The files of effects/, each with its effect or why it is left out."""
@@ -229,7 +234,14 @@ class Study:
         except StudyError as error:
             raise StudyError(f"{error}{self._other_version()}") from None
         self._seen = self._state()
+        if not to_show:  # files change seldom, and are large
+            self._seen_data = data_digest(self.folder, self.settings, model.building)
         return model.with_drive(self.drive or model.drive)
+
+    @property
+    def data(self) -> str:
+        """A digest of what a fit and its judge see, as they are now: see `study.data_digest`."""
+        return data_digest(self.folder, self.settings, building_in(self.folder / "model.toml"))
 
     @property
     def drive(self) -> str:
@@ -270,20 +282,21 @@ class Study:
         Raises
         ------
         StudyError
-            If another process has changed the model since it was read here, writes for longer than
-            `PATIENCE`, or the folder cannot be written.
+            If another process has changed the model or the data since they were read here, writes
+            for longer than `PATIENCE`, or the folder cannot be written.
         """
         with self.writing():
-            self._refuse_if_changed()
+            self.refuse_if_changed()
             self.history.keep_edit()
             numbers = self.history.numbers()
             step = Step(
                 numbers[-1] + 1 if numbers else 0, what, why, {**(before or {})}, {**(after or {})}
             )
             text = model_text(model, self.folder / "model.toml")
-            self.history.add(step, text, self.settings.data)
+            data = data_digest(self.folder, self.settings, model.building)
+            self.history.add(step, text, data)
             self._set_aside(step.number - 1)
-            self._seen = self._state()
+            self._seen, self._seen_data = self._state(), data
         return step
 
     def undo(self) -> Step:
@@ -299,7 +312,7 @@ class Study:
             self.history.keep_edit()
             step = self.history.undo()
             self._set_aside(step.number)
-            self._seen = self._state()
+            self._seen, self._seen_data = self._state(), ""
         return step
 
     def with_mask(self) -> Study:
@@ -409,6 +422,8 @@ class Study:
     def verdict(self) -> dict[str, Any] | None:
         """Return the verdict on the present model in the present schema, None if there is none.
 
+        Where the data are no longer those that it is on, its notes say so.
+
         Raises
         ------
         StudyError
@@ -417,13 +432,21 @@ class Study:
         from ..diagnose.verdict_file import current
 
         path = self.folder / "verdict.json"
-        return current(read_json(path), str(path)) if path.is_file() else None
+        if not path.is_file():
+            return None
+        verdict = current(read_json(path), str(path))
+        other = other_than(str(verdict.get("data", "")), self.data, self.settings)
+        if not other:
+            return verdict
+        again = f"Diagnose again:  {command('diagnose', self.folder)}"
+        note = f"{other[:1].upper()}{other[1:]} are no longer those of this verdict. {again}"
+        return {**verdict, "notes": [note, *(verdict.get("notes") or [])]}
 
     def write_verdict(self, verdict: Mapping[str, Any]) -> None:
         """Write the verdict on the model that was read here; see `add_step` for what is raised."""
         with self.writing():
-            self._refuse_if_changed()
-            write_json(self.folder / "verdict.json", verdict)
+            self.refuse_if_changed()
+            write_json(self.folder / "verdict.json", {**verdict, "data": self.data})
 
     def write_report(self, name: str, content: str | bytes) -> Path:
         """Write a file into reports/, whole; return its path."""
@@ -495,11 +518,19 @@ class Study:
         content = path.read_bytes() if path.is_file() else b""
         return tuple(self.history.numbers()), hashlib.sha256(content).hexdigest()
 
-    def _refuse_if_changed(self) -> None:
-        if read_settings(self.folder / "study.toml").channels != self.settings.channels:
+    def refuse_if_changed(self) -> None:
+        """Refuse a result where model or data are others than were read here; hold the lock.
+
+        Raises
+        ------
+        StudyError
+            Saying what has been changed.
+        """
+        settings = read_settings(self.folder / "study.toml")
+        if settings.channels != self.settings.channels:
             raise StudyError(
                 f"{self.folder}: its channels have been corrected meanwhile, so that this result "
-                "is not of the present data. Nothing is written; run this again."
+                f"is not of the present data. {_AGAIN}"
             )
         now = self._state()
         if now != self._seen:
@@ -509,4 +540,15 @@ class Study:
             raise StudyError(
                 f"{self.folder}: the model has been changed meanwhile ({what}{how}), so that this "
                 "result is not of the present one. Nothing is written; run this again."
+            )
+        self._refuse_other_data(settings)
+
+    def _refuse_other_data(self, settings: Settings) -> None:
+        """Refuse a result where the data are others than were read, by the study.toml of now."""
+        building = building_in(self.folder / "model.toml")
+        known = self._seen_data or data_digest(self.folder, self.settings, building)
+        if other := other_than(known, data_digest(self.folder, settings, building), settings):
+            raise StudyError(
+                f"{self.folder}: {other} have been changed meanwhile, so that this result is not "
+                f"of the present data. {_AGAIN}"
             )
