@@ -119,24 +119,38 @@ def ringing(trial: Trial, held_out: Problem) -> float:
     """
     if any(isinstance(run, StructureRun) and _has_gaps(run) for run in held_out.runs):
         return 0.0
-    largest, begin = 0.0, 0
-    powers, motions = [], []
-    size = min(1024, *(len(run.force) - run.skip for run in held_out.runs))
-    rate = 1.0 / held_out.runs[0].dt
-    for run in held_out.runs:
-        count = len(run.force) - run.skip
-        residual = np.clip(trial.residual[begin : begin + count], -50.0, 50.0)
-        begin += count
-        f, power = welch(residual, rate, nperseg=size)
-        powers.append(power)
-        motions.append(welch(run.v[run.skip :], rate, nperseg=size)[1])
-    power, motion = np.mean(powers, axis=0), np.cumsum(np.mean(motions, axis=0))
+    f, power, motion = _spectra(trial, held_out)
+    largest, motion = 0.0, np.cumsum(motion)
     ends = f[int(np.searchsorted(motion, 0.9 * motion[-1]))]
     total = float(power.sum())
     for centre in f[f > 1.5 * ends]:
         inside = (f >= centre / 2 ** (1 / 6)) & (f <= centre * 2 ** (1 / 6))
         largest = max(largest, float(power[inside].sum()) / total)
     return largest
+
+
+def _spectra(trial: Trial, held_out: Problem) -> tuple[Array, Array, Array]:
+    """Return frequencies (m,) [Hz] and the mean spectra (m,) there: of residual, and of velocity.
+
+    Windows of all runs last equally long, so that their frequencies are the same whatever the rate;
+    a run has nothing above half of its own.
+    """
+    runs = held_out.runs
+    seconds = min(run.dt * min(1024, len(run.force) - run.skip) for run in runs)
+    rate = 1.0 / min(run.dt for run in runs)
+    f = np.asarray(np.fft.rfftfreq(round(seconds * rate), 1.0 / rate), float)
+    powers: list[Array] = []
+    motions: list[Array] = []
+    begin = 0
+    for run in runs:
+        count = len(run.force) - run.skip
+        residual = np.clip(trial.residual[begin : begin + count], -50.0, 50.0)
+        begin += count
+        for values, found in ((residual, powers), (run.v[run.skip :], motions)):
+            own, power = welch(values, 1.0 / run.dt, nperseg=round(seconds / run.dt))
+            found.append(np.interp(f, own, power, right=0.0))
+    power, motion = (np.asarray(np.mean(one, axis=0), float) for one in (powers, motions))
+    return f, power, motion
 
 
 def _has_gaps(run: StructureRun) -> bool:

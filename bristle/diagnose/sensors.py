@@ -120,7 +120,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
                 either="displacement",
             )
         )  # fmt: skip
-    found += _late(theta * gain, std * gain, runs[0].step, rule)
+    found += _late(theta * gain, std * gain, _mean_step(runs), rule)
     bias, bias_std = -theta[5] * gain, std[5] * gain
     rms = float(np.sqrt(np.mean(np.concatenate([run["velocity"] for run in runs]) ** 2)))
     if abs(bias) > max(rule.sure * bias_std, rule.least_bias * rms):
@@ -163,6 +163,12 @@ def _power(runs: Sequence[Measurement]) -> float:
         return 0.0
     power = np.concatenate([run["force"] * run["velocity"] for run in able])
     return float(power.mean() / max(float(np.mean(np.abs(power))), 1e-300))
+
+
+def _mean_step(runs: Sequence[Measurement]) -> float:
+    """Return the mean sampling step [s] over all samples, as what is pooled over runs has it."""
+    samples = [len(run.time) for run in runs]
+    return float(np.average([run.step for run in runs], weights=samples))
 
 
 def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[SensorFault]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,9 @@ from bristle.compare.patterns import LEVEL, ResidualPattern
 from bristle.diagnose import remaining_residual
 from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.finding import Finding
-from bristle.diagnose.remaining_residual import most_telling
+from bristle.diagnose.remaining_residual import most_telling, ringing
 from bristle.diagnose.rule import BENCH
+from bristle.identify.model import Problem, Run
 
 NONE = np.zeros(0)
 
@@ -56,6 +59,22 @@ def test_what_rings_after_each_reversal_has_a_frequency(rings):
     assert most_telling(found, None, None) == "time_since_reversal"
     rings(1.1 * BENCH.rings)
     assert most_telling(found, None, None) == "frequency"
+
+
+@pytest.mark.parametrize("steps", [(0.002, 0.002), (0.002, 0.005), (0.005, 0.002)])
+def test_a_residual_rings_at_the_rate_of_each_run(steps):
+    runs, left = zip(*(_rung(dt) for dt in steps), strict=True)
+    trial = SimpleNamespace(residual=np.concatenate(left))
+    assert ringing(trial, Problem(list(runs))) == pytest.approx(0.86, abs=0.01)
+
+
+def _rung(dt: float) -> tuple[Run, np.ndarray]:
+    """Return a run of a sine of 2 Hz, and a residual that rings at 60 Hz with noise on it."""
+    t = np.arange(0.0, 16.0, dt)
+    v = np.cos(2.0 * np.pi * 2.0 * t)
+    noise = 0.3 * np.random.default_rng(0).standard_normal(len(t))
+    run = Run("r", dt, v, v, v, v, v, 1.0, np.zeros((0, len(t), 4)), skip=0)
+    return run, np.sin(2.0 * np.pi * 60.0 * t) + noise
 
 
 def test_nothing_is_named_where_there_is_no_place(rings):

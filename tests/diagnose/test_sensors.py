@@ -28,8 +28,11 @@ def motion(seed, late=0.0):
     return x, v
 
 
-def measured(seed, late=0.0, spoil=lambda channels: None, after=lambda channels: None):
-    """Return a run of a yielding damper; `spoil` acts before the noise is added, `after` then."""
+def measured(seed, late=0.0, spoil=lambda channels: None, after=lambda channels: None, every=1):
+    """Return a run of a yielding damper; `spoil` acts before the noise is added, `after` then.
+
+    Of its samples one of `every` is kept.
+    """
     x, v = motion(seed, late)
     _, true = motion(seed)
     V = 2.0 + 1.5 * np.sin(1.7 * T)
@@ -42,7 +45,7 @@ def measured(seed, late=0.0, spoil=lambda channels: None, after=lambda channels:
     after(channels)
     titles = {"displacement": "m", "velocity": "m/s", "voltage": "V", "force": "N"}
     columns = {f"{name} [{titles[name]}]": values for name, values in channels.items()}
-    frame = pd.DataFrame({"time [s]": T, **columns})
+    frame = pd.DataFrame({"time [s]": T, **columns}).iloc[::every]
     specs = {
         name: ChannelSpec(column=f"{name} [{unit}]", noise=noise[name])
         for name, unit in titles.items()
@@ -78,6 +81,14 @@ def test_a_late_velocity(late):
     fault = only(sensor_faults(runs(late=late)))
     assert (fault.channel, fault.fault) == ("velocity", "delay")
     assert fault.value == pytest.approx(late, rel=0.1)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_late_velocity_of_runs_with_different_rates(order):
+    fast, slow = runs(late=0.0012), [measured(9, late=0.0012, every=4)]
+    fault = only(sensor_faults([*fast, *slow][::order]))
+    assert fault.channel == "velocity"  # less than a sample: whether it is rounded is not sure
+    assert fault.value == pytest.approx(0.0012, rel=0.1)
 
 
 def test_a_late_displacement():

@@ -26,9 +26,9 @@ def best_mode(known: Normal) -> Promise | None:
     residual = known.residual
     if not residual.shown:
         return None
-    dt = residual.runs[0].dt
-    length = min(len(run.x) for run in residual.runs) * dt
-    nodes = product(map(float, frequencies(dt, length)), DAMPINGS)
+    nodes = product(
+        map(float, frequencies(residual.coarsest_step, residual.shortest_length)), DAMPINGS
+    )
     found = [one for one in (_rings_at(known, *node) for node in nodes) if one is not None]
     if not found:
         return None

@@ -51,6 +51,16 @@ class Residual:
         """The site of the rig whose model this is the residual of."""
         return Place(self.at)
 
+    @property
+    def coarsest_step(self) -> float:
+        """The longest sampling step of the runs [s]: what that resolves, all of them resolve."""
+        return max(run.dt for run in self.runs)
+
+    @property
+    def shortest_length(self) -> float:
+        """The length of the shortest run [s]."""
+        return min(run.dt * len(run.x) for run in self.runs)
+
 
 def residual_of(problem: Problem, base: Model) -> Residual:
     """Return the residual of a fitted model, with what its law's parts do."""

@@ -96,7 +96,7 @@ def promises(
 
 def _tuned(known: Normal, one: Promise) -> Promise:
     """Return a promise with the times and travels of its memory at which it promises most."""
-    limits = one.curve.signal.limits(known.residual.runs[0].dt, _stroke(known.residual))
+    limits = one.curve.signal.limits(known.residual.coarsest_step, _stroke(known.residual))
     for step, name, factor in product(STEPS, limits, (1.0, -1.0)):
         low, high = limits[name]
         while True:
@@ -143,8 +143,7 @@ def signals(
     residual : of a fitted model
     names : of those that are wanted; empty for all
     """
-    step = residual.runs[0].dt
-    length = min(len(run.x) for run in residual.runs) * step
+    step, length = residual.coarsest_step, residual.shortest_length
     top = max(float(np.max(run.x)) for run in residual.runs)
     offered = [one for one in ALONG.values() if residual.place.offers(one.needs)]
     offered += measured_signals(residual.runs) if not residual.place.is_line else []

@@ -15,7 +15,7 @@ from bristle.diagnose.learned.normal import Normal, hats_at
 from bristle.diagnose.learned.promise import distinct
 from bristle.diagnose.learned.residual import residual_of
 from bristle.diagnose.learned.rule import LEARN
-from bristle.diagnose.learned.screen import knots_of, promises
+from bristle.diagnose.learned.screen import knots_of, promises, signals
 from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.errors import RecordError
 from bristle.identify.fit import Model, Problem, Run, fit
@@ -28,6 +28,17 @@ def first_of(hidden):
     problem = runs(hidden)
     base = fit(problem, Model("bingham", (), VALUES), with_std=False).model
     return promises(residual_of(problem, base))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_memories_that_are_looked_at_are_those_of_all_runs_whatever_their_rates(order):
+    fine, _, other = runs().runs
+    part = {name: getattr(other, name)[::10] for name in ("x", "v", "a", "V", "force")}
+    coarse = replace(other, dt=10.0 * STEP, draws=NOWHERE[:, ::10], **part)  # 6 s, as the fine one
+    problem = Problem([fine, coarse][::order])
+    residual = residual_of(problem, Model("bingham", (), VALUES))
+    taus = {memory["tau"] for _, memory, _ in signals(residual, ["recent_speed"])}
+    assert taus == {0.1, 0.5}  # s; two samples of 20 ms or more, a third of a run or less
 
 
 def test_a_channel_besides_those_that_are_known_is_a_signal_as_well():
