@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from ..data.files import Toml
 from ..diagnose.effect_size import Known as Fitted
 from ..errors import StudyError
 from ..findings import unknown
+from ..identify.fit import identify
 from ..identify.model import REFERENCE, Model, Problem, Run, law_parameters
 from ..identify.smooth import posterior_draws
 from ..physics.drive import DRIVES, VOLTAGE
@@ -27,7 +28,9 @@ from .questions import (
     NONE,
     SizedRival,
     able_beside,
+    law_rivals,
     open_parts,
+    refuse_no_rival,
     refuse_unable,
     rivals_of,
     sized_rival,
@@ -166,16 +169,25 @@ def _beside(
     """Return the effects to be seen and the rivals to be told apart, at typical sizes."""
     fitted = Fitted(problem, model, problem.expectation(model), 0)
     able = able_beside(model, problem, ("force",))
-    separate = [name for name in wish.separate or () if name != NONE]
-    for name in (*(wish.see or ()), *separate):
+    for name in wish.see or ():
         refuse_unable(name, able, model)
     effects = () if wish.see is None else tuple(sized_rival(n, fitted) for n in wish.see or able)
     if wish.separate is None:
         return effects, ()
-    models = {name: sized_rival(name, fitted).rival().model for name in separate}
-    if NONE in wish.separate:
-        models[NONE] = model
-    return effects, tuple(rivals_of(models))
+    names = sorted(wish.separate, key=lambda name: name == NONE)  # the model as it is comes last
+    return effects, tuple(rivals_of({name: _rival(name, able, fitted) for name in names}))
+
+
+def _rival(name: str, able: Sequence[str], fitted: Fitted) -> Model:
+    """Return the model with an effect of a typical size, or another law fitted to its force."""
+    model = fitted.model
+    if name in (NONE, model.law):
+        return model
+    if name in law_rivals():
+        return identify(fitted.problem, name, model.effects).model
+    refuse_no_rival(name)
+    refuse_unable(name, able, model)
+    return sized_rival(name, fitted).rival().model
 
 
 def _stand_in(rig: NewRig) -> Run:

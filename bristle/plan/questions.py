@@ -21,7 +21,7 @@ from ..identify.search_context import refine
 from ..identify.start_grid import SearchContext, ranked_guesses
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
-from ..physics.laws import LAWS
+from ..physics.laws import laws_of
 from ..progress import tell
 from ..quantity import quantity
 from .basis import USUAL, basis_along, ranges
@@ -123,6 +123,24 @@ def refuse_unable(name: str, able: Sequence[str], model: Model) -> None:
         )
 
 
+def law_rivals() -> list[str]:
+    """Return the names of the laws that a damper's model may have in place of its own."""
+    return [law.name for law in laws_of("damper")]
+
+
+def refuse_no_rival(name: str) -> None:
+    """Refuse a name of neither an effect, nor the law of a damper, nor the model as it is.
+
+    Raises
+    ------
+    StudyError
+        With the nearest names.
+    """
+    known = [*law_rivals(), *sorted(EFFECTS), NONE]
+    if name not in known:
+        raise StudyError(unknown("effect or law", name, known))
+
+
 def rivals(opened: Opening, names: Sequence[str]) -> list[Question]:
     """Return questions whose rivals are each other: the model with one effect, or with another.
 
@@ -162,9 +180,10 @@ def _fitted(name: str, opened: Opening) -> Model:
     model, problem = opened.before.model, opened.searched
     if name == NONE:
         return model
-    if name in LAWS:
+    if name in law_rivals():
         return identify(problem, name, model.effects).model
     plain = plain_name(name)
+    refuse_no_rival(plain)
     refuse_unable(plain, able_beside(model, problem, opened.shown), model)
     return fitted_with(plain, model, problem)
 

@@ -14,6 +14,7 @@ import bristle
 from bristle.cli import main
 from bristle.diagnose.bench import BenchRuns
 from bristle.diagnose.opening import Opening
+from bristle.diagnose.rule import BENCH
 from bristle.errors import StudyError
 from bristle.example.make import Choice, make_bench
 from bristle.identify.fit import intervals_of
@@ -226,6 +227,21 @@ def test_a_sheet_that_is_not_there_is_no_study(
 def test_the_pause_between_tests_is_told(sheet: Path, tmp_path: Path) -> None:
     found = bristle.plan(sheet, sharpen="f_c", pause="30 s").write(tmp_path / "plan")
     assert "rests for 30 s between" in (found / "plan.md").read_text()
+
+
+def test_laws_are_told_apart_before_the_first_measurement(sheet: Path) -> None:
+    few = {"motions": ["sine"], "commands": ["stairs"]}
+    found = bristle.plan(sheet, separate=["bingham", "lugre", "none"], **few)
+    then = {one.name: one.then for one in found.outcomes}
+    assert then["bingham or none"] == 0.0  # the data sheet's law is the model as it is
+    assert then["bingham or lugre"] == then["lugre or none"] > BENCH.tells
+    with pytest.raises(StudyError, match=r'no effect or law "lugree"\. Did you mean "lugre"'):
+        bristle.plan(sheet, separate=["lugree", "none"])
+
+
+def test_what_is_no_law_of_a_damper_is_no_rival(rig: bristle.Study) -> None:
+    with pytest.raises(StudyError, match='no effect or law "linear_layer"'):
+        bristle.plan(rig, separate=["linear_layer", "none"])
 
 
 def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
