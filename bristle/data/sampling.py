@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 from ..physics.record import GAP
+from .even_grid import ROUNDED, even_grid
 from .noise import SHORTEST, is_switched
 from .table import Array
 
@@ -134,8 +135,8 @@ class _Stretch:
 
 
 def _even_stretch(time: Array, channels: dict[str, Array], step: float) -> _Stretch:
-    grid, places, jitter, digits = _grid(time, step)
-    off = np.abs(time - grid[places]) / step > max(_TOLERATED, 0.51 * digits / step)
+    grid, places, jitter, digits = even_grid(time, step, _TOLERATED)
+    off = np.abs(time - grid[places]) / step > max(_TOLERATED, ROUNDED * digits / step)
     at = np.where(off, time, grid[places])
     resampled = float(np.mean(off)) > _MOVED or not (np.diff(at) > 0.0).all()
     if resampled:
@@ -221,29 +222,6 @@ def _in_order(
     keep[double + 1] = False
     notes.append(f"{len(double)} samples that repeat the one before are left out")
     return time[keep], {key: values[keep] for key, values in channels.items()}, lines[keep]
-
-
-def _grid(time: Array, step: float) -> tuple[Array, NDArray[np.int64], float, float]:
-    """Return an even grid, each sample's place on it, the largest distance from it in steps, and
-    the step on which the times are written [s]."""
-    places = np.concatenate([[0], np.cumsum(np.maximum(np.round(np.diff(time) / step), 1.0))])
-    # The median spacing of rounded times is rounded, too: the whole span knows the step better.
-    slope = (time[-1] - time[0]) / places[-1]
-    start = float(time[0])
-    off = np.abs(time - start - slope * places) / slope
-    if off.max() > 1e-6:
-        for _ in range(2):  # the second time without what is far off
-            near = off <= max(_TOLERATED, float(np.quantile(off, 0.9)))
-            slope, start = (float(one) for one in np.polyfit(places[near], time[near], 1))
-            off = np.abs(time - start - slope * places) / slope
-    digits = 0.0
-    for power in range(0, 7):
-        unit = 10.0**-power
-        if np.abs(time / unit - np.round(time / unit)).max() < 1e-4:
-            digits = unit
-            break
-    grid = start + slope * np.arange(int(places[-1]) + 1)
-    return grid, places.astype(np.int64), float(off.max()), digits
 
 
 def _resampled_note(time: Array, step: float) -> str:
