@@ -16,6 +16,7 @@ import numpy as np
 
 from .operations import (
     AHEAD,
+    ALONG,
     END,
     FAULT,
     MIDDLE,
@@ -46,6 +47,7 @@ _VALUE = {
     AHEAD: "1.5 * m[{now}] - 0.5 * past{past}",
     END: "2.0 * m[{now}] - past{past}",
     PAST: "past{past}",
+    ALONG: "(1.0 - share) * past{past} + share * m[{now}]",  # at the step's end to the last digit
 }
 """What an input is given, of doubles in memory m; those of a step before are in local names."""
 _SLOPE = "(m[{now}] - past{past}) / step"
@@ -76,9 +78,7 @@ class Memory:
         start = -(-size // 8) * 8
         self.past = {port: start + 8 * i for i, port in enumerate(kept)}
         self._gathered = start + 8 * len(kept)
-        total = self._gathered + 8 * sum(
-            len(o.names) for o in schedule.operations if isinstance(o, Write | Ramp)
-        )
+        total = self._gathered + 8 * sum(len(one.names) for one in _setting(schedule))
         self._buffer = bytearray(total)
         self._address = ctypes.addressof((ctypes.c_char * total).from_buffer(self._buffer))
         view = memoryview(self._buffer)
@@ -187,12 +187,12 @@ def compile_loop(
     names: dict[str, Any] = {"fail": fail, "keep": rows.append, "take": memory.row.tobytes}
     names |= {"real": ctypes.c_double.from_param, "step": step, "reals": memory.views["Real"]}
     body: list[str] = []
-    for number, operation in enumerate(schedule.operations):
+    for place, operation in enumerate(schedule.operations):
+        number = str(place)
         names[f"o{number}"] = operation
         instance = instances[operation.component]
         if isinstance(operation, Step):
-            substeps = memory.nodes[operation.component].substeps
-            body += _step(number, instance, step, substeps, names)
+            body += _step(number, operation, instance, step, memory, names)
         elif isinstance(operation, Save | Restore):
             body += _state(number, operation, instance, names)
         elif isinstance(operation, Keep | Shift):
@@ -217,8 +217,14 @@ def compile_loop(
 
 
 def _step(
-    number: int, instance: Instance, step: float, substeps: int, names: dict[str, Any]
+    number: str,
+    operation: Step,
+    instance: Instance,
+    step: float,
+    memory: Memory,
+    names: dict[str, Any],
 ) -> list[str]:
+    substeps = memory.nodes[operation.component].substeps
     names[f"f{number}"] = instance.library.function("DoStep")
     names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
     names[f"h{number}"] = ctypes.c_double.from_param(step / substeps)
@@ -226,9 +232,14 @@ def _step(
     call = f"f{number}(c{number}, now, h{number}, past)"
     if substeps == 1:
         return [f"if s := {call}: fail(o{number}, s)"]
-    names[f"d{number}"] = [i * step / substeps for i in range(substeps)]
+    begins = [(i * step / substeps, (i + 1) / substeps) for i in range(substeps)]
+    names[f"d{number}"] = begins
     call = call.replace("now", "real(t + d)")
-    return [f"for d in d{number}:", f" if s := {call}: fail(o{number}, s)"]
+    inside = [f"if s := {call}: fail(o{number}, s)"]
+    for i, one in enumerate(operation.along):
+        names[f"o{number}_{i}"] = one
+        inside[:0] = _transfer(f"{number}_{i}", one, instance, memory, names)
+    return [f"for d, share in d{number}:", *(f" {line}" for line in inside)]
 
 
 def _forms(operation: Write | Ramp) -> dict[str, str]:
@@ -240,7 +251,7 @@ def _forms(operation: Write | Ramp) -> dict[str, str]:
 
 
 def _transfer(
-    number: int,
+    number: str,
     operation: Read | Write | Ramp,
     instance: Instance,
     memory: Memory,
@@ -280,7 +291,7 @@ def _transfer(
 
 
 def _state(
-    number: int, operation: Save | Restore, instance: Instance, names: dict[str, Any]
+    number: str, operation: Save | Restore, instance: Instance, names: dict[str, Any]
 ) -> list[str]:
     """Return the lines that get a component's state, or set it and free it: a get may allocate."""
     component = ctypes.c_void_p.from_param(instance.component)
@@ -302,6 +313,12 @@ def _state(
 def _keep(operation: Keep | Shift, memory: Memory) -> list[str]:
     assign = operation.change if isinstance(operation, Shift) else "="
     return [f"past{past} {assign} reals[{now}]" for now, past in memory.kept(operation)]
+
+
+def _setting(schedule: Schedule) -> list[Write | Ramp]:
+    """Return the operations that set inputs, for which values may be gathered."""
+    inside = [one for o in schedule.operations if isinstance(o, Step) for one in o.along]
+    return [*inside, *(o for o in schedule.operations if isinstance(o, Write | Ramp))]
 
 
 def _kept(schedule: Schedule) -> set[Port]:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from ..component import HELD
+from ..component import HELD, LINEAR, SAMPLED
 from ..fmu.description import Value, Variable
 
 Port = tuple[int, str]
@@ -15,9 +15,10 @@ Port = tuple[int, str]
 FAULT = "fault"
 
 NEWEST, MIDDLE, AHEAD, END, PAST = "newest", "middle", "ahead", "end", "past"
+ALONG = "along"
 """Which value an input is given, of its source's newest u and the kept one p of a step before:
 u; (u + p)/2; (3 u - p)/2, the middle of a step that the source has still to make; 2 u - p, its end;
-p.
+p; and along the step, at the end of each substep, (1 - s) p + s u with the share s that has passed.
 """
 
 
@@ -58,6 +59,16 @@ class Node:
         told = all(v.dependencies is not None for v in self.outputs.values())
         return variable.over_step == HELD or (variable.over_step is None and told)
 
+    def moves(self, name: str) -> bool:
+        """Return whether an input is to move on substep by substep towards its newest value.
+
+        Such a component takes it as linear from its own last step: with the newest value from the
+        first substep on it would have all of the change there, ahead of time.
+        """
+        variable = self.inputs[name]
+        taken = variable.over_step in (LINEAR, SAMPLED)
+        return self.substeps > 1 and taken and variable.kind == "Real"
+
     def taken(self, name: str, value: Value) -> Value:
         """Return what an input gets where its source gives a value."""
         factor, offset = self.transformed.get(name, (1.0, 0.0))
@@ -72,9 +83,13 @@ class Node:
 
 @dataclass(frozen=True)
 class Step:
-    """Let a component step."""
+    """Let a component step.
+
+    `along` sets inputs before each of its substeps, where it has several.
+    """
 
     component: int
+    along: tuple[Write, ...] = ()
 
 
 @dataclass(frozen=True)

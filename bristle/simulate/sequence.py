@@ -10,6 +10,7 @@ from ..fmu.description import Variable
 from .graph import at_level, find_late, lay_out, loop_members, read_early, signal_graph
 from .operations import (
     AHEAD,
+    ALONG,
     END,
     MIDDLE,
     NEWEST,
@@ -58,6 +59,8 @@ class _Plan:
         fed_back = {source for c in inside for source in nodes[c].sources.values()}
         self.early = read_early(nodes, self.refresh, fed_back)
         self.kept = {nodes[c].sources[name] for c, name in held}
+        along = {nodes[c].sources[name] for c in range(len(nodes)) for name in self._along(c)}
+        self.kept_for_substeps = along - self.kept
         self.jumping = self._jumping()
         self.operations: list[Operation] = []
         # When each output was read and each input written: only inputs that are older are set.
@@ -122,13 +125,28 @@ class _Plan:
         own = not ramped and self._ramps_alone(c, stepped)
         if own:
             values, ramped = dict.fromkeys(self._older(c), NEWEST), tuple(stepped)
-        self._write(c, {name: values[name] for name in node.sources if name in values}, own)
+        along = self._along(c)
+        rest = (name for name in node.sources if name in values and name not in along)
+        self._write(c, {name: values[name] for name in rest}, own)
         self.operations += [Ramp(c, ramped)] if ramped else []
-        past = tuple(name for name in node.outputs if (c, name) in self.kept)
+        kept = self.kept | self.kept_for_substeps
+        past = tuple(name for name in node.outputs if (c, name) in kept)
         self.operations += [Keep(c, past)] if past else []
-        self.operations.append(Step(c))
+        self._substeps(c, along)
         self._current.update({(c, name): self._clock for name in ramped if stepped[name]})
         self._show(c, {name: known for name, known in stepped.items() if name not in ramped})
+
+    def _along(self, c: int) -> list[str]:
+        """Return the inputs that move on substep by substep: their source's end is known."""
+        node = self.nodes[c]
+        known = (name for name, (d, _) in node.sources.items() if self._has_stepped(d, c))
+        return [name for name in known if node.moves(name)]
+
+    def _substeps(self, c: int, along: Sequence[str]) -> None:
+        """Let a component step, and have these inputs arrive at their newest value with it."""
+        given = writes(c, self.nodes[c], dict.fromkeys(along, ALONG))
+        self.operations.append(Step(c, tuple(given)))
+        self._written.update({(c, name): self._clock for name in along})
 
     def _ramped_by_others(self, c: int) -> tuple[str, ...]:
         """Return the held inputs that a foreign FMU interpolates over its step.
@@ -165,9 +183,10 @@ class _Plan:
         before = [n for n, (d, _) in node.sources.items() if d < c and (c, n) not in self.held]
         values, ramped = dict.fromkeys(self._held(c), MIDDLE), self._ramped_by_others(c)
         values.update(dict.fromkeys(ramped, PAST))
-        self._write(c, {**dict.fromkeys(before, NEWEST), **values})
+        along = self._along(c)
+        self._write(c, {**{n: NEWEST for n in before if n not in along}, **values})
         self.operations += [Ramp(c, ramped)] if ramped else []
-        self.operations.append(Step(c))
+        self._substeps(c, along)
         self._show(c, dict.fromkeys((name for name in values if name not in ramped), True))
 
     def _show(self, c: int, known: Mapping[str, bool]) -> None:
