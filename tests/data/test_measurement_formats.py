@@ -67,6 +67,25 @@ def test_numbers_keep_the_line_they_are_from(tmp_path: Path) -> None:
     assert table.lines[-1] == 3 + len(TIME)
 
 
+@pytest.mark.parametrize("end", ["", "\n# end"])  # a comment among the rows takes the slow way
+def test_blank_lines_are_no_samples(tmp_path: Path, end: str) -> None:
+    head, rows = "time [s],x [mm],F [kN]\n", body(",").split("\n")
+    parted = "\n".join([*rows[:40], "", "  ", *rows[40:]])
+    table = read(tmp_path, head + parted + end)
+    check(table)
+    assert table.lines[[39, 40]].tolist() == [41, 44]
+    check(read(tmp_path, (head + body(",") + end).replace("\n", "\r\r\n")))
+
+
+@pytest.mark.parametrize("end", ["", "\n# end"])
+def test_tabs_alone_are_a_row_of_missing_values(tmp_path: Path, end: str) -> None:
+    rows = body("\t").split("\n")
+    rows[7] = "\t\t"
+    table = read(tmp_path, "time [s]\tx [mm]\tF [kN]\n" + "\n".join(rows) + "\n\t\t" + end)
+    assert table.lines.tolist()[:80] == [*range(2, 82)]
+    assert np.isnan([values[7] for values in table.values.values()]).all()
+
+
 def test_gzip_and_other_encodings(tmp_path: Path) -> None:
     text = "time [s],x [mm],F [kN]\n" + body(",")
     check(read(tmp_path, gzip.compress(text.encode()), "run.csv.gz"))

@@ -81,9 +81,7 @@ def read_fast(lines: list[str], first: int, layout: Layout) -> Body | None:
     import pyarrow as pa
     from pyarrow.csv import ConvertOptions, ParseOptions, ReadOptions, read_csv
 
-    last = len(lines)
-    while last > first and not lines[last - 1].strip():
-        last -= 1
+    full = _full(lines, first, layout)
     names = [str(k) for k in range(len(layout.numeric))]
     convert = ConvertOptions(
         column_types=dict.fromkeys(names, pa.float64()),
@@ -91,15 +89,30 @@ def read_fast(lines: list[str], first: int, layout: Layout) -> Body | None:
         decimal_point="," if layout.comma else ".",
     )
     parse = ParseOptions(delimiter=layout.delimiter, ignore_empty_lines=False)
-    body = io.BytesIO("\n".join(lines[first:last]).encode())
+    body = io.BytesIO("\n".join([lines[k] for k in full]).encode())
     try:
         read = read_csv(body, ReadOptions(column_names=names), parse, convert)
     except pa.ArrowInvalid:
         return None
     values = [_floats(read[name]) for name in names]
-    if any(np.isinf(array).any() for array in values) or len(read) != last - first:
+    if any(np.isinf(array).any() for array in values) or len(read) != len(full):
         return None
-    return Body(values, np.arange(first + 1, last + 1))
+    return Body(values, np.array(full, dtype=np.int64) + 1)
+
+
+def _full(lines: list[str], first: int, layout: Layout) -> list[int]:
+    """Return the indices of the lines that are rows.
+
+    A blank line is no sample: it would count where times come from a given step. Tabs alone are a
+    row of missing values where tabs part columns, but at the end of a text.
+    """
+    last = len(lines)
+    while last > first and not lines[last - 1].strip():
+        last -= 1
+    tabs = len(layout.numeric) - 1 if layout.delimiter == "\t" else 0
+    return [
+        k for k in range(first, last) if lines[k].strip() or (tabs and lines[k].count("\t") == tabs)
+    ]
 
 
 def _floats(column: Any) -> Array:
@@ -134,7 +147,7 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
     places: list[int] = []
     not_numeric: dict[int, str] = {}
     notes: list[str] = []
-    full = [k for k in range(first, len(lines)) if lines[k].strip() and not is_comment(lines[k])]
+    full = [k for k in _full(lines, first, layout) if not is_comment(lines[k])]
     infinite = 0
     for k in full:
         fields = layout.split(lines[k].strip(" \n\r"))
