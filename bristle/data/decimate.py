@@ -40,15 +40,16 @@ _JUMPS = 4.0  # standard deviations by which samples about one leave a line wher
 
 @dataclass(frozen=True, eq=False)
 class Decimated:
-    """Pieces with fewer samples; `lost` of each piece says by channel where they tell nothing (n,).
+    """Pieces with fewer samples; `jumps` of each says by channel where a force jumps (n,).
 
-    They jump there, or the record of a channel that was moved in time has ended. `gain` is by
-    channel what filter and interpolation leave of white noise, where there was one; `noise` of each
-    piece that before them, of channels whose noise is not white behind them. `notes` says what was
-    done, none where nothing was.
+    `lost` of each piece says where the record of a channel that was moved in time holds nothing.
+    `gain` is by channel what filter and interpolation leave of white noise, where there was one;
+    `noise` of each piece that before them, of channels whose noise is not white behind them.
+    `notes` says what was done, none where nothing was.
     """
 
     even: Even
+    jumps: list[Mapping[str, Flags]]
     lost: list[Mapping[str, Flags]]
     gain: Mapping[str, float] = field(default_factory=dict)
     noise: list[Mapping[str, Noise]] = field(default_factory=list)
@@ -77,9 +78,12 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
     moved = moved or [InTime(channels) for _, channels, _ in even.pieces]
     if rate <= 0.0 or recorded < FAST * rate * (1.0 - 1e-6):
         left = {name: one.noise_left(name) for one in moved for name in one.between}
-        return Decimated(even, [one.lost for one in moved], left, [one.noise for one in moved])
+        none: list[Mapping[str, Flags]] = [{} for _ in moved]
+        lost: list[Mapping[str, Flags]] = [one.lost for one in moved]
+        return Decimated(even, none, lost, left, [one.noise for one in moved])
     every = int(recorded / rate + 1e-6)
-    pieces, lost, noise = [], [], []
+    pieces, jumps, noise = [], [], []
+    ended: list[Mapping[str, Flags]] = []
     gain: dict[str, float] = {}
     for (time, channels, measured), shift in zip(even.pieces, moved, strict=True):
         if len(time) // every < SHORTEST:
@@ -89,11 +93,12 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
         pieces.append((time[::every], kept, _all_within(measured, every)[::every]))
         short = {name: channels[name] for name, own in taps.items() if own is _short(every)}
         noise.append({n: shift.noise.get(n) or estimate_noise(y) for n, y in short.items()})
-        jumps = {name: _jumps(y, every, noise[-1][name].std) for name, y in short.items()}
-        lost.append({name: flags for name, flags in jumps.items() if flags.any()})
-        for name, flags in shift.lost.items():
-            beyond = ~_all_within(~flags, every)[::every]
-            lost[-1][name] = lost[-1].get(name, beyond) | beyond
+        forces = [name for name in short if name.endswith("force")]  # what models are held against
+        found = {n: _jumps(short[n], every, noise[-1][n].std) for n in forces}
+        jumps.append({name: flags for name, flags in found.items() if flags.any()})
+        ended.append(
+            {name: ~_all_within(~flags, every)[::every] for name, flags in shift.lost.items()}
+        )
         gain |= {name: shift.noise_left(name, own) for name, own in taps.items()}
     if not pieces:
         raise RecordError(
@@ -105,17 +110,17 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
         f"decimated from {plain(recorded, 4)} Hz to {plain(1.0 / step, 4)} Hz behind an anti-alias "
         "filter (linear phase)"
     )
-    count = sum(int(flags.sum()) for one in lost for flags in one.values())
+    count = sum(int(flags.sum()) for one in jumps for flags in one.values())
     if count:
-        note += f"; {count} samples beside jumps of {_named(lost)} are not judged"
+        note += f"; {count} samples beside jumps of {_named(jumps)} are not judged"
     return Decimated(
-        Even(pieces, replace(even.sampling, step=step), even.notes), list(lost), gain,
+        Even(pieces, replace(even.sampling, step=step), even.notes), list(jumps), ended, gain,
         list(noise), (note,),
     )  # fmt: skip
 
 
-def _named(lost: list[dict[str, Flags]]) -> str:
-    return ", ".join(dict.fromkeys(name for one in lost for name in one))
+def _named(jumps: list[dict[str, Flags]]) -> str:
+    return ", ".join(dict.fromkeys(name for one in jumps for name in one))
 
 
 def _taps(name: str, y: Array, every: int) -> Array:

@@ -72,6 +72,9 @@ class Measurement:
         False where a sample was missing and is interpolated.
     lost : mapping of (n,) arrays of bool
         By channel: True where that one alone says nothing, such as beyond the end of its range.
+    jumps : mapping of (n,) arrays of bool
+        By channel: True where it jumps between samples that were joined. Its value there is no
+        model's, but equilibrium holds: the filter was the same for all forces.
     noise : dict of float
         Standard deviation of each channel in SI; `noise_facts` how it was found, None where given.
     notes : tuple of str
@@ -107,6 +110,7 @@ class Measurement:
     source: str
     notes: tuple[str, ...] = field(default=())
     lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    jumps: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
     extra: Mapping[str, Extra] = field(default_factory=dict)
@@ -129,12 +133,19 @@ class Measurement:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def valid(self, *channels: str) -> NDArray[np.bool_]:
-        """Return at which samples (n,) all of these channels say something."""
+    def valid(self, *channels: str, jumps: bool = True) -> NDArray[np.bool_]:
+        """Return at which samples (n,) all of these channels say something.
+
+        Parameters
+        ----------
+        channels : their names
+        jumps : whether a channel says nothing where it jumps, as is right for a model's force
+        """
         valid = self.measured
         for channel in channels:
-            if channel in self.lost:
-                valid = valid & ~self.lost[channel]
+            for flags in (self.lost, self.jumps) if jumps else (self.lost,):
+                if channel in flags:
+                    valid = valid & ~flags[channel]
         return valid
 
     @property
@@ -163,6 +174,7 @@ class Measurement:
             channels={key: values[start:stop] for key, values in self.channels.items()},
             measured=self.measured[start:stop],
             lost={key: flags[start:stop] for key, flags in self.lost.items()},
+            jumps={key: flags[start:stop] for key, flags in self.jumps.items()},
             extra={key: one.of(slice(start, stop)) for key, one in self.extra.items()},
         )
 
@@ -193,6 +205,7 @@ class Measurement:
 
         return replace(
             self, channels=named(self.channels), units=named(self.units), lost=named(self.lost),
+            jumps=named(self.jumps),
             noise=named(self.noise), noise_facts=named(self.noise_facts),
             spikes=tuple(one._replace(channel=names.get(one.channel, one.channel))
                          for one in self.spikes),
@@ -312,7 +325,7 @@ def measurements_of(
             Measurement(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
                 tuple(notes), labels=labels, spikes=() if known.mask else spikes,
-                lost=fewer.lost[number - 1], extra=extra.at(piece),
+                lost=fewer.lost[number - 1], jumps=fewer.jumps[number - 1], extra=extra.at(piece),
             )
         )  # fmt: skip
     return out

@@ -48,9 +48,7 @@ def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
             del channels[fault.channel]  # displacement says the same, without it
         elif fault.fault == "clipping":
             lost[fault.channel] = beyond_range(values, noise.get(fault.channel, 0.0), fault.value)
-    known = {
-        name: run.measured & ~lost[name] if name in lost else run.measured for name in channels
-    }
+    known = {name: replace(run, lost=lost).valid(name) for name in channels}
     moved = in_time(channels, known, run.step, timing)
     for name in moved.between:
         noise[name] = noise.get(name, 0.0) * moved.noise_left(name)

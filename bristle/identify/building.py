@@ -27,6 +27,7 @@ from .equilibrium_system import (
     EquilibriumSystem,
     cross_products,
     equations_of,
+    judged,
     modes_of,
     ratios_of,
 )
@@ -287,9 +288,10 @@ def _left(runs: list[Response], found: Building, system: EquilibriumSystem) -> E
             (system.equations.weights @ level)[:, SKIP:]
             for level in (inertia + C @ run.v + K @ run.x, inertia)
         )
+        told = judged(run, unknown)[SKIP:]
         for row, i in enumerate(system.equations.levels):
-            rest[i].append(above[row] - np.median(above[row]))
-            whole[i].append(carried[row] - np.median(carried[row]))
+            rest[i].append(above[row, told] - np.median(above[row, told]))
+            whole[i].append(carried[row, told] - np.median(carried[row, told]))
     z, share = np.full(found.size, np.nan), np.full(found.size, np.nan)
     for row, i in enumerate(system.equations.levels):
         left = np.concatenate(rest[i])

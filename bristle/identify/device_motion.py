@@ -55,7 +55,7 @@ def measured_across(
 
     Parameters
     ----------
-    runs : of one rig, with one sampling step
+    runs : of one rig
     building : whose levels were measured
     device : that connects two of them, or the ground and one
     draws, seed : how many draws of the smoother's error, and their seed
@@ -75,17 +75,20 @@ def measured_across(
         None if (seen := _difference(run, *pair)) is None else smoothed_level(seen, _NAME, jerk)
         for run in runs
     ]
-    longest = max(len(run.time) for run in runs)
-    made: dict[tuple[bool, ...], Array] = {}
-    there = [one for one in smoothed if one is not None]
-    for have in dict.fromkeys(map(_have, there)):
-        alike = [one for one in there if _have(one) == have]
-        made[have] = level_draws(longest, alike, runs[0].step, draws, seed)
+    there = [(one, run) for one, run in zip(smoothed, runs, strict=True) if one is not None]
+    made: dict[tuple[tuple[bool, ...], float], Array] = {}
+    for have, dt in dict.fromkeys((_have(one), run.step) for one, run in there):
+        alike = [(one, run) for one, run in there if (_have(one), run.step) == (have, dt)]
+        longest = max(len(run.time) for _, run in alike)
+        made[have, dt] = level_draws(longest, [one for one, _ in alike], dt, draws, seed)
     return [
         None
         if one is None
         else DeviceMotion(
-            one["state"][:, 0], one["state"][:, 1], one["std"], made[_have(one)][:, : len(run.time)]
+            one["state"][:, 0],
+            one["state"][:, 1],
+            one["std"],
+            made[_have(one), run.step][:, : len(run.time)],
         )
         for one, run in zip(smoothed, runs, strict=True)
     ]

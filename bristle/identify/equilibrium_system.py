@@ -193,6 +193,20 @@ class EquilibriumSystem:
         return found, theta[m : m + self.n]
 
 
+def judged(run: Response, unknown: Device | None) -> NDArray[np.bool_]:
+    """Return where all was measured that the equations of a run take (n,).
+
+    Parameters
+    ----------
+    run : response of the building
+    unknown : the damper whose force is in no equation, None where there is none
+    """
+    if run.known is None:
+        return np.ones(run.x.shape[1], dtype=np.bool_)
+    there = run.known.equilibrium()
+    return there & run.known.force if unknown is None and run.force is not None else there
+
+
 def cross_products(
     runs: list[Response], building: Building, stiffness: Array, zeta: Array,
     unknown: Device | None, plain: bool,
@@ -224,6 +238,7 @@ def cross_products(
         else:
             x, v = simulated(run, building, stiffness, zeta, unknown)
             shown = np.vstack([np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1]))), v, one])
+        shown = shown * judged(run, unknown)  # what was not measured is in no sum
         slowest = round(2.0 * np.pi / modes_of(building, stiffness).omega[0] / run.dt)
         size = max(10, round(BLOCK / run.dt))
         size = max(size, min(slowest, (signals.shape[1] - SKIP) // BLOCKS))

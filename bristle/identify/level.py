@@ -24,31 +24,42 @@ JUMP = 6.0
 
 
 def smoothed_level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
-    """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have."""
+    """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have.
+
+    What was not measured of one channel the others tell, and the motion about it.
+    """
     n, dt = len(m.time), m.step
     y, r, have = np.zeros((n, 3)), np.zeros(3), np.zeros(3, dtype=np.bool_)
+    seen = np.ones((n, 3), dtype=np.bool_)
     for i, what in enumerate(("displacement", "velocity")):
         channel = f"{name}_{what}"
         if m.has(channel):
-            y[:, i], have[i] = m[channel], True
+            y[:, i], have[i], seen[:, i] = m[channel], True, m.valid(channel, jumps=False)
             r[i] = m.noise.get(channel, 0.0) ** 2
-    channel = f"{name}_acceleration_absolute"
+    channel, ground = f"{name}_acceleration_absolute", "ground_acceleration"
     if m.has(channel):
-        y[:, 2], have[2] = m[channel] - m["ground_acceleration"], True
-        r[2] = m.noise.get(channel, 0.0) ** 2 + m.noise.get("ground_acceleration", 0.0) ** 2
+        y[:, 2], have[2], seen[:, 2] = (
+            m[channel] - m[ground],
+            True,
+            m.valid(channel, ground, jumps=False),
+        )
+        r[2] = m.noise.get(channel, 0.0) ** 2 + m.noise.get(ground, 0.0) ** 2
     # A channel without any noise still is no better than its last digits.
     r = np.maximum(r, (1e-7 * np.std(y, axis=0)) ** 2 + 1e-30)
     added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
-    jerk = looser * _likeliest(y, r, have, dt, added)
+    jerk = looser * _likeliest(y, seen, r, have, dt, added)
     out = room(n)
-    kalman_smooth(_samples(y, r, have, dt), jerk + added, out)
+    kalman_smooth(_samples(y, r, have, dt, seen), jerk + added, out)
     std = np.sqrt(np.maximum(out.cov, 0.0))
     return {"state": out.state, "std": std, "jerk": jerk, "r": r, "have": have}
 
 
-def _samples(y: Array, r: Array, have: NDArray[np.bool_], dt: float) -> Samples:
+def _samples(
+    y: Array, r: Array, have: NDArray[np.bool_], dt: float, seen: NDArray[np.bool_] | None = None
+) -> Samples:
     """Return a level's channels (n, 3) of variances r (3,), with a wide guess of the beginning.
 
+    `seen` (n, 3) says which values were measured, None that all were.
     Where a channel is missing, the fastest change of the one below it says how large it is.
     """
     n, largest = len(y), np.max(np.abs(y), axis=0)
@@ -62,7 +73,8 @@ def _samples(y: Array, r: Array, have: NDArray[np.bool_], dt: float) -> Samples:
     cov = np.zeros(6)
     for c, (at, size) in enumerate(((0, wide), (3, speed), (5, rise))):
         cov[at] = 4.0 * r[c] if have[c] else size**2
-    return Samples(y, r, have, dt, np.where(have, y[0], 0.0), cov)
+    told = y if seen is None or seen.all() else np.where(seen, y, np.nan)
+    return Samples(told, r, have, dt, np.where(have, y[0], 0.0), cov)
 
 
 def jumps(a: Array, dt: float) -> Array:
@@ -73,15 +85,17 @@ def jumps(a: Array, dt: float) -> Array:
 
 
 def _likeliest(
-    y: Array, r: Array, have: NDArray[np.bool_], dt: float, added: Array, most: int = 4000
-) -> float:
+    y: Array, seen: NDArray[np.bool_], r: Array, have: NDArray[np.bool_], dt: float, added: Array,
+    most: int = 4000,
+) -> float:  # fmt: skip
     """Return the intensity of the white jerk that makes the strongest stretch likeliest."""
     n = len(y)
     if n > most:
         power = np.convolve(np.abs(y[:, int(np.argmax(have))]), np.ones(most), mode="valid")
         begin = int(np.argmax(power))
         y, added = y[begin : begin + most], added[begin : begin + most]
-    samples = _samples(y, r, have, dt)
+        seen = seen[begin : begin + most]
+    samples = _samples(y, r, have, dt, seen)
     highest = int(np.flatnonzero(have)[-1])
     third = np.diff(y[:, highest], n=3 - highest) / dt ** (3 - highest)
     top = np.log10(np.var(third) * dt + 1e-30)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,30 @@ from .level import corrected, level_draws, smoothed_level
 from .prepare import SHORTEST
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 FIRST_LEVEL = Device("", GROUND, 0)
 """Where the damper of a building without devices of its own sits."""
+
+
+class KnownSamples(NamedTuple):
+    """Which samples of a run were measured.
+
+    `motion`, `acceleration` (levels, n) of each level's displacement or velocity, and of its
+    accelerometer and the ground's; `force` (n,) of the damper; `others` (n,) of all other devices;
+    `smooth` (n,) where the damper's force does not jump either, between samples that were joined.
+    """
+
+    motion: Flags
+    acceleration: Flags
+    force: Flags
+    others: Flags
+    smooth: Flags
+
+    def equilibrium(self, level: int = 0) -> Flags:
+        """Return where the equilibrium of a level and all above it is known (n,)."""
+        there = np.vstack([self.acceleration[level:], self.motion, self.others[None, :]])
+        return np.asarray(there.all(axis=0), dtype=np.bool_)
 
 
 @dataclass(frozen=True)
@@ -49,7 +70,7 @@ class Response:
     the smoother leaves uncertain of x, v and relative acceleration; `draws` (levels, d, n, 3) draws
     of that error; `V_left` the noise left on V; `drive` the channel that V holds, in its own unit,
     "" where none was measured; `labels` what is known of the whole run; `extra` its channels
-    besides those that bristle knows.
+    besides those that bristle knows. `known` says where all that was measured, and not filled in.
     """
 
     name: str
@@ -73,6 +94,7 @@ class Response:
     device: Device = FIRST_LEVEL
     others: tuple[Load, ...] = ()
     across: DeviceMotion | None = None
+    known: KnownSamples | None = None
 
     @property
     def damped(self) -> bool:
@@ -179,7 +201,7 @@ def responses(
 
     Parameters
     ----------
-    measurements : runs of one rig, with one sampling step
+    measurements : runs of one rig
     building : whose levels were measured
     draws, seed : how many draws of the smoother's error, and their seed
     looser : factor of the jerk's intensity [1]
@@ -196,13 +218,16 @@ def responses(
     smoothed = [
         [smoothed_level(m, name, looser) for name in building.levels()] for m in measurements
     ]
-    longest = max(len(m.time) for m in measurements)
-    made: dict[tuple[int, tuple[bool, ...]], Array] = {}
+    steps = [m.step for m in measurements]
+    made: dict[tuple[int, tuple[bool, ...], float], Array] = {}
     for i in range(building.size):
-        for have in dict.fromkeys(_instruments(run[i]) for run in smoothed):
-            alike = [run[i] for run in smoothed if _instruments(run[i]) == have]
+        kinds = [(_instruments(run[i]), dt) for run, dt in zip(smoothed, steps, strict=True)]
+        for have, dt in dict.fromkeys(kinds):
             if not _is_smooth(i, have, building):
-                made[i, have] = level_draws(longest, alike, measurements[0].step, draws, seed + i)
+                alike = [k for k, kind in enumerate(kinds) if kind == (have, dt)]
+                longest = max(len(measurements[k].time) for k in alike)
+                runs = [smoothed[k][i] for k in alike]
+                made[i, have, dt] = level_draws(longest, runs, dt, draws, seed + i)
     across = measured_across(measurements, building, device, draws, seed + building.size, looser)
     out = []
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
@@ -212,11 +237,31 @@ def responses(
                 levels[i], error = corrected(one, m.step, draws, seed + i)
                 errors.append(error)
             else:
-                errors.append(made[i, _instruments(one)])
+                errors.append(made[i, _instruments(one), m.step])
         found = _response(m, levels, errors, _accelerations(m, building, levels))
-        found = replace(found, device=device, others=_loads(m, building, device), across=own)
+        found = replace(
+            found, device=device, others=_loads(m, building, device), across=own,
+            known=_known(m, building, device),
+        )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
     return out
+
+
+def _known(m: Measurement, building: Building, device: Device) -> KnownSamples | None:
+    """Return which samples were measured, None where all were."""
+    if m.measured.all() and not m.lost and not m.jumps:
+        return None
+    motion, acceleration = [], []
+    for name in building.levels():
+        either = [f"{name}_displacement", f"{name}_velocity"]
+        motion.append(np.any([m.valid(one) for one in either if m.has(one)], axis=0))
+        shown = ["ground_acceleration", f"{name}_acceleration_absolute"]
+        acceleration.append(m.valid(*shown, jumps=False))
+    others = [f"{one.name}_force" for one in building.devices if one is not device]
+    return KnownSamples(
+        np.array(motion), np.array(acceleration), m.valid("force", jumps=False),
+        m.valid(*others, jumps=False), m.valid("force"),
+    )  # fmt: skip
 
 
 def _loads(m: Measurement, building: Building, device: Device) -> tuple[Load, ...]:

@@ -158,6 +158,7 @@ class StructureProblem(Problem):
 def structure_run(
     name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
     draws: Array, keep: NDArray[np.bool_] | None = None, drawn: Array | None = None,
+    measured: NDArray[np.bool_] | None = None,
 ) -> StructureRun:  # fmt: skip
     """Return a run of the samples that count; the first ones are the smoother's and skipped.
 
@@ -169,8 +170,9 @@ def structure_run(
     draws : (d, n, 4) draws of the error of x, v, a, V
     keep : (n,) which samples count; None for all
     drawn : (d, n) draws of the error of a force that follows from the motion [N]; None for none
+    measured : (n,) False where a sample was filled in; None if none was
     """
-    whole = Run(name, dt, *motion, force, noise, draws, force_draws=drawn)
+    whole = Run(name, dt, *motion, force, noise, draws, measured=measured, force_draws=drawn)
     if keep is None:
         index, skip = np.arange(len(force)), whole.skip
     else:
@@ -178,6 +180,7 @@ def structure_run(
     x, v, a, V = (part[index] for part in motion)
     return StructureRun(
         name, dt, x, v, a, V, force[index], noise, draws[:, index], skip, whole=whole, keep=index,
+        measured=None if measured is None else measured[index],
         force_draws=None if drawn is None else drawn[:, index],
     )  # fmt: skip
 
@@ -218,11 +221,23 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
     if response.force is not None and response.device.crosses(level):
         force = force - response.force
         noise = float(np.hypot(noise, response.noise_force))
-    a = response.a[level]
-    return _of(
-        response,
-        structure_run(response.name, response.dt, (x, v, a, response.V), force, noise, error),
-    )
+    motion = (x, v, response.a[level], response.V)
+    made = structure_run(
+        response.name, response.dt, motion, force, noise, error,
+        measured=_known(response, level, response.device.crosses(level)),
+    )  # fmt: skip
+    return _of(response, made)
+
+
+def _known(response: Response, level: int, loaded: bool) -> NDArray[np.bool_] | None:
+    """Return where a level's equilibrium is known (n,), with the damper's force if it is `loaded`.
+
+    None where all was measured.
+    """
+    if response.known is None:
+        return None
+    there = response.known.equilibrium(level)
+    return there & response.known.force if loaded and response.force is not None else there
 
 
 def layer_run(response: Response, building: Building) -> StructureRun:
@@ -242,7 +257,7 @@ def layer_run(response: Response, building: Building) -> StructureRun:
     x, v, a = response.x[0], response.v[0], response.a[0]
     made = structure_run(
         response.name, response.dt, (x, v, a, response.V), force, noise, _error(response, 0),
-        sliding(response),
+        sliding(response), measured=_known(response, 0, response.device.crosses(0)),
     )  # fmt: skip
     return _of(response, made)
 
@@ -292,8 +307,24 @@ def damper_run(
         if len(found.error):
             noise, drawn = found.white, found.error
     keep = moving(v, std) if blind_at_rest(law) else None
-    made = structure_run(response.name, response.dt, motion, force, noise, error, keep, drawn)
+    made = structure_run(
+        response.name, response.dt, motion, force, noise, error, keep, drawn,
+        _known_across(response),
+    )  # fmt: skip
     return _of(response, made)
+
+
+def _known_across(response: Response) -> NDArray[np.bool_] | None:
+    """Return where the damper's force and the motion of its ends are known (n,).
+
+    None where all was measured.
+    """
+    known = response.known
+    if known is None:
+        return None
+    ends = [level for level in response.device.levels if level != GROUND]
+    shown = known.equilibrium() if response.force is None else known.smooth
+    return np.asarray(known.motion[ends].all(axis=0) & shown, dtype=np.bool_)
 
 
 class AcrossDamper(NamedTuple):

@@ -91,7 +91,7 @@ def test_fast_runs_are_decimated_and_that_is_said(tmp_path, capsys) -> None:
     np.testing.assert_allclose(run["displacement"], 1e-3 * slow["x [mm]"], atol=2e-5)
     # What the short filter leaves of white noise of 0.1 N.
     assert run.noise["force"] == pytest.approx(0.1 * 6.0**0.5 / 4.0 / 2.0**0.5, rel=0.2)
-    assert run.lost["force"].any()
+    assert run.jumps["force"].any()
     main(["study", "new", str(tmp_path / "all"), "--rate", "0", "--data", *map(str, files)])
     assert Study(tmp_path / "all").read()[0].step == pytest.approx(0.0005)
 
@@ -135,7 +135,7 @@ def test_a_force_does_not_ring_where_it_jumps() -> None:
     given = even_run(force=clean + rng.normal(0.0, 0.05, t.size), voltage=np.floor(t % 3.0))
     found = decimated(given, 500.0)
     _, y, _ = found.even.pieces[0]
-    lost = found.lost[0]["force"]
+    lost = found.jumps[0]["force"]
     error = (y["force"] - clean[::4])[~lost]
     assert np.max(np.abs(error)) < 6.0 * found.gain["force"] * 0.05
     assert np.std(error) == pytest.approx(found.gain["force"] * 0.05, rel=0.05)
