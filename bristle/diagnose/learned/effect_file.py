@@ -12,6 +12,7 @@ from ...physics.drive import drive_named, unit_for
 from .along import FOLLOWING, GIVEN, MEMORIES
 from .curve import BOUND, Curve, Formula, bounds_of
 from .slip import SLIP
+from .source_text import class_data, in_docstring, literal, row
 
 MATH = tuple(
     one.__name__ for one in (math.copysign, math.cos, math.exp, math.log, math.sin, math.tanh)
@@ -52,8 +53,8 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         f'    name = "{name}"',
         f'    sites = ("{curve.of.site}",)',
         *_fields(curve),
-        f'    source = "{origin}"',
-        f'    expect = "an error that depends on {curve.of.cause or _signals(curve)}"',
+        f"    source = {literal(origin)}",
+        f"    expect = {literal(f'an error that depends on {curve.of.cause or _signals(curve)}')}",
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
     ]
     held = _assumed(curve, table)
@@ -101,7 +102,7 @@ def _listed(held: Sequence[str]) -> list[str]:
         text = f"{tuple(held)!r}".replace("'", '"')
         return [f"    assumed = {text}  # no fit moves them"]
     rows = [" ".join(names[k : k + 6]) for k in range(0, len(names), 6)]
-    return ["    assumed = (  # no fit moves them", *(f"        {row}" for row in rows), "    )"]
+    return ["    assumed = (  # no fit moves them", *(f"        {one}" for one in rows), "    )"]
 
 
 def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
@@ -145,12 +146,14 @@ def _imports(
         f"from bristle.physics.effect import Effect, {', '.join(kinds)}",
     ]
     if table:
-        lines += ["", *_row("KNOTS = ", curve.knots)]
+        lines += ["", *row("KNOTS = ", curve.knots)]
         unit = curve.along_unit
-        lines.append(f'"""Where the {_kind(curve)} is given: {curve.signal.words} [{unit}]."""')
+        at = in_docstring(curve.signal.words)
+        lines.append(f'"""Where the {_kind(curve)} is given: {at} [{unit}]."""')
     if curve.across:
-        lines += ["", *_row("LEVELS = ", curve.levels)]
-        lines.append(f'"""The same: {curve.second.words} [{curve.across_unit}]."""')
+        lines += ["", *row("LEVELS = ", curve.levels)]
+        at = in_docstring(curve.second.words)
+        lines.append(f'"""The same: {at} [{curve.across_unit}]."""')
     unit = drive_named(curve.drive).unit
     return [
         *lines,
@@ -176,7 +179,7 @@ def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
         f"class {''.join(word.capitalize() for word in name.split('_'))}(Effect):",
         f'    """{_title(name)}: {_subject(curve, "that depends on")}.',
         "",
-        f"        {curve.of.formula},   {g}",
+        f"        {curve.of.formula},   {in_docstring(g)}",
         "",
         "    Learned from measurements, not derived. Leaves out what those runs did not do: doubt",
         f"    it where the motion goes further{end}",
@@ -189,9 +192,9 @@ def _title(name: str) -> str:
 
 
 def _subject(curve: Curve, joined: str) -> str:
-    """Return what a curve is: its part, and its signal after a word or two."""
+    """Return what a curve is, for a docstring: its part, and its signal after a word or two."""
     words = curve.of.words
-    return words if curve.of.alone else f"{words} {joined} {_signals(curve)}"
+    return words if curve.of.alone else f"{words} {joined} {in_docstring(_signals(curve))}"
 
 
 def _kind(curve: Curve) -> str:
@@ -211,14 +214,14 @@ def _table(curve: Curve) -> list[str]:
         unit = "" if curve.across_unit == "1" else f" {curve.across_unit}"
         meanings = [f"value where {curve.second.words} is {at:.4g}{unit}" for at in curve.levels]
     lines, each = ["    tables = {"], len(curve.knots)
-    for k, (row, meaning) in enumerate(zip(curve.rows, meanings, strict=True)):
+    for k, (name, meaning) in enumerate(zip(curve.rows, meanings, strict=True)):
         lines += [
-            f'        "{row}": Table(',
+            f'        "{name}": Table(',
             "            KNOTS,",
-            *(f"            {line}" for line in _row("", curve.values[k * each :][:each], ",")),
+            *(f"            {line}" for line in row("", curve.values[k * each :][:each], ",")),
             f'            "{curve.unit}",',
             f"            ({low:.4g}, {high:.4g}),",
-            f'            "{meaning}",',
+            f"            {literal(meaning)},",
             "        ),",
         ]
     return [*lines, "    }"]
@@ -244,7 +247,7 @@ def _fields(curve: Curve) -> list[str]:
         "passive": curve.passive,
         "zero_at_rest": curve.rests or part.alone or part.expression != "{g}",
     }
-    texts = [(key, f"{value!r}".replace("'", '"')) for key, value in given.items()]
+    texts = [(key, class_data(value)) for key, value in given.items()]
     return [f"    {key} = {text}" for key, text in texts if text not in ("{}", "()")]
 
 
@@ -259,7 +262,8 @@ def _declared(parameters: Sequence[Declared], kept: Sequence[str] = ()) -> list[
         low, high = (0.02 * value, 50.0 * value) if name in POSITIVE else (-size, size)
         low = 0.0 if name in kept else low
         bounds = f"({low:.4g}, {high:.4g})"
-        lines.append(f'        "{name}": Parameter({value:.6g}, "{unit}", {bounds}, "{text}"),')
+        told = f"{literal(unit)}, {bounds}, {literal(text)}"
+        lines.append(f'        "{name}": Parameter({value:.6g}, {told}),')
     return lines
 
 
@@ -286,10 +290,3 @@ def _only_storey(curve: Curve) -> list[str]:
         return []
     text = "number of the storey; 0: every storey"
     return [f'        "which": Parameter({curve.place.storey}.0, "1", (0.0, 20.0), "{text}"),']
-
-
-def _row(begin: str, values: tuple[float, ...], end: str = "") -> list[str]:
-    """Return the lines of a tuple of numbers, some to a line."""
-    texts = [f"{float(f'{value:.6g}')!r}," for value in values]  # 0.0, for numba wants one type
-    rows = [" ".join(texts[k : k + 6]) for k in range(0, len(texts), 6)]
-    return [f"{begin}(", *(f"    {row}" for row in rows), f"){end}"]

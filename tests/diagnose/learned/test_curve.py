@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from dataclasses import replace
 from math import log
 
@@ -193,6 +194,23 @@ def test_a_name_that_is_taken_is_refused_and_nothing_stays():
     with pytest.raises(PhysicsError, match=r"gas_spring.*taken"), defined({"gas_spring": text}):
         pass
     assert set(EFFECTS) == before
+
+
+@pytest.mark.parametrize("origin", ['study of rig "B"', r"study C:\new\"", 'study """ö\'s"""'])
+def test_what_a_study_is_called_stands_in_the_file_as_it_is(origin):
+    text = effect_text("learned_9", curve_of("force", "displacement"), origin)
+    with defined({"learned_9": text}):
+        assert EFFECTS["learned_9"].source == origin
+
+
+def test_what_a_channel_is_called_stands_in_the_file_as_it_is():
+    name = r"oil\new of \"\"\"pump"
+    curve = Curve("force", name, (), (-1.0, 0.0, 2.0), (0.0, 0.1, 0.3), measured="1")
+    tree = ast.parse(effect_text("learned_9", curve, "made for a test, 2026"))
+    made = next(node for node in tree.body if isinstance(node, ast.ClassDef))
+    assert f"that depends on {name}." in (ast.get_docstring(made) or "")
+    texts = {node.value for node in ast.walk(made) if isinstance(node, ast.Constant)}
+    assert {name, f"an error that depends on {name}", f"{name}, which runs tell"} <= texts
 
 
 def test_a_text_that_is_not_right_leaves_nothing_behind():
