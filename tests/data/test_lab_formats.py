@@ -334,7 +334,25 @@ def test_instants_of_several_countries(tmp_path: Path, form: str, start: datetim
     same(table)
 
 
+@pytest.mark.parametrize("day", ["", "12.03.2024 "])
+def test_whole_seconds_stand_without_a_fraction_in_any_row(day: str) -> None:
+    for clocks in (["10:00:00", "10:00:00.004", "10:00:01"], ["10:00:00", "10:00:00,004"]):
+        found = seconds_of([day + clock for clock in clocks])
+        np.testing.assert_allclose(found, [0.0, 0.004, 1.0][: len(clocks)])
+
+
+def test_times_of_day_from_midnight_in_a_workbook(tmp_path: Path) -> None:
+    def clocked(sheet, book) -> None:
+        for k in range(N):
+            cell = sheet.cell(5 + k, 1)
+            cell.value = (datetime(2024, 3, 12) + timedelta(seconds=T[k])).time()
+            cell.number_format = "hh:mm:ss.000"
+
+    same(read_table(workbook(tmp_path / "run.xlsx", clocked)))
+
+
 def test_what_is_no_instant() -> None:
+    assert seconds_of(["2024-03-12T10:00:00Z", "2024-03-12T10:00:01"]) is None
     assert seconds_of(["12.03.2024 25:00:00"]) is None
     assert seconds_of(["a", "b"]) is None
     assert seconds_of([]) is None

@@ -32,7 +32,10 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
     if found is None:
         return None
     instants, clock = found
-    seconds = np.array([(one - instants[0]).total_seconds() for one in instants])
+    try:
+        seconds = np.array([(one - instants[0]).total_seconds() for one in instants])
+    except TypeError:  # some have a time zone, some none: nothing tells how far apart they are
+        return None
     if clock:
         seconds += _DAY * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
     return seconds
@@ -47,7 +50,7 @@ def _by_iso(texts: Sequence[str]) -> tuple[list[datetime], bool] | None:
 
 def _by_form(texts: Sequence[str], form: str) -> tuple[list[datetime], bool] | None:
     try:
-        datetime.strptime(texts[0], form)  # most forms fail here
+        _read(texts[0], form)  # most forms fail here
         return [_read(text, form) for text in texts], form in _CLOCKS
     except ValueError:
         return None
