@@ -33,6 +33,12 @@ WITHIN = 0.9
 BOUND = 30.0
 """Times the largest value of a learned curve: bounds of each of its values."""
 
+ROOM = 10.0
+"""Times the range of a measured channel: how far beyond it the bounds of what follows it are."""
+
+LEAST = {"K": 0.0, "degC": -273.15}
+"""Where a unit ends: no temperature is lower."""
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -203,6 +209,19 @@ def bounds_of(curve: Curve) -> tuple[float, float]:
     """Return the bounds of the values of a curve, in its unit."""
     size = BOUND * max(max(abs(value) for value in curve.values), 1e-9)
     return max(curve.of.low, -size), max(size, 5.0) if curve.of.unit == "1" else size
+
+
+def followed(curve: Curve) -> tuple[float, float, float]:
+    """Return value and bounds of the parameter that follows a measured channel.
+
+    Only a model without runs keeps that value; the bounds leave the channel of later runs room.
+    """
+    knots, unit = (
+        (curve.levels, curve.across_unit) if curve.across else (curve.knots, curve.along_unit)
+    )
+    first, last = knots[0], knots[-1]
+    room = max(ROOM * (last - first), abs(first), abs(last))
+    return 0.5 * (first + last), max(first - room, LEAST.get(unit, float("-inf"))), last + room
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ...physics.drive import drive_named, unit_for
 from .along import FOLLOWING, GIVEN, MEMORIES
-from .curve import BOUND, Curve, Formula, bounds_of
+from .curve import BOUND, Curve, Formula, bounds_of, followed
 from .slip import SLIP
 from .source_text import class_data, in_docstring, literal, row
 
@@ -37,17 +37,16 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     formula : what stands for the table, None for the table itself
     """
     body = _hooks(curve, formula)
-    memory: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
-    parameters = [*memory, *_followed(curve)]
-    only = [*_only_value(curve), *_only_storey(curve)]
-    kept = formula.positive if formula else ()
+    parameters = [
+        *_declared([(n, value, *MEMORIES[n]) for n, value in curve.memory]),
+        *_only_followed(curve),
+        *(_of_formula(formula) if formula else []),
+        *_only_value(curve),
+        *_only_storey(curve),
+    ]
     table = formula is None and not curve.of.parameter
-    if formula:
-        parameters += [
-            (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
-        ]
     lines = [
-        *_imports(name, curve, body, bool(parameters or only), table),
+        *_imports(name, curve, body, bool(parameters), table),
         *_about(name, curve, formula),
         "",
         f'    name = "{name}"',
@@ -60,27 +59,11 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     held = _assumed(curve, table)
     if held:
         lines += _listed(held)
-    if parameters or only:
-        lines += [
-            "    parameters = {",
-            *_declared(parameters, kept),
-            *only,
-            "    }",
-        ]
+    if parameters:
+        lines += ["    parameters = {", *parameters, "    }"]
     if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
-
-
-def _followed(curve: Curve) -> list[Declared]:
-    """Return the parameter that follows a measured channel; none where the curve follows none."""
-    if not curve.measured:
-        return []
-    knots, unit = (
-        (curve.levels, curve.across_unit) if curve.across else (curve.knots, curve.along_unit)
-    )
-    words = curve.signals[-1].words
-    return [(FOLLOWING, 0.5 * (knots[0] + knots[-1]), unit, f"{words}, which runs tell")]
 
 
 def _assumed(curve: Curve, table: bool) -> tuple[str, ...]:
@@ -265,6 +248,24 @@ def _declared(parameters: Sequence[Declared], kept: Sequence[str] = ()) -> list[
         told = f"{literal(unit)}, {bounds}, {literal(text)}"
         lines.append(f'        "{name}": Parameter({value:.6g}, {told}),')
     return lines
+
+
+def _of_formula(formula: Formula) -> list[str]:
+    """Return the lines that declare the parameters of a closed form."""
+    text = formula.text
+    named = [(n, value, unit, f"{n} in g = {text}") for n, value, unit in formula.parameters]
+    return _declared(named, formula.positive)
+
+
+def _only_followed(curve: Curve) -> list[str]:
+    """Return the line that declares what follows a measured channel; none where nothing does."""
+    if not curve.measured:
+        return []
+    unit = curve.across_unit if curve.across else curve.along_unit
+    value, low, high = followed(curve)
+    told = f"{literal(unit)}, ({low:.4g}, {high:.4g})"
+    text = literal(f"{curve.signals[-1].words}, which runs tell")
+    return [f'        "{FOLLOWING}": Parameter({value:.6g}, {told}, {text}),']
 
 
 def _only_value(curve: Curve) -> list[str]:

@@ -213,6 +213,24 @@ def test_what_a_channel_is_called_stands_in_the_file_as_it_is():
     assert {name, f"an error that depends on {name}", f"{name}, which runs tell"} <= texts
 
 
+@pytest.mark.parametrize(
+    ("knots", "unit", "bounds"),
+    [
+        ((-5.0, 0.0, 5.0), "N", (-105.0, 105.0)),  # symmetric: its middle says nothing of its size
+        ((0.0, 2.0), "N", (-20.0, 22.0)),
+        ((1.0e5, 1.01e5), "Pa", (-1000.0, 2.02e5)),  # a run of another level stays within
+        ((290.0, 330.0), "K", (0.0, 730.0)),
+    ],
+)
+def test_what_follows_a_channel_has_bounds_from_the_range_of_the_channel(knots, unit, bounds):
+    values = tuple(0.1 * k for k in range(len(knots)))
+    curve = Curve("force", "oil", (), knots, values, measured=unit)
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        signal = EFFECTS["learned_9"].parameters["signal"]
+    assert signal.bounds == pytest.approx(bounds)
+    assert signal.value == pytest.approx(0.5 * (knots[0] + knots[-1]))
+
+
 def test_a_text_that_is_not_right_leaves_nothing_behind():
     before = set(EFFECTS)
     good = effect_text("learned_8", curve_of("force", "displacement"), "a test, 2026")
