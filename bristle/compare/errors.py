@@ -150,6 +150,8 @@ def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
 def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
     """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
     loss = losses(np.concatenate(list(normalised)))
+    if not loss.any():  # a model that meets every sample exactly
+        return 0.0, 0.0
     blocks = finder.blocks
     counts = np.bincount(blocks.label, weights=loss > 0.0)
     means = np.bincount(blocks.label, weights=loss)[counts > 0] / counts[counts > 0]
