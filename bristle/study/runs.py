@@ -60,24 +60,46 @@ def _idle(piece: Measurement) -> str:
 
 
 def split_in_time(pieces: list[Measurement]) -> Runs:
-    """Return the first 70 % of a single run's samples for training, and the rest held out."""
-    total = sum(len(piece.time) for piece in pieces)
-    wanted, train, holdout = round(SPLIT * total), [], []
-    for piece in pieces:
-        size = len(piece.time)
-        if wanted >= size:
+    """Return the first 70 % of a single run's samples for training, and the rest held out.
+
+    The cut moves to the next place where no part is too short for a fit: it may be a gap between
+    two pieces.
+    """
+    sizes = [len(piece.time) for piece in pieces]
+    cut = _cut(sizes, round(SPLIT * sum(sizes)))
+    left, train, holdout = cut, [], []
+    for piece, size in zip(pieces, sizes, strict=True):
+        if left >= size:
             train.append(piece)
-        elif wanted <= 0:
+        elif left <= 0:
             holdout.append(piece)
         else:
-            train.append(piece.part(0, wanted, f"{piece.name}, first {SPLIT:.0%}"))
-            holdout.append(piece.part(wanted, size, f"{piece.name}, last {1.0 - SPLIT:.0%}"))
-        wanted -= size
+            share = left / size
+            train.append(piece.part(0, left, f"{piece.name}, first {share:.0%}"))
+            holdout.append(piece.part(left, size, f"{piece.name}, last {1.0 - share:.0%}"))
+        left -= size
+    rest = 100.0 * (1.0 - cut / sum(sizes))
     note = (
-        "There is one run. It is split in time, the last 30 % held out: weaker than a "
+        f"There is one run. It is split in time, the last {rest:.0f} % held out: weaker than a "
         "separate run, because its motion, voltage and temperature are like those in training."
     )
     return Runs(train, holdout, (note,))
+
+
+def _cut(sizes: list[int], wanted: int) -> int:
+    """Return the number of samples for training: next to `wanted`, no part below `SHORTEST`.
+
+    Where pieces are too short for that, it is `wanted`: what needs more of them refuses them.
+    """
+    allowed, begin = [], 0
+    for size in sizes:
+        end = begin + size
+        if begin:
+            allowed.append(begin)
+        if size >= 2 * SHORTEST:
+            allowed.append(min(max(wanted, begin + SHORTEST), end - SHORTEST))
+        begin = end
+    return min(allowed, key=lambda cut: abs(cut - wanted), default=wanted)
 
 
 def refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
