@@ -127,3 +127,26 @@ def gain_of(corrections: Sequence[Correction], channel: str) -> float:
     """Return what a channel shows by what it should show, by its corrections: 1 without any."""
     gains = [one.value for one in corrections if (one.channel, one.fault) == (channel, "gain")]
     return float(np.prod(gains))
+
+
+def after(known: Sequence[Correction], found: Sequence[Correction]) -> list[Correction]:
+    """Return corrections that were found where others are made already, beside those.
+
+    Parameters
+    ----------
+    known : corrections that were made
+    found : of the channels as they are with them: a zero is in corrected units, and is taken off
+        before a gain and a sign are
+    """
+    return [
+        one._replace(value=one.value * _shown_by(known, one.channel))
+        if one.fault == "bias"
+        else one
+        for one in found
+    ]
+
+
+def _shown_by(known: Sequence[Correction], channel: str) -> float:
+    """Return what a channel shows of a unit, by corrections of its gain and sign."""
+    turned = sum((one.channel, one.fault) == (channel, "sign") for one in known)
+    return gain_of(known, channel) * (-1.0) ** turned

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..data.channels import ChannelSpec, at_device
-from ..data.corrections import Correction
+from ..data.corrections import Correction, after
 from .channel_file import channel_as_toml
 from .run_file import EXCLUDE, RunFile, corrections_as_toml, run_as_toml
 
@@ -93,7 +93,7 @@ def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correct
         if corrections is None:
             continue
         known = [Correction(**one) for one in table.unwrap().get("correct", [])]
-        table["correct"] = corrections_as_toml([*known, *corrections])
+        table["correct"] = corrections_as_toml([*known, *after(known, corrections)])
     return tomlkit.dumps(document)
 
 

@@ -11,7 +11,7 @@ from bristle.cli import main
 from bristle.data.channels import ChannelSpec
 from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.recording import check_recording
-from bristle.data.corrections import Correction, set_right, wrong_value
+from bristle.data.corrections import Correction, after, set_right, wrong_value
 from bristle.data.line_removal import without_lines
 from bristle.data.mains import mains_of
 from bristle.data.measurement import Measurement, measurements_of
@@ -224,6 +224,16 @@ def test_corrections_take_faults_back():
     wanted = (Correction("force", "bias", 7.0), Correction("force", "gain", 1.25),
               Correction("force", "sign", -1.0))  # fmt: skip
     assert np.allclose(set_right(faulty, 0.002, wanted)["force"], force)
+
+
+def test_a_zero_that_is_found_beside_a_known_gain_is_taken_off():
+    _, channels = run(6)
+    force = channels["force"]
+    shown = {"force": -1.25 * (force + 3.0)}
+    known = [Correction("force", "gain", 1.25), Correction("force", "sign", -1.0)]
+    left = set_right(shown, 0.002, known)["force"] - force
+    whole = [*known, *after(known, [Correction("force", "bias", float(np.mean(left)))])]
+    assert np.allclose(set_right(shown, 0.002, whole)["force"], force)
 
 
 @pytest.mark.parametrize(
