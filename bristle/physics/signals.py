@@ -43,6 +43,16 @@ PARAMETERS: dict[str, Parameter] = {
     "frequency_end": Parameter(10.0, "Hz", (0.0, 1e6), "frequency of a chirp at its end"),
 }
 
+TAKEN: dict[str, tuple[str, ...]] = {
+    "constant": ("level",),
+    "sine": ("amplitude", "frequency", "phase", "offset", "start"),
+    "chirp": ("amplitude", "frequency", "frequency_end", "phase", "offset", "start", "duration"),
+    "steps": ("steps",),
+    "half_sine": ("amplitude", "offset", "start", "duration"),
+    "csv": ("file",),
+}
+"""Which parameters each kind takes: those above, and the two of its samples."""
+
 
 def value(
     kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]

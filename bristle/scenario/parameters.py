@@ -6,14 +6,13 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import PhysicsError, RecordError
+from ..errors import RecordError
 from ..findings import Findings, number, unknown, written
 from ..fmu.description import Value, Variable
-from ..physics.record import read_two_column
-from ..physics.signals import read_steps
 from .document import FILE_PARAMETERS
 from .library import Library
-from .parts import Part, existing_file
+from .parts import Part
+from .signals import check_signal
 
 _INTEGER_RANGE = (-(2**31), 2**31 - 1)
 _CHOICES = re.compile(r"\bone of:? ((?:[\w-]+, )*[\w-]+)")
@@ -145,31 +144,4 @@ def check_together(part: Part, folder: Path, findings: Findings) -> None:
                 part.places[name],
                 f"{part.name}.{name} does nothing while {part.name}.{switch} is false.",
             )
-    kind = part.value("kind")
-    if part.file is None and isinstance(kind, str):
-        if kind == "csv" and "file" in part.variables:
-            _check_csv(part, folder, findings)
-        if kind == "steps" and "steps" in part.variables:
-            _check_steps(part, findings)
-
-
-def _check_csv(part: Part, folder: Path, findings: Findings) -> None:
-    path = part.places.get("file") or part.places.get("kind", part.path)
-    value, where = part.value("file"), f"{part.name}.file"
-    if not value:
-        findings.error(path, f'{where} is missing: kind = "csv" reads a file.')
-        return
-    file = existing_file(str(value), folder, path, where, findings)
-    if file:
-        try:
-            read_two_column(file, header=None)
-        except PhysicsError as error:
-            findings.error(path, f"{where}: {error}")
-
-
-def _check_steps(part: Part, findings: Findings) -> None:
-    try:
-        read_steps(str(part.value("steps") or ""))
-    except PhysicsError as error:
-        path = part.places.get("steps") or part.places.get("kind", part.path)
-        findings.error(path, f"{part.name}.{error}")
+    check_signal(part, folder, findings)
