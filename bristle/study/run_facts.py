@@ -20,7 +20,8 @@ from .run_titles import counted_names
 
 _NUMBER = r"\d+(?:[.,p]\d+)?"  # "1p5" stands for 1.5 where a point would end a name
 _UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
-_TOKEN = re.compile(rf"(?<![\d.])({_NUMBER})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z])")
+_SIGN = r"(?:(?<![^_= ])-)?"  # T=-10C and cold_-10C have one; in run-10C the minus parts words
+_TOKEN = re.compile(rf"(?<![\d.])({_SIGN}{_NUMBER})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z])")
 _SPELLED = {"pct": "%", "percent": "%", "C": "degC"}
 _FILE = ("file", "run", "name", "datei", "filename")
 
@@ -208,7 +209,8 @@ def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
             )
     target = PLAIN.get(named) or UNITS.get(named, "")
     number = target != "" or known is not None
-    wanted = rf"[-+]?{_NUMBER}" if number else r"[A-Za-z0-9.]+"
+    sign = "[-+]?" if before else rf"(?:\+|{_SIGN})"  # alone, a pattern reads as names are read
+    wanted = sign + _NUMBER if number else r"[A-Za-z0-9.]+"
     match = re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}", file.stem + "_")
     match = match or re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}$", file.stem)
     if match is None:

@@ -21,7 +21,7 @@ from bristle.fmu.description import read_description
 from bristle.physics.drive import DRIVES, VOLTAGE, declared_for, text_for, unit_for
 from bristle.physics.effect import EFFECTS
 from bristle.study.create import create_study
-from bristle.study.run_facts import RunChoices, rows_of_table
+from bristle.study.run_facts import RunChoices, facts_of, rows_of_table
 from bristle.study.study import Study
 
 RATE = 200.0
@@ -147,6 +147,29 @@ def test_a_table_beside_the_files_gives_level_role_and_labels(lab, tmp_path) -> 
     assert [run.role for run in runs] == list(roles)
     assert runs[1].labels["temperature"] == 21.5
     assert runs[1].labels["batch"] == "B1"
+
+
+@pytest.mark.parametrize(
+    ("names", "values"),
+    [
+        (["T=-10degC_a", "T=20degC_b"], [-10.0, 20.0]),
+        (["cold_-10C", "warm 40C"], [-10.0, 40.0]),
+        (["-1p5C", "a -5 C"], [-1.5, -5.0]),
+        (["run-10C", "run_1-20C"], [10.0, 20.0]),
+    ],
+)
+def test_a_minus_in_a_name_is_a_sign_where_no_word_stands_before_it(names, values) -> None:
+    found, _ = facts_of([Path(f"{name}.csv") for name in names], RunChoices(), commanded=True)
+    assert [one.labels["temperature"] for one in found] == values
+
+
+@pytest.mark.parametrize(
+    ("pattern", "name", "value"),
+    [("{}A", "run-1A", 1.0), ("{}A", "run_-1A", -1.0), ("run{}A", "run-1A", -1.0)],
+)
+def test_a_pattern_without_words_reads_the_sign_as_names_are_read(pattern, name, value) -> None:
+    (found,), _ = facts_of([Path(f"{name}.csv")], RunChoices(levels=[pattern]), commanded=False)
+    assert dict(found.levels) == {"current": value}
 
 
 def test_numbers_that_count_files_are_no_levels(tmp_path) -> None:
