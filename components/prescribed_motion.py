@@ -4,7 +4,10 @@ from bristle.fmu.source import SignalSlave
 
 
 class PrescribedMotion(SignalSlave):
-    """Prescribed motion of a test bench: displacement as a test signal, velocity its derivative."""
+    """Prescribed motion of a test bench: displacement as a test signal, velocity its derivative.
+
+    Before and after the samples of a CSV the rod stands still where the nearest of them is.
+    """
 
     rated = True
 

@@ -13,7 +13,8 @@ from ..physics.signals import CONSTANT, CSV, PARAMETERS, STEPS, rate, value
 class Constants(NamedTuple):
     """A signal: `scale` times that of `physics.signals.value`, `delay` [s] later.
 
-    The rate is shown behind the value if it is `rated`.
+    The rate is shown behind the value if it is `rated`. That is the motion of a rod: before and
+    after samples of the kind "csv" it stands at the nearest of them, where others are zero.
     """
 
     kind: int
@@ -196,7 +197,10 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
         0.
     """
     kind, p, times, samples, scale, delay, rated = c
-    outputs[0] = scale * value(kind, time - delay, p, times, samples)
+    at = time - delay
     if rated:
-        outputs[1] = scale * rate(kind, time - delay, p, times, samples)
+        outputs[1] = scale * rate(kind, at, p, times, samples)
+        if kind == CSV:  # with a velocity of zero it cannot go back to zero
+            at = min(max(at, times[0]), times[len(times) - 1])
+    outputs[0] = scale * value(kind, at, p, times, samples)
     return 0

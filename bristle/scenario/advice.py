@@ -18,6 +18,7 @@ from ..physics.laws import LAWS, laws_of
 from .connections import Wire
 from .library import Library
 from .parts import Part, Run
+from .signals import check_rod
 from .stability import longest_step
 
 _DAMPER_PORTS = frozenset(("displacement", "velocity", "force"))  # and that of its command
@@ -100,6 +101,8 @@ def advise(
     _rollback(run, network, findings)
     _loops(network, findings)
     _designs(network, library, findings)
+    for part in parts.values():
+        check_rod(part, run, findings)
     for damper, drive in dampers_of(network):
         _holding(damper, network, findings)
         _limits(damper, drive, network, findings)

@@ -61,3 +61,43 @@ def test_parameters_that_a_kind_takes_leave_no_word(tmp_path: Path) -> None:
     for kind, taken in TAKEN.items():
         keys = ", ".join([f'kind = "{kind}"', *(values[name] for name in taken)])
         assert warnings(tmp_path, keys) == []
+
+
+CHIRP = 'kind = "chirp", amplitude = 0.005, frequency = 1.0, frequency_end = 3.0'
+
+
+def test_a_rod_that_jumps_where_a_chirp_ends_is_told(tmp_path: Path) -> None:
+    (text,) = warnings(tmp_path, f"{CHIRP}, duration = 0.6")
+    assert text == (
+        "rod: the displacement jumps by -0.00476 m with velocity 0 where the chirp ends, at "
+        "t = 0.6 s; duration = 0.5 ends it at its offset."
+    )
+    assert warnings(tmp_path, f"{CHIRP}, duration = 0.5") == []
+    assert warnings(tmp_path, f"{CHIRP}, duration = 2.1") == []  # behind the end of the run
+
+
+def test_the_duration_that_is_proposed_is_right(tmp_path: Path) -> None:
+    for phase in (0.3, -2.0, 7.0):
+        keys = f"{CHIRP}, duration = 0.1, phase = {phase}"
+        (text,) = warnings(tmp_path, keys)
+        better = text.partition("duration = ")[2].split()[0]
+        assert float(better) > 0.0
+        assert warnings(tmp_path, keys.replace("0.1", better)) == []
+
+
+def test_a_rod_that_jumps_where_a_sine_begins_is_told(tmp_path: Path) -> None:
+    sine = 'kind = "sine", amplitude = 0.004, start = 0.5'
+    assert warnings(tmp_path, f"{sine}, phase = 1.5707963267948966") == [
+        "rod: the displacement jumps by 0.004 m with velocity 0 where the sine begins, at "
+        "t = 0.5 s; phase = 0 or start = 0 is right."
+    ]
+    assert warnings(tmp_path, sine) == []
+    assert warnings(tmp_path, f"{sine}, phase = 1.5".replace("0.5", "0.0")) == []
+
+
+def test_a_rod_stands_where_its_samples_end_and_a_signal_may_jump(tmp_path: Path) -> None:
+    assert warnings(tmp_path, 'kind = "csv", file = "motion.csv"') == []
+    file = tmp_path / "my.toml"
+    text = SCENARIO.format(keys=f"{CHIRP}, duration = 0.6")
+    file.write_text(text.replace("PrescribedMotion", "SignalSource"))
+    assert [one for one in check_scenario(file) if one.level == "warning"] == []
