@@ -13,7 +13,7 @@ import pytest
 
 from bristle.cli import main
 from bristle.conformance import conform
-from bristle.errors import ScenarioError
+from bristle.errors import BuildError, ScenarioError
 from bristle.fmu import catalogue
 from bristle.fmu.build import build, plan
 from bristle.fmu.controller import MEASURED
@@ -72,6 +72,20 @@ def test_the_page_shows_the_template_without_its_comments(file: Path) -> None:
 
 def test_what_is_measured_are_the_ports_of_every_controller() -> None:
     assert Measured._fields == tuple(MEASURED)
+
+
+def test_an_edited_file_is_read_again(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    start = text[text.index("        super().declare_law()") :].splitlines()[0] + "\n"
+    for name in ("one", "two"):  # of one size, and within a second
+        law = f'        self.add_parameter("{name}", 1.0, "V", "a level", (0.0, 9.0))\n'
+        file.write_text(text.replace(start, start + law), encoding="utf-8")
+        assert plan(str(file), starts={name: 2.0}).baked["starts"] == {name: 2.0}
+    with pytest.raises(BuildError, match='no parameter "one"'):
+        plan(str(file), starts={"one": 2.0})
+    file.unlink()
+    with pytest.raises(BuildError, match=r"my_controller\.py: cannot be read"):
+        catalogue.component_class(file)
 
 
 def test_it_samples_on_its_own_clock(file: Path) -> None:

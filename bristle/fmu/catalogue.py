@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import hashlib
 import re
 import sys
 import tomllib
@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any
 
 from .. import units
-from ..errors import BuildError
+from ..errors import BuildError, StudyError
 from ..physics.forms import split_form
 from ..physics.law import LAWS
 from ..physics.user import own_laws
@@ -110,29 +110,43 @@ def _words(law: str) -> list[str]:
 
 
 def _own_source(law: str) -> Path:
-    """Return the file of the component that is a damper of a user's own law, written if need be."""
-    path = cache_folder() / "components" / f"{'_'.join(_words(law))}_damper.py"
+    """Return the file of the component that is a damper of a user's own law, written if need be.
+
+    All projects share the folder, and each text has its own: laws of one name differ in their
+    first lines.
+    """
+    from ..data.files import write_whole  # here: what only lists components needs no numpy
+
     about = LAWS[law].first_line().replace("\\", "/").replace('"', "'")
     text = _OWN_DAMPER.format(law=law, component=_own_component(law), about=about)
-    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+    folder = cache_folder() / "components" / hashlib.sha256(text.encode()).hexdigest()[:12]
+    path = folder / f"{'_'.join(_words(law))}_damper.py"
+    if not path.is_file() or path.read_bytes() != text.encode():
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise BuildError(f"{path}: cannot be written ({error.strerror or error}).") from None
+            write_whole(path, text)
+        except StudyError as error:
+            raise BuildError(str(error)) from None
     return path
 
 
-@cache
 def component_class(path: Path) -> type[Slave]:
-    """Return the component class that a source file defines.
+    """Return the component class that a source file defines, as the file is now.
 
     Raises
     ------
     BuildError
-        If the file defines none, or more than one.
+        If the file cannot be read, or defines none, or more than one.
     """
-    module = _load(path)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BuildError(f"{path}: cannot be read ({error.strerror or error}).") from None
+    return _class_of(path, content)
+
+
+@cache
+def _class_of(path: Path, content: bytes) -> type[Slave]:
+    module = _load(path, content)
     classes = [
         value
         for value in vars(module).values()
@@ -145,15 +159,13 @@ def component_class(path: Path) -> type[Slave]:
     return classes[0]
 
 
-def _load(path: Path) -> ModuleType:
-    name = f"_bristle_component_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+def _load(path: Path, content: bytes) -> ModuleType:
+    module = ModuleType(f"_bristle_component_{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module
     try:
-        spec.loader.exec_module(module)
+        # Not by Python's loader: its bytecode stays, of a file that changes within a second.
+        exec(compile(content, str(path), "exec", dont_inherit=True), module.__dict__)
     except Exception as error:  # whatever a component of the user's own raises
         raise BuildError(f"{path}: {type(error).__name__}: {error}") from error
     return module

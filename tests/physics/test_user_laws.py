@@ -259,6 +259,27 @@ def test_its_damper_is_an_fmu_that_carries_the_law(tmp_path: Path) -> None:
     assert "stribeck.on" in variables
 
 
+def test_the_component_of_a_law_is_no_file_that_others_rewrite(tmp_path: Path) -> None:
+    user.load_law(written(tmp_path / "mine"))
+    mine = catalogue.source("OwnRubbingDamper")
+    text = mine.read_text(encoding="utf-8")
+    first_line = text.split('    """')[1].splitlines()[0].rstrip('"')
+    user.load_law(written(tmp_path / "theirs", **{first_line: "Another law of that name."}))
+    theirs = catalogue.source("OwnRubbingDamper")
+    assert "Another law of that name." in theirs.read_text(encoding="utf-8")
+    assert mine.read_text(encoding="utf-8") == text, "the other project reads its own file"
+
+
+def test_the_component_of_a_law_is_written_beside_and_put_in_place(tmp_path: Path) -> None:
+    user.load_law(written(tmp_path))
+    file = catalogue.source("OwnRubbingDamper")
+    text = file.read_text(encoding="utf-8")
+    file.write_text("half of it", encoding="utf-8")
+    (tmp_path / "read").hardlink_to(file)  # sees what is written in place, and no replacement
+    assert catalogue.source("OwnRubbingDamper").read_text(encoding="utf-8") == text
+    assert (tmp_path / "read").read_text(encoding="utf-8") == "half of it"
+
+
 def test_compiled_it_is_what_python_gives(tmp_path: Path) -> None:
     import numpy as np
 
