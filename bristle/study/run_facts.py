@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 
 from ..data.channels import DRIVE, PLAIN
@@ -44,6 +44,14 @@ class RunChoices:
     rate: float | None = None
     mask: bool = False
     test: Sequence[Path | str] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a rate that is none with a StudyError."""
+        if self.rate is not None and not 0.0 <= self.rate < inf:
+            raise StudyError(
+                f"the rate to which runs are decimated is {self.rate:g} Hz (--rate); 0 keeps all "
+                "samples, a positive number is right else."
+            )
 
 
 @dataclass(frozen=True)

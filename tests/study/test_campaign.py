@@ -210,6 +210,14 @@ def test_what_is_wrong_with_a_pattern_is_one_clear_word(lab, tmp_path, choices, 
     assert not (tmp_path / "rig").exists()
 
 
+@pytest.mark.parametrize("rate", ["-5", "nan", "inf"])
+def test_a_rate_that_is_none_is_refused(lab, tmp_path, capsys, rate) -> None:
+    new = ["study", "new", str(tmp_path / "rig"), "--data", str(lab), f"--rate={rate}"]
+    assert main(new) == 2
+    assert f"is {rate} Hz (--rate); 0 keeps all samples" in capsys.readouterr().err
+    assert not (tmp_path / "rig").exists()
+
+
 @pytest.mark.parametrize(
     ("rows", "what"),
     [
