@@ -12,7 +12,7 @@ from ..data.labels import label_text
 from ..draw.style import percent
 from ..quantity import plain, quantity
 from ..quantity import with_interval as with_interval
-from ..study.reading import names_of_runs
+from ..study.reading import names_of_runs, place_of_run
 from ..study.run_file import TEST
 
 if TYPE_CHECKING:
@@ -68,20 +68,15 @@ def _at_bound(value: Value) -> bool:
 
 def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
     """Return header and rows: a line per run, or per piece where gaps have cut it."""
-    roles = {run.name.rpartition("/")[2]: run.role for run in study.settings.runs}
+    roles = _roles(study, measured)
     labelled = any(run.labels or run.levels for run in study.settings.runs)
-    single = sum(run.role != TEST for run in study.settings.runs) == 1
     header = ["run", "role", "duration [s]", "rate [Hz]", "samples", "channels"]
     header += ["known"] if labelled else []
     rows = []
     for run in measured:
-        file = run.source.replace("\\", "/").rpartition("/")[2]
-        role = roles.get(file, "")
-        if single and role != TEST:
-            role = "held out" if "last" in run.name else "train"
         rows.append(
             [
-                run.name, "held out" if role == "holdout" else role, plain(run.duration, 4),
+                run.name, roles[run.name], plain(run.duration, 4),
                 plain(run.sampling.rate, 5), str(len(run.time)), ", ".join(run.channels),
                 *([_known(study, run)] if labelled else []),
             ]
@@ -90,6 +85,18 @@ def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str]
     for one in study.settings.excluded:
         rows.append([names[one.file, one.piece], "left out", *["-"] * (len(header) - 2)])
     return header, rows
+
+
+def _roles(study: Study, measured: Sequence[Measurement]) -> dict[str, str]:
+    """Return what each measurement is for, by its name, as the report calls it."""
+    settings = study.settings
+    listed = {(run.file, run.piece): run.role for run in settings.runs}
+    roles = {one.name: listed[place_of_run(study.folder, settings, one.name)] for one in measured}
+    if sum(role != TEST for role in listed.values()) == 1:  # it is split in time
+        split = study.runs()
+        roles |= {one.name: "train" for one in split.train}
+        roles |= {one.name: "holdout" for one in split.holdout}
+    return {name: "held out" if role == "holdout" else role for name, role in roles.items()}
 
 
 def _known(study: Study, run: Measurement) -> str:
