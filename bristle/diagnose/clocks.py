@@ -266,7 +266,7 @@ def _told(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[SensorFa
             )
         )  # fmt: skip
     if (rated or off) and abs(usual) > max(
-        rule.sure * float(np.median(clocks.late_std)), rule.least_delay * runs[0].dt
+        rule.sure * float(np.median(clocks.late_std)), rule.least_delay * max(run.dt for run in runs)
     ):
         out.append(_late(usual, float(np.median(clocks.late_std)), "In every run", ""))
     for k in off:

@@ -182,7 +182,7 @@ def _late_drive(
     """Return the delay of the voltage's record that fits best, the law refitted to it."""
     if steady(train):
         return None
-    model, dt = before.model, train.runs[0].dt
+    model, dt = before.model, max(run.dt for run in train.runs)
     grid = dt * np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
     grid = grid[grid <= LATEST]
     at_first = _loss(model, train)

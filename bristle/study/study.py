@@ -435,8 +435,8 @@ class Study:
         if not path.is_file():
             return None
         verdict = current(read_json(path), str(path))
-        other = other_than(str(verdict.get("data", "")), self.data, self.settings)
-        if not other:
+        known = str(verdict.get("data", ""))  # a verdict of an older version has none
+        if not known or not (other := other_than(known, self.data, self.settings)):
             return verdict
         again = f"Diagnose again:  {command('diagnose', self.folder)}"
         note = f"{other[:1].upper()}{other[1:]} are no longer those of this verdict. {again}"
