@@ -265,8 +265,9 @@ def _told(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[SensorFa
                 f'[{{channel = "force", fault = "clock", value = {clocks.rate:.3g}}}].',
             )
         )  # fmt: skip
+    coarsest = max(run.dt for run in runs)
     if (rated or off) and abs(usual) > max(
-        rule.sure * float(np.median(clocks.late_std)), rule.least_delay * max(run.dt for run in runs)
+        rule.sure * float(np.median(clocks.late_std)), rule.least_delay * coarsest
     ):
         out.append(_late(usual, float(np.median(clocks.late_std)), "In every run", ""))
     for k in off:
