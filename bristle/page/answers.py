@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BristleError
+from .stamp import stamp
 
 LONGEST = 600.0
 """Seconds that an answer may take: a scenario's first run compiles all laws, a minute or more."""
@@ -22,11 +23,6 @@ LARGEST = 1024**3
 """Memory [bytes] beyond which a worker is replaced after its answer."""
 KEPT = 64 * 1024**2
 """Bytes of answers that are kept."""
-DEPENDS = ("study.toml", "model.toml", "verdict.json", "reports/identify.json")
-"""Files of a study that its views show."""
-
-
-_DESIGNED = ("design/passive/passive.json",)
 
 
 class ViewError(BristleError):
@@ -37,17 +33,6 @@ class ViewError(BristleError):
     def __init__(self, told: Mapping[str, Any]) -> None:
         super().__init__(str(told["error"]))
         self.told = {key: told[key] for key in ("error", "kind", "file", "text") if key in told}
-
-
-def stamp(folder: Path) -> str:
-    """Return a text that changes with a study's files and its history."""
-    parts = []
-    folders = ("history", "history/undone", "reports", "export", "design", "comparisons")
-    for name in (*DEPENDS, *folders, *_DESIGNED):
-        with suppress(OSError):
-            about = (folder / name).stat()
-            parts.append(f"{name}:{about.st_mtime_ns}:{about.st_size}")
-    return " ".join(parts)
 
 
 class Answers:

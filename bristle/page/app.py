@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import BristleError, StudyError
 from ..version import __version__
-from .answers import Answers, Compiling, stamp
+from .answers import Answers, Compiling
 from .commands import COMMANDS, order_of
 from .consent import consent, waiting_texts
 from .designs import write_design
@@ -22,6 +22,7 @@ from .files import files_of, is_given, kind_of
 from .jobs import Jobs
 from .message import PACKED, Answer, Handler, Request, RequestError, as_json
 from .names import UPLOADS, batch_name, file_name
+from .stamp import stamp
 
 LARGEST_UPLOAD = 256 * 1024**2
 """Bytes of a file that may be dropped: as much as the reader of measurements takes."""
