@@ -9,6 +9,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
+from ..physics.user_text import text_of
 from ..trust import digest, is_trusted, readable, remember
 from .message import RequestError
 
@@ -25,7 +26,7 @@ def waiting_texts(folder: Path) -> list[dict[str, Any]]:
     """
     found = []
     for file in own_files(folder):
-        text = file.read_text(encoding="utf-8", errors="replace")
+        text = text_of(file, "replace")
         if not is_trusted(text):
             name = file.relative_to(folder).as_posix()
             found.append({"file": name, "text": readable(text), "digest": digest(text)})
@@ -45,7 +46,7 @@ def consent(folder: Path, name: object, shown: object) -> None:
     for file in own_files(folder):
         if file.relative_to(folder).as_posix() != name:
             continue
-        text = file.read_text(encoding="utf-8", errors="replace")
+        text = text_of(file, "replace")
         if digest(text) != shown:
             raise RequestError(
                 f"{name}: the file has changed since it was shown. Read it again.",

@@ -30,7 +30,7 @@ from .law import LAWS, Law, law_names
 from .parameter import fields_of
 from .probe import probe
 from .probe_law import probe_law
-from .user_text import EFFECT, LAW, Dialect, FlawError, read
+from .user_text import EFFECT, LAW, Dialect, FlawError, read, text_of
 
 PACKAGE = "bristle_own_effects"
 
@@ -271,7 +271,7 @@ def _load(files: list[Path], word: str) -> tuple[list[Loaded], bool]:
         try:
             if not path.is_file():  # a folder, or a pipe, which would be read for ever
                 raise OSError("it is no file")
-            text = path.read_text(encoding="utf-8-sig")
+            text = text_of(path)
         except (OSError, UnicodeDecodeError) as error:
             found[shown] = Loaded(shown, None, f"{shown}: cannot be read ({error}).")
             continue

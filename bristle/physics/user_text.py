@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 from .effect import HOOKS, Q
@@ -21,6 +22,24 @@ class FlawError(Exception):
     def __init__(self, text: str, line: int = 0) -> None:
         super().__init__(text)
         self.line = line
+
+
+def text_of(path: Path, errors: str = "strict") -> str:
+    """Return the text of a user's file, to which consent is given; no mark of its encoding counts.
+
+    Editors of Windows put a byte order mark before it. A text read with it would be another one.
+
+    Parameters
+    ----------
+    path : the file
+    errors : what becomes of bytes that are no UTF-8, as `open` takes it
+
+    Raises
+    ------
+    OSError, UnicodeDecodeError
+        If the file cannot be read.
+    """
+    return path.read_text(encoding="utf-8-sig", errors=errors)
 
 
 class Dialect(NamedTuple):

@@ -28,6 +28,7 @@ from bristle.errors import StudyError
 from bristle.page import app as page_app
 from bristle.page.app import App
 from bristle.page.commands import order_of
+from bristle.page.consent import consent, waiting_texts
 from bristle.page.message import RequestError
 from bristle.page.packing import pack, unpack
 from bristle.study import Study, create_study
@@ -447,6 +448,22 @@ def test_consent_is_to_the_text_that_was_shown(
         assert own.post(path, given).status == 200
         assert trust.is_trusted(file.read_text())
         assert own.get(path).json["texts"] == []
+
+
+def test_consent_counts_for_a_file_with_a_byte_order_mark(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(trust.VARIABLE)
+    monkeypatch.setenv("BRISTLE_STATE", str(tmp_path / "state"))
+    files = sorted((home / "lab").glob("run_*.csv"))
+    folder = create_study(home / "marked", files, law="bingham").study.folder
+    (folder / "effects" / "rub.py").write_text(template("rub"), encoding="utf-8-sig")
+    assert "not run" in Study(folder).own_effects[0].error
+    (shown,) = waiting_texts(folder)
+    assert shown["text"] == template("rub")
+    consent(folder, shown["file"], shown["digest"])
+    assert Study(folder).own_effects[0].error == ""
+    assert waiting_texts(folder) == []
 
 
 def test_commands_of_the_page_are_never_given_trust() -> None:
