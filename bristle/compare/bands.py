@@ -53,35 +53,57 @@ class Spectrum:
 
 
 def spectrum(predictions: Sequence[RunPrediction]) -> Spectrum:
-    """Return the spectrum of residual, expected noise and measured output over all runs."""
-    from scipy.signal import csd, welch
+    """Return the spectrum of residual, expected noise and measured output over all runs.
 
-    size = min(1024, *(len(one.residual) for one in predictions))
-    rate = 1.0 / predictions[0].dt
-    lines = None
+    Runs of different rates share the lines up to half the lowest rate. What a faster run holds
+    beyond is left out.
+    """
     limit = _SPIKE * max(1.0, z_scale(np.concatenate([one.normalised for one in predictions])))
     errors = [np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in predictions]
     total = sum(len(one.residual) for one in predictions)
-    sums = np.zeros((4, size // 2 + 1))
-    cross = np.zeros(size // 2 + 1, dtype=complex)
+    slowest = max(one.dt for one in predictions)
+    span = min(1024 * slowest, *(len(one.residual) * one.dt for one in predictions))
+    lines = np.fft.rfftfreq(round(span / slowest), slowest).astype(np.float64)
+    sums = np.zeros((4, len(lines)))
+    cross = np.zeros(len(lines), dtype=complex)
     for one, error in zip(predictions, errors, strict=True):
         weight = len(error) / total
-        options = {"fs": 1.0 / one.dt, "nperseg": size}
-        lines, residual = welch(error, **options)
-        white = 2.0 * one.noise**2 * one.dt
-        carried = np.mean(welch(one.carried, **options, axis=-1)[1], axis=0)
-        predicted = one.predicted[one.skip :]
-        measured = one.measured[one.skip :]
-        sums[0] += weight * residual
-        sums[1] += weight * (white + carried)
-        sums[2] += weight * welch(measured, **options)[1]
-        sums[3] += weight * welch(predicted, **options)[1]
-        cross += weight * csd(error, predicted, **options)[1]
-    assert lines is not None
+        powers, joint = _powers(one, error, span, lines)
+        sums += weight * powers
+        cross += weight * joint
     with np.errstate(invalid="ignore", divide="ignore"):
         coherence = np.nan_to_num(np.abs(cross) ** 2 / (sums[0] * sums[3]))
-    bands = _bands(predictions, errors, rate, lines, coherence, sums[0])
+    bands = _bands(predictions, errors, 1.0 / slowest, lines, coherence, sums[0])
     return Spectrum(lines, sums[0], sums[1], sums[2], bands)
+
+
+def _powers(
+    one: RunPrediction, error: Array, span: float, lines: Array
+) -> tuple[Array, NDArray[np.complex128]]:
+    """Return the power of error, noise, measured and predicted output, and the cross power.
+
+    Parameters
+    ----------
+    one : the run
+    error : (n,) its residual, spikes cut
+    span : s, the length of a segment: it sets one frequency resolution for all runs
+    lines : (k,) Hz, where the powers are asked for
+
+    Returns
+    -------
+    powers : (4, k) unit^2/Hz
+    joint : (k,) unit^2/Hz, of error and predicted output
+    """
+    from scipy.signal import csd, welch
+
+    options = {"fs": 1.0 / one.dt, "nperseg": min(round(span / one.dt), len(error))}
+    predicted, measured = one.predicted[one.skip :], one.measured[one.skip :]
+    own, power = welch(error, **options)
+    noise = 2.0 * one.noise**2 * one.dt + np.mean(welch(one.carried, **options)[1], axis=0)
+    seen, model = welch(measured, **options)[1], welch(predicted, **options)[1]
+    joint = csd(error, predicted, **options)[1]
+    powers = np.array([np.interp(lines, own, each) for each in (power, noise, seen, model)])
+    return powers, np.interp(lines, own, joint)
 
 
 def edges(rate: float, duration: float) -> Array:
@@ -110,8 +132,11 @@ def _bands(
     found, expected, freedom = (np.zeros(len(cuts) - 1) for _ in range(3))
     for one, error in zip(predictions, errors, strict=True):
         f, mine = _periodogram(error, one.dt)
+        inside = f <= cuts[-1] * (1.0 + 1e-6)  # a faster run holds more than all runs share
+        f, mine = f[inside], mine[inside]
         white = np.full(len(f), 2.0 * one.noise**2 * one.dt)
-        noise = white + np.mean([_periodogram(d, one.dt)[1] for d in one.carried], axis=0)
+        carried = [_periodogram(d, one.dt)[1][inside] for d in one.carried]
+        noise = white + np.mean(carried, axis=0)
         width = f[1] - f[0]
         weight = len(one.residual) / sum(len(other.residual) for other in predictions)
         label = np.clip(np.searchsorted(cuts, f, side="right") - 1, 0, len(cuts) - 2)
@@ -126,9 +151,9 @@ def _bands(
     p = chi2.sf(ratio * freedom, np.maximum(freedom, 1.0))
     out = []
     for i, (low, high) in enumerate(itertools.pairwise(cuts)):
-        inside = (lines >= low) & (lines < high)
-        weights = power[inside]
-        shared = float(np.average(coherence[inside], weights=weights)) if weights.sum() else 0.0
+        within = (lines >= low) & (lines < high)
+        weights = power[within]
+        shared = float(np.average(coherence[within], weights=weights)) if weights.sum() else 0.0
         out.append(
             Band(
                 float(low), float(high), float(np.sqrt(ratio[i])), float(np.sqrt(found[i])),
