@@ -36,8 +36,9 @@ def commands(study: Study) -> list[str]:
     lines.append(command("study", "check", new))
     law = ""
     for step in study.steps():
-        lines += _step(step, old, new, law)
-        law = _law(study, step)
+        present = _law(study, step)
+        lines += _step(step, old, new, law, present)
+        law = present
     return [*lines, *(command(word, new) for word in ("compare", "diagnose", "report"))]
 
 
@@ -69,8 +70,11 @@ def _channel(name: str, spec: ChannelSpec) -> list[str]:
     return ["--channel", f"{name}={'-' if spec.sign < 0 else ''}{spec.column}{unit}"]
 
 
-def _step(step: Step, old: str, new: str, law: str) -> list[str]:
-    """Return what makes a step of the history again; nothing for the first model."""
+def _step(step: Step, old: str, new: str, law: str, present: str) -> list[str]:
+    """Return what makes a step of the history again; nothing for the first model.
+
+    `law` is that of the model before the step, `present` that of its own.
+    """
     verb, _, rest = step.what.partition(" ")
     if verb == "begin":
         return []
@@ -79,8 +83,9 @@ def _step(step: Step, old: str, new: str, law: str) -> list[str]:
     if step.what == "identify the building":
         return [command("identify", new, "--structure")]
     if verb == "identify":
-        other = rest.split(" + ")[0]
-        return [command("identify", new, *(_other_law(law, other) if other != law else []))]
+        # Not by the step's words: they name a table without its knots.
+        options = _other_law(law, present) if present != law else []
+        return [command("identify", new, *options)]
     return [_copy(f"{old}/history/{step.number:03d}/model.toml", f"{new}/model.toml")]
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shlex
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from study.made import bench_run, write
 
 from bristle.cli import build_parser, main
-from bristle.data.model import read_model
+from bristle.data.model import new_model, read_model
 from bristle.report.reproduce import AGAIN, commands
 from bristle.study import Study, create_study
 
@@ -90,10 +91,6 @@ def test_a_history_of_fits_is_repeated_with_its_laws(study: Study) -> None:
     study.add_step("identify bingham + stribeck + gas_spring", "", model)
     study.undo()
     lugre = read_model(study.history.model_file(0))
-    from dataclasses import replace
-
-    from bristle.data.model import new_model
-
     study.add_step("identify lugre", "", new_model("lugre"))
     study.add_step("identify lugre", "", new_model("lugre"))
     study.add_step("identify the building", "", replace(lugre))
@@ -102,6 +99,20 @@ def test_a_history_of_fits_is_repeated_with_its_laws(study: Study) -> None:
     assert told == [
         f"bristle identify {name} --law lugre", f"bristle identify {name}",
         f"bristle identify {name} --structure",
+    ]  # fmt: skip
+
+
+def test_a_fit_with_a_table_of_the_command_is_repeated_by_its_form(study: Study) -> None:
+    tabled = new_model("dahl[table 0 0.5 1.5]")
+    for _ in range(2):
+        study.add_step("identify dahl[table]", "", tabled)
+    study.add_step("identify dahl[quadratic]", "", new_model("dahl[quadratic]"))
+    study.add_step("identify dahl", "", new_model("dahl"))
+    told = [line for line in commands(study) if " identify " in line]
+    name = f"'my rig{AGAIN}'"
+    assert told == [
+        f"bristle identify {name} --law dahl --command table", f"bristle identify {name}",
+        f"bristle identify {name} --command quadratic", f"bristle identify {name} --law dahl",
     ]  # fmt: skip
 
 
