@@ -136,7 +136,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         fault = self._index["fault"]
         self._shown = itemgetter(*self._outputs, fault, fault)
         for name, value in self.baked.get("starts", {}).items():
-            self._values[self._index[name]] = value
+            index = self._index[name]
+            self._values[index] = value
+            if index in self._inputs:  # the build sets it as a host would: it is measured
+                self._set.add(index)
 
     def _hold(self) -> None:
         """Keep alive what the binary lets go of as an exception passes it."""
@@ -298,7 +301,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return self._values[self._index[name]]
 
     def was_set(self, name: str) -> bool:
-        """Return whether the host has ever set this variable."""
+        """Return whether the host has ever set this variable, or the build this input."""
         return self._index[name] in self._set
 
     # -- the life of an instance

@@ -124,6 +124,7 @@ def _variable(slave: ComponentSlave, index: int, has_words: bool) -> str:
         quoted(f"[{low!r}, {high!r}]"),
         f"words_{index}" if has_words else "0",
         str(int(slave._over_step.get(variable.name) == HELD)),
+        str(int(index in slave._set)),
     ]  # fmt: skip
     return f"    {{{', '.join(fields)}}},"
 

@@ -483,6 +483,26 @@ def test_start_values_are_baked_in_and_can_still_be_set(tmp_path: Path) -> None:
     assert started(path, {"velocity": 0.5, "f_c": 3.0})["force"] == pytest.approx(3.25, rel=1e-6)
 
 
+def test_an_input_that_the_build_sets_is_measured_as_one_that_a_host_sets() -> None:
+    starts = {"fluid_inertia.on": True, "fluid_inertia.m_f": 2.0}
+    kind = catalogue.component_class(catalogue.source("LuGreDamper"))
+
+    def force(baked: dict[str, Any], given: dict[str, float]) -> float:
+        slave = kind(baked={"name": "One", "starts": {**starts, **baked}}, instance_name="one")
+        slave.setup_experiment(0.0)
+        slave.enter_initialization_mode()
+        for name, value in given.items():
+            slave.set_real([slave._index[name]], [value])
+        slave.exit_initialization_mode()
+        slave.set_real([slave._index["velocity"]], [0.05])
+        assert slave.do_step(0.0, 0.001)
+        assert slave.do_step(0.001, 0.001)
+        return float(slave["force"])
+
+    assert force({"acceleration": 3.0}, {}) == force({}, {"acceleration": 3.0})
+    assert force({"acceleration": 3.0}, {}) == pytest.approx(force({}, {}) + 2.0 * 3.0)
+
+
 # -- what is refused
 
 

@@ -7,9 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from both_forms import both, needs_zig
+from both_forms import Both, Native, both, folder, needs_zig
 
 from bristle.fmu import catalogue
+from bristle.fmu.plan import plan
+from bristle.native.build import build
+from bristle.native.platforms import here
+from bristle.native.prepare import component_of
 from bristle.physics.effect import effects_of
 from bristle.physics.laws import LAWS, laws_of
 
@@ -183,6 +187,23 @@ def test_a_parameter_is_refused_in_the_same_words(
     assert mine == other
     assert words in mine[0]
     assert pair.shown()[1] == [0.0] * len(pair.reals)
+    pair.end()
+
+
+@pytest.mark.slow
+def test_an_input_that_the_build_sets_counts_as_set_after_a_reset_too() -> None:
+    starts = {"fluid_inertia.on": True, "fluid_inertia.m_f": 2.0, "acceleration": 3.0}
+    what = plan("LuGreDamper", name="Accelerated", starts=starts)
+    pair = Both(Native(build(what, folder(), [here()])), component_of(what))
+    for _ in range(2):
+        pair.begin()
+        pair.set("velocity", 0.05)
+        assert pair.step(0.0, 0.001) == (True, 0)
+        mine, other = pair.shown()
+        assert other == pytest.approx(mine, rel=EQUAL)
+        assert pair.slave.constants.measured
+        pair.slave = component_of(what)
+        assert pair.one.reset() == 0
     pair.end()
 
 

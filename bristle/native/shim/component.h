@@ -18,6 +18,7 @@ typedef struct {
     const char *bounds;       /* both, as messages show them */
     const char *const *words; /* what a String chooses from, NULL behind the last; NULL: any text */
     int held;                 /* whether it is an input that is held over a step */
+    int given;                /* whether the build sets it: an input that counts as set by a host */
 } Variable;
 
 /* What a code of the functions means: words and, between them, values of variables. */

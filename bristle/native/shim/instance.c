@@ -56,9 +56,9 @@ int slave_reset(Slave *slave) {
     for (int i = 0; i < component.count; i++) {
         const Variable *v = &component.variables[i];
         slave->values[i] = v->start;
+        slave->given[i] = (unsigned char)v->given;
         if (v->kind == STRING && !(slave->texts[i] = copy_of(v->text))) return 0;
     }
-    memset(slave->given, 0, (size_t)component.count);
     slave->mode = INSTANTIATED;
     slave->stale = slave->unbuilt = 1;
     memset(slave->slopes, 0, (size_t)component.inputs * sizeof *slave->slopes);

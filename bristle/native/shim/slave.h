@@ -30,7 +30,7 @@ typedef struct Slave {
     double *held;         /* room for the Real outputs */
     double *values;       /* of all variables but Strings, by value reference */
     char **texts;         /* of Strings */
-    unsigned char *given; /* whether the host has set it */
+    unsigned char *given; /* whether the host has set it, or the build this input */
     double *slopes;       /* of the inputs over the next steps, in their unit per second */
     int sloping;          /* whether one of them is not 0 */
     int mode, stale, unbuilt;
