@@ -132,6 +132,19 @@ def number(value: object) -> float | str:
     return result if math.isfinite(result) else f"is {result}, not a finite number"
 
 
+def capital(note: str, files: Iterable[str]) -> str:
+    """Return a note as a sentence begins; the name of a file that it begins with stays as it is.
+
+    Parameters
+    ----------
+    note : the words
+    files : names or paths of the files, with / between folders
+    """
+    if note.startswith(tuple(file.rpartition("/")[2] for file in files)):
+        return note
+    return note[:1].upper() + note[1:]
+
+
 def command(*words: object) -> str:
     """Return a `bristle` command as a shell reads it: what holds a space is quoted.
 

@@ -60,7 +60,7 @@ def print_added(
     if as_json:
         _print_json(extended, by_plan)
         return
-    from ..findings import command
+    from ..findings import capital, command
     from ..study.added_runs import unknown_to_model
 
     folder, runs = extended.study.folder, extended.runs
@@ -69,7 +69,7 @@ def print_added(
         print(f"  {run.name:28} {run.role}")
     notes = [*extended.notes, *(by_plan.notes if by_plan else ())]
     for note in notes:
-        print(f"{note[:1].upper()}{note[1:]}.")
+        print(f"{capital(note, [run.file for run in runs])}.")
     for text in by_plan.differences if by_plan else ():
         print(f"Warning: {text}.")
     then = "identify" if unknown_to_model(extended.study) else "diagnose"

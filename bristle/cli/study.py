@@ -194,12 +194,10 @@ def _print_json(created: Created) -> None:
 
 
 def _print_new(created: Created) -> None:
-    from ..findings import command
+    from ..findings import capital, command
 
-    folder = created.study.folder
-    print(
-        f"{folder}: a study of {len(created.study.settings.runs)} run(s). The columns are read as:"
-    )
+    folder, settings = created.study.folder, created.study.settings
+    print(f"{folder}: a study of {len(settings.runs)} run(s). The columns are read as:")
     for guess in created.guesses:
         turned = "turned" if guess.sign < 0 else ""
         told = guess.column.endswith((f"[{guess.unit}]", f"({guess.unit})"))
@@ -214,8 +212,9 @@ def _print_new(created: Created) -> None:
         print(head, *extra, sep="\n")
     if created.unused:
         print(f"Not used: {', '.join(created.unused)}.")
+    files = [run.file for run in (*settings.runs, *settings.excluded)]
     for note in created.notes:
-        print(f"{note[:1].upper()}{note[1:]}.")
+        print(f"{capital(note, files)}.")
     then = command("study", "check", folder)
     wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
     print(f"Wrong? Correct it:  {wrong}\nThen:  {then}")

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
+from ..findings import command
 from ..physics.building import Building, read_building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
@@ -29,9 +30,10 @@ from ..progress import counted
 from ..quantity import plain
 from ..units import canonical
 from .history import History, Step
+from .reading import names_of_runs
 from .roles import for_test, roles_of
 from .run_facts import Facts, RunChoices, facts_of
-from .run_file import EXCLUDE, TEST, RunFile
+from .run_file import EXCLUDE, ROLES, TEST, RunFile
 from .settings import ALL, Settings, write_settings
 
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
@@ -101,8 +103,11 @@ def make_folder(
     found = _parts(names, tables, specs, choices.split)
     of_file = dict(zip(names, about, strict=True))
     is_test = dict(zip(names, closed, strict=True))
-    listed, said = roles_of([one.name for one in found], [is_test[one.file] for one in found])
-    every = [_with_facts(a, b, of_file) for a, b in zip(found, listed, strict=True)]
+    copies = _copies(found, is_test)
+    kept = [one for one in found if one not in copies]
+    listed, said = roles_of([one.name for one in kept], [is_test[one.file] for one in kept])
+    of_part = dict(zip(kept, [run.role for run in listed], strict=True))
+    every = [_with_facts(one, of_part.get(one, EXCLUDE), of_file) for one in found]
     settings = Settings(
         title or folder.name, rig, tuple(run for run in every if run.role != EXCLUDE),
         specs, comments={guess.channel: _comment(guess) for guess in guesses},
@@ -115,7 +120,7 @@ def make_folder(
     if settings.excluded:
         notes.append(settings.excluded_text.removesuffix("."))
     notes += said if not any(one.role for one in about) else []
-    notes += _twins(found, is_test)
+    notes += _copies_text(folder, copies, settings)
     data = dict(zip(names, map(Path, files), strict=True))
     _write(folder, settings, data, building, law or DEFAULT)
     taken += [spec.column for spec in extra.values()]
@@ -129,7 +134,7 @@ class _Part:
 
     file: str
     piece: int
-    digests: list[str]
+    digests: tuple[str, ...]
     rate: float
 
     @property
@@ -145,14 +150,14 @@ def _parts(
     for name, table in zip(names, tables, strict=True):
         for number, piece in enumerate(pieces_of(table, split, specs) if split else [table], 1):
             read = measurements_of(piece, specs, estimate=False)
-            digests = [one.digest() for one in read]
+            digests = tuple(one.digest() for one in read)
             out.append(_Part(name, number if split else 0, digests, read[0].sampling.rate))
     return out
 
 
-def _with_facts(part: _Part, listed: RunFile, facts: Mapping[str, Facts]) -> RunFile:
+def _with_facts(part: _Part, role: str, facts: Mapping[str, Facts]) -> RunFile:
     about = facts[part.file]
-    role = listed.role if listed.role == TEST else about.role or listed.role
+    role = role if role in (TEST, EXCLUDE) else about.role or role
     return RunFile(f"data/{part.file}", role, about.levels, about.labels, part.piece)
 
 
@@ -330,19 +335,18 @@ def _names(files: list[Path]) -> list[str]:
     return out
 
 
-def _twins(parts: Sequence[_Part], is_test: Mapping[str, bool]) -> list[str]:
-    """Return the sentences that tell which runs are one and the same.
+def _copies(parts: Sequence[_Part], is_test: Mapping[str, bool]) -> dict[_Part, _Part]:
+    """Return the runs that repeat an earlier one, with that one: a copy tests and adds nothing.
 
     Parameters
     ----------
     parts : the runs
     is_test : whether the runs of a file are test runs, which must be none of the others
     """
-    first: dict[str, _Part] = {}
-    twins = []
+    first: dict[tuple[str, ...], _Part] = {}
+    copies: dict[_Part, _Part] = {}
     for one in parts:
-        whole = " ".join(one.digests)
-        other = first.setdefault(whole, one)
+        other = first.setdefault(one.digests, one)
         if other is one:
             continue
         if is_test[one.file] != is_test[other.file]:
@@ -350,13 +354,28 @@ def _twins(parts: Sequence[_Part], is_test: Mapping[str, bool]) -> list[str]:
                 f"{one.name} and {other.name} are the same measurement, and one of them is a test "
                 "run: it tests nothing. Use another run, or remove one."
             )
-        twins.append((one.name, other.name))
+        copies[one] = other
     if len(parts) > 1 and len(first) == 1:
         raise StudyError(
             f"{parts[0].name} and the other {len(parts) - 1} files hold the same measurement: "
             "nothing can be held out. Take runs with different motions, or one file alone."
         )
-    return [f"{one} is the same measurement as {other}: remove one" for one, other in twins]
+    return copies
+
+
+def _copies_text(folder: Path, copies: Mapping[_Part, _Part], settings: Settings) -> Iterator[str]:
+    """Yield what is done about each copy, and the command that changes it."""
+    names = names_of_runs(settings)
+    roles = {(run.file, run.piece): run.role for run in settings.runs}
+    for one, other in copies.items():
+        places = [(f"data/{part.file}", part.piece) for part in (one, other)]
+        copy, first = (names[place] for place in places)
+        role = roles.get(places[1], ROLES[0])
+        swap = command("study", "roles", folder, "--exclude", first, f"--{role}", copy)
+        yield (
+            f"{one.name} is the same measurement as {other.name}, and is left out; {swap} uses it "
+            "instead"
+        )
 
 
 def _comment(guess: Guess) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..data.measurement import Measurement
 from ..errors import StudyError
+from ..findings import command
 from ..identify.prepare import SHORTEST
 
 SPLIT = 0.7
@@ -102,9 +104,17 @@ def _cut(sizes: list[int], wanted: int) -> int:
     return min(allowed, key=lambda cut: abs(cut - wanted), default=wanted)
 
 
-def refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
-    """Refuse runs that are held out and for training, too; StudyError names both."""
-    _refuse_same(train, holdout, "held out", "which is for training")
+def refuse_twins(
+    train: list[Measurement], holdout: list[Measurement], study: Path | None = None
+) -> None:
+    """Refuse runs that are held out and for training, too; StudyError names both.
+
+    Parameters
+    ----------
+    train, holdout : the runs
+    study : the folder whose runs they are, for the command that leaves one out; None without one
+    """
+    _refuse_same(train, holdout, "held out", "which is for training", study)
 
 
 def refuse_seen(seen: list[Measurement], test: list[Measurement]) -> None:
@@ -113,14 +123,19 @@ def refuse_seen(seen: list[Measurement], test: list[Measurement]) -> None:
 
 
 def _refuse_same(
-    others: list[Measurement], judging: list[Measurement], what: str, beside: str
-) -> None:
+    others: list[Measurement], judging: list[Measurement], what: str, beside: str,
+    study: Path | None = None,
+) -> None:  # fmt: skip
     first = {one.digest(): one.name for one in others}
     for one in judging:
         if one.digest() in first:
+            exclude = "remove one"
+            if study is not None:
+                order = command("study", "roles", study, "--exclude", first[one.digest()])
+                exclude = f"leave one out: {order}"
             raise StudyError(
                 f"{one.name} is {what} and is the same measurement as {first[one.digest()]}, "
-                f"{beside}: it tests nothing. Use another run, or remove one."
+                f"{beside}: it tests nothing. Use another run, or {exclude}"
             )
 
 

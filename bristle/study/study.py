@@ -31,8 +31,8 @@ from .history import History, Step
 from .joined_corrections import joined_corrections
 from .new import make_folder, parse_channel
 from .reading import place_of_run, read_runs
-from .role_changes import roles_by_place
-from .run_file import ROLES, TEST
+from .role_changes import refuse_too_few, roles_by_place
+from .run_file import EXCLUDE, ROLES, TEST
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 from .settings import Settings, read_draft, read_settings
 from .settings_text import with_corrections, with_excluded, with_mask, with_roles
@@ -207,9 +207,10 @@ class Study:
             lacking = ROLES[0] if not train else ROLES[1]
             raise StudyError(
                 f'{self.folder / "study.toml"}: no run has role = "{lacking}". Give it to some: a '
-                "model is tested on runs that it was not fitted to."
+                "model is tested on runs that it was not fitted to. "
+                f"{command('study', 'roles', self.folder, f'--{lacking}', 'RUN')}"
             )
-        refuse_twins(train, holdout)
+        refuse_twins(train, holdout, self.folder)
         twins = twins_within(train) + twins_within(holdout)
         return Runs(train, holdout, (*idle, *twins))
 
@@ -348,12 +349,13 @@ class Study:
         Raises
         ------
         StudyError
-            If no run has such a name, or none would be left.
+            If no run has such a name, or none would be left for training or held out.
         """
         places = [place_of_run(self.folder, self.settings, name) for name in names]
+        path = self.folder / "study.toml"
         if len({*places}) == len(self.settings.runs):
-            path = self.folder / "study.toml"
             raise StudyError(f"{path}: these are all runs; some for training are needed.")
+        refuse_too_few(path, self.settings, dict.fromkeys(places, EXCLUDE))
         return self._with_settings(lambda text: with_excluded(text, places))
 
     def with_roles(self, roles: Mapping[str, str]) -> Study:

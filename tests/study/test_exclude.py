@@ -76,3 +76,40 @@ def test_a_table_of_runs_leaves_runs_out(tmp_path):
     settings = Study(tmp_path / "rig").settings
     assert [run.file for run in settings.excluded] == ["data/run_3.csv"]
     assert len(settings.runs) == 3
+
+
+def test_leaving_out_the_last_run_held_out_is_refused_before_it_is_written(folder):
+    before = (folder / "study.toml").read_bytes()
+    with pytest.raises(StudyError, match="no run would be held out") as refused:
+        Study(folder).with_excluded(["run_2"])
+    assert (folder / "study.toml").read_bytes() == before
+    words = str(refused.value)
+    assert "one of run_1, run_3, run_4 as RUN" in words
+    assert f"bristle study roles {folder} --exclude run_2 --holdout RUN" in words
+    assert main(["study", "roles", str(folder), "--exclude", "run_2", "--holdout", "run_1"]) == 0
+    assert Study(folder).runs().holdout[0].name == "run_1"
+
+
+def test_a_copy_of_a_run_is_left_out_of_a_new_study(tmp_path, capsys):
+    files = write_runs(tmp_path / "lab", count=3, seconds=2.0)
+    copy = tmp_path / "lab" / "copy.csv"
+    copy.write_bytes(files[0].read_bytes())
+    rig = tmp_path / "rig"
+    assert main(["study", "new", str(rig), "--data", str(tmp_path / "lab")]) == 0
+    told = capsys.readouterr().out
+    assert "\nrun_1.csv is the same measurement as copy.csv, and is left out" in told
+    swap = next(line for line in told.splitlines() if "uses it instead" in line)
+    order = swap.partition("; bristle ")[2].removesuffix(" uses it instead.").split()
+    assert main(["study", "check", str(rig)]) == 0
+    assert main(order) == 0
+    assert [run.name for run in Study(rig).settings.excluded] == ["data/copy.csv"]
+    assert main(["study", "check", str(rig)]) == 0
+
+
+def test_a_run_that_is_in_two_roles_is_named_with_the_command_that_leaves_it_out(folder):
+    (folder / "data" / "run_2.csv").write_bytes((folder / "data" / "run_1.csv").read_bytes())
+    with pytest.raises(StudyError, match="it tests nothing") as refused:
+        Study(folder).runs()
+    assert str(refused.value).endswith(
+        f"leave one out: bristle study roles {folder} --exclude run_1"
+    )
