@@ -26,8 +26,8 @@ STEADY = 1e-3
 APART = 1.5
 """By what factor z with one value of a label exceeds that with the others to be worth a word."""
 
-FEW = 3
-"""Ranges of a label's values that a sentence names; of more it says between which they lie."""
+FEW = 6
+"""Values or ranges of a label that a sentence names; of more it says how many there are."""
 
 _DIGITS = 4  # of a level, to which runs have the same
 
@@ -36,7 +36,8 @@ _DIGITS = 4  # of a level, to which runs have the same
 class LabelError:
     """The error of the runs that share the value of a label: `z` of them all, and how many.
 
-    `unit` is that of a command's level, else "": labels know their own.
+    `unit` is that of a command's level, else "": labels know their own. `run` is the name of the
+    run where it is one alone.
     """
 
     name: str
@@ -44,6 +45,7 @@ class LabelError:
     z: float
     runs: int
     unit: str = ""
+    run: str = ""
 
     @property
     def text(self) -> str:
@@ -94,7 +96,8 @@ def label_errors(predictions: Sequence[RunPrediction]) -> tuple[LabelError, ...]
             own = [p for p, one in zip(predictions, known, strict=True) if one[name] == value]
             z = z_scale(np.concatenate([one.normalised for one in own]))
             unit = DRIVES[name].unit if name in DRIVES else ""
-            found.append(LabelError(name, value, z, len(own), unit))
+            alone = own[0].name if len(own) == 1 else ""
+            found.append(LabelError(name, value, z, len(own), unit, alone))
     return tuple(found)
 
 
@@ -111,12 +114,33 @@ def label_sentence(errors: Sequence[LabelError]) -> str:
     own = sorted((one for one in errors if one.name == best[1]), key=lambda one: -one.z)
     far = [one for one in own if one.z > CLOSE and one.z * APART > own[0].z]
     rest = [one for one in own if one not in far]
+    if len(far) == 1 and far[0].run:
+        return _of_one_run(far[0], rest[0].z)
     where = _values(far, own)
     label = "" if far[0].unit else f"{name_of(far[0].name)} "
     others = f"z = {short_z(rest[0].z)} at most at {_values(rest, own)}"
     if rest[0].z <= CLOSE:
         return f"Only the runs at {label}{where} are wrong: z = {short_z(own[0].z)}, and {others}."
     return f"It is worst in the runs at {label}{where}: z = {short_z(own[0].z)}, and {others}."
+
+
+def _of_one_run(far: LabelError, others: float) -> str:
+    """Return that one run errs: it may differ in more than the label, which is not blamed.
+
+    Parameters
+    ----------
+    far : the error of that run
+    others : the largest z of a value with the others
+    """
+    label = "" if far.unit else f"{name_of(far.name)} "
+    wrong = f"is wrong: z = {short_z(far.z)}" if others <= CLOSE else ""
+    begin = (
+        f"Only {far.run} {wrong}" if wrong else f"It is worst in {far.run}: z = {short_z(far.z)}"
+    )
+    return (
+        f"{begin}, and z = {short_z(others)} at most in the other runs. It is the only run at "
+        f"{label}{far.text}, which need not be the cause."
+    )
 
 
 def _values(some: Sequence[LabelError], whole: Sequence[LabelError]) -> str:
@@ -138,9 +162,10 @@ def _values(some: Sequence[LabelError], whole: Sequence[LabelError]) -> str:
     for named, group in groupby(among, lambda one: one in some):
         row = [one.text for one in group] if named else []
         texts += [f"{row[0]} to {row[-1]}"] if len(row) > 2 else row
+    # No span over all of them: it would hold values that are not meant.
     if len(texts) <= FEW:
         return joined(texts)
-    return f"{order[0].text} to {order[-1].text} ({len(some)} of {len(whole)} values)"
+    return f"{len(some)} of {len(whole)} values, among them {joined(texts[:FEW])}"
 
 
 def _order(value: Label) -> tuple[bool, Label]:

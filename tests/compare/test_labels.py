@@ -28,12 +28,29 @@ def test_values_that_each_run_has_of_its_own_are_ranges() -> None:
     assert "at 20.3 °C to 22.5 °C and 33 °C." in told(warm | cold | {33.0: 1.0})
 
 
-def test_values_that_lie_among_others_have_their_span() -> None:
+def test_values_that_lie_among_others_are_listed() -> None:
     mixed = {20.0 + k: (5.0 if k % 2 else 1.0) for k in range(9)}
     assert told(mixed) == (
-        "Only the runs at temperature 21 °C to 27 °C (4 of 9 values) are wrong: z = 5.00, and "
-        "z = 1.00 at most at 20 °C to 28 °C (5 of 9 values)."
+        "Only the runs at temperature 21 °C, 23 °C, 25 °C and 27 °C are wrong: z = 5.00, and "
+        "z = 1.00 at most at 20 °C, 22 °C, 24 °C, 26 °C and 28 °C."
     )
+    many = {20.0 + k: (5.0 if k % 2 else 1.0) for k in range(20)}
+    assert "at temperature 10 of 20 values, among them 21 °C, 23 °C" in told(many)
+
+
+def test_one_run_that_has_a_value_of_its_own_is_named() -> None:
+    def errors(other: float) -> list[LabelError]:
+        z = {"a": 1.0, "late": 4.4, "b": other}
+        return [
+            LabelError("temperature", 20.0 + k, one, 1, run=run)
+            for k, (run, one) in enumerate(z.items())
+        ]
+
+    assert label_sentence(errors(1.1)) == (
+        "Only late is wrong: z = 4.40, and z = 1.10 at most in the other runs. It is the only run "
+        "at temperature 21 °C, which need not be the cause."
+    )
+    assert label_sentence(errors(1.9)).startswith("It is worst in late: z = 4.40, and z = 1.90 at")
 
 
 def test_words_are_named_each() -> None:
