@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..compare.names import joined
 from ..draw.ranking import ROW, draw_ranking
 from ..draw.style import Page, look, short_z
+from .law_text import law_name
 
 if TYPE_CHECKING:
     from .verdict import Diagnosis
@@ -23,12 +25,14 @@ def draw_diagnosis(found: Diagnosis) -> Page:
     """
     trials = found.trials[:MOST]
     with look():
-        if not trials or found.before is None:
+        if not trials or found.before is None or found.worst is None:
             return Page(7.6, 0.0, headline(found), found.words)
-        return _bars(
-            [trial.effects[-1] for trial in trials], [trial.z for trial in trials],
-            found.before.z, found.effects, (headline(found), _subtitle(found)),
-        )  # fmt: skip
+        worst, without = found.worst, _without(found.laws.as_dict() if found.laws else {})
+        rows = [(trial.effects[-1], trial.z) for trial in trials]
+        rows = _with_winner(rows, worst.kind, worst.effects, worst.z_after)
+        strong = {*found.effects, joined(worst.effects)}
+        texts = (headline(found), _subtitle(found, without))
+        return _bars(rows, found.before.z, strong, without, texts)
 
 
 def draw_evidence(verdict: Mapping[str, Any]) -> Page | None:
@@ -47,24 +51,64 @@ def draw_evidence(verdict: Mapping[str, Any]) -> Page | None:
         return None
     if not rows:
         return None
-    named, before = verdict.get("effects") or [], float(at["z_holdout_before"])
+    before, own = float(at["z_holdout_before"]), [str(name) for name in at.get("effects") or []]
+    if at.get("z_holdout_after") is not None:
+        rows = _with_winner(rows, str(at.get("kind")), own, float(at["z_holdout_after"]))
+    strong = {*(verdict.get("effects") or []), joined(own)}
     with look():
-        return _bars([name for name, _ in rows], [z for _, z in rows], before, named, ("", ""))
+        return _bars(rows, before, strong, _without(verdict), ("", ""))
+
+
+def _with_winner(
+    rows: Sequence[tuple[str, float]], kind: str, effects: Sequence[str], z: float
+) -> list[tuple[str, float]]:
+    """Return the effects with their z, the best first, and among them the pair that was found.
+
+    Parameters
+    ----------
+    rows : single effects
+    kind, effects : what the site lacks
+    z : what the model with these effects leaves
+    """
+    pair = [(joined(effects), z)] if kind == "effect" and len(effects) > 1 else []
+    return sorted([*pair, *rows], key=lambda row: row[1])
+
+
+def _without(verdict: Mapping[str, Any]) -> str:
+    """Return which model the effects are added to: of a verdict with all laws its own law."""
+    if not verdict.get("laws"):
+        return "the present model"
+    return f"{law_name(verdict)}, the law of this verdict, without the effect"
 
 
 def _bars(
-    effects: Sequence[str], values: Sequence[float], before: float, named: Collection[str],
+    rows: Sequence[tuple[str, float]], before: float, named: Collection[str], without: str,
     texts: tuple[str, str],
 ) -> Page:  # fmt: skip
-    """Return the page of the trials; `texts` are its title and what stands beneath."""
+    """Return the page of the trials.
+
+    Parameters
+    ----------
+    rows : effects with their z
+    before : z of the model without them
+    named : the effects of the verdict, which are drawn in colour
+    without : what that model is
+    texts : title of the page, and what stands beneath
+    """
+    effects, values = [name for name, _ in rows], [z for _, z in rows]
     page = Page(7.6, ROW * len(effects) + 1.0, *texts)
     grid = page.grid(1, 1, top=0.3, bottom=0.5, left=1.9, right=0.7)
     axes = page.figure.add_subplot(grid[0, 0])
-    names, strong = [f"with {name}" for name in effects], [f"with {name}" for name in named]
+    names, strong = ([_label(name) for name in some] for some in (effects, named))
     draw_ranking(axes, names, values, before, strong)
-    axes.set_title(f"dashed: the present model, z = {short_z(before)}", loc="right", fontsize=8.5)
+    axes.set_title(f"dashed: {without}, z = {short_z(before)}", loc="right", fontsize=8.5)
     axes.set_xlabel("error / noise on held-out runs (z)")
     return page
+
+
+def _label(name: str) -> str:
+    """Return an effect, or a pair of them, as it stands beside its bar: a pair in two lines."""
+    return f"with {name}".replace(" and ", "\nand ")
 
 
 def headline(found: Diagnosis) -> str:
@@ -72,11 +116,11 @@ def headline(found: Diagnosis) -> str:
     return TITLES.get(found.kind, TITLES["ambiguous"]).format(names=", ".join(found.effects))
 
 
-def _subtitle(found: Diagnosis) -> str:
+def _subtitle(found: Diagnosis, without: str) -> str:
     site = found.worst.site if found.worst is not None and found.force else ""
     where = f" at the {site}" if site else ""
     return (
-        f"Dashed: the present model{where}. Each bar: the model with that effect, fitted again. "
+        f"Dashed: {without}{where}. Each bar: the model with that effect, fitted again. "
         "Green: the noise floor."
     )
 
