@@ -14,6 +14,9 @@ from .linear import cholesky
 
 MAX_FLOORS = 20
 
+ROUNDING = 1e-9
+"""Share of a matrix [1] by which its entries may be wrong: files hold them with so many digits."""
+
 Matrix = tuple[tuple[float, ...], ...]
 
 
@@ -102,7 +105,7 @@ def from_data(data: dict[str, Any], where: str = "building") -> Building:
     ------
     PhysicsError
         For an unknown key, a wrong shape, a mass or stiffness that is not positive, matrices that
-        are not symmetric or not positive definite.
+        are not symmetric or not positive definite, damping that adds energy.
     """
     known = {"schema", "name", "masses", "stiffnesses", "base", "damping_ratio", "modal"}
     known |= {"rayleigh", "M", "C", "K", "devices"}
@@ -124,6 +127,8 @@ def from_data(data: dict[str, Any], where: str = "building") -> Building:
     for letter, matrix in (("M", building.M), ("K", building.K)):
         if cholesky([value for row in matrix for value in row], building.size) is None:
             raise PhysicsError(f"{where}: {letter} is not positive definite.")
+    if "C" in data:
+        _refuse_active(building.C, where)
     devices = read_devices(data.get("devices", []), building.levels(), where)
     return building._replace(devices=devices)
 
@@ -141,6 +146,19 @@ def _from_matrices(data: dict[str, Any], name: str, isolated: bool, where: str) 
     return Building(name, M, C, K, isolated, tuple(below))
 
 
+def _refuse_active(C: Matrix, where: str) -> None:
+    """Raise PhysicsError where some motion would gain energy from damping."""
+    n, scale = len(C), max(abs(value) for row in C for value in row) or 1.0
+    A = [[0.5 * (C[i][j] / scale + C[j][i] / scale) for j in range(n)] for i in range(n)]
+    _diagonalise(A)
+    values = [A[i][i] for i in range(n)]
+    if min(values) < -ROUNDING * max(map(abs, values)):
+        raise PhysicsError(
+            f"{where}: C is not positive semidefinite: its least eigenvalue is "
+            f"{scale * min(values):.3g} N s/m, and that motion gains energy; none below 0 is right."
+        )
+
+
 def _matrix(data: dict[str, Any], key: str, where: str) -> Matrix:
     rows = data.get(key)
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
@@ -150,7 +168,9 @@ def _matrix(data: dict[str, Any], key: str, where: str) -> Matrix:
         raise PhysicsError(f"{where}: {key} must be square with at most {MAX_FLOORS + 1} rows.")
     values = [[_number(value, key, where) for value in row] for row in rows]
     largest = max(abs(value) for row in values for value in row)
-    if any(abs(values[i][j] - values[j][i]) > 1e-9 * largest for i in range(n) for j in range(i)):
+    if any(
+        abs(values[i][j] - values[j][i]) > ROUNDING * largest for i in range(n) for j in range(i)
+    ):
         raise PhysicsError(f"{where}: {key} is not symmetric.")
     return _freeze(values)
 
@@ -236,7 +256,7 @@ def _rayleigh(
 def modes(M: Any, K: Any) -> list[tuple[float, list[float]]]:
     """Return the undamped modes by frequency: omega [rad/s] and mass-normalised shape (n,).
 
-    Jacobi's rotations on L^-1 K L^-T with M = L L^T (Golub & Van Loan 2013, section 8.5).
+    They are the eigenvectors of L^-1 K L^-T with M = L L^T.
     """
     n = len(M)
     low = cholesky([M[i][j] for i in range(n) for j in range(n)], n)
@@ -253,14 +273,7 @@ def modes(M: Any, K: Any) -> list[tuple[float, list[float]]]:
 
     half = [forward([K[i][j] for i in range(n)]) for j in range(n)]  # rows: (L^-1 K)^T
     A = [forward([half[j][i] for j in range(n)]) for i in range(n)]
-    V = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
-    for _ in range(100):
-        off = sum(A[i][j] ** 2 for i in range(n) for j in range(i))
-        if off <= 1e-30 * sum(A[i][i] ** 2 for i in range(n)):
-            break
-        for i in range(n):
-            for j in range(i):
-                _rotate(A, V, i, j, n)
+    V = _diagonalise(A)
     shapes = []
     for m in range(n):
         shape = [0.0] * n
@@ -269,6 +282,23 @@ def modes(M: Any, K: Any) -> list[tuple[float, list[float]]]:
             shape[i] = (V[i][m] - rest) / low[i * n + i]
         shapes.append((max(A[m][m], 0.0) ** 0.5, shape))
     return sorted(shapes, key=lambda pair: pair[0])
+
+
+def _diagonalise(A: list[list[float]]) -> list[list[float]]:
+    """Leave the eigenvalues of a symmetric A on its diagonal; return its eigenvectors as columns.
+
+    Jacobi's rotations (Golub & Van Loan 2013, section 8.5).
+    """
+    n = len(A)
+    V = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
+    for _ in range(100):
+        off = sum(A[i][j] ** 2 for i in range(n) for j in range(i))
+        if off <= 1e-30 * sum(A[i][i] ** 2 for i in range(n)):
+            break
+        for i in range(n):
+            for j in range(i):
+                _rotate(A, V, i, j, n)
+    return V
 
 
 def _rotate(A: list[list[float]], V: list[list[float]], i: int, j: int, n: int) -> None:

@@ -18,6 +18,7 @@ from .library import Library
 from .over_step import choose_over_step
 from .parameters import check_parameter, check_together
 from .parts import ALGORITHMS, Part, Run, existing_file
+from .storeys import check_storeys
 
 SCHEMA = 1
 MAX_RESULT_BYTES = 2**31
@@ -238,6 +239,7 @@ def _check_component(
         if part.description:
             check_parameter(part, name, value, folder, library, findings)
     check_together(part, folder, findings)
+    check_storeys(part, findings)
     return part
 
 

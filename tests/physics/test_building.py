@@ -191,6 +191,18 @@ def test_a_consistent_mass_matrix_is_taken() -> None:
         assert np.abs(residual).max() <= 1e-9 * np.abs(K).max()
 
 
+@pytest.mark.parametrize("scale", [0.0, 1e-200, 1.0, 1e200])
+def test_damping_that_leaves_a_motion_alone_is_taken(scale: float) -> None:
+    """Dampers between floors: the building as one moves without them; files round the entries."""
+    C = [[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0 - 1e-10]]
+    table = {"schema": 1, **matrices_of(paper_building()), "C": [[scale * c for c in r] for r in C]}
+    assert from_data(table).C[1][1] == 2.0 * scale
+    table["C"][2][2] = scale * (1.0 - 1e-6)
+    if scale:
+        with pytest.raises(PhysicsError, match="not positive semidefinite"):
+            from_data(table)
+
+
 def test_attached_mass_adds_to_the_first_level_and_only_there() -> None:
     model = paper_building()
     heavier = model.with_attached_mass(0.5)
@@ -267,6 +279,8 @@ RATIO = "damping_ratio = 0.01"
         (FULL.replace("[-1.0, 1.0]", "[-1.1, 1.0]"), "K is not symmetric"),
         (FULL.replace("[[2.0", "[[-2.0"), "M is not positive definite"),
         (FULL.replace("[-1.0, 1.0]", "[-1.0, 0.2]"), "K is not positive definite"),
+        (FULL.replace("0.1", "-50.0"), "C is not positive semidefinite: its least .* is -50 N s/m"),
+        (FULL.replace("0.0, 0.1]", "0.2, 0.1]").replace("[0.1, 0.0", "[0.1, 0.2"), "is -0.1 N s/m"),
     ],
 )
 def test_a_wrong_file_says_where_and_what(file: Path, text: str, says: str) -> None:
