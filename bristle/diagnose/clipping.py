@@ -7,14 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.channels import DRIVE
+from ..compare.names import joined
+from ..data.channels import DRIVE, channel_unit
 from ..data.checks.clipping import stands_at_top
 from ..data.measurement import Measurement
-from ..quantity import plain
+from ..quantity import quantity
 from .faults import SensorFault
 from .rule import SENSOR, DecisionRule
 
 Array = NDArray[np.float64]
+
+NAMED = 3
+"""Runs that a sentence names; of more it says how many there are."""
 
 BESIDE = 4.0
 """Noises inside the end of a range within which a sample may have been cut."""
@@ -24,20 +28,18 @@ def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Se
     """Return the channels that repeat an extreme: their range ends before the motion does."""
     found = []
     for channel in ("force", "displacement", "velocity", *DRIVE):
-        limits = [
-            limit
-            for run in runs
-            if run.has(channel)
-            and _may_be_clipped(run, channel)
-            and (limit := _limit(run[channel], rule)) is not None
-        ]
-        if limits:
-            level = max(limits)
+        there = [run for run in runs if run.has(channel) and _may_be_clipped(run, channel)]
+        ends = {run.name: cut for run in there if (cut := _ends(run[channel], rule))}
+        if ends:
+            every = [end for cut in ends.values() for end in cut]
+            at = joined([quantity(end, channel_unit(channel), 4) for end in _outermost(every)])
+            named = joined([*ends]) if len(ends) <= NAMED else f"{len(ends)} runs"
             found.append(
                 SensorFault(
-                    channel, "clipping", level, 0.0,
-                    f"{channel.capitalize()} repeats the very same extreme in {len(limits)} "
-                    f"run{'s' * (len(limits) > 1)}: its range ended at {plain(level, 4)} (SI).",
+                    channel, "clipping", max(map(abs, every)), 0.0,
+                    f"{channel.capitalize()} repeats the very same extreme in {named}: its range "
+                    f"ended at {at}.",
+                    runs=tuple(ends) if len(ends) < len(runs) else (),
                 )
             )  # fmt: skip
     return found
@@ -63,14 +65,19 @@ def _is_noisy(run: Measurement, channel: str) -> bool:
     return 1e-4 * top < run.noise.get(channel, 0.0) < 0.2 * top
 
 
-def _limit(values: Array, rule: DecisionRule) -> float | None:
-    """Return the level at which a signal is cut off, on either side, None where it is not."""
-    cut = [
-        abs(float(np.max(way * values)))
+def _ends(values: Array, rule: DecisionRule) -> list[float]:
+    """Return the values at which a signal is cut off: of both sides, of one, or none."""
+    return [
+        way * float(np.max(way * values))
         for way in (1.0, -1.0)
         if _stands_at_top(way * values, rule)
     ]
-    return max(cut) if cut else None
+
+
+def _outermost(ends: Sequence[float]) -> list[float]:
+    """Return the lowest of the lower ends and the highest of the upper ones."""
+    lower, upper = [e for e in ends if e < 0.0], [e for e in ends if e >= 0.0]
+    return [*([min(lower)] if lower else []), *([max(upper)] if upper else [])]
 
 
 def beyond_range(

@@ -24,7 +24,8 @@ class SensorFault:
     what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; "derived" [s,
     how late] is a velocity that was computed from the displacement, "unrelated" (0) one of another
     motion. `std` is the uncertainty of `value`; `words` a sentence; `either` the channel that may
-    have it instead, as far as the data tell; `run` the run whose channel it is, "" for all.
+    have it instead, as far as the data tell; `run` the run whose channel it is, "" for all. `runs`
+    are those that "clipping" was seen in, () for all; no model corrects it, so that `run` is "".
     "clock" [s/s] is what the channel's clock gains on that of the motion. "range" [the channel's
     unit] and "slew" [that per second] limit a command between its record and the coil.
     """
@@ -36,6 +37,7 @@ class SensorFault:
     words: str
     either: str = ""
     run: str = ""
+    runs: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """Return what verdict.json holds of it."""
@@ -44,7 +46,8 @@ class SensorFault:
             "words": self.words,
         }  # fmt: skip
         more = {"either": self.either, "run": self.run}
-        return {**entry, **{key: text for key, text in more.items() if text}}
+        listed = {"runs": list(self.runs)} if self.runs else {}
+        return {**entry, **{key: text for key, text in more.items() if text}, **listed}
 
 
 def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:

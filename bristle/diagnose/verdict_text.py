@@ -169,9 +169,14 @@ FAULTS = ("channel", "fault", "value", "run")
 def fault_rows(verdict: Verdict) -> list[list[str]]:
     """Return the cells of the table of sensors' faults, a row per fault; see `FAULTS`."""
     return [
-        [str(one["channel"]), str(one["fault"]), _size(one), str(one.get("run") or "all")]
+        [str(one["channel"]), str(one["fault"]), _size(one), _runs(one)]
         for one in verdict.get("sensors") or []
     ]
+
+
+def _runs(fault: Mapping[str, Any]) -> str:
+    """Return the runs that have a fault, as a cell of a table."""
+    return str(fault.get("run") or ", ".join(fault.get("runs") or []) or "all")
 
 
 def _size(fault: Mapping[str, Any]) -> str:

@@ -11,8 +11,11 @@ from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of_frame
+from bristle.diagnose.clipping import clipped
 from bristle.diagnose.corrected import corrected
 from bristle.diagnose.sensors import sensor_faults
+from bristle.diagnose.verdict_text import fault_rows
+from bristle.quantity import quantity
 
 STEP, SECONDS, NOISE = 0.002, 10.0, 0.01
 T = STEP * np.arange(round(SECONDS / STEP))
@@ -127,6 +130,20 @@ def test_a_clipped_channel(channel):
     fault = only(sensor_faults(all_runs))
     assert (fault.channel, fault.fault) == (channel, "clipping")
     assert fault.value == pytest.approx(max(np.max(np.abs(one[channel])) for one in all_runs))
+
+
+def test_a_force_that_is_clipped_in_one_run_names_it_and_both_ends():
+    plain = runs()
+    force = plain[1].channels["force"]
+    top = float(np.max(np.abs(force)))
+    spoilt = replace(
+        plain[1], channels={**plain[1].channels, "force": np.clip(force, -0.6 * top, 0.5 * top)}
+    )
+    fault = only(clipped([plain[0], spoilt, *plain[2:]]))
+    assert fault.runs == (spoilt.name,)
+    ends = f"{quantity(-0.6 * top, 'N', 4)} and {quantity(0.5 * top, 'N', 4)}"
+    assert fault.words.endswith(f"in {spoilt.name}: its range ended at {ends}.")
+    assert fault_rows({"sensors": [fault.as_dict()]})[0][-1] == spoilt.name
 
 
 @pytest.mark.parametrize("tau", [0.004, 0.01])

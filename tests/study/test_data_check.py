@@ -12,7 +12,7 @@ import pytest
 from made import Columns, bench_run, write, write_runs
 
 from bristle.cli import main
-from bristle.data.checks.clipping import clipped_share
+from bristle.data.checks.clipping import clipped_ends
 from bristle.data.checks.finding import Finding
 from bristle.data.checks.runs import Excitation, _beyond, cycles, drive_levels
 from bristle.study import Study, create_study
@@ -227,18 +227,26 @@ def test_clipping_of_a_quantised_sine_is_none() -> None:
     sine = np.sin(2.0 * np.pi * t)
     for step in (0.0, 1e-3, 0.01, 0.05):
         written = step * np.round(sine / step) if step else sine
-        assert clipped_share(written, step)[0] == 0.0
+        assert clipped_ends(written, step) == []
         cut = np.clip(written, -1.0, 0.85)
-        share, level, stretches = clipped_share(cut, step)
+        ((share, level, stretches),) = clipped_ends(cut, step)
         assert level == pytest.approx(0.85)
         assert share == pytest.approx(0.176, abs=0.03)
         assert stretches == 10
 
 
+def test_both_ends_of_a_channel_that_is_cut_off_are_told() -> None:
+    t = np.arange(5000) / 500.0
+    cut = np.clip(np.sin(2.0 * np.pi * t), -0.8, 0.9)
+    (lower, upper) = clipped_ends(cut, 0.0)
+    assert (lower[1], upper[1]) == (-0.8, 0.9)
+    assert lower[0] > upper[0] > 0.1
+
+
 def test_rest_at_the_end_of_a_stroke_is_no_clipping() -> None:
     t = np.arange(3000) / 500.0
     rest = np.where(t < 1.0, 0.0, 1.0 - np.cos(2.0 * np.pi * (t - 1.0)))
-    assert clipped_share(rest, 0.0)[0] == 0.0
+    assert clipped_ends(rest, 0.0) == []
 
 
 def test_levels_and_cycles() -> None:

@@ -12,7 +12,7 @@ from ..measurement import Measurement
 from ..noise import Noise, estimate_noise, is_switched
 from ..spikes import spikes_text
 from ..table import Array
-from .clipping import clipped_share
+from .clipping import clipped_ends
 from .finding import Finding, Level
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
@@ -63,12 +63,10 @@ def _extra(run: Measurement) -> Iterator[Finding]:
         changes = np.flatnonzero(np.diff(one.values))
         if np.median(np.diff(changes, prepend=-1)) >= _HELD:
             continue  # a slow logger repeats its last value
-        share, level, stretches = clipped_share(one.values, estimate_noise(one.values).quantum)
-        if share and not is_switched(one.values):
-            text = (
-                f"{name} stays at exactly {quantity(level, one.unit, 6)} in {stretches} stretches, "
-                f"{plain(100.0 * share, 2)} % of the samples: it is cut off."
-            )
+        ends = clipped_ends(one.values, estimate_noise(one.values).quantum)
+        if ends and not is_switched(one.values):
+            share = sum(end[0] for end in ends)
+            text = f"{name} stays at exactly {_ends_text(ends, one.unit)}: it is cut off."
             do = "An error beyond that value shows no dependence on it."
             yield Finding("clipping", "warning", text, do, run.name, name, share)
 
@@ -105,26 +103,37 @@ def _clipped(
     facts = run.noise_facts[channel]
     if is_switched(values):
         return
-    share, level, stretches = clipped_share(values, facts.quantum if facts else 0.0)
-    if not share:
-        return
+    ends = clipped_ends(values, facts.quantum if facts else 0.0)
     if channel.endswith("displacement"):
-        if velocity is None or np.ptp(velocity) == 0.0:
-            return
-        flat = np.isclose(values, level, rtol=0.0, atol=1e-9 * float(np.ptp(values)))
-        if float(np.median(np.abs(velocity[flat]))) < 0.05 * float(np.abs(velocity).max()):
-            return  # it stands still there, and is not cut off
+        ends = [end for end in ends if _moves_at(end[1], values, velocity)]
+    if not ends:
+        return
     yield Finding(
         "clipping",
         "warning",
-        f"{channel} stays at exactly {plain(level, 6)} {run.units[channel]} in {stretches} "
-        f"stretches, "
-        f"{plain(100.0 * share, 2)} % of the samples: it is cut off by its instrument or "
-        f"amplifier.",
+        f"{channel} stays at exactly {_ends_text(ends, run.units[channel])}: it is cut off by its "
+        "instrument or amplifier.",
         "Repeat the run with a larger range, or leave it out: saturated samples are lost.",
         run.name,
         channel,
-        share,
+        sum(end[0] for end in ends),
+    )
+
+
+def _moves_at(level: float, values: Array, velocity: Array | None) -> bool:
+    """Return whether a displacement is cut off at a level: it would move, and does not rest."""
+    if velocity is None or np.ptp(velocity) == 0.0:
+        return False
+    flat = np.isclose(values, level, rtol=0.0, atol=1e-9 * float(np.ptp(values)))
+    return float(np.median(np.abs(velocity[flat]))) >= 0.05 * float(np.abs(velocity).max())
+
+
+def _ends_text(ends: list[tuple[float, float, int]], unit: str) -> str:
+    """Return where a channel is cut off, at one end or both, and how much of it."""
+    return " and at ".join(
+        f"{plain(level, 6)} {unit} in {stretches} stretches, {plain(100.0 * share, 2)} % of the "
+        "samples"
+        for share, level, stretches in ends
     )
 
 

@@ -2,7 +2,7 @@
 
 All look at stretches of equal samples at an extreme, and none can stand for another. Before any
 model a channel of any sampling is asked, and a peak in coarse steps must not be taken for a cut:
-`clipped_share`, which knows the step. A diagnosis leaves out what may have been cut, so chance must
+`clipped_ends`, which knows the step. A diagnosis leaves out what may have been cut, so chance must
 not cut it short: `stands_at_top`, on one side, its limits those of a decision rule. A fit refuses a
 force that carries nothing but its ends, whatever did that: `saturated_share`, both sides together,
 coarse steps included.
@@ -56,8 +56,8 @@ def stands_at_top(values: Array, near: float, longest: int, crowded: float) -> b
     return bool(len(below)) and often > crowded * float(np.mean(below[-longest:]))
 
 
-def clipped_share(values: Array, quantum: float) -> tuple[float, float, int]:
-    """Return (share of samples, level, stretches) at an extreme where a channel is cut off.
+def clipped_ends(values: Array, quantum: float) -> list[tuple[float, float, int]]:
+    """Return (share of samples, level, stretches) of each end where a channel is cut off.
 
     A stretch is three or more equal samples at the largest or smallest value, away from the ends of
     the record. A turning point of a signal written in steps dwells there too, but then almost as
@@ -65,7 +65,7 @@ def clipped_share(values: Array, quantum: float) -> tuple[float, float, int]:
     """
     span = float(np.ptp(values))
     tolerance = max(0.5 * quantum, 1e-9 * span)
-    best = (0.0, 0.0, 0)
+    found = []
     for extreme in (float(values.max()), float(values.min())):
         distance = np.abs(values - extreme)
         edges = stretches(distance <= tolerance).tolist()
@@ -78,6 +78,5 @@ def clipped_share(values: Array, quantum: float) -> tuple[float, float, int]:
         round_peak = 0.707 * levels / ((levels + 0.5) ** 0.5 - 0.707)
         often = count >= 5 and (len(inner) > 1 or count >= 10)
         if often and count > 4.0 * round_peak * beside / levels:
-            share = count / len(values)
-            best = max(best, (share, extreme, len(inner)))
-    return best
+            found.append((count / len(values), extreme, len(inner)))
+    return sorted(found, key=lambda end: -end[0])
