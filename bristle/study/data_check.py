@@ -58,7 +58,7 @@ class DataCheck:
         return self.page().figure
 
     def __repr__(self) -> str:
-        found = (f"{one.level}: {sentence(one, runs)}" for one, runs in grouped(self.findings))
+        found = (f"{one.level}: {sentence(one, group)}" for one, group in grouped(self.findings))
         return shown(self, f"{len(self.runs)} runs", found)
 
     def _repr_html_(self) -> str:
@@ -111,13 +111,13 @@ class DataCheck:
         """Return the channels in a table, then the findings, runs that share one joined."""
         lines = _table(self.runs)
         last = ""
-        for finding, runs in grouped(self.findings):
+        for finding, group in grouped(self.findings):
             if finding.kind == "noise" and finding.level == "note":
                 continue  # in the table
             if finding.level != last:
                 last = finding.level
                 lines += ["", f"{_HEADINGS[last]}:"]
-            lines.append(f"  - {sentence(finding, runs)}")
+            lines.append(f"  - {sentence(finding, group)}")
             if finding.do:
                 lines.append(f"    {finding.do}")
         return "\n".join(lines)

@@ -12,9 +12,23 @@ def test_a_warning_in_one_run_and_notes_in_others_are_told_once():
         Finding("offset", "note", "a mean of 4 N.", run="third", channel="force", value=0.2),
         Finding("drift", "note", "the force drifts.", run="first", channel="force"),
     ]
-    (worst, runs), (other, _) = grouped(rows)
+    (worst, group), (other, _) = grouped(rows)
     assert (worst.run, worst.level, other.kind) == ("second", "warning", "drift")
-    assert sentence(worst, runs) == "second: a mean of 9 N. (the same in 2 other runs)"
+    assert sentence(worst, group) == "second: a mean of 9 N. (3 to 9 N in 3 runs)"
+
+
+def test_the_same_is_said_of_equal_sentences_alone():
+    def told(*texts: str) -> list[str]:
+        rows = [Finding("reading", "note", text, run=f"r{k}") for k, text in enumerate(texts)]
+        return [sentence(worst, group) for worst, group in grouped(rows)]
+
+    warm = [f"temperature: {mean} °C, the mean of the run" for mean in ("24.8", "33.7", "30.1")]
+    assert told(*warm) == [f"r0: {warm[0]} (24.8 to 33.7 °C in 3 runs)"]
+    assert told("not UTF-8", "no velocity", "not UTF-8") == [
+        "r0: not UTF-8 (the same in 1 other run)", "r1: no velocity",
+    ]  # fmt: skip
+    units = [Finding("size", "warning", text, run=text) for text in ("900 N", "1.1 kN")]
+    assert sentence(*grouped(units)[0]) == "900 N: 900 N (similar in 1 other run)"
 
 
 def test_runs_that_each_differ_in_their_own_way_are_told_one_by_one():

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -12,6 +13,9 @@ from ..corrections import Correction
 Level = Literal["error", "warning", "note"]
 _OF_ONE_RUN = ("run gain", "run sign", "run zero")
 """Kinds that say how one run differs from the others."""
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\d)")
+"""A number of a sentence, and no part of a name."""
+_UNIT = re.compile(r" [^\s,;:()]*[^\s,;:().]")
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
@@ -39,16 +43,15 @@ class Finding:
         return {**asdict(self), "corrections": [one._asdict() for one in self.corrections]}
 
 
-def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[str]]]:
-    """Return the worst finding of each kind and channel, with the runs that share it."""
+def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[Finding]]]:
+    """Return the worst finding of each kind and channel, with those of all runs that share it."""
     groups: dict[tuple[str, ...], list[Finding]] = defaultdict(list)
     for finding in findings:
         run = finding.run if finding.kind in _OF_ONE_RUN else ""
-        groups[finding.kind, finding.channel, run].append(finding)
-    out = [
-        (min(group, key=_worst_first), [one.run for one in group if one.run])
-        for group in groups.values()
-    ]
+        # Notes of a reader are of one kind whatever they say.
+        said = _NUMBER.sub("", finding.text) if finding.kind == "reading" else ""
+        groups[finding.kind, finding.channel, run, said].append(finding)
+    out = [(min(group, key=_worst_first), group) for group in groups.values()]
     return sorted(out, key=lambda pair: _ORDER[pair[0].level])
 
 
@@ -56,9 +59,33 @@ def _worst_first(finding: Finding) -> tuple[int, float]:
     return _ORDER[finding.level], -finding.value
 
 
-def sentence(finding: Finding, runs: list[str]) -> str:
-    """Return one finding as text: where, what, and in how many other runs."""
+def sentence(finding: Finding, group: Sequence[Finding]) -> str:
+    """Return one finding as text: where, what, and in how many other runs.
+
+    Parameters
+    ----------
+    finding : the worst one
+    group : those of all runs that share it, see `grouped`
+    """
     where = f"{finding.run}: " if finding.run else ""
-    others = len(set(runs)) - 1
-    also = f" (the same in {others} other run{'s' * (others > 1)})" if others > 0 else ""
-    return f"{where}{finding.text}{also}"
+    others = len({one.run for one in group if one.run}) - 1
+    if others < 1:
+        return f"{where}{finding.text}"
+    what = "the same" if len({one.text for one in group}) == 1 else "similar"
+    also = _range_text(group) or f"{what} in {others} other run{'s' * (others > 1)}"
+    return f"{where}{finding.text} ({also})"
+
+
+def _range_text(group: Sequence[Finding]) -> str:
+    """Return between which values the first number lies that differs, "" where none can be told."""
+    if len({_NUMBER.sub("", one.text) for one in group}) > 1:
+        return ""
+    columns = zip(*(list(_NUMBER.finditer(one.text)) for one in group), strict=True)
+    for column in columns:
+        texts = [match.group() for match in column]
+        if len(set(texts)) > 1:
+            unit = _UNIT.match(column[0].string, column[0].end())
+            low, high = min(texts, key=float), max(texts, key=float)
+            runs = len({one.run for one in group})
+            return f"{low} to {high}{unit.group() if unit else ''} in {runs} runs"
+    return ""
