@@ -12,6 +12,7 @@ from ..identify.model import Run
 from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
 from .candidates import Trial
+from .clocks import clock_faults
 from .decision import OTHER_FORM, Z
 from .finding import Finding
 from .odd_run import odd_run, other_gain, other_zero, z_with
@@ -33,9 +34,10 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
     opened : the site's runs and its model
     """
     assert found.after is not None
-    odd = _but_for_a_run(found, opened)
-    if odd is not found:
-        return odd
+    for apart in (_but_for_a_run, _but_for_clocks):
+        odd = apart(found, opened)
+        if odd is not found:
+            return odd
     before, rule, at_damper = opened.before, opened.rule, found.site == DAMPER
     kind = kind_of(found.kind, before, found.after, rule)
     runs = opened.searched, opened.held_out, rule
@@ -63,22 +65,57 @@ def _but_for_a_run(found: Finding, opened: Opening) -> Finding:
     ----------
     found, opened : as in `contradicted`
     """
-    after, rule, problem = found.after, opened.rule, opened.problem
+    for trial, added in _to_be_explained(found, opened):
+        called = f"The model with {' and '.join(added)}" if added else "One model"
+        told = odd_run(trial.model, opened.searched, opened.held_out, opened.rule, called)
+        if told:
+            return _with_reason(found, trial, told)
+    return found
+
+
+def _but_for_clocks(found: Finding, opened: Opening) -> Finding:
+    """Return a finding that names the runs whose loggers began apart, if that explains the rest.
+
+    Beside a missing effect it shows only in what the effect leaves: clocks are looked at for the
+    present model before.
+
+    Parameters
+    ----------
+    found, opened : as in `contradicted`
+    """
+    for trial, added in _to_be_explained(found, opened):
+        clocks = clock_faults(trial, opened.problem, opened.held_out) if added else None
+        if clocks is not None:
+            told = " ".join(fault.words for fault in clocks.faults)
+            return _with_reason(found, trial, f"With {' and '.join(added)}: {told}")
+    return found
+
+
+def _to_be_explained(found: Finding, opened: Opening) -> list[tuple[Trial, list[str]]]:
+    """Return trials that leave more than noise, with the effects that they add, simplest first.
+
+    None where the force is no measured one.
+    """
+    after, problem = found.after, opened.problem
     assert after is not None
     by_equilibrium = isinstance(problem, StructureProblem) and problem.reconstructed
-    if found.site != DAMPER or by_equilibrium or max(after.train, after.z) <= rule.misfit:
-        return found
-    simplest_first = (opened.before, *found.trials[:1], after)
-    for effects, trial in {one.model.effects: one for one in simplest_first}.items():
-        added = [name for name in effects if name not in opened.before.model.effects]
-        called = f"The model with {' and '.join(added)}" if added else "One model"
-        told = odd_run(trial.model, opened.searched, opened.held_out, rule, called)
-        if told and effects == after.model.effects and found.effects:
-            kept = (one for one in found.reasons if one != OTHER_FORM)
-            return replace(found, reasons=(*kept, told))
-        if told:
-            return replace(found, kind="insufficient", effects=(), reasons=(told,))
-    return found
+    if found.site != DAMPER or by_equilibrium or max(after.train, after.z) <= opened.rule.misfit:
+        return []
+    own = opened.before.model.effects
+    trials = {one.model.effects: one for one in (opened.before, *found.trials[:1], after)}
+    return [(one, [name for name in one.effects if name not in own]) for one in trials.values()]
+
+
+def _with_reason(found: Finding, trial: Trial, told: str) -> Finding:
+    """Return a finding with what is wrong in a run, which is to be set right first.
+
+    Where the trial has the effects of the finding, they stand: what remains is no other form.
+    """
+    assert found.after is not None
+    if trial.effects == found.after.effects and found.effects:
+        kept = (one for one in found.reasons if one != OTHER_FORM)
+        return replace(found, reasons=(*kept, told))
+    return replace(found, kind="insufficient", effects=(), reasons=(told,))
 
 
 def kind_of(kind: str, before: Trial, best: Trial, rule: DecisionRule = BENCH) -> str:

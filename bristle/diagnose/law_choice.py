@@ -239,13 +239,22 @@ def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
     """Return the pair of law and effects that the runs ask for.
 
     Of those that explain the runs and that the best one on held-out runs does not surpass, the
-    simplest; where none explains them, the one that comes nearest with an effect or without.
+    simplest; where none explains them, the one that comes nearest with an effect or without. A
+    pair that leaves more than noise explains most of what its own law leaves: a simpler one of
+    another law, which began nearer and comes as near, is taken in its place.
     """
     best = best_of([pair.after for pair in pairs], rule)
     level = [pair for pair in pairs if pair.explains and as_good(pair.after, best, rule)]
-    if level:
-        return min(level, key=lambda pair: pair.order)
-    return _nearest(pairs, rule)
+    if not level:
+        return _nearest(pairs, rule)
+    chosen = min(level, key=lambda pair: pair.order)
+    if chosen.after.z > rule.adequate:
+        nearest = _nearest(pairs, rule)
+        reached = nearest.reach(rule)
+        fewer = len(reached.model.free()) < len(chosen.after.model.free())
+        if fewer and as_good(reached, chosen.after, rule):
+            return nearest
+    return chosen
 
 
 def _nearest(pairs: Sequence[Pair], rule: DecisionRule) -> Pair:

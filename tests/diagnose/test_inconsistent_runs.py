@@ -146,6 +146,32 @@ def test_no_further_effect_is_named_for_one_odd_run():
     assert "gain" in told.reasons[0]
 
 
+def late(run, steps: float):
+    """Return a run whose force was recorded so many steps late."""
+    at = np.arange(len(run.force), dtype=float)
+    return replace(run, force=np.interp(at - steps, at, run.force))
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_logger_that_began_apart_is_told_beside_a_missing_effect(named):
+    """The late run alone leaves more than noise, and is no other form of the spring."""
+    found, opened = sprung_finding(1, 1.0)
+    runs = [*opened.problem.runs]
+    runs[1] = late(runs[1], 3.0)
+    train = opened.problem.of(runs)
+    before = judge(fit(train, opened.before.model, with_std=False).model, train, opened.held_out)
+    single = judge(joined("gas_spring", before.model, train), train, opened.held_out)
+    after = single if named else before
+    kind, effects = ("effect", ("gas_spring",)) if named else ("unknown", ())
+    found = replace(found, kind=kind, effects=effects, trials=(single,), before=before, after=after)
+    told = contradicted(found, Opening(before, train, opened.held_out))
+    assert told.kind == ("effect" if named else "insufficient")
+    assert told.effects == effects
+    assert told.reasons[-1].startswith(f"With gas_spring: In {runs[1].name} the force is on record")
+    value = float(told.reasons[-1].split('fault = "delay", value = ')[1].split("}")[0])
+    assert value == pytest.approx(3.0 * runs[1].dt, rel=0.1)
+
+
 def test_a_verdict_stays_where_no_run_is_odd():
     found, opened = sprung_finding(1, 1.0)
     assert contradicted(found, opened) is found

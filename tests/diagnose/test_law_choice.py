@@ -224,6 +224,19 @@ def test_where_none_explains_the_runs_the_law_that_comes_nearest_with_an_effect_
     assert choose([rich, alone]) is alone  # that hardly differs, with fewer parameters
 
 
+def test_most_of_a_large_error_is_no_explanation_where_a_simpler_law_comes_as_near():
+    """Two effects explain most of what one law leaves, and leave as much as another with one."""
+    mimic = pair("bingham", 10.9, "effect", ("presliding", "gas_spring"), 3.7)
+    other = pair("dahl", 6.08, "unknown")
+    gas = trial(3.3, "dahl", ("gas_spring",))
+    other = replace(other, finding=replace(other.finding, trials=(gas,)))
+    assert choose([mimic, other]) is other
+    settled = pair("bingham", 10.9, "effect", ("presliding", "gas_spring"), 1.05)
+    assert choose([settled, other]) is settled
+    far = replace(other, finding=replace(other.finding, trials=(trial(5.0, "dahl", ("delay",)),)))
+    assert choose([mimic, far]) is mimic
+
+
 def test_of_wrong_laws_one_that_serves_rest_alone_is_not_the_best():
     near_rest, all_over = trial(5.8, "tanh"), trial(6.1, "modified_bouc_wen")
     near_rest, all_over = replace(near_rest, rms=13.2), replace(all_over, rms=9.1)
