@@ -143,7 +143,20 @@ def _limits(verdict: Verdict) -> list[str]:
 
 
 def _next(verdict: Verdict, folder: Path) -> str:
-    """Return the command that follows from a verdict; two where it asks for another law."""
+    """Return the command that follows from a verdict: what sets the data right comes first."""
+    from ..diagnose.correctable import is_correctable
+
+    if not any(map(is_correctable, verdict.get("sensors") or [])):
+        return _with_law(verdict, folder)
+    correct = command("study", "check", folder, "--correct")
+    then = command("diagnose", folder)
+    if verdict["kind"] != "insufficient":
+        then = _with_law(verdict, folder)
+    return f"{correct} , which corrects the runs that are named, then:  {then}"
+
+
+def _with_law(verdict: Verdict, folder: Path) -> str:
+    """Return the command for the model; two where the verdict asks for another law."""
     if not verdict.get("laws") or verdict["kind"] == "insufficient":
         return _then(verdict, folder)
     from ..physics.forms import joined_form

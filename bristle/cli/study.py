@@ -17,7 +17,9 @@ from ._roles import add_roles
 
 if TYPE_CHECKING:
     from ..study.create import Created
+    from ..study.data_check import DataCheck
     from ..study.joined_corrections import RunCorrections
+    from ..study.study import Study
 
 HELP = "make and change studies of measurements: new, extend, check, roles, channels, auto"
 _OLD = "first-look"
@@ -28,7 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     _add_new(commands.add_parser("new", help="make a study from measurement files"))
     add_extend(commands.add_parser("extend", help="add measured runs to a study"))
-    _add_check(commands.add_parser("check", help="check the data, before any model"))
+    _add_check(
+        commands.add_parser(
+            "check",
+            help="check the data, before any model",
+            description="Check the data before any model; exit code 2 if there is an error.",
+        )
+    )
     add_roles(commands.add_parser("roles", help="show or change the roles of the runs"))
     add_channels(commands.add_parser("channels", help="show or correct columns, units and signs"))
     # The name until 0.1; here for one release.
@@ -68,8 +76,8 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--correct", action="store_true",
-        help="correct the faults that can be corrected: lines, and gain, zero or sign of a run "
-        "that differs",
+        help="correct what can be corrected in study.toml: lines, and gain, zero or sign of a run "
+        "that differs, and of the verdict on these data the delay of a run, clock, slew and range",
     )  # fmt: skip
     parser.add_argument(
         "--exclude", nargs="+", action="extend", default=[], metavar="RUN",
@@ -104,6 +112,10 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="column of a channel, instead of the guess; a minus before COLUMN reverses its sign: "
         "--channel 'force=-Ch3@kN'",
     )
+    parser.add_argument(
+        "--without", action="append", default=[], metavar="CHANNEL",
+        help="a channel that is not read, though a column was taken for it",
+    )  # fmt: skip
     parser.add_argument(
         "--step", type=float, metavar="S", help="sampling step in s of files without a time"
     )
@@ -168,6 +180,7 @@ def _new(arguments: argparse.Namespace) -> int:
         law=law,
         runs=choices,
         device=arguments.device,
+        without=arguments.without,
     )
     if arguments.json:
         _print_json(created)
@@ -222,9 +235,9 @@ def _print_new(created: Created) -> None:
 
 def _check(arguments: argparse.Namespace) -> int:
     from ..draw.style import png
+    from ..errors import StudyError
     from ..progress import Progress
     from ..study.data_check import check_data
-    from ..study.joined_corrections import joined_corrections
     from ..study.study import Study
 
     if arguments.action == _OLD:
@@ -242,9 +255,7 @@ def _check(arguments: argparse.Namespace) -> int:
     with Progress("checking the data", total, True) as progress:
         found = check_data(study, progress.show)
     apart: list[str] = []
-    if arguments.correct and found.corrections():
-        sizes = {run.name: len(run.time) for run in found.runs}
-        joined = joined_corrections(study.folder, study.settings, found.corrections(), sizes)
+    if arguments.correct and (joined := _corrections(study, found)):
         study = study.with_corrections({run.name: run.corrections for run in joined})
         apart = [text for run in joined for text in run.apart]
         if not arguments.json:
@@ -262,7 +273,23 @@ def _check(arguments: argparse.Namespace) -> int:
         print(f"\nPicture: {picture}")
         if not found.ok:
             print("Correct these errors before you fit a model.", file=sys.stderr)
-    return 0
+    return 0 if found.ok else StudyError.exit_code
+
+
+def _corrections(study: Study, found: DataCheck) -> list[RunCorrections]:
+    """Return what the check and the verdict on these data can set right, run by run."""
+    from ..diagnose.correctable import corrections_of
+    from ..study.joined_corrections import joined_corrections
+
+    corrections = found.corrections()
+    verdict = study.verdict()
+    if verdict is not None and verdict.get("data") == study.data:
+        for run, listed in corrections_of(verdict, [run.name for run in found.runs]).items():
+            own = corrections.setdefault(run, [])
+            known = {one[:2] for one in own}  # what both found is set right once
+            own += [one for one in listed if one[:2] not in known]
+    sizes = {run.name: len(run.time) for run in found.runs}
+    return joined_corrections(study.folder, study.settings, corrections, sizes)
 
 
 def _print_corrections(joined: Sequence[RunCorrections]) -> None:

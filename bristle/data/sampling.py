@@ -78,7 +78,9 @@ def evenly(
     for channel, values in channels.items():
         if np.isnan(values).all():
             raise RecordError(
-                f"{name}: {channel} has no number. Remove it from [channels], or correct the file."
+                f"{name}: {channel} has no number. Leave the channel out of all runs, with "
+                f"--without {channel} (of bristle study new, or of bristle study channels once "
+                "there is a study); or leave this file out, or correct it."
             )
     step = float(np.median(np.diff(time)))
     breaks = np.flatnonzero(np.diff(time) > (MAX_FILLED + 1.5) * step) + 1

@@ -38,6 +38,7 @@ def create_study(
     law: str | None = None,
     runs: RunChoices | None = None,
     device: str | None = None,
+    without: Sequence[str] = (),
 ) -> Created:
     """Make a study's folder from files; it appears when it is whole.
 
@@ -63,6 +64,8 @@ def create_study(
     device : str
         Of a building with several devices the one that the study is about. None: its only one, or
         the damper on the first level of a building without devices of its own.
+    without : sequence of str
+        Channels that are not read, though a column was guessed to hold them.
 
     Raises
     ------
@@ -75,6 +78,6 @@ def create_study(
     """
     made = make_folder(
         Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law,
-        runs=runs, device=device,
+        runs=runs, device=device, without=without,
     )  # fmt: skip
     return Created(Study(folder), made.guesses, made.extra, made.unused, made.notes)

@@ -22,6 +22,7 @@ from ..data.checks.sizes import check_sizes
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
+from ..findings import command
 from ..quantity import plain, scale
 from ..shown import shown
 from .openings import runs_for_test
@@ -207,7 +208,7 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     excitations += [excitation_of(run, level) for run in test_runs]
     if study.settings.has_building:
         findings += _unmeasured(runs.all, at_damper)
-    findings = [_milder(finding, runs.all) for finding in findings]
+    findings = [_of_study(_milder(finding, runs.all), study) for finding in findings]
     ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
     return DataCheck(tuple(ordered), tuple(excitations), tuple(every), at_damper)
 
@@ -245,6 +246,13 @@ def _milder(finding: Finding, runs: list[Measurement]) -> Finding:
     if finding.kind == "still" and moves:
         return replace(finding, level="warning", do="Leave it out, unless it is meant to rest.")
     return finding
+
+
+def _of_study(finding: Finding, study: Study) -> Finding:
+    """Return a finding whose commands name the study's folder."""
+    _, _, folder = command("study", study.folder).partition("study ")
+    do = finding.do.replace("MY_RIG", folder).replace("check FOLDER", f"check {folder}")
+    return replace(finding, do=do)
 
 
 def _other_levels(run: Measurement, level: str) -> list[str]:

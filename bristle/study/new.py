@@ -63,12 +63,13 @@ def make_folder(
     law: str | None = None,
     runs: RunChoices | None = None,
     device: str | None = None,
+    without: Sequence[str] = (),
 ) -> Made:
     """Make a study's folder from files.
 
     Parameters
     ----------
-    folder, files, rig, building, channels, title, law, runs, device : see
+    folder, files, rig, building, channels, title, law, runs, device, without : see
         `bristle.study.create.create_study`
 
     Raises
@@ -89,7 +90,8 @@ def make_folder(
     tables = [read_table(Path(file)) for file in counted(files, "reading file")]
     closed = for_test([Path(file) for file in files], choices)
     first = tables[closed.index(False)]  # a guess is a choice, which no test run may see
-    guesses = _chosen(first, guess_channels(first, rig, levels, devices), channels or {})
+    seen = guess_channels(first, rig, levels, devices)
+    guesses = _chosen(first, _read(seen, without), channels or {})
     _refuse_incomplete(first, guesses, rig, channels or {})
     specs = {
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
@@ -97,7 +99,8 @@ def make_folder(
     for table in tables:
         refuse_other_columns(table, guesses, first)
     taken = [guess.column for guess in guesses]
-    extra = found_in(first, taken, specs)
+    ignored = [guess.column for guess in seen if guess.channel in without]
+    extra = found_in(first, [*taken, *ignored], specs)
     names = _names([Path(file) for file in files])
     about, notes = facts_of([Path(file) for file in files], choices, _commanded(specs, studied))
     found = _parts(names, tables, specs, choices.split)
@@ -172,12 +175,16 @@ def _refuse_one_role(runs: Sequence[RunFile]) -> None:
 
 def _rate(parts: Sequence[_Part], choices: RunChoices, notes: list[str]) -> float:
     """Return the rate to which runs are decimated, 0 where none is fast enough."""
-    fastest = max(part.rate for part in parts)
+    slowest, fastest = min(part.rate for part in parts), max(part.rate for part in parts)
     rate = RATE if choices.rate is None else choices.rate
     if rate <= 0.0 or fastest < FAST * rate * (1.0 - 1e-6):
         return 0.0
+    held = plain(fastest, 4)
+    if plain(slowest, 4) != held:
+        held = f"{plain(slowest, 4)} to {held}"
+    some = "runs" if slowest >= FAST * rate * (1.0 - 1e-6) else "the faster ones"
     notes.append(
-        f"the files hold {plain(fastest, 4)} samples per second: runs are decimated to about "
+        f"the files hold {held} samples per second: {some} are decimated to about "
         f"{plain(rate, 4)} Hz behind an anti-alias filter, which a fit needs; rate in study.toml "
         "changes that, and rate = 0 keeps all"
     )
@@ -230,6 +237,14 @@ def _refuse_no_device(channels: Iterable[str], devices: Sequence[str]) -> None:
 def _commanded(channels: Iterable[str], device: str) -> bool:
     """Return whether a channel commands the damper, which may be a device of a building."""
     return any(at_device(name, device) in DRIVE for name in channels)
+
+
+def _read(guesses: list[Guess], without: Sequence[str]) -> list[Guess]:
+    """Return the guesses that are not to be left out."""
+    there = [guess.channel for guess in guesses]
+    if wrong := next((name for name in without if name not in there), ""):
+        raise StudyError(f"--without {wrong}: no column was taken for it; {', '.join(there)} were.")
+    return [guess for guess in guesses if guess.channel not in without]
 
 
 def _chosen(table: Table, guesses: list[Guess], channels: Mapping[str, ChannelSpec]) -> list[Guess]:

@@ -92,9 +92,10 @@ class Study:
             raise StudyError(f"a study is a folder, not {written(folder)}.")
         self.folder = Path(folder)
         if not (self.folder / "study.toml").is_file():
+            new = self.folder if self.folder.name else "NAME"
             raise StudyError(
                 f"{self.folder}: no study: there is no study.toml. Make one with  "
-                f"{command('study', 'new', self.folder.name or 'NAME', '--data', 'lab/*.csv')}"
+                f"{command('study', 'new', new, '--data', 'lab/*.csv')}"
             )
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")

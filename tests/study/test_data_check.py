@@ -15,6 +15,7 @@ from bristle.cli import main
 from bristle.data.checks.clipping import clipped_ends
 from bristle.data.checks.finding import Finding
 from bristle.data.checks.runs import Excitation, _beyond, cycles, drive_levels
+from bristle.errors import StudyError
 from bristle.study import Study, create_study
 from bristle.study.data_check import DataCheck, check_data
 
@@ -335,3 +336,51 @@ def test_the_old_names_work_for_one_release(
     with pytest.warns(DeprecationWarning, match="data_check"):
         from bristle.study.first_look import first_look
     assert first_look is check_data
+
+
+def test_errors_end_the_check_with_2_and_advice_names_the_study(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t = np.arange(400) / 500.0
+    columns = {"t [s]": t, "x [mm]": 0.01 * np.sin(3.0 * t), "F [N]": 5.0 * np.cos(3.0 * t)}
+    rig = tmp_path / "my lab" / "rig"
+    create_study(rig, [write(tmp_path / "run.csv", columns)])
+    for more in ([], ["--json"]):
+        assert main(["study", "check", str(rig), *more]) == 2
+    assert f"bristle study channels '{rig}' --channel displacement=" in capsys.readouterr().out
+
+
+def test_a_study_that_is_not_there_is_made_where_it_was_looked_for(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match=f"study new {tmp_path}/lab/nothing --data"):
+        Study(tmp_path / "lab" / "nothing")
+
+
+def test_a_channel_without_a_number_can_be_left_out_of_a_new_study(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = write_runs(tmp_path / "lab", count=3, seconds=2.0)
+    columns = bench_run(2, 2.0)
+    columns["U [V]"] = np.full_like(columns["U [V]"], np.nan)
+    write(files[1], columns)
+    new = ["study", "new", str(tmp_path / "rig"), "--data", *map(str, files)]
+    assert main(new) == 2
+    told = capsys.readouterr().err
+    assert "voltage has no number" in told
+    assert "--without voltage" in told
+    assert main([*new, "--without", "voltage"]) == 0
+    settings = Study(tmp_path / "rig").settings
+    assert "voltage" not in settings.channels
+    assert not settings.extra
+    assert "Not used: U [V]" in capsys.readouterr().out
+    assert main(["study", "new", str(tmp_path / "a"), *new[3:], "--without", "current"]) == 2
+    assert "--without current: no column was taken for it" in capsys.readouterr().err
+
+
+def test_files_of_several_rates_are_told_with_their_range(tmp_path: Path) -> None:
+    files = write_runs(tmp_path / "lab", count=3, seconds=2.0)
+    columns = bench_run(2, 8.0)
+    columns["time [s]"] = columns["time [s]"] / 4.0
+    write(files[1], columns)
+    notes = create_study(tmp_path / "rig", files).notes
+    (note,) = [one for one in notes if "decimated" in one]
+    assert note.startswith("the files hold 500 to 2000 samples per second: the faster ones are")
