@@ -19,7 +19,7 @@ from ..identify.structure import StructureProblem
 from .goal import Purposes, Stated
 from .knowledge import Known, of_roles
 from .measured_force import of_one_force, with_measured_force
-from .outcome import Outcome
+from .outcome import Outcome, along
 from .shaking_table import FORCE, Shaken, ShakingTable
 
 HELPS, SOME = 1.5, 1.15
@@ -173,7 +173,8 @@ def _told(
     row = next(
         one
         for one in rows
-        if one.purpose == purpose and one.name in (f"{site}: {name}", f"{site}: along {name}")
+        if one.purpose == purpose
+        and one.name in (f"{site}: {name}", f"{site}: {along(name, stand[site].purposes.drive)}")
     )
     factor = helps[best]
     if purpose == "see":

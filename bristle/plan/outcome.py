@@ -10,7 +10,7 @@ from typing import Any
 from ..diagnose.allowed_size import ONE_SIDED, TWO_SIDED
 from ..diagnose.rule import BENCH
 from ..identify.model import parameter
-from ..physics.drive import drive_named, unit_for
+from ..physics.drive import VOLTAGE, drive_named, unit_for
 from ..quantity import plain, quantity
 from .goal import Purposes
 from .knowledge import Asked, Known
@@ -200,7 +200,19 @@ def _learned(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
         first, second = (float((one[name] ** 2).mean() ** 0.5) for one in (before, after))
         out.append(
             Outcome(
-                "learn", f"along {name}", "uncertainty of a curve, over noise", "1", first, second
+                "learn", along(name, purposes.drive), "uncertainty of a curve, over noise", "1",
+                first, second,
             )
-        )
+        )  # fmt: skip
     return out
+
+
+def along(name: str, drive: str) -> str:
+    """Return what is learned along a coordinate, the command by the name of its channel.
+
+    Parameters
+    ----------
+    name : of the coordinate, as `ALONG` names it
+    drive : the channel of the command, "" for none
+    """
+    return f"along {name.replace(VOLTAGE.name, drive) if drive else name}"

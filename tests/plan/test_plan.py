@@ -249,6 +249,8 @@ def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
     text = SHEET.replace("max_force", 'command = "current"\nmax_force')
     file.write_text(text.replace('["0 V", "5 V"]', '["0 A", "2 A"]'))
     found = bristle.plan(file, see=["saturation"], sharpen=["f_c", "f_v"])
+    learned = bristle.plan(file, learn=["current", "recent_current"])
+    assert [one.name for one in learned.outcomes] == ["along current", "along recent_current"]
     units = {one.name: one.unit for one in found.outcomes}
     assert units["saturation"] == "A"
     assert "V" not in "".join(units.values())
