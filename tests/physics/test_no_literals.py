@@ -25,7 +25,7 @@ ELSEWHERE = {
     ("data/corrections.py", "delay"): "a fault of a channel that can be set right",
     ("data/checks/motion.py", "delay"): "a kind of finding: a channel that comes late",
     ("diagnose/clocks.py", "delay"): "a kind of sensor fault",
-    ("diagnose/corrected.py", "delay"): "a kind of sensor fault",
+    ("data/timing.py", "delay"): "a kind of sensor fault",
     ("diagnose/faults.py", "delay"): "a kind of sensor fault",
     ("diagnose/load_cell.py", "delay"): "a kind of sensor fault",
     ("diagnose/model_based_faults.py", "delay"): "a kind of sensor fault",
