@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..compare.names import site_name
 from ..diagnose.learned.along import GIVEN
-from ..diagnose.learned.closed import ClosedForm, in_words, name_of
+from ..diagnose.learned.closed import ClosedForm, in_words, name_of, nearest_of
 from ..diagnose.learned.closed_fit import Closed
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.fit import LearnedCurve
@@ -145,8 +145,8 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
     axes.axhline(0.0, color=PALE, lw=1.0)
     axes.fill_between(across * s, up * (y - half), up * (y + half), color=BLUE, alpha=0.18, lw=0.0)
     axes.plot(across * s, up * y, color=BLUE, lw=2.2, marker="o", ms=4, label="learned")
-    if forms:
-        best = forms[0]
+    best = nearest_of(forms)
+    if best is not None:
         named = name_of(forms)
         name = in_words(named, curve) if named else f"nearest form: {best.name}"
         fine = np.linspace(s[0], s[-1], FINE)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..compare.names import site_name
-from ..diagnose.learned.closed import ClosedForm, in_words, name_of
+from ..diagnose.learned.closed import ClosedForm, in_words, name_of, nearest_of
 from ..diagnose.learned.closed_fit import Closed
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.fit import LearnedCurve
@@ -81,10 +81,10 @@ class LearnedEffect:
         elif curve.part == RING:
             out.append(_of_mode(curve))
         elif self.forms:
-            out.append(
-                f"No closed form follows it: the nearest, {in_words(self.forms[0], curve)}, leaves "
-                f"{100.0 * self.forms[0].left:.0f} % of its variation."
-            )
+            near = nearest_of(self.forms)
+            text = f": the nearest, {in_words(near, curve)}, leaves " if near else ""
+            text += f"{100.0 * near.left:.0f} % of its variation" if near else ""
+            out.append(f"No closed form follows it{text}.")
         return [*out, *self._line()]
 
     def _where(self) -> str:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ...quantity import plain, quantity, scale
 from ...units import canonical
+from .centred import UNCENTRED, fitted_about
 from .curve import Curve, Formula
-from .forms import FORMS, LINE, MAPS, Form
+from .forms import CENTRED, FORMS, LINE, MAPS, Form
 from .rule import LEARN, LearnRule
 
 Array = NDArray[np.float64]
@@ -24,7 +25,7 @@ LEAST = 0.02
 class ClosedForm:
     """A form fitted to a curve: `left` the share of its variation that remains, as RMS.
 
-    `values` in the order c, m, d (and what the form has more), SI; `top` the last knot.
+    `values` in the order c, m, d, then n or s0, SI; `top` the last knot.
     """
 
     form: Form
@@ -40,10 +41,18 @@ class ClosedForm:
     def at(self, s: Array) -> Array:
         """Return the form's value (n,) along its signal (n,)."""
         scale = self.values[2] if self.form.scales is not None else 1.0
-        found: Array = self.form.at(s, scale, self.top) @ np.array(
-            self.values[:2] + self.values[3:]
-        )
-        return found
+        factors = self.values[:2] + (self.values[3:] if not self.form.centred else ())
+        return np.asarray(self.form.at(s - self.centre, scale, self.top) @ np.array(factors))
+
+    @property
+    def centre(self) -> float:
+        """Where it has its centre, 0 where that is no number of its own."""
+        return self.values[3] if self.form.centred else 0.0
+
+    @property
+    def price(self) -> float:
+        """What it leaves, raised for each of its numbers: the least is the best form."""
+        return (self.left + LEAST) * 1.25 ** self.form.count()  # less tells no forms apart
 
 
 _GAPS = {"dead band": "of", "contact above": "beyond", "contact below": "beyond"}
@@ -56,6 +65,11 @@ _POWERS = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3, **dict.fro
 def name_of(forms: Sequence[ClosedForm], rule: LearnRule = LEARN) -> ClosedForm | None:
     """Return the form that names a curve, the first of `forms`; None where it leaves too much."""
     return forms[0] if forms and forms[0].left <= rule.follows else None
+
+
+def nearest_of(forms: Sequence[ClosedForm], rule: LearnRule = LEARN) -> ClosedForm | None:
+    """Return the first of `forms`; None where it leaves most of the curve's variation."""
+    return forms[0] if forms and forms[0].left <= rule.near_form else None
 
 
 def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
@@ -80,8 +94,8 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
         return []
     able = [one for one in forms_for(curve) if one.count() + curve.of_line + 1 <= len(s)]
     found = [_fitted(form, curve, y, weight, size) for form in able]
-    # Less than the weights' own share tells no forms apart.
-    return sorted(found, key=lambda one: (one.left + LEAST) * 1.25 ** one.form.count())
+    found = sorted(found, key=lambda one: one.price)
+    return [*_about_a_centre(curve, y, weight, size, found), *found]
 
 
 def forms_for(curve: Curve) -> list[Form]:
@@ -98,7 +112,7 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
 
     What would take ever more from a building's own stiffness or friction ends with the data.
     """
-    s = curve.signal.source
+    s = curve.signal.source if not found.form.centred else f"({curve.signal.source} - p.s0)"
     grows = curve.place.is_line and found.form.grows
     ends = grows and found.values[1] < 0.0
     if ends:
@@ -122,6 +136,8 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
         given.append(("d", found.values[2], "1" if found.name == "power" else along))
     if len(terms) > 1:
         given.append(("n", found.values[3], unit))
+    if found.form.centred:
+        given.append(("s0", found.centre, along))
     text = found.form.text.format(top=top)
     if curve.of.level:  # the law's own strength is the constant
         text = text.removeprefix("c + ")
@@ -147,6 +163,27 @@ def _fitted(form: Form, curve: Curve, y: Array, weight: Array, size: float) -> C
             best = ClosedForm(form, values, left, top)
     assert best is not None
     return best
+
+
+def _about_a_centre(
+    curve: Curve, y: Array, weight: Array, size: float, plain_forms: Sequence[ClosedForm]
+) -> list[ClosedForm]:
+    """Return the form about a centre of its own if it follows the curve best; else nothing."""
+    if curve.rests or curve.of_line or not (curve.along in UNCENTRED or curve.measured):
+        return []
+    if any(one.price <= LEAST * 1.25 ** CENTRED[0].count() for one in plain_forms):
+        return []  # even without an error it would not be the best
+    own = [fitted_about(form, np.array(curve.knots), y, weight) for form in CENTRED]
+    found = [
+        ClosedForm(form, one.values, one.rms / size)
+        for form, one in zip(CENTRED, own, strict=True)
+        if one is not None
+    ]
+    best = min(found, key=lambda one: one.price, default=None)
+    earned = best is not None and best.left <= LEARN.follows
+    if best is None or not earned or any(one.price <= best.price for one in plain_forms):
+        return []
+    return [best]
 
 
 def _constants(A: Array, y: Array, weight: Array, sized: bool) -> Array:
@@ -180,9 +217,11 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
     if found.name == "constant":
         return f"a constant, {quantity(found.values[0], unit)}"
     m, d, scaled = found.values[1], found.values[2], found.form.scales is not None
+    centre = found.centre
     if curve.measured:  # per kPa or MPa, not per Pa
         factor, along = scale(along, max(map(abs, curve.knots)))
         m, d = m / factor, d if found.name == "power" else factor * d
+        centre = factor * found.centre
     rate = unit if along == "1" else canonical(f"{unit}/({_by(along)})")
     if found.name == "line":
         physical = _PHYSICAL.get((curve.part, curve.along))
@@ -201,7 +240,8 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
             for name, word in _GAPS.items()
         },
     }.get(found.name, f" over {quantity(d, along)}" if scaled else "")
-    height = np.hypot(m, found.values[3]) if len(found.values) > 3 else abs(m)
+    over = f" at {quantity(centre, along)}{over}" if found.form.centred else over
+    height = np.hypot(m, found.values[3]) if len(found.form.columns) > 1 else abs(m)
     article = "an" if found.name[0] in "aeiou" else "a"
     tall = f", height {quantity(float(height), unit)}"
     tall = tall if over and found.name not in ("power", *_GAPS) else ""

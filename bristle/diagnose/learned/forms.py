@@ -22,7 +22,8 @@ class Form:
     `text` for readers; `columns` h and k as Python, of {s} and {d}, which a hook and numpy both
     take, and of {top}, the last knot of a command's map; `scales` gives the values of d to look at
     for a span and the least distance of knots, None where there is none. `bent` where it is for a
-    line, or for a force along displacement, alone; `sized` where m is sought, else m = 1.
+    line, or for a force along displacement, alone; `sized` where m is sought, else m = 1;
+    `centred` where it is of the distance from a centre s0.
     """
 
     name: str
@@ -31,10 +32,11 @@ class Form:
     scales: Callable[[float, float], Array] | None = None
     bent: bool = False
     sized: bool = True
+    centred: bool = False
 
     def count(self) -> int:
         """Return how many numbers it has, the constant included."""
-        return 1 + len(self.columns) * self.sized + (self.scales is not None)
+        return 1 + len(self.columns) * self.sized + (self.scales is not None) + self.centred
 
     @property
     def grows(self) -> bool:
@@ -108,6 +110,17 @@ FORMS = (
         _pitches,
     ),
 )  # fmt: skip
+
+
+CENTRED = (
+    Form("bell", "c + m exp(-((s - s0)/d)^2)", ("exp(-(({s} / {d}) ** 2))",), _lengths,
+         centred=True),
+    Form("exponential fall", "c + m exp(-|s - s0|/d)", ("exp(-abs({s}) / {d})",), _lengths,
+         centred=True),
+    Form("hyperbola", "c + m/(1 + |s - s0|/d)", ("1.0 / (1.0 + abs({s}) / {d})",), _lengths,
+         centred=True),
+)  # fmt: skip
+"""Forms about a centre of their own, of signals whose zero is a matter of mounting or scale."""
 
 
 MAPS = (

@@ -102,6 +102,12 @@ class LearnRule:
     their table. Found: blind seeds.
     """
 
+    near_form: float = 0.5
+    """Largest such share at which a form that is no name is told and drawn as the nearest.
+
+    Trades: if higher, a constant stands beside a bell; if lower, a hint is lost. Found: stated.
+    """
+
     def weighed(self, loss: float, curve: Curve) -> float:
         """Return a mean squared residual, raised by what a curve must pay for what it has more.
 

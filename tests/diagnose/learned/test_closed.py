@@ -9,10 +9,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bristle.diagnose.learned.closed import closed_forms, formula_of, in_words, name_of
+from bristle.diagnose.learned.centred import fitted_about
+from bristle.diagnose.learned.closed import (
+    closed_forms,
+    formula_of,
+    in_words,
+    name_of,
+    nearest_of,
+)
 from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import MATH
-from bristle.diagnose.learned.forms import FORMS, MAPS
+from bristle.diagnose.learned.forms import CENTRED, FORMS, MAPS
 
 KNOTS = np.linspace(-0.015, 0.015, 13)  # m
 GAP = 0.004  # m
@@ -61,6 +68,55 @@ def test_a_slope_over_a_temperature_is_per_kelvin():
     best = closed_forms(curve, [0.001] * 4)[0]
     assert in_words(best, curve) == "a line of slope -0.006 per K"
     assert [unit for _, _, unit in formula_of(best, curve).parameters] == ["1/K"]
+
+
+@pytest.mark.parametrize("form", CENTRED, ids=lambda f: f.name)
+def test_a_form_off_centre_comes_back_with_its_centre(form):
+    knots = np.linspace(-0.015, 0.015, 25)
+    values = 0.4 + 2.0 * form.at(knots - 0.004, 0.003)[:, 1]
+    values += np.random.default_rng(5).normal(0.0, 0.01, len(knots))
+    curve = curve_of(values, part="friction", knots=knots)
+    best = closed_forms(curve, [0.01] * len(knots))[0]
+    assert best.form is form
+    assert best.values == pytest.approx((0.4, 2.0, 0.003, 0.004), rel=0.15)
+    assert f"{form.name} at {1e3 * best.centre:.3g} mm over" in in_words(best, curve)
+    formula = formula_of(best, curve)
+    units = {"c": "N", "m": "N", "d": "m", "s0": "m"}
+    assert {n: unit for n, _, unit in formula.parameters if n != "c"} == {
+        n: unit for n, unit in units.items() if n != "c"
+    }
+    p = SimpleNamespace(c=0.0, **{n: value for n, value, _ in formula.parameters if n != "c"})
+    known = {one: getattr(math, one) for one in MATH}
+    away = eval(formula.g, known | {"p": p, "q": SimpleNamespace(x=0.002, v=0.1)})
+    assert away == pytest.approx(best.at(np.array([0.002]))[0] - best.values[0], rel=1e-6)
+
+
+def test_a_bell_about_zero_keeps_the_form_without_a_centre():
+    knots = np.linspace(-0.015, 0.015, 25)
+    for seed in range(10):
+        noise = np.random.default_rng(seed).normal(0.0, 0.03, len(knots))
+        values = np.exp(-((knots / 0.004) ** 2)) + noise
+        found = closed_forms(curve_of(values, part="friction", knots=knots), [0.03] * len(knots))
+        assert found[0].name == "bell"
+        assert not any(one.form.centred for one in found)
+
+
+def test_a_smooth_curve_of_chance_is_no_bell_off_centre():
+    knots = np.linspace(-0.015, 0.015, 13)
+    alike = np.exp(-0.5 * ((knots[:, None] - knots) / 0.006) ** 2) + 1e-6 * np.eye(13)
+    root = np.linalg.cholesky(alike)
+    for seed in range(40):
+        values = root @ np.random.default_rng(seed).normal(size=13)
+        found = fitted_about(CENTRED[0], knots, values, np.full(13, 1.0 / 0.05))
+        assert found is None
+
+
+def test_a_form_that_explains_nearly_nothing_is_not_the_nearest():
+    knots = np.linspace(-0.015, 0.015, 25)
+    values = np.sign(np.sin(np.arange(25.0) ** 2))
+    found = closed_forms(curve_of(values, part="friction", knots=knots), [0.01] * 25)
+    assert found[0].left > 0.5
+    assert nearest_of(found) is None
 
 
 def test_chance_has_no_form():
