@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..data.corrections import Correction
+from ..data.corrections import TIMING, Correction
 
 OF_ALL = ("clock", "slew", "range")
 """Faults that all runs share: of a logger, or of the amplifier of a command."""
-OF_ONE = ("delay",)
-"""Faults that are set right where a single run has them; in all runs they are the model's."""
+OF_ONE = TIMING
+"""Faults that are set right where a single run has them; late in all runs is an effect."""
 
 
 def is_correctable(fault: Mapping[str, Any]) -> bool:
