@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import floor, isfinite, log10
 
 _LONGEST = 9  # digits after the point beyond which a number is told as a power of ten
@@ -64,6 +65,19 @@ def tick(value: float) -> str:
     share = plain(value / 10.0**power, 2)
     raised = times_ten(power)
     return raised.rpartition(" ")[2] if share == "1" else f"{share}{raised}"
+
+
+def log_ticks(low: float, high: float) -> Callable[[float], str]:
+    """Return what writes the decades of a logarithmic axis: all plain numbers, or all powers.
+
+    Parameters
+    ----------
+    low, high : float
+        Ends of the axis, above zero.
+    """
+    if low >= 1e-4 and high < 1e5:
+        return tick
+    return lambda value: times_ten(round(log10(value))).rpartition(" ")[2] if value > 0.0 else ""
 
 
 def typed(value: float) -> str:

@@ -9,7 +9,7 @@ import pytest
 from study.made import bench_run, write
 
 from bristle.cli import main
-from bristle.quantity import plain, quantity, scale, short_z, tick, typed
+from bristle.quantity import log_ticks, plain, quantity, scale, short_z, tick, typed
 from bristle.study import create_study
 
 POWER = re.compile(r"\d[eE][+-]?\d")
@@ -107,3 +107,8 @@ def test_no_list_shows_a_power_of_ten(line: str, capsys: pytest.CaptureFixture[s
     told = capsys.readouterr().out
     assert told
     assert not POWER.search(told), told
+
+
+def test_the_decades_of_an_axis_are_written_in_one_way():
+    assert [log_ticks(0.1, 2e4)(v) for v in (0.1, 1e4)] == ["0.1", "10000"]
+    assert [log_ticks(0.1, 2e5)(v) for v in (0.1, 1e4, 1e5)] == ["10⁻¹", "10⁴", "10⁵"]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..data.model import StudyModel
 from ..errors import RunError
 from ..physics.drive import VOLTAGE
+from ..physics.forms import shown_law
 from ..scenario.model_parts import Parameters, source_of, values_of
 from ..scenario.scenario import Scenario, load_scenario
 from ..simulate.coupled import simulate
@@ -49,7 +50,7 @@ class Simulator:
     def scenario(self) -> Scenario:
         """Write the scenario of the model as it is; return it."""
         own = loads(self.model, self.house.building, self.bench)
-        title = f"{self.model.law} in {self.house.building.name}"
+        title = f"{shown_law(self.model.law)} in {self.house.building.name}"
         quiet = replace(self.shaking, force=None, drive=VOLTAGE)
         file, _ = write_scenario(
             self.folder, (title, "# The model's damper in the building."), self.house, quiet,

@@ -33,6 +33,8 @@ BAND = "#cfe3f1"
 """The band in which a true model's measurement would be."""
 _VARIES = 1e-2
 """Range of a command, over its largest value, from which on it tells cycles apart."""
+_OFF = 5e-3
+"""Share of its largest value below which a command is off."""
 
 
 class OneCycle(NamedTuple):
@@ -117,8 +119,8 @@ def _level(predictions: Sequence[RunPrediction]) -> tuple[str, Any]:
             unit = DRIVES[drive].unit
 
             def level(value: float) -> str:
-                rounded = round(value / largest, 2) * largest  # noise about zero is no command
-                return f"{plain(rounded, 2)} {unit}"
+                off = abs(value) < _OFF * largest  # noise about zero is no command
+                return f"{plain(0.0 if off else value)} {unit}"
 
             return drive, level
     for name in predictions[0].labels:  # what is known of whole runs, such as a temperature

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
-from ..quantity import tick
+from ..quantity import log_ticks
 from .coordinates import SHOWN, shown
 from .names import name_of
 
@@ -114,7 +115,9 @@ def draw_pattern(
         y = y - _means_along(comparison, after)
     if pattern.turned:
         y = y * _direction(comparison)
-    zero_lines(axes)
+    axes.axhline(0.0, color=PALE, lw=0.8, zorder=1)
+    if np.min(x) <= 0.0 <= np.max(x):  # from 25 °C on, a line at zero is an empty panel
+        axes.axvline(0.0, color=PALE, lw=0.8, zorder=1)
     band = 2.0 * float(np.median(sigma))
     axes.axhspan(-band, band, color="#dbe5ec", lw=0.0, zorder=0)
     every = max(1, len(x) // _DOTS)
@@ -166,11 +169,16 @@ def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
     axes.set_ylim(0.3 * floor, 3.0 * float(np.max(found.measured[1:])))
     axes.set_xlim(f[0], f[-1])
     axes.set_title(f"PSD [{comparison.unit}²/Hz]")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(lambda value, _: tick(value))
+    for axis, ends in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        axis.set_major_formatter(_as_text(log_ticks(*ends)))
         axis.set_minor_formatter(lambda value, _: "")
     axes.set_xlabel("frequency [Hz]")
     _legend(axes, ("measured", PALE), ("error", ERROR), ("expected noise", BLUE))
+
+
+def _as_text(text: Callable[[float], str]) -> Callable[[float, int | None], str]:
+    """Return what writes a mark, as an axis calls it: with the number of the mark."""
+    return lambda value, _: text(value)
 
 
 def draw_regimes(axes: Axes, comparison: Comparison) -> None:

@@ -153,9 +153,11 @@ def _where_right(comparison: Comparison) -> str:
 
 def _beside(one: Regime, best: Regime) -> bool:
     """Return whether a regime is neither the other nor a part of it."""
+    if one == best:
+        return False
     if one.speed and one.command and (one.speed == best.speed or one.command == best.command):
         return bool(best.speed and best.command)
-    return one != best
+    return True
 
 
 def _loudest(comparison: Comparison) -> str:

@@ -11,6 +11,7 @@ from ..compare.names import site_name
 from ..compare.picture import headline
 from ..draw import html
 from ..draw.style import percent
+from ..physics.forms import shown_law
 from ..quantity import quantity, short_z
 from ..study.run_file import TEST
 from ..version import __version__
@@ -45,7 +46,7 @@ def render(content: Content) -> str:
     study = content.study
     settings = study.settings
     rig = "structure" if settings.has_building else "test bench"
-    what = " + ".join([content.model.law, *content.model.effects])
+    what = " + ".join([shown_law(content.model.law), *content.model.effects])
     body = [
         f"<h1>{html.escape(settings.title)}</h1>",
         html.paragraphs(f"A damper on a {rig}, compared with its model: {what}.", kind="soft"),

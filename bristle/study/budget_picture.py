@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..compare.loops import OneCycle, chosen_cycles
 from ..compare.prediction import run_predictions
 from ..draw.style import BLUE, GREEN, GREY, INK, PALE, PURPLE, VERMILION, Page, look, percent
 from ..identify.budget import Share, force_budget
+from ..physics.forms import shown_law
 from ..physics.laws import LAWS
 from ..quantity import scale
 
@@ -82,7 +84,7 @@ def draw_budget(problem: Problem, model: Model) -> Page | None:
     with look():
         bars = _BAR * len(parts) + 0.75
         above = _PANELS if cycles else 0.0
-        heading = f"{' + '.join([model.law, *model.effects])}: the parts of its force"
+        heading = f"{' + '.join([shown_law(model.law), *model.effects])}: the parts of its force"
         said = "Stacked over single cycles; the line is their sum, the model's force."
         page = Page(_WIDTH, above + bars, heading, said if cycles else "")
         if cycles:
@@ -105,12 +107,14 @@ def _stacks(
     panels: list[Axes], cycles: list[OneCycle], found: Budgets, colours: dict[str, str]
 ) -> None:
     """Draw the parts of each cycle on each other, those that push back and those that pull."""
+    length = max(float(np.ptp(one.prediction.time[one.part])) for one in cycles)
+    times, in_unit = scale("s", length, fine=True)
     size = max(float(np.abs(one.prediction.measured[one.part]).max()) for one in cycles)
     factor, unit = scale("N", size)
     low, high = 0.0, 0.0
     for axes, one in zip(panels, cycles, strict=True):
         of = one.prediction
-        time = 1e3 * (of.time[one.part] - of.time[one.part.start])
+        time = times * (of.time[one.part] - of.time[one.part.start])
         parts = found[of.name]
         forces = factor * np.array([part.force[one.part] for part in parts])
         fills = [colours[part.name] for part in parts]
@@ -120,7 +124,9 @@ def _stacks(
         axes.plot(time, forces.sum(axis=0), color=INK, lw=1.2)
         axes.set_title(one.text, fontsize=9.5)
         axes.set_title(of.name, loc="right", fontsize=7, color=GREY)
-        axes.set_xlabel("time in the cycle [ms]", fontsize=8)
+        axes.set_xlabel(f"time in the cycle [{in_unit}]", fontsize=8)
+        # A label at the right edge would run into the first one of the next panel.
+        axes.xaxis.set_major_locator(MaxNLocator(4, prune="upper"))
         axes.tick_params(labelsize=8)
         axes.set_xlim(time[0], time[-1])
         low, high = min(low, axes.get_ylim()[0]), max(high, axes.get_ylim()[1])

@@ -10,6 +10,7 @@ from ..compare.picture import LOOPS, loop_panels
 from ..compare.prediction import run_predictions
 from ..draw.style import Page, look, percent, png, short_z
 from ..identify.rig import DAMPER
+from ..physics.forms import shown_law
 
 if TYPE_CHECKING:
     from .identified import Identified
@@ -54,7 +55,7 @@ def draw_identified(found: Identified) -> Page:
 def _headings(found: Identified, role: str) -> tuple[str, str]:
     share = found.after.get("share_holdout", found.after["share_train"])
     low = f" below {found.cutoff:g} Hz" if found.cutoff else ""
-    law = " + ".join([found.model.law, *found.model.effects])
+    law = " + ".join([shown_law(found.model.law), *found.model.effects])
     site = found.at.site
     what = site.quantity[:1].upper() + site.quantity[1:]
     what += " of the damper" if site.shown == DAMPER else ""

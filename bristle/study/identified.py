@@ -10,7 +10,7 @@ from ..errors import StudyError
 from ..identify.fit import Fit, Problem
 from ..identify.rig_fit import SiteModel
 from ..identify.table import LawError
-from ..physics.forms import split_form
+from ..physics.forms import shown_law, split_form
 from ..shown import shown
 from .forms import FormError, form_of
 from .history import Step
@@ -115,7 +115,7 @@ class Identified:
         return page.figure
 
     def __repr__(self) -> str:
-        about = " + ".join([self.model.law, *self.model.effects])
+        about = " + ".join([shown_law(self.model.law), *self.model.effects])
         return shown(self, about, [*map(_in_line, self.parameters()), *self.notes])
 
     def _repr_html_(self) -> str:

@@ -10,6 +10,7 @@ from ..draw import html
 from ..draw.figure import DPI
 from ..draw.style import Page, percent, png, short_z
 from ..errors import RecordError
+from ..physics.forms import shown_law
 from .fit_picture import draw_identified
 from .run_file import TEST
 from .staircase import history_steps
@@ -37,7 +38,7 @@ _HELD = ("exponent", "mass", "which")
 
 def identified_html(found: Identified) -> str:
     """Return an identification as HTML: equations, parameters, errors, and its picture."""
-    title = " + ".join([found.model.law, *found.model.effects])
+    title = " + ".join([shown_law(found.model.law), *found.model.effects])
     rows = [
         [
             str(row["name"]), f"{row['value']:.5g}",

@@ -5,13 +5,18 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from predictions_made import DT, motion, predictions_with
 
 from bristle.compare import compare, compare_predictions
+from bristle.compare.panels import draw_pattern
 from bristle.compare.prediction import halved, run_predictions
+from bristle.compare.regimes import Regime
+from bristle.compare.sentences import _where_right
 from bristle.errors import RecordError
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run
@@ -269,3 +274,26 @@ def test_an_output_with_a_name_of_its_own_is_called_by_it_and_a_large_rig_has_ki
     assert "% of its own" in how
     assert " kN more" in where or " kN less" in where
     assert not re.search(r"\de[+-]\d", how + where + right)
+
+
+def test_the_axis_of_a_signal_far_from_zero_begins_where_its_data_do():
+    predictions = predictions_with(lambda along: 0.1 * along["displacement"] / 0.01)
+    warm = [
+        replace(
+            one, coordinates={**one.coordinates, "temperature": 29.0 + 4.0 * np.sin(one.time)},
+            units={**one.units, "temperature": "degC"},
+        )
+        for one in predictions
+    ]  # fmt: skip
+    found = compare_predictions(warm)
+    pattern = next(one for one in found.patterns if one.coordinate == "temperature")
+    axes = Figure().add_subplot()
+    draw_pattern(axes, found, pattern)
+    assert axes.get_xlim()[0] > 20.0
+
+
+def test_where_it_is_right_is_said_once():
+    cell = Regime("at low speed and at 0 A", "at low speed", "at 0 A", 1.0, 900)
+    other = Regime("at high speed", "at high speed", "", 4.0, 900)
+    text = _where_right(SimpleNamespace(regimes=(cell, other), right=False))
+    assert text == "At low speed and at 0 A it is right within its noise (z = 1.00)."

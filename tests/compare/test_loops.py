@@ -127,3 +127,10 @@ def test_a_ribbon_follows_a_curve_that_turns_back():
     corners = ribbon(x, np.zeros(3), np.ones(3))
     assert corners.shape == (2, 4, 2)
     assert corners[1, :, 0].tolist() == [1.0, 0.0, 0.0, 1.0]
+
+
+def test_a_level_of_the_command_is_called_by_its_own_value():
+    levels = np.select([TIME < 1.3, TIME < 2.6], [0.0, 1.25], 3.0)
+    noisy = levels + 1e-4 * np.random.default_rng(1).standard_normal(len(TIME))
+    texts = [one.text for one in chosen_cycles([made(noisy)])]
+    assert texts == ["0 V", "1.25 V", "3 V"]
