@@ -148,9 +148,17 @@ def _scenario(
 
 
 def _one_run(study: Study) -> Measurement:
-    """Return the run that the scenario plays: the first that is held out."""
+    """Return the run that the scenario plays: the first that is held out.
+
+    On a bench it is the first whose command reaches half of the largest: without one, a scenario
+    shows nothing of what the damper is for.
+    """
     runs = study.runs()
-    return (runs.holdout or runs.train)[0]
+    able = runs.holdout or runs.train
+    if study.settings.has_building or not able[0].drive:
+        return able[0]
+    tops = [float(np.max(np.abs(one[one.drive]))) if one.drive else 0.0 for one in able]
+    return next(one for one, top in zip(able, tops, strict=True) if 2.0 * top >= max(tops))
 
 
 def _bare(study: Study, model: StudyModel, notes: list[str]) -> StudyModel:

@@ -77,7 +77,10 @@ def write_scenario(
         wires["damper.acceleration"] = "acceleration.value"
     motion = {"kind": "csv", "file": files[0].name}
     parts = [part_text("rod", {"fmu": "PrescribedMotion"}, motion)]
+    # A signal is 0 after its file, and the last step may end a rounding error later.
+    time, last = np.append(time, time[-1] + run.dt), slice(-1, None)
     for name, (quantity, unit, values) in rows.items():
+        values = np.append(values, values[last])
         files.append(signal_file(time, values, quantity, unit, folder / f"{name}.csv"))
         signal = {"kind": "csv", "file": files[-1].name}
         parts.append(part_text(name, {"fmu": "SignalSource"}, signal))

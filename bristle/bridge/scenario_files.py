@@ -76,5 +76,11 @@ def scenario_text(
     plain = title.replace("\\", "/").replace('"', "'")
     text = f'{about}\n\nschema = 1\ntitle = "{plain}"\n\n[run]\nstop = {run[0]!r}\n'
     text += f'step = {run[1]!r}\nalgorithm = "gauss-seidel"\n'
-    lines = [f'"{target}" = "{source}"' for target, source in wires.items()]
+    # A SignalSource names no unit. Its file holds that of the input: a factor says so to the check.
+    lines = [
+        f'"{target}" = {{ from = "{source}", factor = 1.0 }}'
+        if source.endswith(".value")
+        else f'"{target}" = "{source}"'
+        for target, source in wires.items()
+    ]
     return "\n".join([text, "\n\n".join(parts), "\n[connections]", *lines]) + "\n"

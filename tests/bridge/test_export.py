@@ -275,3 +275,22 @@ def test_a_bad_effect_of_ones_own_is_left_out_with_a_note(
     (bench.folder / "model.toml").write_text(text)
     assert main(["export", str(bench.folder)]) == 2
     assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_the_bench_scenario_plays_a_run_with_a_command_to_its_end_without_notes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, phase in (("train_1", 0.3), ("holdout_1", 1.1), ("holdout_2", 2.0)):
+        bench_run(tmp_path / f"{name}.csv", phase)
+    idle = np.loadtxt(tmp_path / "holdout_1.csv", delimiter=",", skiprows=1)
+    header = (tmp_path / "holdout_1.csv").read_text().partition("\n")[0]
+    idle[:, 3] = 0.0
+    np.savetxt(tmp_path / "holdout_1.csv", idle, delimiter=",", header=header, comments="")
+    study = Study.create(tmp_path / "rig", sorted(tmp_path.glob("*.csv")))
+    found = export_study(study)
+    assert found.run == "holdout_2"
+    assert main(["check", str(found.scenario)]) == 0
+    told = capsys.readouterr()
+    assert "has no unit" not in told.out + told.err
+    measured = bristle.run(found.scenario)["measured.value"].to_numpy()
+    assert measured[-1] == pytest.approx(study.runs().holdout[1]["force"][-1], rel=1e-6)
