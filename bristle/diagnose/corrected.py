@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from ..data.command_limits import LIMITS
 from ..data.corrections import TIMING, Correction, set_right
+from ..data.cut_off import beyond_range
 from ..data.measurement import Measurement
 from ..data.timing import in_time
-from .clipping import beyond_range
 from .faults import SensorFault
 
 ORDER = {"bias": 1, "sign": 2, "gain": 3}

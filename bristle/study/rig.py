@@ -5,6 +5,9 @@ Here alone a study's `rig` decides; identification, comparison and diagnosis ask
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from ..data.cut_off import without_cut_off
 from ..data.model import StudyModel
 from ..identify.rig import Rig, bench_rig, building_rig
 from ..physics.building import Building, paper_building, read_building, with_damper
@@ -13,7 +16,7 @@ from .study import Study
 
 
 def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:
-    """Return the rig of a study with its runs.
+    """Return the rig of a study with its runs; what a channel's range cut off is not judged.
 
     Raises
     ------
@@ -21,9 +24,10 @@ def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:
         If a building lacks a channel, or has other levels than were measured.
     """
     building = building_of(study, model)
-    if building is None:
-        return bench_rig(runs.train, runs.holdout)
-    return building_rig(runs.train, runs.holdout, building)
+    marked, notes = without_cut_off(runs.all)
+    train, holdout = marked[: len(runs.train)], marked[len(runs.train) :]
+    rig = bench_rig(train, holdout) if building is None else building_rig(train, holdout, building)
+    return replace(rig, notes=(*rig.notes, *notes))
 
 
 def building_of(study: Study, model: StudyModel) -> Building | None:

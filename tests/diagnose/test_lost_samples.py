@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bristle.data.cut_off import beyond_range
 from bristle.diagnose.candidates import judge
-from bristle.diagnose.clipping import beyond_range
 from bristle.diagnose.decision import missing
 from bristle.diagnose.limits import detectable
 from bristle.identify.model import Model, Problem, Run
