@@ -176,7 +176,7 @@ def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
     _legend(axes, ("measured", PALE), ("error", ERROR), ("expected noise", BLUE))
 
 
-def _as_text(text: Callable[[float], str]) -> Callable[[float, int | None], str]:
+def _as_text(text: Callable[[float], str]) -> Callable[[float, float], str]:
     """Return what writes a mark, as an axis calls it: with the number of the mark."""
     return lambda value, _: text(value)
 
