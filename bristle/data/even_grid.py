@@ -10,6 +10,9 @@ from .table import Array
 ROUNDED = 0.51
 """Digits by which rounding may move a time: half of one, and a little for floating point."""
 
+MOSTLY = 0.9
+"""Share of times on a grid from which on the others are off it, and not all of them rounded."""
+
 
 def even_grid(
     time: Array, step: float, tolerated: float
@@ -66,15 +69,15 @@ def _line(
     time: Array, places: Array, off: Array, digits: float, tolerated: float
 ) -> tuple[float, float]:
     """Return slope and start of the line through the times, by place."""
-    if digits:
-        slope, start = _narrowest(time, places)
-        if np.abs(time - start - slope * places).max() <= ROUNDED * digits:
-            return slope, start
     slope = start = 0.0
     for _ in range(2):  # the second time without what is far off
         near = off <= max(tolerated, float(np.quantile(off, 0.9)))
         slope, start = (float(one) for one in np.polyfit(places[near], time[near], 1))
         off = _distance(time, places, slope, start)
+    if digits and np.mean(off <= tolerated) < MOSTLY:  # else times are a step off, here and there
+        narrow = _narrowest(time, places)
+        if np.abs(time - narrow[1] - narrow[0] * places).max() <= ROUNDED * digits:
+            return narrow
     return slope, start
 
 

@@ -112,7 +112,8 @@ def test_the_exported_fmu_takes_a_current(lab, tmp_path) -> None:
     with zipfile.ZipFile(exported.fmu) as archive:
         text = archive.read("modelDescription.xml").decode()
     assert not re.search(r"volt|v_max|unit=\"V|/V\b", text, re.IGNORECASE)
-    assert '"damper.current" = "drive.value"' in exported.scenario.read_text()
+    wire = '"damper.current" = { from = "drive.value", factor = 1.0 }'
+    assert wire in exported.scenario.read_text()
     results = bristle.run(exported.scenario)
     assert np.std(results["damper.force"]) > 0.0
 

@@ -220,7 +220,7 @@ def test_the_fmu_carries_the_form_to_the_last_bit(study: Study) -> None:
         for x, v, V in zip(rod[1:400], v[1:400], drive[1:400], strict=True)
     ]
     assert own == shown["damper.force"].to_numpy()[1:400].tolist()
-    run = prepare(runs.holdout[0])
+    run = prepare(next(one for one in runs.all if one.name == found.run))
     expected = prediction(study.model(), run)
     times = run.dt * np.arange(len(run.x))
     force = np.interp(times, shown.index.to_numpy(), shown["damper.force"])

@@ -105,7 +105,7 @@ def test_its_model_goes_into_a_scenario_at_its_place(two, tmp_path, capsys):
     for wire in (
         '"structure.brace_force" = "damper.force"',
         '"damper.displacement" = "structure.brace_displacement"',
-        '"structure.tie_force" = "tie_measured.value"',
+        '"structure.tie_force" = { from = "tie_measured.value", factor = 1.0 }',
     ):
         assert wire in text
     assert main(["check", str(tmp_path / "structure.toml")]) == 0

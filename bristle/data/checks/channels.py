@@ -131,7 +131,7 @@ def _moves_at(level: float, values: Array, velocity: Array | None) -> bool:
 def _ends_text(ends: list[tuple[float, float, int]], unit: str) -> str:
     """Return where a channel is cut off, at one end or both, and how much of it."""
     return " and at ".join(
-        f"{plain(level, 6)} {unit} in {stretches} stretches, {plain(100.0 * share, 2)} % of the "
+        f"{quantity(level, unit, 6)} in {stretches} stretches, {plain(100.0 * share, 2)} % of the "
         "samples"
         for share, level, stretches in ends
     )
