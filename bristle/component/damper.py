@@ -41,12 +41,13 @@ __all__ = [
 hold_law: Any = None
 hold(globals(), "hold_law")
 
-ENERGY, ENERGY_SHOWN, ENERGY_AT_BEGIN = range(-REMEMBERED, -5)
+ENERGY, ENERGY_SHOWN, ENERGY_AT_BEGIN, DISPLACEMENT_AT_END = range(-REMEMBERED, -5)
 VELOCITY_AT_END, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = range(-5, 0)
 """What the state holds behind the states of law and effects: counted from its end.
 
 `ENERGY` is that of the step, which effects know; `ENERGY_SHOWN` that at the motion shown since;
-`ENERGY_AT_BEGIN` has what the begin of the step adds to it already.
+`ENERGY_AT_BEGIN` has what the begin of the step adds to it already. Motion and force at the end are
+those shown since, at the voltage of the step.
 """
 
 SATURATED = 1
@@ -67,21 +68,24 @@ def stick_force(holding: float, v: float, mass: float, dt: float) -> float:
 
 
 def present_force(
-    inputs: Row, V: float, a: float, c: Constants, state: Row, work: Row
-) -> tuple[float, float]:
-    """Return force and friction [N] at these inputs, without moving on.
+    motion: tuple[float, float, float], V: float, holding: float, c: Constants, state: Row,
+    work: Row,
+) -> tuple[float, float]:  # fmt: skip
+    """Return force and friction [N] at a motion, without moving on.
 
     Parameters
     ----------
-    inputs : (5,) as in `start`; V and a take the place of voltage and acceleration among them
-    V, a : voltage within its limits [V], acceleration [m/s2]
+    motion : displacement [m], velocity [m/s], acceleration [m/s2]
+    V : voltage within its limits [V]
+    holding : holding force [N]
     c : Constants
     state : as in `start`, kept
     work : room to work, of the size that `sizes` gives
     """
-    x, v, dt = inputs[DISPLACEMENT], inputs[VELOCITY], state[LAST_STEP]
+    x, v, a = motion
+    dt = state[LAST_STEP]
     sticks = c.moving_mass > 0.0 and (isfinite(dt) or v == 0.0)
-    stick = stick_force(inputs[HOLDING_FORCE], v, c.moving_mass, dt) if sticks else 0.0
+    stick = stick_force(holding, v, c.moving_mass, dt) if sticks else 0.0
     now = record(Inputs, (x, v, a, V, dt, state[ENERGY], stick, sticks))
     return force_at(c.setup, now, state, work)
 
@@ -95,7 +99,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     inputs : (5,) displacement [m], velocity [m/s], voltage [V], holding force [N],
         acceleration [m/s2]
     c : Constants
-    state : (`SLOTS.z_size` + 8,) the states of law and effects as given; the last eight are filled
+    state : (`SLOTS.z_size` + 9,) the states of law and effects as given; the last nine are filled
     outputs : (4,) force [N], dissipated energy [J], stroke ratio [1], friction [N], filled
     work : room to work, of the size that `sizes` gives
 
@@ -122,6 +126,7 @@ def remember(inputs: Row, c: Constants, state: Row, outputs: Row) -> None:
     state : as in `start`, its last entries filled
     outputs : (4,) as in `start`, those at these inputs
     """
+    state[DISPLACEMENT_AT_END] = inputs[DISPLACEMENT]
     state[VELOCITY_AT_END], state[FORCE_AT_END] = inputs[VELOCITY], outputs[FORCE]
     state[VOLTAGE_AT_END] = limited(inputs[VOLTAGE], 0.0, c.v_max)
     if c.measured:
@@ -161,7 +166,8 @@ def step(
     a1 = now[ACCELERATION] if c.measured else (v1 - v0) / dt
     force0, energy = state[FORCE_AT_END], state[ENERGY_SHOWN]
     if state[VOLTAGE_AT_END] != V0:
-        force0 = present_force(before, V0, a0, c, state, work)[0]
+        shown = state[DISPLACEMENT_AT_END], state[VELOCITY_AT_END], a0
+        force0 = present_force(shown, V0, before[HOLDING_FORCE], c, state, work)[0]
     sticks = c.moving_mass > 0.0
     stick = stick_force(now[HOLDING_FORCE], v1, c.moving_mass, dt) if sticks else 0.0
     end = record(Inputs, (x1, v1, a1, V1, dt, energy, stick, sticks))
@@ -174,6 +180,7 @@ def step(
     new_state[ENERGY_AT_BEGIN] = energy
     energy += 0.5 * dt * force * v1
     new_state[ENERGY] = new_state[ENERGY_SHOWN] = energy
+    new_state[DISPLACEMENT_AT_END] = x1
     new_state[VELOCITY_AT_END], new_state[FORCE_AT_END] = v1, force
     new_state[ACCELERATION_AT_END], new_state[VOLTAGE_AT_END] = a1, V1
     new_state[LAST_STEP] = dt
@@ -188,7 +195,8 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     """Let the force follow motion and voltage, the states held.
 
     The step's energy ends at the motion shown: a master may have given the middle of the step for
-    it, and gives its end now. A voltage that has jumped since counts from the next step on.
+    it, and gives its end now. It ends at the voltage of the step: another one since, a jump or the
+    end of a step whose middle was given, counts from the next step on.
 
     Parameters
     ----------
@@ -206,12 +214,17 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     """
     V = limited(inputs[VOLTAGE], 0.0, c.v_max)
     a = inputs[ACCELERATION] if c.measured else state[ACCELERATION_AT_END]
-    force, friction = present_force(inputs, V, a, c, state, work)
-    dt, v = state[LAST_STEP], inputs[VELOCITY]
-    if state[VOLTAGE_AT_END] == V and isfinite(dt):
-        state[ENERGY_SHOWN] = state[ENERGY_AT_BEGIN] + 0.5 * dt * force * v
-        state[VELOCITY_AT_END], state[FORCE_AT_END] = v, force
+    x, v, holding = inputs[DISPLACEMENT], inputs[VELOCITY], inputs[HOLDING_FORCE]
+    dt, V_end = state[LAST_STEP], state[VOLTAGE_AT_END]
+    force, friction = present_force((x, v, a), V, holding, c, state, work)
+    if isfinite(dt):
+        force_end = force
+        if V_end != V:
+            force_end = present_force((x, v, a), V_end, holding, c, state, work)[0]
+        state[ENERGY_SHOWN] = state[ENERGY_AT_BEGIN] + 0.5 * dt * force_end * v
+        state[DISPLACEMENT_AT_END], state[VELOCITY_AT_END] = x, v
+        state[FORCE_AT_END] = force_end
     outputs[FORCE], outputs[FRICTION] = force, friction
     outputs[DISSIPATED_ENERGY] = state[ENERGY_SHOWN]
-    outputs[STROKE_RATIO] = abs(inputs[DISPLACEMENT]) / c.stroke
+    outputs[STROKE_RATIO] = abs(x) / c.stroke
     return SATURATED if inputs[VOLTAGE] != V else 0

@@ -24,7 +24,7 @@ DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
 FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
 """Outputs; friction, the part of the force that is, is hidden."""
 
-REMEMBERED = 8
+REMEMBERED = 9
 """How many numbers the state holds behind the states of law and effects."""
 
 

@@ -72,6 +72,28 @@ def test_energy_after_a_jump_of_the_voltage_begins_at_the_new_force() -> None:
     assert shown[damper.DISSIPATED_ENERGY] == pytest.approx(force * v * dt, rel=1e-12)
 
 
+def test_the_energy_of_a_step_ends_at_the_motion_shown_and_at_the_voltage_of_the_step() -> None:
+    """Motion and voltage of the middle were given for the step, those of its end are given now."""
+    c, state, shown, work = bingham()
+    dt = 0.01
+
+    def force(v: float, V: float) -> float:
+        return 1.3 + 0.83 * V + (100.0 + 20.0 * V) * v
+
+    begin, middle, end = ([0.0, v, V, 0.0, 0.0] for v, V in ((0.1, 2.0), (0.15, 3.0), (0.2, 4.0)))
+    damper.start(0.0, begin, c, state, shown, work)
+    new = list(state)
+    damper.step((0.0, dt, 0), begin, middle, c, state, new, shown, work)
+    damper.output(dt, end, c, new, shown, work)
+    assert shown[damper.FORCE] == pytest.approx(force(0.2, 4.0))
+    work_done = 0.5 * dt * (0.1 * force(0.1, 3.0) + 0.2 * force(0.2, 3.0))
+    assert shown[damper.DISSIPATED_ENERGY] == pytest.approx(work_done, rel=1e-12)
+    later = list(new)  # the next step begins where this one ended, not at its middle
+    damper.step((dt, dt, 0), middle, end, c, new, later, shown, work)
+    work_done += dt * 0.2 * force(0.2, 4.0)
+    assert shown[damper.DISSIPATED_ENERGY] == pytest.approx(work_done, rel=1e-12)
+
+
 def test_the_voltage_saturates_and_says_so() -> None:
     c, state, shown, work = bingham(v_max=5.0)
     assert damper.start(0.0, [0.0, 0.1, 5.0, 0.0, 0.0], c, state, shown, work) == 0

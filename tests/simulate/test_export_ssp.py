@@ -208,7 +208,10 @@ def elsewhere(script: str, *job: Any) -> str:
 def hold_against_libcosim(
     kind: str, package: Path, rows: pd.DataFrame, watched: tuple[str, ...]
 ) -> None:
-    """Hold outputs to 1e-9 of their peaks; none that follow an input, which it reads too early."""
+    """Hold outputs to 1e-9 of their peaks; none that follow an input, which it reads too early.
+
+    Nor energy: it ends at the motion that a master shows behind a step, and this one shows none.
+    """
     path = package if kind == "ssp" else package.with_name("osp")
     found = np.array(json.loads(elsewhere(LIBCOSIM, kind, str(path), watched, len(rows) - 1)))
     same_rows(found, rows, watched)
@@ -223,7 +226,7 @@ def same_rows(found: np.ndarray, rows: pd.DataFrame, watched: tuple[str, ...]) -
 @pytest.mark.parametrize("kind", ["ssp", "osp"])
 def test_libcosim_gives_the_same_rows(kind: str, package: Path, rows: pd.DataFrame) -> None:
     need("libcosimpy")
-    hold_against_libcosim(kind, package, rows, WATCHED[1:])
+    hold_against_libcosim(kind, package, rows, WATCHED[2:])
 
 
 @pytest.mark.parametrize("kind", ["ssp", "osp"])

@@ -14,7 +14,7 @@ from bristle import run
 from bristle.component import LINEAR, SAMPLED
 from bristle.errors import ScenarioError
 from bristle.fmu.description import Variable
-from bristle.scenario.scenario import check_scenario
+from bristle.scenario.scenario import check_scenario, resolve_scenario
 from bristle.simulate.operations import Node
 from bristle.simulate.schedule import held_inputs, make_schedule
 
@@ -280,6 +280,26 @@ def test_the_pulse_keeps_its_goals_and_its_order() -> None:
     coarse, fine = errors("half_sine_pulse"), errors("half_sine_pulse", run__step=0.0005)
     assert coarse["structure.base_acceleration_absolute"] <= 0.005
     assert fine["structure.base_acceleration_absolute"] <= 0.0004
+    for name, error in coarse.items():
+        assert 10.0 < error / fine[name] < 22.0, name  # 16 is second order
+
+
+def test_the_energy_under_a_voltage_that_goes_on_changing_is_of_second_order(
+    tmp_path: Path,
+) -> None:
+    text = resolve_scenario("half_sine_pulse").read_text(encoding="utf-8")
+    sine = 'kind = "sine", amplitude = 3.0, offset = 4.0, frequency = 3.0'
+    for old, new in {
+        'fmu = "ConstantVoltage"': 'fmu = "SignalSource"',
+        "level = 4.0": sine,
+        '"voltage.voltage"': '"voltage.value"',
+    }.items():
+        assert old in text
+        text = text.replace(old, new)
+    file = tmp_path / "changing.toml"
+    file.write_text(text, encoding="utf-8")
+    coarse, fine = errors(str(file)), errors(str(file), run__step=0.0005)
+    assert coarse["damper.dissipated_energy"] < 0.001
     for name, error in coarse.items():
         assert 10.0 < error / fine[name] < 22.0, name  # 16 is second order
 
