@@ -58,8 +58,9 @@ def entry(functions: Any) -> Any:
         names = ("sizes", "setup", "constants", "start", "step", "output", *calls)
         namespace = {name: getattr(functions, name, None) for name in names}
         namespace["__name__"] = f"entry_{len(_ENTRIES)}"
-        exec(compile(text, __file__, "exec"), namespace)  # numba keeps code of files alone
-        _ENTRIES[id(functions)] = functions, compiled(namespace["entry"], ("rows.row",))
+        exec(text, namespace)
+        # Not kept: machine code whose module is made here could not be read by another process.
+        _ENTRIES[id(functions)] = functions, compiled(namespace["entry"], ("rows.row",), keep=False)
     return _ENTRIES[id(functions)][1]
 
 
