@@ -95,7 +95,9 @@ def test_view_3_has_the_samples_of_the_comparison(home: Path) -> None:
     for row, one in zip(shown["runs"], found.predictions, strict=True):
         assert row["normalised"] == pytest.approx(one.normalised, rel=1e-5)
         assert len(row["time"]) == len(row["measured"]) == len(row["normalised"])
-        assert row["measured"] - row["predicted"] == pytest.approx(one.residual, abs=1e-5)
+        error = row["measured"] - row["predicted"]
+        assert error[one.judged] == pytest.approx(one.residual[one.judged], abs=1e-5)
+    assert not all(one.judged.all() for one in found.predictions)  # the load cell's range ended
 
 
 def test_view_3_opens_no_test_run(home: Path) -> None:
