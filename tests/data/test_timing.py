@@ -54,6 +54,13 @@ def test_a_force_that_was_moved_has_the_noise_that_it_still_has(late, rate, tmp_
     assert np.std(left) / run.noise["force"] == pytest.approx(1.0, abs=0.06)
 
 
+def test_a_force_without_noise_is_lost_where_it_jumps_alone():
+    t = np.arange(3000) * 0.002
+    for force in (np.sin(9.0 * (t - 0.005)), force_of(t - 0.005)):
+        moved = placed({"force": force}, [Correction("force", "delay", 0.005)])
+        assert moved.lost["force"].mean() < 0.1
+
+
 def test_a_noise_that_is_given_is_that_of_the_instrument_with_its_gain(tmp_path):
     t = np.arange(500) * 0.004
     table = np.column_stack([t, 8e-3 * np.sin(9.0 * t), 5.0 * force_of(t)])
