@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantity import quantity
 from .channels import DRIVE, channel_unit
 from .checks.clipping import stands_at_top
 from .measurement import Measurement
@@ -18,7 +19,8 @@ CHANNELS = ("force", "displacement", "velocity", *DRIVE)
 """Channels of a damper that are looked at."""
 
 LONGEST, CROWDED = 5, 8.0
-"""What `checks.clipping.stands_at_top` asks by default."""
+"""What `checks.clipping.stands_at_top` asks: samples of a stretch, times as many as a step below.
+"""
 
 BESIDE = 4.0
 """Noises inside the end of a range within which a sample may have been cut."""
@@ -90,9 +92,10 @@ def without_cut_off(runs: Sequence[Measurement]) -> tuple[list[Measurement], tup
             if cut.any():
                 flags = cut | run.lost.get(channel, np.zeros_like(cut))
                 out[k] = replace(run, lost={**run.lost, channel: flags})
-                at = " and ".join(f"{end:.4g}" for end in outermost(ends))
+                unit = channel_unit(channel)
+                at = " and ".join(quantity(end, unit, 4) for end in outermost(ends))
                 notes.append(
-                    f"{run.name}: {channel} is cut off at {at} {channel_unit(channel)}; the "
+                    f"{run.name}: {channel} is cut off at {at}; the "
                     f"{100.0 * float(cut.mean()):.2g} % of its samples there are not judged."
                 )
     return out, tuple(notes)

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from ..data.cut_off import CROWDED, LONGEST
+
 
 @dataclass(frozen=True)
 class DecisionRule:
@@ -301,14 +303,14 @@ class DecisionRule:
     reversed. Found: stated.
     """
 
-    longest: int = 5
+    longest: int = LONGEST
     """Samples in a row at exactly the same extreme, which no noisy signal shows.
 
     Trades: if higher, channels that saturate briefly pass; if lower, coarse instruments count as
     saturated. Found: blind seeds and published measurements.
     """
 
-    crowded: float = 8.0
+    crowded: float = CROWDED
     """Times as many samples at a limit as at the next step below it: then the channel saturates.
 
     Trades and found: as `longest`.
