@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
+from ..units import conversion
 from .channels import ChannelSpec
 from .noise import SHORTEST
 from .table import Array, Table
@@ -94,6 +95,14 @@ def _values(table: Table, channel: str, channels: Mapping[str, ChannelSpec]) -> 
     return _numbers(table, spec.column)
 
 
+def _seconds(table: Table, spec: ChannelSpec | None) -> float:
+    """Return how many seconds one in the column of the time is."""
+    unit = spec.unit if spec is not None else ""
+    if spec is not None and not unit and (own := table.find(spec.column).unit) is not None:
+        unit = own.name
+    return conversion(unit or "s", "s")[0]
+
+
 def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int64]:
     """Return the middles of rests between two motions."""
     motion = "velocity" if "velocity" in channels else "displacement"
@@ -101,6 +110,7 @@ def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int6
     step = 0.0 if spec is None or spec.step is None else spec.step
     if not step:
         step = float(np.median(np.diff(_filled(_values(table, "time", channels)))))
+        step *= _seconds(table, spec)
     every = np.arange(len(y))
     good = np.isfinite(y)
     if not good.any():

@@ -391,6 +391,18 @@ def test_a_file_of_several_runs_is_cut(tmp_path: Path, split: str) -> None:
         assert top == pytest.approx(number * np.max(np.abs(F)), rel=1e-6)
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("min", 1.0 / 60.0)])
+def test_a_rest_lasts_as_long_in_any_unit_of_time(tmp_path: Path, unit: str, factor: float) -> None:
+    title, *lines = three("rests").splitlines()
+    parted = [line.partition(",") for line in lines]
+    text = [f"{float(time) * factor:.9g},{rest}" for time, _, rest in parted]
+    title = title.replace("[s]", f"[{unit}]")
+    table = table_of(tmp_path, "\n".join([title, *text]) + "\n", "all.csv")
+    from bristle.data.guess import specs
+
+    assert len(pieces_of(table, "rests", specs(table, guess_channels(table)))) == 3
+
+
 def test_a_file_of_one_run_cannot_be_cut(tmp_path: Path) -> None:
     table = table_of(tmp_path, "t [s],x [mm],F [kN],I [A]\n" + rows("%.9f", ","), "one.csv")
     from bristle.data.guess import specs
