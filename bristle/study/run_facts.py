@@ -21,7 +21,8 @@ from .run_titles import counted_names
 _NUMBER = r"\d+(?:[.,p]\d+)?"  # "1p5" stands for 1.5 where a point would end a name
 _UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
 _SIGN = r"(?:(?<![^_= ])-)?"  # T=-10C and cold_-10C have one; in run-10C the minus parts words
-_TOKEN = re.compile(rf"(?<![\d.])({_SIGN}{_NUMBER})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z])")
+_SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s1 is none
+_TOKEN = re.compile(rf"(?<![\d.])({_SIGN}{_NUMBER})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})")
 _SPELLED = {"pct": "%", "percent": "%", "C": "degC"}
 _FILE = ("file", "run", "name", "datei", "filename")
 
@@ -314,6 +315,10 @@ def _facts(
         if number is None:
             found = found.and_(Facts(labels={name: value}))
             continue
+        if target and column.problem:
+            raise StudyError(
+                f'{where}: "{text.strip()}": {column.problem} {name} [{target}] is right.'
+            )
         if target and column.unit is not None:
             try:
                 number = convert(number, column.unit.name, target)

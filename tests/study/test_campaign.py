@@ -256,6 +256,26 @@ def test_a_table_of_runs_in_the_words_of_the_lab(tmp_path, encoding) -> None:
     assert "temperature" not in several.labels
 
 
+@pytest.mark.parametrize(
+    ("title", "right"),
+    [("current [mAmp]", "current [A]"), ("temperature [°F]", "temperature [degC]")],
+)
+def test_a_table_of_runs_in_a_unit_that_is_not_known_is_refused(tmp_path, title, right) -> None:
+    table = tmp_path / "runs.csv"
+    table.write_text(f"file,{title}\na.csv,500\n", encoding="utf-8")
+    with pytest.raises(StudyError, match=re.escape(f"{right} is right")):
+        rows_of_table(table, [Path("a.csv")])
+
+
+def test_a_speed_in_the_name_of_a_file_is_no_amplitude() -> None:
+    names = [Path("v50mm_s_I1A.csv"), Path("v100mm-s_I2A.csv")]
+    found, _ = facts_of(names, RunChoices(), commanded=False)
+    assert [dict(one.labels) for one in found] == [{}, {}]
+    assert [one.levels["current"] for one in found] == [1.0, 2.0]
+    (first, _), _ = facts_of([Path("10mm_s1.csv"), Path("20mm_s2.csv")], RunChoices(), False)
+    assert first.labels == {"amplitude": pytest.approx(0.01)}
+
+
 def test_a_table_of_runs_that_is_no_text_is_refused(tmp_path) -> None:
     table = tmp_path / "runs.xlsx"
     table.write_bytes(b"PK\x03\x04\0\0\0")
