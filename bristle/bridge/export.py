@@ -26,6 +26,7 @@ from ..physics.effect import EFFECTS
 from ..physics.user import own_effects
 from ..scenario.model_parts import Parameters, source_of, values_of
 from ..study.rig import building_of
+from ..study.runs import Runs
 from ..study.study import Study
 from . import on_bench
 from .in_building import House, Shaking, loads, shaking_of, write_scenario
@@ -76,11 +77,12 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
         If the FMU cannot be built, or no run can be read.
     """
     model = study.model()
-    measurement = _one_run(study)
+    runs = study.runs()
+    measurement = _one_run(study, runs)
     folder = study.folder / "export" if out is None else out
     notes: list[str] = []
     with _writing(folder):
-        fmu = build(_damper(study, model, measurement, notes), folder)
+        fmu = build(_damper(study, model, (measurement, runs), notes), folder)
 
         def damper(parameters: Parameters) -> str:
             return part_text("damper", {"fmu": fmu.name}, parameters)
@@ -107,11 +109,12 @@ def write_editable(study: Study, folder: Path) -> Editable:
         If the model or the run cannot be read, or the folder cannot be written.
     """
     model = study.model()
-    measurement = _one_run(study)
+    runs = study.runs()
+    measurement = _one_run(study, runs)
     notes: list[str] = []
     own = _bare(study, model, notes)
     values = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
-    found = _range(_with_stroke(study, model, measurement), notes)
+    found = _range(study, model, (measurement, runs), notes)
     limit = drive_named(measurement.drive).limit
     values |= {VOLTAGE.limit if name == limit else name: value for name, value in found.items()}
 
@@ -147,13 +150,12 @@ def _scenario(
     return _structure(study, model, shaking, folder, damper, notes)
 
 
-def _one_run(study: Study) -> Measurement:
+def _one_run(study: Study, runs: Runs) -> Measurement:
     """Return the run that the scenario plays: the first that is held out.
 
     On a bench it is the first whose command reaches half of the largest: without one, a scenario
     shows nothing of what the damper is for.
     """
-    runs = study.runs()
     able = runs.holdout or runs.train
     if study.settings.has_building or not able[0].drive:
         return able[0]
@@ -178,18 +180,20 @@ def _signals(damper: StudyModel) -> Collection[str]:
     return following(damper.effects)
 
 
-def _damper(study: Study, model: StudyModel, measurement: Measurement, notes: list[str]) -> Plan:
+def _damper(
+    study: Study, model: StudyModel, of: tuple[Measurement, Runs], notes: list[str]
+) -> Plan:
     """Plan the damper with the model's values as its defaults."""
     own = _bare(study, model, notes)
     starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
-    starts |= _range(_with_stroke(study, model, measurement), notes)
+    starts |= _range(study, model, of, notes)
     files = own_effects()
     return plan(
         component_of_law(own.base_law),
         name=_model_name(study.name),
         starts=starts,
         effects=[files[name] for name in own.effects if EFFECTS[name].own],
-        drive=drive_named(measurement.drive).name,
+        drive=drive_named(of[0].drive).name,
     )
 
 
@@ -210,22 +214,34 @@ def _with_stroke(study: Study, model: StudyModel, measurement: Measurement) -> M
     )
 
 
-def _range(measurement: Measurement, notes: list[str]) -> dict[str, float]:
-    """Return the command's limit and stroke [m] that hold what was measured.
+def _range(
+    study: Study, model: StudyModel, of: tuple[Measurement, Runs], notes: list[str]
+) -> dict[str, float]:
+    """Return the command's limit and stroke [m] that hold what was measured in all runs.
 
-    Where the defaults do they are left out.
+    Where the defaults do they are left out. The run that is played alone does not tell: another
+    one, to which the model was fitted, may go further.
     """
     found = {}
+    measurement, runs = of
     drive = drive_named(measurement.drive)
     if not measurement.drive:
         notes.append("neither voltage nor current was measured: the scenario holds 0 V.")
-    elif float(measurement[drive.name].max()) > drive.largest:
-        found[drive.limit] = float(ceil(1.05 * measurement[drive.name].max()))
-    for channel in ("displacement", "base_displacement"):
-        if measurement.has(channel):
-            most = float(np.abs(measurement[channel]).max())
-            if most > 0.02:
-                found["stroke"] = float(f"{1.05 * most:.3g}")
+    tops = [float(one[drive.name].max()) for one in runs.all if one.has(drive.name)]
+    if max(tops, default=0.0) > drive.largest:
+        found[drive.limit] = float(ceil(1.05 * max(tops)))
+    moved = [_with_stroke(study, model, one) for one in runs.all]
+    most = max(
+        (
+            float(np.abs(one[channel]).max())
+            for one in moved
+            for channel in ("displacement", "base_displacement")
+            if one.has(channel)
+        ),
+        default=0.0,
+    )
+    if most > 0.02:
+        found["stroke"] = float(f"{1.05 * most:.3g}")
     return found
 
 

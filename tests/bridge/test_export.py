@@ -294,3 +294,17 @@ def test_the_bench_scenario_plays_a_run_with_a_command_to_its_end_without_notes(
     assert "has no unit" not in told.out + told.err
     measured = bristle.run(found.scenario)["measured.value"].to_numpy()
     assert measured[-1] == pytest.approx(study.runs().holdout[1]["force"][-1], rel=1e-6)
+
+
+def test_the_damper_takes_the_commands_and_strokes_of_all_runs(tmp_path: Path) -> None:
+    for name, phase in (("train_1", 0.3), ("holdout_1", 1.1)):
+        bench_run(tmp_path / f"{name}.csv", phase)
+    far = np.loadtxt(tmp_path / "train_1.csv", delimiter=",", skiprows=1)
+    header = (tmp_path / "train_1.csv").read_text().partition("\n")[0]
+    far[:, 1:4] *= [4.0, 4.0, 3.0]
+    np.savetxt(tmp_path / "train_1.csv", far, delimiter=",", header=header, comments="")
+    found = export_study(Study.create(tmp_path / "rig", sorted(tmp_path.glob("*.csv"))))
+    variables = read_description(found.fmu).variables
+    assert found.run == "holdout_1"  # whose command stays below the default of 8 V
+    assert variables["v_max"].start == np.ceil(1.05 * far[:, 3].max())
+    assert variables["stroke"].start == pytest.approx(1.05 * np.abs(far[:, 1]).max(), rel=0.01)
