@@ -149,6 +149,28 @@ def test_a_workbook_that_is_none(tmp_path: Path) -> None:
         read_table(path)
 
 
+@pytest.mark.parametrize(
+    ("title", "form", "top"),
+    [
+        ("Duty [%]", "0%", 50.0),
+        ("Duty", "0.0 %", 50.0),  # the format tells the unit that the title does not
+        ("Duty [%]", '0.0"%"', 0.5),  # a word behind the number, which is one of per cent already
+        ("Duty [%]", "0.00", 0.5),
+    ],
+)
+def test_a_cell_that_is_shown_in_per_cent_is_read_so(
+    tmp_path: Path, title: str, form: str, top: float
+) -> None:
+    def change(sheet, book) -> None:
+        sheet["D3"], sheet["D4"] = title, ""
+        for cell in sheet["D"][4:]:
+            cell.value, cell.number_format = min(cell.value, 0.5), form
+
+    (run,) = measurements_of(read_table(workbook(tmp_path / "run.xlsx", change)), estimate=False)
+    assert np.max(run["duty"]) == pytest.approx(top)
+    assert np.max(run["displacement"]) == pytest.approx(1e-3 * np.max(X))
+
+
 # -- TDMS, HDF5
 
 
@@ -174,6 +196,18 @@ def test_tdms_is_read_without_its_index(tmp_path: Path, timed: bool) -> None:
     table = read_table(path)
     assert any('of 2 groups "Log" is read' in note for note in table.notes)
     same(table)
+
+
+def test_a_time_in_another_language_counts_beside_a_waveform_of_tdms(tmp_path: Path) -> None:
+    named = {"Zeit": (1e3 * T, "ms"), "Weg": (X, "mm"), "Kraft": (F, "kN")}
+    channels = [
+        ChannelObject("Log", name, values, properties={"unit_string": unit, "wf_increment": 1.0})
+        for name, (values, unit) in named.items()
+    ]
+    with TdmsWriter(str(tmp_path / "run.tdms")) as writer:
+        writer.write_segment(channels)
+    (run,) = measurements_of(read_table(tmp_path / "run.tdms"))
+    assert run.step == pytest.approx(0.005)
 
 
 def test_what_is_wrong_with_a_tdms(tmp_path: Path) -> None:

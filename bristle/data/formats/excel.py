@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from ...errors import RecordError
+from ...units import parse as parse_unit
 from ..table import Table
 from ..titles import is_unit_row
 from . import delimited
@@ -32,6 +33,10 @@ _MERGED = re.compile(rb'<mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
 _CELL = re.compile(rb"<c [^>]*[^>/]>.*?</c>", re.DOTALL)
 _ANY_FORMULA = re.compile(rb"<f[ >/]")
 _VALUE = re.compile(rb"<v(?: [^>/]*)?>[^<]")
+_LETTERS = re.compile(rb'r="([A-Z]+)\d+"')
+_STYLE = re.compile(rb'\bs="(\d+)"')
+_PERCENT = {9, 10}  # numbers of the formats 0% and 0.00% in every workbook
+_OWN_FORMATS = 164  # number of the first format that a workbook defines itself
 _PLACE = re.compile(rb'r="([A-Z]+\d+)"')
 
 
@@ -64,7 +69,7 @@ def read(content: bytes, name: str) -> Table:
         book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
         sheets = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
         texts = [(sheet, _text(sheet)) for sheet in sheets]
-        parts = _parts(content, book)
+        parts, shares = _parts(content, book), _percent_styles(book)
     # A damaged file surfaces as any of these from the library's own parsing.
     except (
         zipfile.BadZipFile, ElementTree.ParseError, ValueError, KeyError, TypeError, OSError,
@@ -80,6 +85,7 @@ def read(content: bytes, name: str) -> Table:
     _refuse_without_values(sheet.part, sheet.where)
     lines = ["", *delimited.lines_of(sheet.text)]
     _refuse_merged(sheet.part, table, lines[int(table.lines[0]) - 1], sheet.where)
+    table = _in_percent(table, _percent_columns(sheet.part, int(table.lines[0]), shares))
     return _with_notes(table, sheet.part, notes, [one.title for one in read], sheet.title)
 
 
@@ -160,6 +166,57 @@ def _parts(content: bytes, book: Any) -> dict[str, bytes]:
             sheet.title: archive.read(sheet._worksheet_path.lstrip("/"))
             for sheet in book.worksheets
         }
+
+
+def _percent_styles(book: Any) -> set[int]:
+    """Return the styles of cells that show their value in per cent: 0.5 as 50 %."""
+    own = {
+        _OWN_FORMATS + k
+        for k, form in enumerate(book._number_formats)
+        if "%" in re.sub(r'"[^"]*"|\\.', "", form)
+    }
+    return {k for k, style in enumerate(book._cell_styles) if style.numFmtId in _PERCENT | own}
+
+
+def _percent_columns(part: bytes, first: int, styles: set[int]) -> set[int]:
+    """Return the columns, from 0, whose cell in the first row of numbers is shown in per cent."""
+    if not styles:
+        return set()
+    row = re.search(rb'<row [^>]*r="%d".*?</row>' % first, part, re.DOTALL)
+    cells = re.findall(rb"<c ([^>]*)>", row.group()) if row else []
+    found = set()
+    for cell in cells:
+        place, style = _LETTERS.search(cell), _STYLE.search(cell)
+        if place and style and int(style.group(1)) in styles:
+            found.add(_column_index(place.group(1).decode()))
+    return found
+
+
+def _column_index(letters: str) -> int:
+    """Return the index from 0 of a column by its letters: A, B, ..., Z, AA."""
+    number = 0
+    for letter in letters:
+        number = 26 * number + ord(letter) - ord("A") + 1
+    return number - 1
+
+
+def _in_percent(table: Table, shown: set[int]) -> Table:
+    """Return a table whose values are what cells show: 50 % is stored as 0.5.
+
+    Parameters
+    ----------
+    table : as read from the sheet's text
+    shown : the columns whose cells are shown in per cent; what has another unit stays as it is
+    """
+    values, notes, percent = dict(table.values), list(table.notes), parse_unit("%")
+    columns = list(table.columns)
+    for k, column in enumerate(columns):
+        if column.index not in shown or column.problem or column.unit not in (None, percent):
+            continue
+        values[column.text] = 100.0 * values[column.text]
+        columns[k] = replace(column, unit=percent)
+        notes.append(f'"{column.text}" is shown in per cent, and is taken so')
+    return replace(table, columns=tuple(columns), values=values, notes=tuple(notes))
 
 
 def _text(sheet: Any) -> str:

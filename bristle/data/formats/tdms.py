@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...errors import RecordError
+from ..channels import quantity_of_unit
 from ..table import Table, from_arrays
 from ..titles import unit_or_none
 from ._extra import library
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
+_RISING = 0.98  # share of the steps of a time that are positive, at least
 
 
 def recognises(content: bytes, suffix: str) -> bool:
@@ -58,7 +60,7 @@ def read(content: bytes, name: str) -> Table:
     data = {key: array for key, (array, _, _) in kept.items()}
     units: dict[str, str | None] = {key: unit for key, (_, unit, _) in kept.items()}
     steps = {step for _, _, step in kept.values() if step}
-    timed = any("time" in key.lower() or array.dtype.kind == "M" for key, array in data.items())
+    timed = any(_is_time(key, array, units[key]) for key, array in data.items())
     if not timed and len(steps) == 1:
         step = steps.pop()
         data, units["time"] = {"time": np.arange(size) * step, **data}, "s"
@@ -81,6 +83,16 @@ def _channels(group: Any) -> Channels:
         step = float(channel.properties.get("wf_increment", 0.0) or 0.0)
         out[channel.name] = array, None if unit is None else unit.name, step
     return out
+
+
+def _is_time(name: str, array: Any, unit: str | None) -> bool:
+    """Return whether a channel is the time by its name or, in any language, by its unit."""
+    if "time" in name.lower() or array.dtype.kind == "M":
+        return True
+    # What is written beside a time is often a wf_increment of 1, which nobody set.
+    if quantity_of_unit(unit) != "time" or array.dtype.kind not in "fiu":
+        return False
+    return float(np.mean(np.diff(array) > 0.0)) > _RISING
 
 
 def _length(channels: Channels) -> int:
