@@ -45,13 +45,15 @@ export class Component {
   set(values) {
     for (const [name, value] of Object.entries(values)) {
       const { kind, reference } = this.#variable(name);
+      const text = kind === "String" ? this.#text(String(value)) : 0;
+      // Only now: memory that grows for a long text takes its views away.
       const view = new DataView(this.#exports.memory.buffer);
       view.setUint32(this.#places, reference, true);
       if (kind === "String") {
-        const text = this.#text(String(value));
         view.setUint32(this.#places + 8, text, true);
-        this.#done(this.#call("Set", kind));
+        const status = this.#call("Set", kind);
         this.#exports.free(text);
+        this.#done(status);
         continue;
       }
       if (kind === "Real") view.setFloat64(this.#places + 8, value, true);
@@ -62,8 +64,9 @@ export class Component {
 
   /** Returns the value of a variable by name, in its unit. */
   get(name) {
-    if (!this.#stepping) this.#start();
-    const { kind, reference } = this.#variable(name);
+    const { kind, reference, causality } = this.#variable(name);
+    // Parameters that are read can still be set: the start alone fixes them.
+    if (!this.#stepping && causality === "output") this.#start();
     if (!(kind in KINDS)) throw new TypeError(`${name} is a text, which is only set.`);
     const view = new DataView(this.#exports.memory.buffer);
     view.setUint32(this.#places, reference, true);

@@ -98,7 +98,8 @@ def chosen(
     Raises
     ------
     ScenarioError
-        If one that is named cannot be, or moves what another one moves.
+        If one that is named cannot be, does not hold the scenario's value, or moves what another
+        one moves.
     """
     found: list[Slider] = []
     names = among or offered(numbers.scenario)
@@ -106,6 +107,7 @@ def chosen(
     for name, (low, high) in (sliders or ranges).items():
         try:
             one = numbers.slider(name, low, high)
+            _check_begin(one)
             _check_apart(one, found)
         except ScenarioError:
             if sliders:
@@ -115,6 +117,17 @@ def chosen(
         if not sliders and len(found) == MOST_SLIDERS:
             break
     return found
+
+
+def _check_begin(one: Slider) -> None:
+    """Refuse a slider that does not hold the scenario's value: the page begins there."""
+    if not one.low <= one.value <= one.high:
+        unit = "" if one.unit in ("", "1") else f" {one.unit}"
+        raise ScenarioError(
+            f"{one.name} is {one.value:g}{unit} in the scenario, outside of the slider from "
+            f"{one.low:g} to {one.high:g}. A slider that holds it is right, or --set "
+            f"{one.name}=VALUE within it."
+        )
 
 
 def _check_apart(one: Slider, others: Sequence[Slider]) -> None:

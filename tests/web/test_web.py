@@ -90,6 +90,14 @@ def test_a_slider_without_room_is_refused(numbers: Numbers) -> None:
         numbers.slider("voltage.level", 3.0, 3.0)
 
 
+def test_a_slider_that_does_not_hold_the_value_of_the_scenario_is_refused(
+    numbers: Numbers,
+) -> None:
+    # The page begins there, and could not run any value of another slider.
+    with pytest.raises(ScenarioError, match=r"voltage\.level is 4 V .* from 5 to 8"):
+        chosen(numbers, {"voltage.level": (5.0, 8.0)})
+
+
 def test_two_sliders_that_move_one_number_are_refused(numbers: Numbers) -> None:
     with pytest.raises(ScenarioError, match=r"ground\.factor and ground\.peak move the same"):
         chosen(numbers, {"ground.peak": (None, None), "ground.factor": (None, None)})
@@ -205,6 +213,27 @@ def stepped_in_python(
         time += row["dt"]
         found.append(slave.get_real([slave._index[output]])[0])
     return found
+
+
+@pytest.mark.slow
+@needs_tools
+def test_a_component_takes_a_long_text_after_its_parameters_were_read(tmp_path: Path) -> None:
+    export_component("SignalSource", tmp_path)
+    script = tmp_path / "long.mjs"
+    script.write_text("""
+import fs from "node:fs";
+import { Component } from "./component.mjs";
+const [about, module] = ["component.json", "component.wasm"].map((name) =>
+  fs.readFileSync(new URL(name, import.meta.url)));
+const source = await Component.load(module, JSON.parse(about));
+const before = source.get("offset");
+const steps = Array.from({ length: 20000 }, (_, k) => `${k}:${k % 7}`).join(" ");
+source.set({ kind: "steps", steps, offset: 0.5 });
+source.step(19998.5);
+console.log(JSON.stringify([before, source.get("offset"), source.get("value")]));
+""")
+    said = subprocess.run(["node", str(script)], capture_output=True, text=True, check=True)
+    assert json.loads(said.stdout) == [0.0, 0.5, 19998 % 7]
 
 
 def motion(count: int) -> list[dict[str, float]]:
