@@ -27,7 +27,7 @@ class Column:
     """One column: where it stands, its text in the header, and what that means.
 
     `unit` is None where the text gives none that can be read; `problem` then says why, if it
-    gives one at all.
+    gives one at all, and `written` is that of a row of units.
     """
 
     index: int
@@ -35,6 +35,7 @@ class Column:
     name: str
     unit: Unit | None
     problem: str = ""
+    written: str = ""
 
     def is_a(self, dimension: tuple[int, ...], *names: str) -> bool:
         """Return whether the unit has that dimension and the name is one of those, if any."""

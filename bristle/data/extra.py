@@ -103,7 +103,7 @@ def unit_as_written(column: Column) -> str:
     if column.unit is not None:
         return column.unit.name
     written = _TITLE_UNIT.fullmatch(column.text)
-    return written["unit"] if written else ""
+    return column.written or (written["unit"] if written else "")
 
 
 def unit_of(spec: ChannelSpec) -> str:

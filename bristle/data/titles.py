@@ -9,11 +9,13 @@ from dataclasses import replace
 from ..errors import UnitError
 from ..units import Unit
 from ..units import parse as parse_unit
+from .channels import meaning
 from .columns import Column, column
 
 _PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
 _BRACKET = re.compile(r".*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]")
 _BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
+_WHOLE = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
 _NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none")
 
 
@@ -55,9 +57,19 @@ def titles(names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Co
         if met[text] > 1:
             found = replace(found, text=f"{text} ({met[text]})")
         if units is not None and units[index].strip().lower() not in _NOTHING:
-            found = replace(found, unit=row_unit(units[index]), problem="")
+            found = _in_unit(found, units[index].strip().strip('"').strip())
         out.append(found)
     return tuple(out)
+
+
+def _in_unit(column: Column, text: str) -> Column:
+    """Return a column in the unit that a row of units says."""
+    unit = row_unit(text)
+    if unit is not None:
+        return replace(column, unit=unit, problem="")
+    written = _WHOLE.fullmatch(text)
+    spelled = text[1:-1].strip() if written else text
+    return replace(column, unit=None, problem=f'unit "{spelled}" is not known.', written=spelled)
 
 
 def row_unit(text: str) -> Unit | None:
@@ -67,9 +79,18 @@ def row_unit(text: str) -> Unit | None:
 
 
 def is_unit_row(fields: Sequence[str]) -> bool:
-    """Return whether a row below the titles holds units: all that is there is a unit."""
-    some = [field for field in fields if field.strip().lower() not in _NOTHING]
-    return bool(some) and all(row_unit(field) is not None for field in some)
+    """Return whether a row below the titles holds units: what is there is one, or in brackets.
+
+    Test machines and loggers count in units of their own, too, such as `sec;segments;mm;kN`: most
+    are known then, and the others name no quantity.
+    """
+    some = [field.strip().strip('"').strip() for field in fields]
+    some = [field for field in some if field.lower() not in _NOTHING]
+    other = [field for field in some if row_unit(field) is None]
+    known = len(some) - len(other)
+    if not known or all(_WHOLE.fullmatch(field) for field in other):
+        return known > 0
+    return known > len(other) and all(meaning(field, None) is None for field in other)
 
 
 def unit_or_none(text: str) -> Unit | None:
@@ -114,6 +135,16 @@ _RENAMED = {
     "second": "s",
     "seconds": "s",
     "msec": "ms",
+    "msecs": "ms",
+    "msec.": "ms",
+    "millisecond": "ms",
+    "milliseconds": "ms",
+    "millisekunden": "ms",
+    "microseconds": "us",
+    "usec": "us",
+    "minute": "min",
+    "minutes": "min",
+    "mins": "min",
     "meter": "m",
     "metre": "m",
     "kip": "kip",
@@ -123,4 +154,14 @@ _RENAMED = {
     "inch": "in",
     "g's": "g",
     "sekunden": "s",
+    # In capitals, as some programs write all their titles.
+    "s": "s",
+    "ms": "ms",
+    "kn": "kN",
+    "lbf": "lbf",
+    "mm": "mm",
+    "mm/s": "mm/s",
+    "m/s": "m/s",
+    "in": "in",
+    "in/s": "in/s",
 }

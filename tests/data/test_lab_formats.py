@@ -171,6 +171,52 @@ def test_a_cell_that_is_shown_in_per_cent_is_read_so(
     assert np.max(run["displacement"]) == pytest.approx(1e-3 * np.max(X))
 
 
+# -- titles and units
+
+
+def test_a_row_of_units_may_hold_one_of_the_loggers_own(tmp_path: Path) -> None:
+    lines = rows("%.9f", ";")
+    for number, units in enumerate(("[s];[mm];[kN];[counts]", "sec;mm;kN;segments")):
+        table = table_of(tmp_path, f"Zeit;Weg;Kraft;Teile\n{units}\n{lines}", f"{number}.csv")
+        assert [one.name for one in table.columns] == ["Zeit", "Weg", "Kraft", "Teile"]
+        (run,) = measurements_of(table, estimate=False)
+        np.testing.assert_allclose(run["force"], 1e3 * F, atol=1e-5)
+    plain = table_of(tmp_path, f"Log of a test;;;\nt;s;F;V\n{lines}", "plain.csv")
+    assert [one.name for one in plain.columns] == ["t", "s", "F", "V"]
+
+
+def test_a_time_in_a_unit_that_is_not_known_is_asked_for(tmp_path: Path) -> None:
+    lines = rows("%.9f", ",")
+    table = table_of(tmp_path, f"Time [ticks],x [mm],F [kN],I [A]\n{lines}", "a.csv")
+    (time, *_) = guess_channels(table)
+    assert (time.channel, time.unit) == ("time", "")
+    assert '"ticks", is not known' in time.doubt
+    table = table_of(tmp_path, f"TIME (S),X (MM),FORCE (KN),I (A)\n{lines}", "b.csv")
+    same(table)
+    table = table_of(tmp_path, f"time (from start),x [mm],F [kN],I [A]\n{lines}", "c.csv")
+    assert guess_channels(table)[0].unit == "s"
+
+
+def test_a_rest_in_the_middle_hides_no_decimal_commas(tmp_path: Path) -> None:
+    lines = ["Zeit [ms];Weg [mm];Kraft [kN]"]
+    for k in range(N):
+        still = abs(k - N // 2) < 70
+        values = (0, 0) if still else (f"{X[k]:.9f}", f"{F[k]:.9f}")
+        lines.append(f"{5 * k};{values[0]};{values[1]}".replace(".", ","))
+    table = table_of(tmp_path, "\n".join(lines) + "\n")
+    assert table.rows == N
+    assert [one.name for one in table.columns] == ["Zeit", "Weg", "Kraft"]
+
+
+def test_decimal_commas_in_quotes_between_commas(tmp_path: Path) -> None:
+    quoted = [
+        ",".join(f'"{one:.9f}"'.replace(".", ",") for one in row)
+        for row in zip(T, X, F, I, strict=True)
+    ]
+    titles = "Zeit [s],Weg [mm],Kraft [kN],Strom [A]"
+    same(table_of(tmp_path, "\n".join([titles, *quoted]) + "\n"))
+
+
 # -- TDMS, HDF5
 
 
@@ -391,6 +437,13 @@ def test_what_is_no_instant() -> None:
     assert seconds_of(["a", "b"]) is None
     assert seconds_of([]) is None
     np.testing.assert_allclose(seconds_of(["10:00:59.5", "10:01:00", "10:01:00.5"]), [0, 0.5, 1.0])
+
+
+@pytest.mark.parametrize("form", ["%m/%d/%Y", "%d/%m/%Y", "%m/%d/%y", "%d/%m/%y"])
+def test_a_date_that_changes_moves_on_by_a_day_in_any_country(form: str) -> None:
+    begin = datetime(2024, 4, 5, 23, 59, 59)
+    texts = [(begin + timedelta(seconds=k)).strftime(f"{form} %H:%M:%S") for k in range(3)]
+    np.testing.assert_allclose(seconds_of(texts), [0.0, 1.0, 2.0])
 
 
 # -- several runs in a file

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
+from datetime import datetime, timedelta
 
 import numpy as np
 
 from ..table import Array
 
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p")
-_DATES = ("%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d", "%d-%m-%Y")
+_DATES = (
+    "%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%Y/%m/%d", "%d-%m-%Y",
+    "%m-%d-%Y",
+)  # fmt: skip
 _FORMS = (*(f"{date} {clock}" for date in _DATES for clock in _CLOCKS), *_CLOCKS)
 _DAY = 86400.0
 
@@ -19,8 +22,8 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
     """Return instants as seconds since the first (n,), None where they are none.
 
     ISO 8601, `12.03.2024 10:00:00.000` and its like, or a time of day alone, which may pass
-    midnight; seconds with a point or a comma. Of `03/12/2024` the month matters in no difference
-    but across the end of one: the day comes first unless that cannot be.
+    midnight; seconds with a point or a comma. Of `03/12/2024` either number may be the month, which
+    matters where a date changes: what gives the shorter record counts, else the day comes first.
     """
     plain = [text.strip().strip('"').strip() for text in texts]
     if not plain or not plain[0]:
@@ -28,7 +31,11 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
     found = _by_iso(plain)
     if found is None:
         plain = [_with_point(text) for text in plain]
-        found = next((one for form in _FORMS if (one := _by_form(plain, form)) is not None), None)
+        able = (one for form in _FORMS if (one := _by_form(plain, form)) is not None)
+        day, last = (text.partition(" ")[0] for text in (plain[0], plain[-1]))
+        found = (
+            next(able, None) if day == last or ":" in day else min(able, key=_span, default=None)
+        )
     if found is None:
         return None
     instants, clock = found
@@ -39,6 +46,11 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
     if clock:
         seconds += _DAY * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
     return seconds
+
+
+def _span(found: tuple[list[datetime], bool]) -> timedelta:
+    """Return how long instants with a date last."""
+    return max(found[0]) - min(found[0])
 
 
 def _by_iso(texts: Sequence[str]) -> tuple[list[datetime], bool] | None:

@@ -113,9 +113,13 @@ def _find_layout(lines: list[str], name: str) -> Layout:
     middle = [_without_ends(lines[k]) for k in islice(full, len(full) // 2, len(full) // 2 + 60)]
     if len(middle) > 3:
         middle.pop()  # the last line of a file may be cut
+    # A rig may rest in the middle: whole numbers do not tell how decimals are written.
+    spread = full[len(full) // 2 : -1 : max(1, len(full) // 120)]
+    middle += [_without_ends(lines[k]) for k in spread]
     best: tuple[float, Layout] | None = None
     for delimiter in (";", "\t", ",", ""):
-        for comma in (False, True) if delimiter != "," else (False,):
+        quoted = any('"' in row for row in middle)
+        for comma in (False, True) if delimiter != "," or quoted else (False,):
             found = _try_layout(middle, delimiter, comma)
             if found and (best is None or found[0] > best[0]):
                 best = found

@@ -14,6 +14,8 @@ import numpy as np
 
 from ...units import parse as parse_unit
 from ..channels import ChannelSpec, device_channel, meaning, quantity_of_unit
+from ..columns import Column
+from ..extra import unit_as_written
 from ..labels import TEMPERATURE
 from ..table import Table
 from .bench import bench_guesses
@@ -158,9 +160,23 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
         if unit and not timed:
             continue
         reason = "its name" if named else "its unit" if timed else "the first column, and it rises"
-        doubt = "" if unit else f"no unit is given, s is assumed: {1.0 / np.median(spacing):.4g} Hz"
+        assumed, doubt = _assumed_unit(column, float(np.median(spacing)))
         score = 4 * named + 2 * timed + rising
-        guess = Guess("time", column.text, unit or "s", 1, reason, doubt)
+        guess = Guess("time", column.text, unit or assumed, 1, reason, doubt)
         if best is None or score > best[0]:
             best = score, guess, float(np.median(spacing)) * parse_unit(unit or "s").factor
     return (best[1], best[2]) if best else (None, 0.0)
+
+
+def _assumed_unit(column: Column, spacing: float) -> tuple[str, str]:
+    """Return the unit of a time that tells none, and the doubt; "" where it tells an unknown one.
+
+    What stands in round brackets may be a word, as in "time (from start)".
+    """
+    if column.unit is not None:
+        return column.unit.name, ""
+    told = unit_as_written(column)
+    if told and "(" not in column.text:
+        return "", f'its unit, "{told}", is not known'
+    told = f'"{told}" is no unit that is known' if told else "no unit is given"
+    return "s", f"{told}, s is assumed: {1.0 / spacing:.4g} Hz"
