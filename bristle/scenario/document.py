@@ -152,7 +152,7 @@ def apply_overrides(
         else:
             before = {name: old for name, old, _ in flatten(table, ())}
             _drop(table, key)
-            table[key] = _plain(value, key)
+            table[key] = _as_in_file(value, key)
             document.overridden[target] = str(name)
             if key not in before or before[key] != table[key]:
                 document.changed.add(target)
@@ -190,16 +190,22 @@ def _drop(table: dict[str, Any], name: str) -> None:
             _drop(inner, ".".join(parts[count:]))
 
 
-def _plain(value: object, key: str) -> object:
+def plain(value: object) -> object:
+    """Return an override's value in the types of TOML: paths and numbers of numpy have others."""
+    if isinstance(value, Path):
+        return str(value)
+    item = getattr(value, "item", None)
+    if callable(item) and getattr(value, "size", 1) == 1:  # numbers of numpy
+        return item()
+    return value
+
+
+def _as_in_file(value: object, key: str) -> object:
     """Return an override's value as TOML would give it.
 
     A file is looked for in the current folder first, because there its name was typed.
     """
-    if isinstance(value, Path):
-        value = str(value)
-    item = getattr(value, "item", None)
-    if callable(item) and getattr(value, "size", 1) == 1:  # numbers of numpy
-        value = item()
+    value = plain(value)
     is_file_name = key in (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
     if is_file_name and isinstance(value, str) and Path(value).suffix:
         here = Path(value).absolute()

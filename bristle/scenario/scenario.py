@@ -22,6 +22,7 @@ from .document import (
     exists,
     parse_override,
     parse_overrides,
+    plain,
     read_document,
 )
 from .import_ssp import unpacked
@@ -104,7 +105,7 @@ class Scenario:
     `title` is the file's unless overrides changed what runs (see `naming.changed_title`).
 
     `algorithm` is one of `parts.ALGORITHMS`; components step in their order. `findings` are the
-    warnings and notes of its check.
+    warnings and notes of its check; `overrides` what was laid over the file.
     """
 
     file: Path
@@ -115,6 +116,7 @@ class Scenario:
     components: tuple[Component, ...]
     connections: tuple[Connection, ...]
     findings: tuple[Finding, ...] = ()
+    overrides: dict[str, object] = field(default_factory=dict)
 
     @property
     def steps(self) -> int:
@@ -236,9 +238,11 @@ def _read(
         Connection(w.target, w.input, w.source, w.output, w.factor, w.offset, w.transformed)
         for w in wires
     )
+    laid_over = {str(name): plain(value) for name, value in overrides.items()}
     scenario = Scenario(
-        path, title, run.stop, run.step, run.algorithm, components, connections, tuple(found)
-    )
+        path, title, run.stop, run.step, run.algorithm, components, connections, tuple(found),
+        laid_over,
+    )  # fmt: skip
     return scenario, found
 
 
@@ -287,13 +291,15 @@ def resolve_scenario(name: str | Path) -> Path:
     file = Path(name)
     if not str(name):
         raise ScenarioError("the name of the scenario file is empty.")
-    if exists(file):
+    if exists(file) and not file.is_dir():
         return file.absolute()
     stock = stock_scenarios()
     if len(file.parts) == 1:
-        for found in stock:
+        for found in stock:  # a folder of that name may hold its results
             if found.name in (file.name, f"{file.name}.toml"):
                 return found.absolute()
+    if exists(file):
+        return file.absolute()
     beside = [str(entry) for entry in file.parent.glob("*.toml")] if exists(file.parent) else []
     names = [found.stem for found in stock]
     # Whole paths are alike by their folders alone, so files are compared by their own names.

@@ -72,7 +72,8 @@ def run(
     scenario : path or Scenario
         A scenario file, the name of a stock scenario, or a loaded scenario.
     overrides : mapping, optional
-        Values that take the place of the file's: `{"damper.f_c": 2.0, "run.stop": 10.0}`.
+        Values that take the place of the file's: `{"damper.f_c": 2.0, "run.stop": 10.0}`; those
+        that a loaded scenario has stay beside them.
     engine : str
         "fmu" steps FMUs; "compiled" solves built-in components together, without coupling error.
     fmus : str
@@ -168,12 +169,12 @@ def execute(
             raise not_usable(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}.')
         ensure = ensure_of(fmus, engine)
         if isinstance(scenario, Scenario) and overrides:
-            scenario = scenario.file
+            scenario, overrides = scenario.file, {**scenario.overrides, **overrides}
         if not isinstance(scenario, Scenario):
             scenario = load_scenario(scenario, overrides)
         for line in scenario.remarks():
             output.show(line)
-        job = _Job(scenario, dict(overrides or {}), engine, output, ensure)
+        job = _Job(scenario, engine, output, ensure)
         if engine == "compiled":
             if coupling_error:
                 raise not_usable('engine "compiled" makes no coupling error; "fmu" does.')
@@ -236,7 +237,6 @@ class _Job:
     def __init__(
         self,
         scenario: Scenario,
-        overrides: dict[str, object],
         engine: str,
         output: Output,
         ensure: Callable[..., Path],
@@ -249,7 +249,7 @@ class _Job:
             "version": __version__,
             "title": scenario.title,
             "file": str(scenario.file),
-            "overrides": overrides,
+            "overrides": dict(scenario.overrides),
             "algorithm": scenario.algorithm if engine == "fmu" else "coupled",
             "engine": engine,
             "step": scenario.step,

@@ -164,6 +164,13 @@ def test_an_override_can_exchange_the_damper(write):
     assert scenario.component("damper").parameters["f_c"] == 2.0
 
 
+def test_a_scenario_knows_what_was_laid_over_its_file(write):
+    assert load(write(VALID)).overrides == {}
+    assert load(write(VALID), {"damper.gas_spring.k": np.int64(70)}).overrides == {
+        "damper.gas_spring.k": 70
+    }
+
+
 def test_an_override_can_rewire(write):
     text = VALID.replace(
         "[components.damper]", '[components.other]\nfmu = "ConstantVoltage"\n\n[components.damper]'
@@ -284,6 +291,8 @@ def test_a_file_here_goes_before_a_stock_scenario(tmp_path, monkeypatch):
     monkeypatch.setattr(resources, "scenarios_folder", lambda: stock)
     monkeypatch.chdir(here)
     assert resolve_scenario("a.toml") == here / "a.toml"
+    assert resolve_scenario("a") == stock / "a.toml"
+    (here / "a").mkdir()  # such as a folder of its results
     assert resolve_scenario("a") == stock / "a.toml"
 
 

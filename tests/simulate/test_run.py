@@ -200,6 +200,17 @@ def test_loaded_scenario_runs_with_and_without_overrides(fine: Path) -> None:
     scenario = load_scenario(fine, {"sum.gain": 3.0})
     assert run(scenario)["sum.y"].iloc[-1] == pytest.approx(0.55 + 3.0)
     assert run(scenario, {"sum.gain": 4.0})["sum.y"].iloc[-1] == pytest.approx(0.55 + 4.0)
+    longer = run(scenario, {"run.stop": 2.0})
+    assert longer["sum.y"].iloc[10] == pytest.approx(0.55 + 3.0)
+    assert longer.attrs["made"]["overrides"] == {"sum.gain": 3.0, "run.stop": 2.0}
+
+
+def test_overrides_of_numpy_and_paths_are_written(fine: Path, tmp_path: Path) -> None:
+    overrides = {"sum.gain": np.int64(3), "sum.fmu": Path(load_scenario(fine).components[1].path)}
+    frame = run(fine, overrides, out=tmp_path / "out")
+    made = load_results(tmp_path / "out").attrs["made"]
+    assert made["overrides"] == {"sum.gain": 3, "sum.fmu": str(overrides["sum.fmu"])}
+    assert load_results(tmp_path / "out").equals(frame)
 
 
 def test_package_runs_as_a_function_whatever_was_imported(fine: Path) -> None:
