@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 _TOP = re.compile(r"(?P<component>.*)\.floor(?P<floor>\d+)_acceleration_absolute")
 SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
 """Units in SI, with the factor to those that are shown."""
-_MOTIONS = ("displacement", "velocity")
+_MOTIONS = {"displacement": "m", "velocity": "m/s"}
+"""What a damper feels, and its unit."""
 _MOST_HISTORIES = 5
 _MOST_OTHERS = 12
 _HISTORY, _LOOP = 1.75, 3.55
@@ -96,6 +97,17 @@ def _draw_histories(figure: Figure, grid: GridSpec, histories: list[Draw]) -> No
             shared.set_xlabel("time [s]", loc="right", labelpad=0)
 
 
+class _Wire(NamedTuple):
+    """What feeds an input, which gets factor source + offset; "" where nothing does."""
+
+    source: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+_NOTHING = _Wire()
+
+
 @dataclass(frozen=True)
 class _Run:
     """What can be drawn of a frame of results; `shown` are the outputs that panels have so far."""
@@ -135,7 +147,7 @@ class _Run:
         for component, floor in tops.items():
             of = f", {component}" if many else ""
             name = f"{component}.floor{floor}_acceleration_absolute"
-            ground = self.wires().get(f"{component}.ground_acceleration", "")
+            ground = self.wire(f"{component}.ground_acceleration")
             what = f"Absolute acceleration of floor {floor}{of}"
             made.append(partial(self.history, name, what, ground=ground))
             base = f"{component}.base_displacement"
@@ -154,21 +166,25 @@ class _Run:
         names = [name for name in self.reals() if name.endswith(".voltage")]
         return [name for name in names if self._moves(name)]
 
-    def wires(self) -> dict[str, str]:
-        """Return the connections of the scenario, input to output."""
-        wires: dict[str, str] = tomllib.loads(self.made.get("scenario", "")).get("connections", {})
-        return wires
+    def wire(self, target: str) -> _Wire:
+        """Return what feeds an input, by the connections of the scenario."""
+        text = self.made.get("scenario", "")
+        said = tomllib.loads(text).get("connections", {}).get(target, "")
+        plain = isinstance(said, str)
+        return _Wire(said) if plain else _Wire(said["from"], said["factor"], said["offset"])
 
-    def history(self, name: str, title: str, *, stroke: bool = False, ground: str = "") -> Draw:
+    def history(
+        self, name: str, title: str, *, stroke: bool = False, ground: _Wire = _NOTHING
+    ) -> Draw:
         """Return what draws one output over time, its peak marked, over that of the ground."""
-        self.shown.update((name, ground))
+        self.shown.update((name, ground.source))
 
         def draw(axes: Axes) -> None:
             time = self.frame.index.to_numpy()
             values, unit = self._shown(name)
             axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)
-            if ground in self.frame:
-                axes.plot(time, self.frame[ground].to_numpy(), color="#9a9a9a", linewidth=0.8)
+            if ground.source in self.frame:
+                axes.plot(time, self._taken(ground), color="#9a9a9a", linewidth=0.8)
                 axes.set_title("grey: ground", loc="right", fontsize=8.5, color=GREY)
             axes.plot(time, values, color=BLUE, linewidth=0.9)
             axes.set_title(title + _bracketed(unit))
@@ -227,26 +243,25 @@ class _Run:
 
     def loops(self) -> list[Draw]:
         """Return force over displacement and force over velocity of all dampers."""
-        wires = self.wires()
         dampers = [name[:-6] for name in self.reals() if name.endswith(".force")]
         draws = []
         for motion in _MOTIONS:
             pairs = [
-                (damper, source)
+                (damper, wire)
                 for damper in dampers
-                if (source := wires.get(f"{damper}.{motion}", "")) in self.frame
+                if (wire := self.wire(f"{damper}.{motion}")).source in self.frame
             ]
             if pairs:
                 self.shown.update(f"{damper}.force" for damper, _ in pairs)
-                self.shown.update(source for _, source in pairs)
+                self.shown.update(wire.source for _, wire in pairs)
                 draws.append(self._loop(motion, pairs))
         return draws
 
-    def _loop(self, motion: str, pairs: list[tuple[str, str]]) -> Draw:
+    def _loop(self, motion: str, pairs: list[tuple[str, _Wire]]) -> Draw:
         def draw(axes: Axes) -> None:
             zero_lines(axes)
-            for number, (damper, source) in enumerate(pairs):
-                across, unit = self._shown(source)
+            for number, (damper, wire) in enumerate(pairs):
+                across, unit = self._fed(wire, damper, motion)
                 force, force_unit = self._shown(f"{damper}.force")
                 colour, cycle = COLOURS[number % len(COLOURS)], self._largest_cycle(damper)
                 thin = PALE if cycle else colour
@@ -267,9 +282,21 @@ class _Run:
 
     def _largest_cycle(self, damper: str) -> slice | None:
         """Return the samples of a damper's largest cycle: all of an earthquake are a tangle."""
-        motion = [self.wires().get(f"{damper}.{name}", "") for name in _MOTIONS]
-        known = all(name in self.frame for name in motion)
-        return largest(*(self.frame[name].to_numpy() for name in motion)) if known else None
+        motion = [self.wire(f"{damper}.{name}") for name in _MOTIONS]
+        known = all(wire.source in self.frame for wire in motion)
+        return largest(*(self._taken(wire) for wire in motion)) if known else None
+
+    def _taken(self, wire: _Wire) -> Array:
+        """Return the values that an input gets, in its own unit."""
+        return wire.factor * self.frame[wire.source].to_numpy() + wire.offset
+
+    def _fed(self, wire: _Wire, damper: str, motion: str) -> tuple[Array, str]:
+        """Return what a damper feels as it is shown, and its unit ("" where that is not known)."""
+        if wire[1:] == (1.0, 0.0):
+            return self._shown(wire.source)
+        unit = "" if damper in foreign(self.frame) else _MOTIONS[motion]
+        factor, shown = SHOWN.get(unit, (1.0, unit))
+        return self._taken(wire) * factor, shown
 
     def _shown(self, name: str) -> tuple[Array, str]:
         """Return an output as it is shown, and its unit ("" without one)."""

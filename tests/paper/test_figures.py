@@ -97,6 +97,20 @@ def test_a_fixed_building_shows_the_drift_of_its_first_storey() -> None:
     assert titles(a_run(columns, units))[1] == "Drift of the first storey [mm]"
 
 
+def test_what_a_connection_scales_is_drawn_as_it_arrives() -> None:
+    frame = a_run(
+        BUILDING | {"shaker.value": 0.1 * SINE, "damper.force": SINE}, UNITS,
+        '"house.ground_acceleration" = { from = "shaker.value", factor = 9.81, offset = 0.5 }\n'
+        '"damper.velocity" = { from = "shaker.value", factor = -0.2, offset = 0.0 }',
+    )  # fmt: skip
+    axes = draw_run(frame).figure.axes
+    ground = next(line for line in axes[0].lines if line.get_color() == "#9a9a9a")
+    assert np.allclose(ground.get_ydata(), 0.981 * SINE + 0.5)
+    assert axes[-1].get_xlabel() == "velocity [mm/s]"
+    loop = max(axes[-1].lines, key=lambda line: len(line.get_xdata()))
+    assert np.allclose(loop.get_xdata(), -20.0 * SINE)
+
+
 def test_outputs_that_are_not_known_are_drawn_over_time() -> None:
     frame = a_run({"plant.pressure": SINE, "plant.flow": -SINE}, {"plant.pressure": "Pa"})
     assert titles(frame) == ["plant.pressure [Pa]", "plant.flow"]
