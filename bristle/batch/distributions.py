@@ -116,9 +116,10 @@ class Distribution:
 
         The ends of a bounded distribution, the mean of an unbounded one, every value of a list.
         """
-        if self.kind == "normal":
-            return self.within or self.values[:1]
-        return self.values
+        if self.kind in ("choice", "each", "integers"):
+            return self.values
+        bounds = self.values if self.kind != "normal" else self.within or self.values[:1]
+        return tuple(map(float, bounds))  # as they are drawn, also between whole numbers
 
 
 def _is_number(value: object) -> bool:

@@ -32,12 +32,12 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 from .. import resources
-from ..errors import BristleError, EnsembleError, PhysicsError
+from ..errors import BristleError, EnsembleError, PhysicsError, TrustError
 from ..findings import nearest, unknown, written
 from ..lines import KeyPath, key_lines
 from ..scenario.document import FILE_PARAMETERS, MADE_FROM
@@ -68,7 +68,7 @@ _KEYS = (
     "outputs",
     "identified",
 )
-_FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu")
+_FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
 
 
 def stock_ensembles() -> list[Path]:
@@ -87,11 +87,11 @@ def resolve_ensemble(name: str | Path) -> Path:
     path = Path(name)
     if path.is_file():
         return path.absolute()
-    if path.is_dir():
-        raise EnsembleError(f"{path}: is a folder; an ensemble is a TOML file.")
     stock = {found.stem: found for found in stock_ensembles()}
     if len(path.parts) == 1 and path.name.removesuffix(".toml") in stock:
         return stock[path.name.removesuffix(".toml")].absolute()
+    if path.is_dir():
+        raise EnsembleError(f"{path}: is a folder; an ensemble is a TOML file.")
     close = nearest(path.stem, stock)
     hint = f' Did you mean "{close[0]}"?' if close else ""
     raise EnsembleError(
@@ -267,7 +267,7 @@ class _Reader:
             return None
         try:
             varied = Varied(name, distribution, place_of(name, base, engine))
-            mistake = _try(varied, base)
+            mistake = _try(varied, base) or _idle(varied, base, self._table("vary"))
         except EnsembleError as error:
             mistake = str(error)
         if mistake:
@@ -378,7 +378,9 @@ def _try(varied: Varied, base: Scenario) -> str:
     for value in varied.distribution.extremes():
         if varied.place == "scenario":
             try:
-                load_scenario(base.file, {varied.name: value})
+                load_scenario(base.file, {**base.overrides, varied.name: value})
+            except TrustError:
+                raise  # no mistake of the file, and it is asked about
             except BristleError as error:
                 return f'"{varied.name}" = {written(value)}: {error}'
             continue
@@ -396,6 +398,28 @@ def _try(varied: Varied, base: Scenario) -> str:
         if isinstance(fits, Wrong):
             return f'"{varied.name}" {fits.words}'
     return ""
+
+
+def _idle(varied: Varied, base: Scenario, all_varied: Collection[str]) -> str:
+    """Return the words for why what is drawn would change nothing, "" if it does."""
+    component, rest = split(varied.name, base)
+    if component is None or varied.place != "parameter":
+        return ""
+    for wire in base.connections:
+        if (wire.target, wire.input) == (component.name, rest):
+            return (
+                f'"{varied.name}" is fed by {wire.source}.{wire.output}, so that a value here '
+                "would have no effect; vary what feeds it."
+            )
+    switch = f"{rest.rpartition('.')[0]}.on"
+    known = component.description.variables.get(switch)
+    on = known is None or component.parameters.get(switch, known.start) is True
+    if on or f"{component.name}.{switch}" in map(plain_target, all_varied):
+        return ""
+    return (
+        f'"{varied.name}" does nothing while {component.name}.{switch} is false; '
+        f'"{component.name}.{switch}" = true in [set] is right.'
+    )
 
 
 def _files_read(base: Scenario, varied: tuple[Varied, ...]) -> list[Path]:

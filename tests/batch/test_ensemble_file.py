@@ -10,10 +10,29 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
+from bristle import trust
 from bristle.batch import read_ensemble, stock_ensembles
 from bristle.batch.distributions import Distribution, share
-from bristle.errors import EnsembleError
+from bristle.batch.file import resolve_ensemble
+from bristle.errors import EnsembleError, TrustError
+from bristle.scenario.scenario import resolve_scenario
 
+OWN_LAW = '''
+from bristle.physics.law import Law, Parameter
+
+
+class Mine(Law):
+    """A viscous force."""
+
+    name = "mine"
+    parts = ("viscous",)
+    source = "a test"
+    parameters = {"c": Parameter(20.0, "N.s/m", (0.0, 1e5), "damping")}
+
+    @staticmethod
+    def viscous(q, z, p):
+        return p.c * q.v
+'''
 Write = Callable[..., Path]
 SHARES = [share(3, run, "a") for run in range(4000)]
 
@@ -148,6 +167,8 @@ def test_the_stock_ensembles_are_right() -> None:
         ("building.masses.2", "building.mass", "'mass' is not there"),
         ("building.masses.2", "building.masses", "not a single number"),
         ("seed = 7", 'engine = "fmu"', "compiled"),
+        ("voltage.level", "damper.voltage", "fed by voltage.voltage"),
+        ("voltage.level", "damper.gas_spring.k", "nothing while damper.gas_spring.on is false"),
         ("{ each = [0.0, 4.0] }", "{ each = [0.0, 4000000.0] }", "lies above"),
         ("{ each = [0.0, 4.0] }", '{ each = [0.0, "four"] }', "a number"),
         ('["peak", "rms"]', '["peek"]', 'no statistic "peek"'),
@@ -162,6 +183,49 @@ def test_mistakes_are_named(write: Write, old: str, new: str, message: str) -> N
     assert caught.value.exit_code == 2  # type: ignore[attr-defined]
 
 
+def test_a_parameter_of_an_effect_varies_where_that_is_switched_on(write: Write) -> None:
+    k = ('"voltage.level" = { each', '"damper.gas_spring.k" = { each')
+    read_ensemble(write(k, ("[vary]", '"damper.gas_spring.on" = true\n[vary]')))
+    read_ensemble(write(k, ("[vary]", '[vary]\n"damper.gas_spring.on" = { each = [true, false] }')))
+
+
+def test_a_whole_number_is_not_drawn_from_between_two(write: Write, tmp_path: Path) -> None:
+    shutil.copy(resolve_scenario("el_centro_0p6g_lpv_sensors"), tmp_path / "own.toml")
+    own = ("half_sine_pulse", "own.toml")
+    seed = ('"voltage.level" = { each = [0.0, 4.0] }', '"sensors.seed" = { uniform = [1, 9] }')
+    with pytest.raises(EnsembleError, match=r"is 1\.0; a whole number is right"):
+        read_ensemble(write(own, seed))
+
+
+def test_what_varies_is_tried_beside_what_is_set(write: Write) -> None:
+    step = ("voltage.level", "run.step"), ("{ each = [0.0, 4.0] }", "{ each = [0.0003, 0.0001] }")
+    assert read_ensemble(write(*step, ("0.5", "0.3"))).fixed == {"run.stop": 0.3}
+    with pytest.raises(EnsembleError, match="a whole number is right"):
+        read_ensemble(write(*step))
+
+
+def test_a_law_beside_the_ensemble_is_found_and_consent_is_asked(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(trust.VARIABLE)
+    text = resolve_scenario("half_sine_pulse").read_text()
+    (tmp_path / "own.toml").write_text(text.replace('fmu = "LuGreDamper"', 'law = "lugre"'))
+    (tmp_path / "own_law.py").write_text(OWN_LAW)
+    own = ("half_sine_pulse", "own.toml")
+    path = write(own, ("[vary]", '[vary]\n"damper.law" = { each = ["own_law.py"] }'))
+    with pytest.raises(TrustError) as caught:
+        read_ensemble(path)
+    assert Path(caught.value.path) == tmp_path / "own_law.py"
+
+
+def test_a_folder_of_results_does_not_hide_a_stock_ensemble(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "el_centro_damper_and_building").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert resolve_ensemble("el_centro_damper_and_building") == stock_ensembles()[0].absolute()
+
+
 def test_all_mistakes_are_named_at_once(write: Write) -> None:
     path = write(("runs = 12", "runs = -1"), ("65.0]", "-65.0]"), ('"rms"', '"rsm"'))
     with pytest.raises(EnsembleError) as caught:
@@ -170,8 +234,6 @@ def test_all_mistakes_are_named_at_once(write: Write) -> None:
 
 
 def test_a_file_beside_the_ensemble_is_found(write: Write, tmp_path: Path) -> None:
-    from bristle.scenario.scenario import resolve_scenario
-
     shutil.copy(resolve_scenario("half_sine_pulse"), tmp_path / "own.toml")
     assert read_ensemble(write(("half_sine_pulse", "own.toml"))).scenario == tmp_path / "own.toml"
 
