@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from .building import plan_building
 from .new_rig import plan_new
 from .plan import Plan
 from .rig_file import limits_given, read_rig
-from .wish import Wish
+from .wish import Wish, notes_of_change
 
 Names = str | Sequence[str] | bool | None
 
@@ -100,11 +101,19 @@ def plan(
     opened = study if isinstance(study, Study) else Study(study)
     given = limits_given(limits, opened.drive)
     of_file = read_rig(Path(rig), opened.drive) if rig is not None else {}
+    if not opened.settings.has_building:
+        _refuse_of_building(opened.folder, limits, record)
+    limits = {**of_file, **given}
+    opened.model()
+    opened.refuse_if_changed()  # where it was opened before others wrote in it
+    found: Plan
     if opened.settings.has_building:
         names = [str(one) for one in ((record,) if isinstance(record, str | Path) else record)]
-        return plan_building(opened, wish, limits={**of_file, **given}, records=names, seed=seed)
-    _refuse_of_building(opened.folder, limits, record)
-    return plan_study(opened, wish, limits={**of_file, **given}, seed=seed)
+        found = plan_building(opened, wish, limits=limits, records=names, seed=seed)
+    else:
+        found = plan_study(opened, wish, limits=limits, seed=seed)
+    opened.refuse_if_changed()
+    return replace(found, notes=(*notes_of_change(opened), *found.notes))
 
 
 def _names(names: Names) -> tuple[str, ...] | None:

@@ -9,6 +9,7 @@ from ..errors import StudyError
 from ..findings import command, unknown
 from ..physics.effect import EFFECTS, plain_name
 from ..quantity import short_z
+from ..study.added_runs import behind_data
 from ..study.study import Study
 
 
@@ -66,6 +67,13 @@ def parameters_of(free: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
             raise StudyError(unknown("parameter", name, free))
         out += own
     return tuple(dict.fromkeys(out)) or tuple(free)
+
+
+def notes_of_change(study: Study) -> tuple[str, ...]:
+    """Return how the data are others than the present model, or its verdict, knows."""
+    verdict = study.verdict() or {}
+    stale = study.stale(verdict) if verdict else ""
+    return tuple(note for note in (behind_data(study), stale) if note)
 
 
 def note_of_missing(study: Study, there: Sequence[str]) -> tuple[str, ...]:

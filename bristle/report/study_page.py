@@ -51,7 +51,7 @@ def render(content: Content) -> str:
         f"<h1>{html.escape(settings.title)}</h1>",
         html.paragraphs(f"A damper on a {rig}, compared with its model: {what}.", kind="soft"),
         f'<div class="notes">{html.escape(settings.notes)}</div>' if settings.notes.strip() else "",
-        verdict_section(content.verdict, study.name),
+        verdict_section(content.verdict, study.name, content.notes),
         _tiles(content),
         _history(content),
         _before_after(content),

@@ -10,6 +10,7 @@ from ..draw import html
 from ..errors import BristleError
 from ..plan.folder import FILE, PlanFolder, read_plan
 from ..plan.outcome import OUTCOMES
+from ..plan.performed import shows
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -27,7 +28,7 @@ def plan_section(study: Study) -> str:
         header, rows = told["header"], told["rows"]
     except (BristleError, OSError, ValueError, KeyError, TypeError) as error:
         return html.section("Next tests", html.paragraphs(f"{folder.name} cannot be read: {error}"))
-    performed = _performed(study, plan)
+    performed = _performed(study, plan, others=len(folders) > 1)
     lead = (
         f"The tests of {folder.name} are measured: their runs are in this study."
         if performed
@@ -46,10 +47,21 @@ def plan_section(study: Study) -> str:
     )
 
 
-def _performed(study: Study, plan: PlanFolder) -> bool:
-    """Return whether the runs of a plan are in a study."""
+def _performed(study: Study, plan: PlanFolder, others: bool) -> bool:
+    """Return whether the runs of a plan are in a study.
+
+    Where there are `others`, names are not enough: each plan calls its runs plan_1, plan_2 ...
+    """
     there = {Path(run.file).stem for run in study.settings.runs}
-    return all(run.name in there for run in plan.runs)
+    if not all(run.name in there for run in plan.runs):
+        return False
+    if not others:
+        return True
+    measured = [(Path(run.source).stem, run) for run in study.read()]
+    return all(
+        any(name == planned.name and shows(run, planned, plan.motion) for name, run in measured)
+        for planned in plan.runs
+    )
 
 
 def _pictures(folder: Path, plan: PlanFolder) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from ..data.channels import channel_unit, is_channel
 from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
 from ..diagnose.picture import draw_evidence
@@ -29,8 +31,11 @@ _TONES = {"none": "green", "effect": "blue", "ambiguous": "purple", "unknown": "
 """Colours of the kinds of a verdict."""
 
 
-def verdict_section(verdict: Verdict | None, name: str) -> str:
-    """Return the verdict on a study of this name as HTML, with its evidence."""
+def verdict_section(verdict: Verdict | None, name: str, told: Collection[str] = ()) -> str:
+    """Return the verdict on a study of this name as HTML, with its evidence.
+
+    `told` are notes that stand elsewhere on the page.
+    """
     if verdict is None:
         kind, heading, texts = "", "Not diagnosed", _undiagnosed(name)
     else:
@@ -44,6 +49,7 @@ def verdict_section(verdict: Verdict | None, name: str) -> str:
         html.paragraphs(texts[0], kind="say"),
         html.paragraphs(*texts[1:]),
         "</div>",
+        html.items([note for note in (verdict or {}).get("notes") or [] if note not in told]),
     ]
     if verdict and verdict.get("laws"):
         inner.append("<h3>The laws</h3>")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
@@ -61,6 +61,21 @@ def note_addition(study: Study, files: Sequence[str]) -> None:
     made = Addition(now, numbers[-1] if numbers else 0, tuple(files))
     every = [asdict(one) for one in (*additions(study), made)]
     write_json(study.folder / FILE, {"schema": 1, "additions": every})
+
+
+def note_undone(study: Study, listed: Sequence[Addition], number: int) -> None:
+    """Write down that a step is undone: the model before it does not know its later runs either.
+
+    Parameters
+    ----------
+    study : the folder, opened; the caller holds the lock
+    listed : the runs that were added
+    number : of the step; another one may get it, which knows these runs
+    """
+    if any(one.step == number for one in listed):
+        moved = [replace(one, step=min(one.step, number - 1)) for one in listed]
+        every = [asdict(one) for one in moved]
+        write_json(study.folder / FILE, {"schema": 1, "additions": every})
 
 
 def unknown_to_model(study: Study) -> list[str]:

@@ -127,14 +127,18 @@ class History:
 
     def keep_edit(self) -> None:
         """Make a step of a model.toml that was edited by hand, so that no step loses it."""
-        numbers = self.numbers()
-        present = self.study / "model.toml"
+        if self.is_edited():
+            last, text = self.numbers()[-1], (self.study / "model.toml").read_bytes()
+            step = Step(last + 1, "edited by hand", "model.toml was changed in an editor")
+            self.add(step, text.decode("utf-8-sig"), self.data_of(last))
+
+    def is_edited(self) -> bool:
+        """Return whether model.toml is another one than that of the last step."""
+        numbers, present = self.numbers(), self.study / "model.toml"
         if not numbers or not present.is_file():
-            return
-        content = present.read_bytes()
-        if content != self.model_file(numbers[-1]).read_bytes():
-            step = Step(numbers[-1] + 1, "edited by hand", "model.toml was changed in an editor")
-            self.add(step, content.decode("utf-8-sig"), self.data_of(numbers[-1]))
+            return False
+        last = self.model_file(numbers[-1])
+        return last.is_file() and present.read_bytes() != last.read_bytes()
 
     def undo(self) -> Step:
         """Take the last step back and return it; it is kept in history/undone/.
@@ -159,8 +163,8 @@ class History:
 
     def undone(self, number: int) -> Path:
         """Return the folder of the step of a number that was taken back last."""
-        *_, last = takewhile(Path.is_dir, self._places_undone(number))
-        return last
+        there = [*takewhile(Path.is_dir, self._places_undone(number))]
+        return there[-1] if there else next(self._places_undone(number))
 
     def _places_undone(self, number: int) -> Iterator[Path]:
         """Yield where steps of a number that are taken back go: 001, then 001_2, 001_3 ..."""

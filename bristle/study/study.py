@@ -8,6 +8,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,7 @@ from ..physics.user import Loaded, waiting
 from ..shown import shown
 from ..trust import can_do_without, load
 from ..version import __version__
-from .added_runs import behind_data
+from .added_runs import additions, behind_data, note_undone
 from .data_digest import building_in, data_digest, other_than
 from .history import History, Step
 from .joined_corrections import joined_corrections
@@ -40,7 +41,10 @@ from .settings_text import with_corrections, with_excluded, with_mask, with_role
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-OF_MODEL = ("identify.png", "identify.json", "compare.png", "report.html")
+OF_MODEL = (
+    "identify.png", "identify.json", "force_budget.png", "compare.png", "diagnose.png",
+    "report.html",
+)  # fmt: skip
 """Reports that show a model: they are set aside when another becomes the present one."""
 
 PATIENCE = 10.0
@@ -289,7 +293,7 @@ class Study:
         """
         with self.writing():
             self.refuse_if_changed()
-            self.history.keep_edit()
+            self._keep_edit()
             numbers = self.history.numbers()
             step = Step(
                 numbers[-1] + 1 if numbers else 0, what, why, {**(before or {})}, {**(after or {})}
@@ -298,6 +302,7 @@ class Study:
             data = data_digest(self.folder, self.settings, model.building)
             self.history.add(step, text, data)
             self._set_aside(step.number - 1)
+            self._make_room(step.number)
             self._seen, self._seen_data = self._state(), data
         return step
 
@@ -311,8 +316,10 @@ class Study:
         """
         with self.writing():
             self.history.refuse_damaged()  # before an edit is kept
-            self.history.keep_edit()
+            added = additions(self)
+            self._keep_edit()
             step = self.history.undo()
+            note_undone(self, added, step.number)
             self._set_aside(step.number)
             self._seen, self._seen_data = self._state(), ""
         return step
@@ -425,7 +432,7 @@ class Study:
     def verdict(self) -> dict[str, Any] | None:
         """Return the verdict on the present model in the present schema, None if there is none.
 
-        Where the data are no longer those that it is on, its notes say so.
+        Where data or model are no longer those that it is on, its notes say so.
 
         Raises
         ------
@@ -438,17 +445,28 @@ class Study:
         if not path.is_file():
             return None
         verdict = current(read_json(path), str(path))
-        known = str(verdict.get("data", ""))  # a verdict of an older version has none
-        if not known or not (other := other_than(known, self.data, self.settings)):
+        if not (stale := self.stale(verdict)):
             return verdict
-        again = f"Diagnose again:  {command('diagnose', self.folder)}"
-        note = f"{other[:1].upper()}{other[1:]} are no longer those of this verdict. {again}"
-        return {**verdict, "notes": [note, *(verdict.get("notes") or [])]}
+        return {**verdict, "notes": [stale, *(verdict.get("notes") or [])]}
+
+    def stale(self, verdict: Mapping[str, Any]) -> str:
+        """Return how data or model are others than a verdict's, and what to do; "" if not."""
+        known = str(verdict.get("data", ""))  # a verdict of an older version has none
+        other = other_than(known, self.data, self.settings) if known else ""
+        if other:
+            text = f"{other[:1].upper()}{other[1:]} are no longer those of this verdict."
+        elif self.history.is_edited():
+            text = "model.toml has been edited since this verdict."
+        else:
+            return ""
+        return f"{text} Diagnose again:  {command('diagnose', self.folder)}"
 
     def write_verdict(self, verdict: Mapping[str, Any]) -> None:
         """Write the verdict on the model that was read here; see `add_step` for what is raised."""
         with self.writing():
             self.refuse_if_changed()
+            self._keep_edit()  # the verdict is on it
+            self._seen = self._state()
             write_json(self.folder / "verdict.json", {**verdict, "data": self.data})
 
     def write_report(self, name: str, content: str | bytes) -> Path:
@@ -458,14 +476,43 @@ class Study:
             write_whole(path, content)
         return path
 
-    def _set_aside(self, number: int) -> None:
-        """Put the reports of a step's model into a folder of that step."""
+    def _keep_edit(self) -> None:
+        """Make a step of a model.toml that was edited by hand, as `History.keep_edit`.
+
+        Reports from before the edit are of the model that was edited.
+        """
+        if not self.history.is_edited():
+            return
+        edited = (self.folder / "model.toml").stat().st_mtime_ns
+        self.history.keep_edit()
+        number = self.history.numbers()[-1]
+        self._set_aside(number - 1, before=edited)
+        self._make_room(number)
+
+    def _set_aside(self, number: int, before: float = inf) -> None:
+        """Put the reports of a step's model into a folder of that step.
+
+        Parameters
+        ----------
+        number : of the step
+        before : ns, a date of files: those that are not older stay
+        """
         for name in OF_MODEL:
             old = self.reports_folder / name
-            if old.is_file():
+            if old.is_file() and old.stat().st_mtime_ns < before:
                 kept = self.reports_folder / f"step_{max(number, 0):03d}"
                 kept.mkdir(exist_ok=True)
                 old.replace(kept / name)
+
+    def _make_room(self, number: int) -> None:
+        """Put the reports of a step that was undone aside, for another step has its number now."""
+        kept = self.reports_folder / f"step_{number:03d}"
+        if kept.is_dir():
+            place = self.reports_folder / "undone" / self.history.undone(number).name
+            while place.exists():
+                place = place.with_name(f"{place.name}_")
+            place.parent.mkdir(exist_ok=True)
+            kept.replace(place)
 
     def plot(self) -> Figure:
         """Return the figure: the error of each model of the history, or the first run before any.

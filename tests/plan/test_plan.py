@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -30,7 +31,7 @@ from bristle.plan.questions import effects_beside, open_parts
 from bristle.plan.rig_limits import RigLimits
 from bristle.plan.search import Planner
 from bristle.plan.seen import Goal, Seen, roles_of
-from bristle.plan.wish import Wish, default_wish
+from bristle.plan.wish import Wish, default_wish, notes_of_change
 from bristle.quantity import quantity
 from bristle.study.identification import as_model
 
@@ -430,6 +431,23 @@ def test_without_a_purpose_the_verdict_says_what_for(
 ) -> None:
     monkeypatch.setattr(type(rig), "verdict", lambda _self: verdict)
     assert default_wish(rig) == wish
+
+
+def test_a_plan_says_that_its_model_or_verdict_is_of_other_data(
+    rig: bristle.Study, tmp_path: Path
+) -> None:
+    study = bristle.Study(shutil.copytree(rig.folder, tmp_path / "rig"))
+    study.write_verdict({"schema": 2, "kind": "none", "effects": []})
+    assert notes_of_change(study) == ()
+    opened = bristle.Study(study.folder)
+    file = study.files("train")[0]
+    file.write_text("\n".join(file.read_text().split("\n")[:-500]) + "\n")
+    model, verdict = notes_of_change(bristle.Study(study.folder))
+    assert "present model was identified with. Identify it again:" in model
+    assert "no longer those of this verdict. Diagnose again:" in verdict
+    bristle.Study(study.folder).with_excluded([study.files("train")[1].stem])
+    with pytest.raises(StudyError, match="have been changed meanwhile"):
+        bristle.plan(opened, see="coil_lag")
 
 
 @pytest.mark.parametrize(

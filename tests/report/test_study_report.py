@@ -198,6 +198,16 @@ def test_every_kind_of_verdict_is_told(folder, verdict, words):
     assert words in text_of(page)
 
 
+def test_a_verdict_that_is_stale_is_told_to_be_so(folder):
+    from dataclasses import replace
+
+    content = replace(gather(Study(folder)), now=None, before=None, notes=("One run.",))
+    notes = ["The data are no longer those of this verdict.", "One run."]
+    page = render(replace(content, verdict={**VERDICT, "notes": notes}))
+    assert notes[0] in text_of(page)
+    assert text_of(page).count(notes[1]) == 1
+
+
 def test_the_command_writes_the_file_and_says_where(folder, tmp_path, capsys):
     assert main(["report", str(folder)]) == 0
     said = capsys.readouterr().out

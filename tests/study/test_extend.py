@@ -105,6 +105,17 @@ def test_the_next_command_says_that_the_model_does_not_know_them(rig: Path, tmp_
     assert isinstance(extended.study.steps()[0], Step)
 
 
+def test_a_step_with_the_number_of_an_undone_one_knows_the_runs(rig: Path, tmp_path: Path) -> None:
+    study = identified(rig)
+    study.add_step("add stribeck", "by hand", study.model().with_effect("stribeck"))
+    study = extend_study(study, [new_run(tmp_path)]).study
+    study.undo()
+    assert unknown_to_model(study) == ["data/day_2.csv"]
+    study.add_step("identify bingham", "on all runs", study.model())
+    assert study.history.numbers() == [0, 1, 2]
+    assert behind_data(study) == ""
+
+
 def test_a_run_that_was_taken_out_again_is_not_told(rig: Path, tmp_path: Path) -> None:
     extended = extend_study(identified(rig), [new_run(tmp_path)])
     study = extended.study.with_excluded(["day_2"])

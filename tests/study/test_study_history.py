@@ -119,6 +119,21 @@ def test_hand_edits_are_steps_that_undo_brings_back(study: Study) -> None:
     assert edited.model().values()["sigma_a"] == 650.0
 
 
+def test_a_verdict_is_on_the_model_that_was_edited(study: Study) -> None:
+    study.write_verdict({"schema": 2, "kind": "none", "effects": []})
+    path = study.folder / "model.toml"
+    path.write_text(path.read_text() + "# of the lab\n")
+    note = (Study(study.folder).verdict() or {})["notes"][0]
+    assert note.startswith("model.toml has been edited since this verdict. Diagnose again:")
+    study = Study(study.folder)
+    study.model()
+    study.write_verdict({"schema": 2, "kind": "unknown", "effects": []})
+    assert [step.what for step in study.steps()] == ["begin with lugre", "edited by hand"]
+    assert "notes" not in (study.verdict() or {})
+    study.undo()
+    assert (study.verdict() or {})["kind"] == "none"
+
+
 def test_change_by_another_process_is_not_overwritten(study: Study) -> None:
     other = Study(study.folder)
     other.add_step("add gas_spring", "first", other.model().with_effect("gas_spring"))
