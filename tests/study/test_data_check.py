@@ -116,6 +116,12 @@ def test_what_no_damper_does_is_doubted(tmp_path: Path, title, factor, said) -> 
             "warning",
             r"force stays at exactly (-)?3 N in \d+ stretches",
         ),
+        (
+            replaced("F [N]", lambda d: np.clip(d["F [N]"], -0.7, 0.7)),
+            "clipping",
+            "warning",
+            r"force stays at exactly -?0\.7 N in .* and at -?0\.7 N in",
+        ),
         (scaled("F [N]", 0.0), "still", "error", "force is zero throughout"),
         (scaled("x [mm]", 0.0), "still", "error", "displacement is zero throughout"),
         (
@@ -234,6 +240,17 @@ def test_clipping_of_a_quantised_sine_is_none() -> None:
         assert level == pytest.approx(0.85)
         assert share == pytest.approx(0.176, abs=0.03)
         assert stretches == 10
+
+
+def test_what_keeps_to_levels_by_its_nature_is_not_cut_off(tmp_path: Path) -> None:
+    def spoil(data: Columns) -> None:
+        t = data["time [s]"]
+        data["x [mm]"] = 8.0 * np.arcsin(np.sin(9.0 * t))
+        data["v [mm/s]"] = 72.0 * np.sign(np.cos(9.0 * t))
+
+    look = look_at(tmp_path, spoil)
+    assert {"velocity", "voltage"} <= {*look.runs[0].channels}
+    assert not found(look, "clipping")
 
 
 def test_both_ends_of_a_channel_that_is_cut_off_are_told() -> None:

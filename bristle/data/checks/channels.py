@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...quantity import plain, quantity
-from ..channels import DRIVE
+from ..channels import DRIVE, device_channel
 from ..measurement import Measurement
 from ..noise import Noise, estimate_noise, is_switched
 from ..spikes import spikes_text
@@ -101,9 +101,9 @@ def _clipped(
     run: Measurement, channel: str, values: Array, velocity: Array | None
 ) -> Iterator[Finding]:
     facts = run.noise_facts[channel]
-    if is_switched(values):
-        return
     ends = clipped_ends(values, facts.quantum if facts else 0.0)
+    if is_switched(values) and (_keeps_levels(channel) or not _is_at_ends(ends)):
+        return
     if channel.endswith("displacement"):
         ends = [end for end in ends if _moves_at(end[1], values, velocity)]
     if not ends:
@@ -118,6 +118,17 @@ def _clipped(
         channel,
         sum(end[0] for end in ends),
     )
+
+
+def _keeps_levels(channel: str) -> bool:
+    """Return whether a channel may keep to two levels: a command, or the velocity of a triangle."""
+    _, quantity = device_channel(channel) or ("", channel)
+    return quantity in DRIVE or quantity.endswith("velocity")
+
+
+def _is_at_ends(ends: list[tuple[float, float, int]]) -> bool:
+    """Return whether a channel stands at one of two ends most of the time."""
+    return len(ends) == 2 and sum(end[0] for end in ends) > 0.5
 
 
 def _moves_at(level: float, values: Array, velocity: Array | None) -> bool:
