@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..data.model import read_model
 from ..findings import command
 from ..physics.forms import split_form
+from ..study.channel_proposal import devices_of
 from ..study.run_file import TEST
 
 if TYPE_CHECKING:
@@ -26,7 +27,13 @@ def commands(study: Study) -> list[str]:
     """
     old = study.name
     new = old + AGAIN
-    lines = [_new(study, old, new), _copy(f"{old}/study.toml", f"{new}/study.toml")]
+    lines = [_new(study, old, new)]
+    read = {run.file for run in study.settings.runs}
+    # What is left out may be what no command can read.
+    for file in dict.fromkeys(run.file for run in study.settings.excluded):
+        if file not in read:
+            lines.append(_copy(f"{old}/{file}", f"{new}/{file}"))
+    lines.append(_copy(f"{old}/study.toml", f"{new}/study.toml"))
     own_laws = sorted(study.laws_folder.glob("*.py"))
     if own_laws:  # `study new` makes a folder for effects alone
         lines.append(shlex.join(["mkdir", "-p", f"{new}/laws"]))
@@ -58,6 +65,8 @@ def _new(study: Study, old: str, new: str) -> str:
         words += ["--law", split_form(model.law)[0]]
         if model.building:
             words += ["--building", f"{old}/{model.building}"]
+            if len(devices_of(study.folder, settings)[1]) > 1:
+                words += ["--device", settings.device]
     for name, spec in settings.channels.items():
         words += _channel(name, spec)
     return command(*words)

@@ -69,6 +69,16 @@ def test_the_commands_make_the_same_study(study: Study, capsys: pytest.CaptureFi
     assert read_model(first, again.folder) == read_model(study.history.model_file(0))
 
 
+def test_a_run_that_is_left_out_is_there_again(study: Study) -> None:
+    study = study.with_excluded(["run 1"])
+    (study.folder / "data" / "run 1.csv").write_text("no table\n")
+    lines = commands(study)
+    for line in lines[: [" study check " in line for line in lines].index(True)]:
+        assert run(line) == 0, line
+    again = Study(study.folder.with_name(f"my rig{AGAIN}"))
+    assert again.settings == study.settings
+
+
 def test_own_laws_and_effects_are_copied_before_anything_needs_them(study: Study) -> None:
     study.laws_folder.mkdir()
     (study.laws_folder / "oil.py").write_text("")
@@ -142,3 +152,17 @@ def test_pictures_of_another_model_are_set_aside(tmp_path: Path) -> None:
     assert not (reports / "compare.png").exists()
     assert (reports / "step_001" / "compare.png").read_bytes() == b"of step 1"
     assert (reports / "data_check.png").is_file()
+
+
+def test_pictures_of_an_undone_step_stay_when_another_has_its_number(tmp_path: Path) -> None:
+    files = [write(tmp_path / "lab" / f"run_{k}.csv", bench_run(k, 2.0)) for k in (1, 2, 3)]
+    study = create_study(tmp_path / "rig", files).study
+    reports = study.reports_folder
+    for effect in (b"stribeck", b"gas_spring", b"stribeck"):
+        study.add_step("add", "to see", study.model().with_effect(effect.decode()))
+        study.write_report("force_budget.png", effect)
+        study.undo()
+    study.add_step("add", "to see", study.model().with_effect("stribeck"))
+    kept = [reports / "undone" / name / "force_budget.png" for name in ("001", "001_2", "001_3")]
+    assert [file.read_bytes() for file in kept] == [b"stribeck", b"gas_spring", b"stribeck"]
+    assert not (reports / "step_001").exists()

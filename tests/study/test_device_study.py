@@ -17,6 +17,7 @@ from bristle.cli import main
 from bristle.data.channels import channel_unit
 from bristle.errors import PhysicsError, StudyError
 from bristle.page import channels_view
+from bristle.report.reproduce import commands
 from bristle.study.building import identify_building_alone
 from bristle.study.data_check import check_data
 from bristle.study.rig import building_of
@@ -69,6 +70,10 @@ def two(tmp_path_factory):
     ) == 0  # fmt: skip
     assert main(["identify", str(folder / "rig"), "--no-table"]) == 0
     return Study(folder / "rig")
+
+
+def test_the_commands_that_make_a_study_again_name_its_device(two):
+    assert "--device brace" in commands(two)[0]
 
 
 def test_a_study_is_about_the_device_that_is_named(two):
