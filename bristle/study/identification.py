@@ -23,6 +23,7 @@ from ..physics.forms import shown_law
 from ..physics.laws import base_and_variant, law_names
 from ..progress import tell
 from ..units import convert
+from .added_runs import behind_data
 from .fit_notes import by_site, doubts, under_load, weighing, why
 from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
@@ -84,11 +85,14 @@ def identify_study(
     all_of_them, law = law == ALL, None if law == ALL else law
     if law is not None:
         refuse_left_out(study.laws_folder / f"{law}.py")
-    model = _of_law(model or study.model(), law)
+    present = study.model()
+    model = _of_law(model or present, law)
     compile_ahead(bool(model.effects))
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
-    task = replace(task, laws=all_of_them)
+    # Before is what the study had: at its defaults another law would be nobody's model.
+    present = present if present.law != model.law else None
+    task = replace(task, laws=all_of_them, present=present)
     found = identify_model(study, model, task)
     if not write:
         return found
@@ -134,7 +138,9 @@ def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified
     """
     left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
     model = _with_choices(model, task.begin)
-    runs = study.runs()
+    runs, old = study.runs(), behind_data(study)
+    # What the present model does not know of the data, this fit does.
+    runs = replace(runs, notes=tuple(note for note in runs.notes if note != old))
     model = _with_labels(model, runs.train)
     found = identify_on_rig(rig_of(study, model, runs), runs, model, task)
     return replace(found, notes=(*found.notes, *left_out))

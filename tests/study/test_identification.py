@@ -163,6 +163,22 @@ def test_the_step_holds_the_errors_before_and_after_and_can_be_undone(tmp_path, 
     assert Study(study.folder).model().parameters["f_c"].std is None
 
 
+def test_errors_before_another_law_are_those_of_the_model_that_the_study_had(tmp_path):
+    study = study_of(tmp_path, [bench_frame(seed)[0] for seed in (1, 2)])
+    first = identify_study(study, starts=1, table=False)
+    other = identify_study(study, law="bingham_standard", starts=1, table=False)
+    assert other.before == pytest.approx(first.after, rel=1e-6)
+
+
+def test_a_fit_on_other_data_does_not_ask_to_be_repeated(tmp_path):
+    study = study_of(tmp_path, [bench_frame(seed)[0] for seed in (1, 2, 3)])
+    identify_study(study, starts=1, table=False)
+    study = study.with_roles({"train_1": "exclude"})
+    assert "Identify it again" in str(study.runs().notes)
+    assert "Identify it again" not in str(identify_study(study, starts=1, table=False).notes)
+    assert "Identify it again" not in str(study.runs().notes)
+
+
 def test_json_and_a_dry_run_that_writes_nothing(tmp_path, capsys):
     study = study_of(tmp_path, [bench_frame(seed)[0] for seed in (1, 2, 3)])
     before = sorted(path.name for path in study.folder.rglob("*"))
