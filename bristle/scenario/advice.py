@@ -266,7 +266,10 @@ def asked_range(damper: Part, drive: Drive, network: Network) -> tuple[float, fl
     if source is None or (source[0].value("kind") or "constant") != "constant":
         return None
     level = source[0].real("level")
-    return None if level is None else (level, level)
+    if level is None:
+        return None
+    level = network.feeding[damper.name, drive.name].given(level)
+    return level, level
 
 
 def _limits(damper: Part, drive: Drive, network: Network, findings: Findings) -> None:
@@ -344,11 +347,12 @@ def _stability(
     """Warn where dampers that drive one mass [kg] make the coupling unstable at the run's step."""
     c, k = 0.0, 0.0
     for damper, drive in dampers:
-        _mass_terms(damper, mass, findings)
+        over_velocity, over_travel = _scaled(damper, structure, network)
+        _mass_terms(damper, mass / over_velocity if over_velocity > 0.0 else mass, findings)
         most = damper.real(drive.limit) or 0.0
         asked = asked_range(damper, drive, network)
         each = slopes(damper, min(max(asked[1], 0.0), most) if asked else most)
-        c, k = c + each[0], k + each[1]
+        c, k = c + over_velocity * each[0], k + over_travel * each[1]
     if run.step is None or c <= 0.0:
         return
     rough = any(_jumps(damper, network) for damper, _ in dampers)
@@ -362,6 +366,19 @@ def _stability(
             f"{structure.name} becomes unstable ({mass:.4g} kg, {c:.4g} N.s/m, {k:.4g} N/m); a "
             f"shorter step{' or gauss-seidel' if run.algorithm == 'jacobi' else ''} is right.",
         )
+
+
+def _scaled(damper: Part, structure: Part, network: Network) -> tuple[float, float]:
+    """Return by what connections multiply the slopes of a damper's force on a structure.
+
+    Over velocity and over travel [1]: two dampers alike may stand in a scenario as one, with a
+    factor of 2 on its force.
+    """
+    ends = (damper.name, "force", structure.name)
+    force = next(w.factor for w in network.wires if (w.source, w.output, w.target) == ends)
+    felt = (network.feeding.get((damper.name, name)) for name in ("velocity", "displacement"))
+    velocity, travel = (wire.factor if wire else 1.0 for wire in felt)
+    return force * velocity, force * travel
 
 
 def _jumps(damper: Part, network: Network) -> bool:

@@ -36,6 +36,10 @@ class Wire:
     offset: float = 0.0
     transformed: bool = False
 
+    def given(self, value: float) -> float:
+        """Return what the input gets where the output has a value."""
+        return self.factor * value + self.offset
+
 
 def check_connections(
     document: Document, parts: Mapping[str, Part], findings: Findings

@@ -182,6 +182,29 @@ def test_two_dampers_add_up(told):
     assert "damper, second" in warning
 
 
+def test_what_connections_multiply_counts(told):
+    text = VALID.replace(
+        '"structure.damper_force" = "damper.force"',
+        '"structure.damper_force" = { from = "damper.force", factor = 2.0 }',
+    )
+    limit = longest_step("jacobi", BASE_MASS, 2 * 185.0, 2 * 2310.0)
+    (warning,) = told(text, {"run.algorithm": "jacobi", "run.step": 0.006, "run.stop": 6.0})
+    assert f"about {1e3 * limit:.3g} ms" in warning
+    held = text + '"damper.holding_force" = "structure.holding_force"\n'
+    assert told(held, {**BINGHAM, "damper.moving_mass": 0.5 * BASE_MASS}) == []
+
+
+@pytest.mark.parametrize(("level", "volts"), [(10.0, 6.0), (3.0, -1.0)])
+def test_a_voltage_counts_as_its_connection_gives_it(told, level, volts):
+    text = VALID.replace(
+        '"damper.voltage" = "voltage.voltage"',
+        '"damper.voltage" = { from = "voltage.voltage", factor = 1.0, offset = -4.0 }',
+    )
+    found = told(text, {"voltage.level": level})
+    assert len(found) == (volts < 0.0)
+    assert all(f"damper.voltage = {volts:g} V lies outside" in one for one in found)
+
+
 @pytest.mark.parametrize("level", [-1.0, 9.0])
 def test_a_voltage_that_saturates_the_damper_is_a_warning(told, level):
     (warning,) = told(VALID, {"voltage.level": level})
