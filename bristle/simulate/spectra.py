@@ -68,6 +68,8 @@ def write_spectra(frame: pd.DataFrame, path: Path) -> None:
     RunError
         As `spectra`, or if the file cannot be written.
     """
+    if len(frame) < 2:
+        raise not_usable("the run has one row alone: there is no response spectrum.")
     columns = {str(name): frame[name].to_numpy() for name in frame}
     found = spectra(columns, float(frame.index[1] - frame.index[0]))
     head = ["period [s]", *(f"{name} [m/s2]" for name in list(found)[1:])]

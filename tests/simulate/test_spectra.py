@@ -10,7 +10,7 @@ import pytest
 
 from bristle.cli import main
 from bristle.errors import RunError
-from bristle.simulate.spectra import spectra
+from bristle.simulate.spectra import spectra, write_spectra
 
 
 def test_the_command_writes_the_spectra_of_ground_and_floors(
@@ -47,3 +47,9 @@ def test_a_run_without_a_building_has_no_spectrum(
 def test_rows_that_are_too_far_apart_have_no_spectrum() -> None:
     with pytest.raises(RunError, match="too few"):
         spectra({"ground.ground_acceleration": np.zeros(10)}, 1.0)
+
+
+def test_a_run_that_failed_in_its_first_step_has_no_spectrum(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"ground.ground_acceleration": [0.0]}, index=[0.0])
+    with pytest.raises(RunError, match="one row alone"):
+        write_spectra(frame, tmp_path / "spectrum.csv")
