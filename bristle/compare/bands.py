@@ -59,7 +59,7 @@ def spectrum(predictions: Sequence[RunPrediction]) -> Spectrum:
     beyond is left out.
     """
     limit = _SPIKE * max(1.0, z_scale(np.concatenate([one.normalised for one in predictions])))
-    errors = [np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in predictions]
+    errors = [_whole(one, limit) for one in predictions]
     total = sum(len(one.residual) for one in predictions)
     slowest = max(one.dt for one in predictions)
     span = min(1024 * slowest, *(len(one.residual) * one.dt for one in predictions))
@@ -75,6 +75,15 @@ def spectrum(predictions: Sequence[RunPrediction]) -> Spectrum:
         coherence = np.nan_to_num(np.abs(cross) ** 2 / (sums[0] * sums[3]))
     bands = _bands(predictions, errors, 1.0 / slowest, lines, coherence, sums[0])
     return Spectrum(lines, sums[0], sums[1], sums[2], bands)
+
+
+def _whole(one: RunPrediction, limit: float) -> Array:
+    """Return a run's residual (n,), spikes cut; its power is that of a run judged throughout.
+
+    Where a sample does not count the residual is 0.
+    """
+    error = np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :]
+    return np.asarray(error / np.sqrt(max(float(np.mean(one.judged)), 1e-12)))
 
 
 def _powers(

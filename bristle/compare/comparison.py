@@ -230,10 +230,11 @@ def compare_predictions(
         If there is no run, or one is too short, not finite or without noise.
     """
     refuse(predictions)
-    normalised = [one.normalised for one in predictions]
-    along = [one.along() for one in predictions]
+    normalised = [one.only_judged(one.normalised) for one in predictions]
+    residuals = [one.only_judged(one.residual) for one in predictions]
+    along = [one.judged_along() for one in predictions]
     runs = tuple(run_error(one.name, [one]) for one in predictions)
-    finder = Finder(normalised, [one.residual for one in predictions], along, flips, seed)
+    finder = Finder(normalised, residuals, along, flips, seed)
     found = finder.ranked(finder.normalised)
     second = None
     if found and found[0].significant:

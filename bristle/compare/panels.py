@@ -34,6 +34,7 @@ def worst_window(prediction: RunPrediction, samples: int = _WINDOW) -> slice:
         return slice(0, count)
     power = np.minimum(((prediction.measured - prediction.predicted) / prediction.sigma) ** 2, 1e4)
     power[: prediction.skip] = 0.0
+    power[prediction.skip :][~prediction.judged] = 0.0
     total = np.concatenate([[0.0], np.cumsum(power)])
     begin = int(np.argmax(total[samples:] - total[:-samples]))
     return slice(begin, begin + samples)
@@ -108,9 +109,11 @@ def draw_pattern(
     """
     units, size = comparison.predictions[0].units, float(np.max(np.abs(pattern.centre)))
     factor, unit = shown(pattern.coordinate, units, size)
-    x = np.concatenate([one.along()[pattern.coordinate] for one in comparison.predictions])
-    y = np.concatenate([one.residual for one in comparison.predictions])
-    sigma = np.concatenate([one.sigma[one.skip :] for one in comparison.predictions])
+    x = np.concatenate([one.judged_along()[pattern.coordinate] for one in comparison.predictions])
+    y = np.concatenate([one.only_judged(one.residual) for one in comparison.predictions])
+    sigma = np.concatenate(
+        [one.only_judged(one.sigma[one.skip :]) for one in comparison.predictions]
+    )
     if after:
         y = y - _means_along(comparison, after)
     if pattern.turned:
@@ -146,12 +149,12 @@ def draw_pattern(
 
 
 def _direction(comparison: Comparison) -> Array:
-    return np.concatenate([one.along()["direction"] for one in comparison.predictions])
+    return np.concatenate([one.judged_along()["direction"] for one in comparison.predictions])
 
 
 def _means_along(comparison: Comparison, pattern: ResidualPattern) -> Array:
     """Return the error's mean (n,) that a pattern gives each sample."""
-    x = np.concatenate([one.along()[pattern.coordinate] for one in comparison.predictions])
+    x = np.concatenate([one.judged_along()[pattern.coordinate] for one in comparison.predictions])
     bins = np.clip(np.searchsorted(pattern.low, x, side="right") - 1, 0, len(pattern.mean) - 1)
     means = pattern.mean[bins]
     return np.asarray(means * _direction(comparison) if pattern.turned else means)
@@ -207,12 +210,12 @@ def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, 
 
     Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
     """
-    along = [one.along() for one in comparison.predictions]
+    along = [one.judged_along() for one in comparison.predictions]
     if not all("displacement" in one and "velocity" in one for one in along):
         return None
     x = np.concatenate([one["displacement"] for one in along])
     v = np.concatenate([one["velocity"] for one in along])
-    r = np.concatenate([one.normalised for one in comparison.predictions])
+    r = np.concatenate([one.only_judged(one.normalised) for one in comparison.predictions])
     r = np.clip(r, -30.0, 30.0)
     edges = [_edges(y, bins) for y in (x, v)]
     count = np.histogram2d(x, v, edges)[0]

@@ -86,6 +86,14 @@ class RunPrediction:
         """Return the coordinates without the skipped samples."""
         return {name: values[self.skip :] for name, values in self.coordinates.items()}
 
+    def only_judged(self, values: Array) -> Array:
+        """Return those of values (n - skip,) that count: a mean over others would be too small."""
+        return values if self.judged.all() else values[self.judged]
+
+    def judged_along(self) -> dict[str, Array]:
+        """Return the coordinates at the samples that count."""
+        return {name: self.only_judged(values) for name, values in self.along().items()}
+
 
 def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[RunPrediction]:
     """Return the runs of a problem held against a model's force.

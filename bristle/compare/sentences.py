@@ -312,7 +312,7 @@ def _at_levels(pattern: ResidualPattern, comparison: Comparison, finder: Finder)
         return ""
     if comparison.site not in ("", "damper"):
         return ""  # it tells how far the damper let a spring move, and nothing of the spring
-    V = np.concatenate([one.along()[drive.name] for one in comparison.predictions])
+    V = np.concatenate([one.judged_along()[drive.name] for one in comparison.predictions])
     middle = 0.5 * float(np.quantile(V, 0.98))
     sizes = [size_of(pattern, finder, chosen) for chosen in (middle > V, middle <= V)]
     if not all(np.isfinite([*low, *high]).all() for low, high in [sizes]):

@@ -73,8 +73,9 @@ def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteError
         return SiteError(first.site, first.quantity, first.unit, (), total, (nothing,) * 2, None)
     refuse(predictions)
     runs = tuple(run_error(one.name, [one]) for one in predictions)
-    normalised = [one.normalised for one in predictions]
-    residuals, along = [one.residual for one in predictions], [one.along() for one in predictions]
+    normalised = [one.only_judged(one.normalised) for one in predictions]
+    residuals = [one.only_judged(one.residual) for one in predictions]
+    along = [one.judged_along() for one in predictions]
     finder = Finder(normalised, residuals, along, FLIPS, seed)
     found = finder.ranked(finder.normalised)
     pattern = found[0] if found and found[0].significant else None

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from predictions_made import DT, motion, predictions_with
 
 from bristle.compare import compare, compare_predictions
-from bristle.compare.panels import draw_pattern
+from bristle.compare.panels import draw_pattern, residual_map, worst_window
 from bristle.compare.prediction import halved, run_predictions
 from bristle.compare.regimes import Regime
 from bristle.compare.sentences import _where_right
@@ -297,3 +297,36 @@ def test_where_it_is_right_is_said_once():
     other = Regime("at high speed", "at high speed", "", 4.0, 900)
     text = _where_right(SimpleNamespace(regimes=(cell, other), right=False))
     assert text == "At low speed and at 0 A it is right within its noise (z = 1.00)."
+
+
+def test_samples_that_do_not_count_make_no_error_smaller():
+    def beyond(along):
+        return 2.0 * (np.abs(along["displacement"]) > 0.004) * np.sign(along["displacement"])
+
+    whole = predictions_with(beyond)
+    random = np.random.default_rng(3)
+    lost = [
+        (np.abs(one.coordinates["displacement"]) > 0.004) & (random.random(4000) < 0.6)
+        for one in whole
+    ]
+    some = [replace(one, known=~gone) for one, gone in zip(whole, lost, strict=True)]
+    all_of_it, found = compare_predictions(whole), compare_predictions(some)
+    assert found.first.coordinate == all_of_it.first.coordinate == "displacement"
+    assert np.max(np.abs(found.first.mean)) == pytest.approx(2.0, abs=0.1)
+    assert found.first.share > 0.8
+    assert np.nanmax(np.abs(residual_map(found)[2])) == 30.0
+    assert max(one.samples for one in found.regimes) < sum(4000 - 25 for _ in whole)
+    quiet = [replace(one, known=random.random(4000) < 0.5) for one in predictions_with()]
+    assert [band.z for band in compare_predictions(quiet).spectrum.bands] == pytest.approx(
+        [1.0] * len(found.spectrum.bands), abs=0.2
+    )
+
+
+def test_the_worst_stretch_is_one_that_counts():
+    (one,) = predictions_with(count=1)
+    measured, known = one.measured.copy(), np.ones(4000, dtype=bool)
+    measured[1000:1600] += 5.0
+    known[1000:1600] = False
+    measured[2000:2600] += 1.0
+    window = worst_window(replace(one, measured=measured, known=known))
+    assert window == slice(2000, 2600)
