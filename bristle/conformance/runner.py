@@ -34,6 +34,7 @@ _FIRST = {  # what a probe rests on, by its level
     "run": {_LIBRARY, _LEGAL, _REFERENCE, _REPEATABLE},
 }
 _DEFAULT_STEPS = 100  # where the FMU names no step
+_MOST_INNER = 100  # steps of its own that such a step holds at most, where the FMU names theirs
 
 
 def judge(
@@ -115,8 +116,19 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     plan.start = _time(times.get("startTime"), -math.inf) or 0.0
     plan.stop = _time(times.get("stopTime"), plan.start)
     step = _time(times.get("stepSize"), 0.0)
-    plan.step = step or (plan.end - plan.start) / _DEFAULT_STEPS
+    plan.step = step or _usual_step(plan, root)
     return plan
+
+
+def _usual_step(plan: Plan, root: ElementTree.Element) -> float:
+    """Return a step [s] for an FMU that names none: one that it can make within the time limit."""
+    step = (plan.end - plan.start) / _DEFAULT_STEPS
+    simulation = root.find("CoSimulation")
+    told = None if simulation is None else simulation.get("fixedInternalStepSize")
+    inner = _time(told, 0.0)  # in FMI 3.0
+    if inner is None:
+        return step
+    return inner * max(1, min(round(step / inner), _MOST_INNER))
 
 
 def _time(text: str | None, above: float) -> float | None:

@@ -157,6 +157,14 @@ def test_the_reference_fmus_violate_nothing_but_lack_robustness(name: str) -> No
     assert robustness == (set() if name == "Stair" else {"NaN step", "infinite step"})
 
 
+@pytest.mark.skipif(not REFERENCE.exists(), reason="the Reference-FMUs are not at hand")
+def test_a_step_that_the_fmu_does_not_name_holds_few_of_its_own() -> None:
+    # Its experiment takes 1e8 s, and its solver 1 ms: a hundredth of the one never ends.
+    report = conform(REFERENCE / "Roberts.fmu", timeout=5.0, only=["legal run"])
+    assert report.row("legal run").verdict == "pass"
+    assert "steps of 0.1 s" in report.row("legal run").seen
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [
