@@ -22,6 +22,7 @@ from ..progress import Progress
 from ..quantity import plain
 from ..scenario.scenario import Component, Scenario, load_scenario
 from ..simulate.rows import make_columns
+from .file import plain_target
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -108,7 +109,7 @@ class Passive:
         found = []
         for goal, text in GOALS.items():
             value = self.goals[goal].value
-            excess = f"at most {100 * (value - 1):.1f} % above"
+            excess = f"at most {100 * max(value - 1, 0.0):.1f} % above"
             said = excess if goal == "regret" else plain(value, 4)
             found.append((text, self.goals[goal].voltage, said))
         return found
@@ -204,6 +205,7 @@ class _Case:
         base = load_scenario(file, overrides)
         ground, source = _only(base, "GroundMotion"), _only(base, "ConstantVoltage")
         own: dict[str, object] = {f"{ground.name}.record": motion.record}
+        _refuse_own(overrides, ground.name, source.name)
         if motion.intensity:
             own[f"{ground.name}.peak"] = motion.intensity * G
         elif "peak" in ground.parameters:
@@ -251,6 +253,18 @@ def _only(scenario: Scenario, kind: str) -> Component:
             f"as in {SCENARIO}."
         )
     return found[0]
+
+
+def _refuse_own(overrides: Mapping[str, object], ground: str, source: str) -> None:
+    """Refuse values in place of those that the optimum itself sets: they would be ignored."""
+    taken = {
+        f"{ground}.record": "the motions of an optimum say it (--motions)",
+        f"{ground}.peak": "the intensities of an optimum say it (--intensities)",
+        f"{source}.level": "an optimum tries every voltage",
+    }
+    for name in overrides:
+        if why := taken.get(plain_target(name)):
+            raise ScenarioError(f'override "{name}" would have no effect: {why}.')
 
 
 def _largest_voltage(scenario: Scenario) -> float:

@@ -111,6 +111,7 @@ def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     files = {"table": folder / "passive.csv", "answer": folder / "passive.json"}
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / "passive.png").unlink(missing_ok=True)  # that of an older optimum
         table.to_csv(files["table"], index=False, float_format="%.9g")
         write_json(files["answer"], {"schema": 1, **_answer(found)})
     except OSError as error:

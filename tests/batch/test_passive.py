@@ -122,6 +122,7 @@ def test_the_command(
     for name in ("passive.csv", "passive.json", "passive.png"):
         assert (tmp_path / "results" / "optimise" / name).stat().st_size > 100
     assert main([*command, "--set", "run.stop=5", "--json", "--no-figure"]) == 0
+    assert not (tmp_path / "results" / "optimise" / "passive.png").exists(), "of another optimum"
     answer = json.loads(capsys.readouterr().out)
     assert [round(motion["voltage"]) for motion in answer["motions"]] == [2, 3]
     assert set(answer["set"]) == {"worst", "mean", "regret"}
@@ -143,6 +144,9 @@ def test_the_command(
         (["--grid", "2"], "too coarse"),
         (["--set", "damper.sigma_x=2"], "sigma_x"),
         (["--set", "damper.v_max=0"], "v_max"),
+        (["--set", "ground.record=near_fault_pulse"], "--motions"),
+        (["--set", "ground.parameters.peak=2"], "--intensities"),
+        (["--set", "voltage.level=3"], "tries every voltage"),
     ],
 )
 def test_bad_input_is_one_message(
