@@ -89,6 +89,8 @@ def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
 
     files = {"runs": folder / "runs.csv", "quantiles": folder / "quantiles.csv"}
     try:
+        if found.continued < len(found.runs):
+            (folder / "figure.png").unlink(missing_ok=True)  # that of fewer runs, or of others
         found.quantiles.to_csv(files["quantiles"], float_format="%.9g")
     except OSError as error:
         raise not_usable(

@@ -41,6 +41,10 @@ def test_tables_and_figure_are_written(
         assert image.width > 800
     assert main(["ensemble", str(path)]) == 0
     assert "12 of them from before" in capsys.readouterr().out
+    assert main(["ensemble", str(path), "--no-figure"]) == 0
+    assert (folder / "figure.png").exists(), "of these runs"
+    assert main(["ensemble", str(path), "--no-figure", "--runs", "13"]) == 0
+    assert not (folder / "figure.png").exists(), "of fewer runs"
 
 
 def test_json_says_all(write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
