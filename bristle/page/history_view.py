@@ -34,11 +34,12 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     study = Study(folder)
     steps = study.steps()
     drawn = history_steps(steps)
+    low = {study.settings.cut_off if one.cut_off is None else one.cut_off for one in drawn}
     verdict = study.verdict() or {}
     named = verdict.get("effects", []) if verdict.get("kind") in ("effect", "ambiguous") else []
     return {
         "steps": [_step(study, step, one) for step, one in zip(steps, drawn, strict=True)],
-        "floor": 1.0, "close": CLOSE, "cut_off": study.settings.cut_off,
+        "floor": 1.0, "close": CLOSE, "cut_off": low.pop() if len(low) == 1 else 0.0,
         "named": list(named), "kind": verdict.get("kind", ""), "can_add": _can_join(study),
         "commands": _commands(study),
     }  # fmt: skip

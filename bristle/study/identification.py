@@ -98,7 +98,7 @@ def identify_study(
         return found
     step = study.add_step(
         f"identify {shown_law(found.model.law)}" + "".join(f" + {e}" for e in found.model.effects),
-        why(found), found.model, found.before, found.after,
+        why(found), found.model, *found.for_history(),
     )  # fmt: skip
     return replace(found, step=step)
 

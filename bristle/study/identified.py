@@ -88,6 +88,11 @@ class Identified:
         """z on held-out runs; on training runs where none is held out."""
         return self.after.get("z_holdout", self.after["z_train"])
 
+    def for_history(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Return the errors before and after with the low-pass of their RMS [Hz], for a step."""
+        own = {"cut_off": self.cutoff}
+        return {**self.before, **own}, {**self.after, **own}
+
     @property
     def unidentified(self) -> tuple[str, ...]:
         """Names of the parameters that the data do not identify."""

@@ -175,7 +175,7 @@ def add_effects(
     law = joined_form(verdict["law"], verdict["command"]) if agreed and "law" in verdict else ""
     other_law = law if law != identified.model.law else ""
     step = study.add_step(
-        "add " + ", ".join(names), why, identified.model, identified.before, identified.after
+        "add " + ", ".join(names), why, identified.model, *identified.for_history()
     )
     return Added(names, replace(identified, step=step), step, other_law)
 

@@ -26,7 +26,8 @@ CLOSE = 1.1
 class HistoryStep:
     """One step of the staircase: what was done, and z and error [N] of the model after it.
 
-    `share` is the error on held-out runs over the force's RMS [1].
+    `share` is the error on held-out runs over the force's RMS [1]; `cut_off` [Hz] of the low-pass
+    on the forces of both, 0 for none, None where the step does not tell.
     """
 
     number: int
@@ -35,6 +36,7 @@ class HistoryStep:
     z_train: float | None
     rms: float | None
     share: float | None = None
+    cut_off: float | None = None
 
     @property
     def missed(self) -> float:
@@ -49,7 +51,7 @@ class Staircase:
     """The steps of a history; `str` gives plain text, rich prints it in colour.
 
     `floor` is the z that noise alone explains; `cut_off` [Hz] of the low-pass on the forces whose
-    RMS errors are told, 0 for none.
+    RMS errors are told where a step does not tell, 0 for none.
     """
 
     history_steps: tuple[HistoryStep, ...]
@@ -91,7 +93,8 @@ class Staircase:
         share = log10(max(one.z / self.floor, 1.0)) / log10(top / self.floor)
         bar = mark * max(1, round(WIDTH * share))
         colour = "green" if done else "dark_orange"
-        low = f" below {self.cut_off:g} Hz" if self.cut_off else ""
+        cut_off = self.cut_off if one.cut_off is None else one.cut_off
+        low = f" below {cut_off:g} Hz" if cut_off else ""
         about = (
             [] if one.rms is None else [f"{quantity(one.rms, self.unit, 3, self._size())} RMS{low}"]
         )
@@ -111,7 +114,8 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0, cut_off: float = 
     noise_floor : float
         z that noise alone explains.
     cut_off : float
-        Hz, of the low-pass on the forces whose RMS errors the steps hold; 0 for none.
+        Hz, of the low-pass on the forces whose RMS errors the steps hold, where a step does not
+        tell its own; 0 for none.
 
     Examples
     --------
@@ -131,7 +135,7 @@ def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
         errors: dict[str, Any] = {**step.after}
         if not errors and k + 1 < len(steps):
             errors = {**steps[k + 1].before}
-        keys = ("z_holdout", "z_train", "rms_holdout", "share_holdout")
+        keys = ("z_holdout", "z_train", "rms_holdout", "share_holdout", "cut_off")
         numbers = [_number(errors.get(key)) for key in keys]
         out.append(HistoryStep(step.number, step.what, *numbers))
     return out

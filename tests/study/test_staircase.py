@@ -48,3 +48,11 @@ def test_a_name_longer_than_its_column_is_cut_visibly():
     assert "0 identify modified_bouc_wen[quadrati...  ####" in str(staircase(long))
     (line,) = {line for line in str(staircase(STEPS)).splitlines() if "add gas_spring" in line}
     assert line.startswith("3 add gas_spring    #")
+
+
+def test_each_step_tells_the_low_pass_of_its_own_error():
+    told = [{"z_holdout": 4.0, "rms_holdout": 2.0, **own} for own in ({}, {"cut_off": 0.0})]
+    told.append({**told[0], "cut_off": 5.0})
+    steps = [Step(k, f"identify {k}", "", {}, one) for k, one in enumerate(told)]
+    lines = str(staircase(steps, cut_off=18.0)).splitlines()
+    assert [line.partition("RMS")[2] for line in lines[1:4]] == [" below 18 Hz", "", " below 5 Hz"]
