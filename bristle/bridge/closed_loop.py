@@ -21,6 +21,7 @@ from ..findings import command
 from ..identify.run_labels import following
 from ..progress import tell
 from ..quantity import short_z
+from ..study.added_runs import behind_data
 from ..study.openings import count_opening, opened_text, openings, runs_for_test
 from ..study.rig import building_of
 from ..study.run_file import TEST
@@ -147,11 +148,15 @@ def _prepared(
             f"{study.folder / 'model.toml'}: no covariance of the parameters, which the 95 % band "
             f"needs. Identify the model again:  {command('identify', study.folder)}"
         )
+    changed = [note] if (note := behind_data(study)) else []
     if not with_limits:
-        return [], []
+        return [], changed
     if draws < FEWEST:
         raise StudyError(f"--with-limits widens a band, for which --draws {FEWEST} is the least.")
-    return left_open(study.verdict(), model, study.folder)
+    verdict = study.verdict()
+    effects, notes = left_open(verdict, model, study.folder)
+    stale = [note] if (note := study.stale(verdict or {})) else []
+    return effects, [*changed, *stale, *notes]
 
 
 def _refuse_other_command(study: Study, trials: Sequence[Trial]) -> None:

@@ -101,4 +101,6 @@ def print_closed_loop(found: ClosedLoop) -> None:
     if any(row.inside is False for row in found.rows):
         print("\n* the measured figure is outside the band")
     for note in found.notes:
-        print(f"{note[:1].upper()}{note[1:]}{'' if note.endswith('.') else '.'}")
+        # A command that ends a note is copied to a shell: no full stop is part of it.
+        end = "" if note.endswith(".") or ":  bristle " in note else "."
+        print(f"{note[:1].upper()}{note[1:]}{end}")

@@ -125,6 +125,7 @@ def study_html(study: Study) -> str:
             f"{f', {test} for the test at the end' if test else ''}.",
             settings.excluded_text,
             f"Verdict: {verdict.get('words')}" if verdict else "",
+            study.stale(verdict) if verdict else "",
         ),
         html.table(
             ["step", "what", "z, held out", "z, training", "RMS error [N]"], rows, (2, 3, 4)

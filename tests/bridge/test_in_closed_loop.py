@@ -7,6 +7,7 @@ has computed.
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -339,3 +340,14 @@ def test_a_command_of_another_kind_is_played_as_it_is(tmp_path: Path) -> None:
     volts = replace(shaking, drive=drive_named("voltage"))
     other = replace(simulator, model=new_model("bingham"), shaking=volts, folder=tmp_path / "volts")
     np.testing.assert_array_equal(as_current, other.response(other.scenario())["damper.force"])
+
+
+def test_a_prediction_says_that_its_model_is_of_other_data(
+    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = Study(shutil.copytree(made, tmp_path / "rig"))
+    first = study.files("holdout")[0]
+    first.write_text("\n".join(first.read_text().split("\n")[:-50]) + "\n")
+    assert main(["compare", str(study.folder), "--closed-loop", "--draws", "0"]) == 0
+    told = capsys.readouterr().out
+    assert f"Identify it again:  bristle identify {study.folder}\n" in told
