@@ -11,7 +11,6 @@ from . import lmi, table, verify
 from .norms import hinf_norm, least_gamma
 from .plant import Plant, Units, balancing, generalized
 from .result import DesignResult, packed, pole_list
-from .sliding import stiffness
 from .task import Task
 
 _USUAL = (2.0, 0.04, 5.0)
@@ -50,7 +49,7 @@ def design_hinf(task: Task) -> DesignResult:
         or too fast for its sample period.
     """
     plant = generalized(
-        task.plant_building, task.weights, stiffness=stiffness(task.damper), device=task.place
+        task.plant_building, task.weights, stiffness=task.stiffness, device=task.place
     )
     least = least_gamma(plant)
     units = units_for(plant, least)

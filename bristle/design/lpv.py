@@ -19,7 +19,7 @@ from .hinf import units_for
 from .norms import hinf_norm, least_gamma
 from .plant import Plant, States, Units, balancing, family
 from .result import DesignResult, packed, pole_list
-from .sliding import coefficients, stiffness
+from .sliding import coefficients
 from .task import Task
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ def plants_at(task: Task, r: Array) -> list[Plant]:
         raise DesignError(
             f"damper: at {speed:g} m/s voltage does not raise the force; nothing could control it."
         )
-    return family(task.plant_building, task.weights, b, d, stiffness(task.damper), task.place)
+    return family(task.plant_building, task.weights, b, d, task.stiffness, task.place)
 
 
 def _frame(task: Task, plants: list[Plant]) -> tuple[Units, States]:

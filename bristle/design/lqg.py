@@ -12,7 +12,6 @@ from ..errors import DesignError
 from . import table, verify
 from .plant import Plant, structure
 from .result import DesignResult, packed, pole_list
-from .sliding import stiffness
 from .task import Task
 
 
@@ -34,7 +33,7 @@ def design_lqg(task: Task) -> DesignResult:
     import control
 
     weights, h = task.lqg, task.sample_period
-    s = structure(task.plant_building, stiffness=stiffness(task.damper), device=task.place)
+    s = structure(task.plant_building, stiffness=task.stiffness, device=task.place)
     push, ground = s.B[:, :1], s.B[:, 1:]
     y, drift, direct = s.C[:1], s.C[1:2], s.D[:1, :1]
     Q = weights.acceleration * y.T @ y + weights.drift * drift.T @ drift

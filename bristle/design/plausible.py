@@ -15,7 +15,7 @@ import numpy as np
 from ..physics.building import frequencies
 from .norms import hinf_norm
 from .plant import StateSpace, structure
-from .sliding import coefficients, stiffness
+from .sliding import coefficients
 from .task import MOST_SAMPLES, SPEEDS, Task
 
 EFFORT = (1e-4, 10.0)
@@ -59,7 +59,7 @@ def implausible(task: Task) -> list[str]:
 
 def reach_of(task: Task) -> Reach:
     """Return peak gains over frequency, per unit of command: N, or V for "lpv"."""
-    s = structure(task.plant_building, stiffness=stiffness(task.damper), device=task.place)
+    s = structure(task.plant_building, stiffness=task.stiffness, device=task.place)
     gain = 1.0
     if task.kind == "lpv":
         speeds = np.array(task.scheduling.grid)

@@ -12,7 +12,6 @@ from ..physics.building import Building, frequencies
 from .margins import grid_rows
 from .norms import gains
 from .plant import Plant, StateSpace, structure
-from .sliding import stiffness
 from .task import Task
 
 if TYPE_CHECKING:
@@ -111,7 +110,7 @@ def task_curves(task: Task) -> dict[str, Array]:
         `command_weight` [1/N, 1/V]: sizes of the weights.
     """
     omega = omega_of(task.building)
-    s = structure(task.plant_building, stiffness=stiffness(task.damper), device=task.place)
+    s = structure(task.plant_building, stiffness=task.stiffness, device=task.place)
     ground = StateSpace(s.A, s.B[:, 1:2], s.C[:1], s.D[:1, 1:2])
     return {
         "frequency": omega / (2.0 * np.pi),

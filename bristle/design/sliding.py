@@ -19,6 +19,7 @@ from ..errors import DesignError
 from ..physics.damper import DamperModel
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.forms import split_form
+from ..physics.inputs import Inputs
 from ..physics.laws import DEFAULT_OF_DESIGN, LEAST, Law, base_and_variant, law_names
 
 Array = NDArray[np.float64]
@@ -104,6 +105,16 @@ class Damper:
         }
         return {**values, **variant.values}
 
+    def sliding_force(self, v: float, V: float) -> tuple[float, float]:
+        """Return the law's yield force [N] and its other force [N], the mean of both directions.
+
+        In steady sliding at v > 0 [m/s] and V [V].
+        """
+        values = self.parameters()
+        held, there = self.kind.sliding_force(values, v, V)
+        _, back = self.kind.sliding_force(values, -v, V)
+        return held, 0.5 * (there - back)
+
     def data(self) -> dict[str, Any]:
         """Return the damper as a table of a design file."""
         return {
@@ -121,15 +132,15 @@ def coefficients(damper: Damper, r: Array, eps: float) -> tuple[Array, Array]:
         d = Y_0/(r + eps) + F_0/r,   b = r (Y_V/(r + eps) + F_V/r)
 
     Y, F are the law's yield force and its other force in steady sliding, without voltage and per
-    volt. Effects enter as what they add to the force in steady sliding, read from the damper itself
+    volt; F is the mean of both directions, for an accumulator's force at mid-stroke damps nothing.
+    Effects enter as what they add to the force in steady sliding, read from the damper itself
     at some speeds, the mean of both directions; a slow effect as it is near its start. Elements in
     series with the fluid (mount, backlash) carry its force and are left out.
     """
-    law, values = damper.kind, damper.parameters()
-    top = 1.0 if law.affine() else damper.v_max
+    top = 1.0 if damper.kind.affine() else damper.v_max
     speed = np.maximum(r, LEAST)
     still, driven = (
-        np.array([law.sliding_force(values, v, V) for v in speed.tolist()]).T for V in (0.0, top)
+        np.array([damper.sliding_force(v, V) for v in speed.tolist()]).T for V in (0.0, top)
     )
     per_volt = (driven - still) / top
     d = still[0] / (r + eps) + still[1] / speed
@@ -152,6 +163,20 @@ def stiffness(damper: Damper) -> float:
         sum(_slid(damper, sign * v, 0.0, x, on) for sign in (1.0, -1.0)) for x in (-_NUDGE, _NUDGE)
     ]
     return (force[1] - force[0]) / (4.0 * _NUDGE)
+
+
+def spring(damper: Damper) -> float:
+    """Return the force per displacement [N/m] of the law itself: an accumulator's."""
+    law, values = damper.kind, damper.parameters()
+    elastic = law.hook("elastic")
+    if elastic is None:
+        return 0.0
+    rest = law.State(*(0.0 for _ in law.states)) if law.states else ()
+    force = [
+        elastic(Inputs(x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False), rest, law.at(values))
+        for x in (-_NUDGE, _NUDGE)
+    ]
+    return float(force[1] - force[0]) / (2.0 * _NUDGE)
 
 
 def _parallel(damper: Damper) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from .lmi import VARIES
 from .passive import Share, with_share
 from .plant import check_building
 from .policy.training import Training
-from .sliding import Damper
+from .sliding import Damper, spring, stiffness
 from .weights import LqgWeights, Weights
 
 DAMPER = "damper"
@@ -202,6 +202,18 @@ class Task:
             device = building.device("" if name == DAMPER else name)
             building = with_share(building, device, share)
         return building
+
+    @property
+    def stiffness(self) -> float:
+        """What the commanded damper's springs add to the plant [N/m].
+
+        Beside a voltage those of its law and its effects. Beside a commanded force that of its
+        effects: the law's own is in that force, which an inverse takes apart. None where the
+        measured force enters an estimator, for it holds them all.
+        """
+        if self.kind in ("lqg", POLICY):
+            return 0.0
+        return stiffness(self.damper) + (spring(self.damper) if self.kind == "lpv" else 0.0)
 
     @property
     def states(self) -> int:
