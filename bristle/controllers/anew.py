@@ -8,10 +8,9 @@ differs in its unit of mass alone gets the same design.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from ..control.controller import COMMAND_UNITS, POLICY, Controller
 from ..design import Damper as DesignDamper
@@ -99,11 +98,25 @@ def force_share(damper: Damper) -> float:
 
     1 where its law is not known in closed form.
     """
+    return _beside(damper, lambda one: sum(one.sliding_force(one.speed, one.v_max)))
+
+
+def slope_share(damper: Damper) -> float:
+    """Return how much force a volt makes beside the library's damper, at its typical speed.
+
+    1 where its law is not known in closed form.
+    """
+
+    def per_volt(one: DesignDamper) -> float:
+        still, driven = (sum(one.sliding_force(one.speed, V)) for V in (0.0, one.v_max))
+        return (driven - still) / one.v_max
+
+    return _beside(damper, per_volt)
+
+
+def _beside(damper: Damper, measure: Callable[[DesignDamper], float]) -> float:
+    """Return what a measure tells of a damper over what it tells of the library's."""
     known = damper.for_design()
     if known is None or damper.usual:
         return 1.0
-
-    def force(one: DesignDamper) -> float:
-        return float(np.sum(one.kind.sliding_force(one.parameters(), one.speed, one.v_max)))
-
-    return force(known) / force(DesignDamper(catalogue_law(DEFAULT)))
+    return measure(known) / measure(DesignDamper(catalogue_law(DEFAULT)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
@@ -82,6 +83,19 @@ def said(choice: Choice) -> str:
     """Return what tables call a choice without a label: its name with its settings."""
     name = Path(choice.what).stem if choice.is_file else choice.what
     return " ".join([name, *(f"{key}={value}" for key, value in choice.settings.items())])
+
+
+def number(value: object, name: str, where: str) -> float:
+    """Return a setting as a number.
+
+    Raises
+    ------
+    ScenarioError
+        If it is none; `where` says what was chosen, `name` the setting.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise ScenarioError(f"{where}: {name} = {written(value)}; a number is right.")
+    return float(value)
 
 
 def refuse_twice(labels: Sequence[str], where: str, taken: Sequence[str] = ()) -> None:

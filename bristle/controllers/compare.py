@@ -6,6 +6,7 @@ import tempfile
 import time as clock
 from collections.abc import Sequence
 from contextlib import nullcontext
+from math import ceil, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -123,14 +124,14 @@ def compare_controllers(
     ['passive off', 'passive on', 'best constant', 'Skyhook']
     """
     began = clock.monotonic()
-    _refuse(statistic, grid, engine, workers)
+    _refuse(statistic, grid, engine, workers, step)
     with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as path:
         folder = Folder(Path(path))
         site = site_from(building, device, folder)
         one = damper_from(damper, folder)
         tell("designing")
         entries = Maker(site, one, folder).entries(controllers)
-        rows = step or _step(entries)
+        rows = _step(entries) if step is None else step
         bench = Bench(site, one, folder, rows, engine, fmus, workers or cores())
         judged = _judged(bench, output, statistic)
         chosen = motions_of(motions, folder, rows)
@@ -270,7 +271,9 @@ class _Run:
         return pd.DataFrame(self.worsts) if self.worsts else None
 
 
-def _refuse(statistic: str, grid: int, engine: str, workers: int | None) -> None:
+def _refuse(
+    statistic: str, grid: int, engine: str, workers: int | None, step: float | None
+) -> None:  # fmt: skip
     if statistic not in STATISTICS:
         raise ScenarioError(unknown("statistic", str(statistic), STATISTICS))
     if isinstance(grid, bool) or not isinstance(grid, int) or not 3 <= grid <= 1000:
@@ -279,12 +282,12 @@ def _refuse(statistic: str, grid: int, engine: str, workers: int | None) -> None
         raise ScenarioError(f'engine "{engine}"; compiled or fmu is right.')
     if workers is not None and workers < 1:
         raise ScenarioError(f"--workers {workers}: 1 or more is right.")
+    if step is not None and not 0.0 < step < inf:
+        raise ScenarioError(f"--step {step:g}: a time above 0 s is right.")
 
 
 def _step(entries: list[Entry]) -> float:
     """Return rows that fall on the controllers' instants, where they can."""
-    from math import ceil
-
     periods = [one.period for one in entries if one.period is not None]
     return min([STEP, *(period / ceil(period / STEP - 1e-9) for period in periods)])
 

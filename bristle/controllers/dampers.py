@@ -17,7 +17,7 @@ from ..physics.drive import DRIVES, VOLTAGE, Drive
 from ..physics.laws import LAWS, laws_of
 from ..scenario.library import damper_of
 from ..scenario.model_parts import source_of, values_of
-from .choice import Choice, choice_of, said
+from .choice import Choice, choice_of, number, said
 from .folder import Folder, Part
 
 DEFAULT = "LuGreDamper"
@@ -129,7 +129,7 @@ def _from_law(choice: Choice, law: str | Path, folder: Folder) -> Damper:
 def _built_in(choice: Choice, source: dict[str, Any], law: str, description: Description) -> Damper:
     declared = LAWS[law].parameters
     values = {
-        name: float(choice.settings.get(name, parameter.value))
+        name: number(choice.settings.get(name, parameter.value), name, f"--damper {choice.what}")
         for name, parameter in declared.items()
     }
     on = [name[:-3] for name, value in choice.settings.items() if name.endswith(".on") and value]
@@ -154,8 +154,11 @@ def _from_model(choice: Choice, path: Path, folder: Folder) -> Damper:
     law = inside.base_law
     component = catalogue.component_of_law(law)
     description = catalogue.describe(component)
-    own = {name: float(values[name]) for name in LAWS[law].parameters if name in values}
-    name = choice.label or (file.parent.name if path.is_dir() else file.stem)
+    own = {
+        name: number(values[name], name, f"--damper {choice.what}")
+        for name in LAWS[law].parameters if name in values
+    }  # fmt: skip
+    name = choice.label or (path.resolve().name if path.is_dir() else file.stem)
     return Damper(
         name, Part(source, values), VOLTAGE, _most(choice.what, values, description, VOLTAGE), law,
         own, tuple(inside.effects), tuple(_notes(model, name)),

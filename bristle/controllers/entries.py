@@ -21,8 +21,8 @@ from ..fmu.controller import MEASURED, invertible
 from ..fmu.description import Description, read_description
 from ..physics.building import paper_building
 from ..scenario.library import controller_in
-from .anew import designed_for, force_share
-from .choice import Choice, Given, choices_of, refuse_twice, said
+from .anew import designed_for, force_share, slope_share
+from .choice import Choice, Given, choices_of, number, refuse_twice, said
 from .dampers import Damper
 from .entry import BEST, CONSTANT, LIMIT, OFF, ON, Entry
 from .folder import ABOVE, FILES, Folder, Part, plain_name
@@ -118,16 +118,14 @@ class Maker:
             data = tomllib.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise DesignError(f"{file}: cannot be read as a design file: {error}.") from None
-        task = task_from_data({"schema": SCHEMA, **data}, file.parent, str(file))
-        if "building" not in data:
-            device = task.device or self.site.device.name
-            task = replace(task, building=self.site.building, device=device)
+        place = self.site.building, self.site.device.name
+        task = task_from_data({"schema": SCHEMA, **data}, file.parent, str(file), place)
         known = self.damper.for_design()
         if "damper" not in data and known is not None:
             task = replace(task, damper=known)
         found = design(task).controller
         kept = self._save(found, file.stem)
-        found.check_building(self.site.building, str(file))
+        self._check_place(found, file)
         return self._designed(self._component(found.kind), name, dict(choice.settings), kept)
 
     def _of_source(self, choice: Choice, name: str) -> Entry:
@@ -165,7 +163,7 @@ class Maker:
         period = parameters.get("sample_period", _start(description, "sample_period"))
         return Entry(
             name, Part(source, parameters), self._wires(description), "voltage", True,
-            None if period is None else float(period),
+            None if period is None else number(period, "sample_period", component),
             about or "without a design: it suits any building", carries,
         )  # fmt: skip
 
@@ -176,11 +174,13 @@ class Maker:
         there, found = description.variables, dict[str, Any]()
         if "v_max" in there and self.damper.most != _start(description, "v_max"):
             found["v_max"] = self.damper.most
-        if "f_min" in there and (share := force_share(self.damper)) != 1.0:
-            found["f_min"] = float(f"{share * float(_start(description, 'f_min') or 0.0):.4g}")
         inverts = "inverse" in there and settings.get("kind", "inverse") == "inverse"
         if component == "Skyhook" and "kind" not in settings:
             inverts = False  # it switches, and inverts nothing
+        shares = {"f_min": force_share, **({"least_slope": slope_share} if inverts else {})}
+        for name, share_of in shares.items():
+            if name in there and 0.0 < (share := share_of(self.damper)) != 1.0:
+                found[name] = float(f"{share * float(_start(description, name) or 0.0):.4g}")
         if inverts and "inverse" not in settings:
             if self.damper.law not in _invertible():
                 raise ScenarioError(
@@ -248,8 +248,22 @@ class Maker:
         found = read_controller(file)
         if found.kind != kind:
             raise DesignError(f"{file}: is of the kind {found.kind}; {kind or 'none'} is right.")
-        found.check_building(self.site.building, str(file))
+        self._check_place(found, file)
         return self.folder.keep(file)
+
+    def _check_place(self, found: Controller, file: Path) -> None:
+        """Refuse a design for another building, or for another of its dampers."""
+        building, here = self.site.building, self.site.device
+        found.check_building(building, str(file))
+        made, n = str(found.design.get("device", "")), building.size
+        known = made in ("", *(device.name for device in building.devices))
+        if known and building.device(made).incidence(n) == here.incidence(n):
+            return
+        first = "the damper on the first level"
+        raise DesignError(
+            f"{file}: was designed for {made or first}, not for {here.name or first}; --device "
+            "says which damper controllers command."
+        )
 
     def _anew(self, kind: str) -> str:
         if kind not in self._designs:

@@ -87,8 +87,10 @@ def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
             f"--motions {choice.what}: peak = {values['peak']:g}; above 0 is right, and none at "
             "all for a record as it is."
         )
-    own = record if record in names else folder.keep(Path(record))
     scaled = values.get("peak", motion.peak) * abs(values.get("factor", 1.0))
+    if not scaled > 0.0:
+        raise ScenarioError(f"--motions {choice.what}: the ground does not move; check its factor.")
+    own = record if record in names else folder.keep(Path(record))
     return Motion(
         choice.label or _said(Path(record).stem if record not in names else record, values),
         Part({"fmu": "GroundMotion"}, {"record": own, **values}),

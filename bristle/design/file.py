@@ -5,8 +5,8 @@ kind = "lpv"                     # or "hinf", "lqg", "policy"; the rest may be l
 building = "my_building.toml"    # else the paper's model
 device = "brace"                 # what is commanded; else the damper on the first level
 sample_period = 0.002            # s
-tau = 2.0                        # 1 or more; larger: a slower controller
-order = 12                       # balanced states to keep; else all
+tau = 2.0                        # hinf, lpv: 1 or more; larger: a slower controller
+order = 12                       # hinf, lpv: balanced states to keep; else all
 
 [weights]                        # hinf, lpv
 acceleration = { gain = 1.5, corner = 12.0 }           # gain w/(s + w), rad/s
@@ -48,7 +48,7 @@ from typing import Any, TypeVar
 
 from ..data.model import read_model
 from ..errors import BristleError, DesignError, StudyError
-from ..physics.building import paper_building, read_building
+from ..physics.building import Building, paper_building, read_building
 from ..physics.laws import DEFAULT_OF_DESIGN
 from .passive import Share
 from .policy.training import Training
@@ -95,8 +95,17 @@ def read_task(path: str | Path) -> Task:
     return task_from_data(data, path.parent, str(path))
 
 
-def task_from_data(data: Mapping[str, Any], folder: Path, where: str = "design") -> Task:
+def task_from_data(
+    data: Mapping[str, Any], folder: Path, where: str = "design",
+    place: tuple[Building, str] | None = None,
+) -> Task:  # fmt: skip
     """Return the task that the content of a design file describes; paths are from `folder`.
+
+    Parameters
+    ----------
+    data, folder, where
+        The content, the folder of its paths, what messages call it.
+    place : building and device where the content names none; else the paper's building
 
     Raises
     ------
@@ -109,15 +118,19 @@ def task_from_data(data: Mapping[str, Any], folder: Path, where: str = "design")
     if not isinstance(kind, str) or kind not in _TABLES:
         raise DesignError(f"{where}: kind = {kind!r}; there are {', '.join(_TABLES)}.")
     _known(data, _TOP | _TABLES[kind], where)
+    for key in ("tau", "order"):
+        if kind == "lqg" and key in data:
+            raise DesignError(f"{where}: {key} is of hinf and lpv designs; lqg has none.")
     given: dict[str, Any] = {"kind": kind, "title": _text(data, "title", where)}
     for key in ("sample_period", "tau"):
         if key in data:
             given[key] = _number(data[key], key, where)
     if "order" in data:
         given["order"] = _whole(data["order"], "order", where)
-    given["device"] = _text(data, "device", where)
-    building = _text(data, "building", where)
-    given["building"] = read_building(folder / building) if building else paper_building()
+    building, usual = place or (paper_building(), "")
+    if name := _text(data, "building", where):
+        building, usual = read_building(folder / name), ""
+    given["building"], given["device"] = building, _text(data, "device", where) or usual
     readers: dict[str, Callable[[Mapping[str, Any], str], Any]] = {
         "weights": _weights,
         "damper": lambda table, at: _damper(table, folder, at),

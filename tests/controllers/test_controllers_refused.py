@@ -8,6 +8,7 @@ import pytest
 
 from bristle.cli import main
 from bristle.controllers.choice import choice_of, choices_of
+from bristle.design import design
 from bristle.errors import ScenarioError
 from bristle.fmu.build import build, plan
 
@@ -88,6 +89,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
          "none that can be inverted"),
         (["--motions", MOTION, "--controller", "Skyhook", "--output", "structure.floor9"],
          "structure.floor9"),
+        (["--motions", MOTION, "--controller", "Skyhook", "--damper", "LuGreDamper,sigma_a=stiff"],
+         'sigma_a = the text "stiff"; a number is right'),
+        (["--motions", MOTION, "--controller", "Skyhook,sample_period=fast"],
+         'sample_period = the text "fast"; a number is right'),
+        (["--motions", "el_centro,factor=0", "--controller", "Skyhook"], "ground does not move"),
+        (["--motions", MOTION, "--controller", "Skyhook", "--step", "0"], "a time above 0 s"),
         (["--motions", MOTION, "--controller", "Skyhook", "--grid", "1"], "3 to 1000"),
         (["--motions", MOTION, "--controller", "Skyhook", "--ensemble", "1"], "2 or more members"),
         (["--motions", MOTION, "--controller", "Skyhook", "--spread", "wide"], "10% or 0.1"),
@@ -104,6 +111,22 @@ def test_one_message_says_what_is_right(
     assert len(printed.err.split("Error: ")) == 2
     assert not printed.out
     assert not (folder / "out" / "comparison.csv").exists()
+
+
+def test_a_design_for_another_damper_of_the_building_is_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "braced.toml").write_text(
+        f'{TOWER}[[devices]]\nname = "brace"\nat = "storey1"\n'
+        '[[devices]]\nname = "low"\nat = "isolation"\n'
+    )
+    design({"kind": "lqg", "building": "braced.toml"}).controller.save("base.json")
+    words = ["controllers", "--motions", MOTION, "--controller", "base.json", "--building",
+             "braced.toml", "--grid", "3", "--out", "out", "--no-figure", "--quiet"]  # fmt: skip
+    assert main([*words, "--device", "brace"]) == 2
+    said = "designed for the damper on the first level, not for brace"
+    assert said in capsys.readouterr().err
+    assert main([*words, "--device", "low"]) == 0  # the same place by its name
 
 
 def test_fmus_without_the_ports_are_refused(

@@ -133,6 +133,8 @@ def test_a_model_file_brings_its_units_and_effects(tmp_path: Path) -> None:
         (HEAD + '[damper]\nmodel = "missing.toml"', r"missing\.toml: there is no such file"),
         (HEAD + "[damper]\nparameters = 3", "must be a table"),
         ('schema = 1\nkind = "lqg"\n[lqg]\nforce = 0.0', r"\[lqg\].*singular"),
+        ('schema = 1\nkind = "lqg"\norder = 4', "order is of hinf and lpv designs"),
+        ('schema = 1\nkind = "lqg"\ntau = 3.0', "tau is of hinf and lpv designs"),
     ],
 )
 def test_mistakes_are_named(tmp_path: Path, text: str, message: str) -> None:
