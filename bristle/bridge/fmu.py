@@ -225,7 +225,9 @@ def _typed(description: Description, values: Mapping[str, str]) -> dict[str, Val
             elif kind == "Boolean":
                 out[name] = {"true": True, "false": False, "1": True, "0": False}[text.lower()]
             else:
-                out[name] = text
+                # The FMU runs in a folder of its own, where a relative path would lead to nothing.
+                file = Path(text)
+                out[name] = str(file.resolve()) if file.suffix and file.is_file() else text
         except (ValueError, KeyError):
             raise FmuError(
                 f"--set {name}={text}: {name} is {kind} in {description.name}."

@@ -246,10 +246,11 @@ class Master:
         when = f"in the step from t = {self.time:.9g} s"
         answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         text = f"{instance.name} {when}: {verb} answered {answer}"
+        said = instance.said()  # before the fault is read: each call forgets what was said before
         node = self.nodes[operation.component]
         if not instance.poisoned and any(kind_of(v) == "fault" for v in node.outputs.values()):
             text += self._code(instance.get(["fault"])["fault"])
-        text += self._inputs(operation.component) + instance.said()
+        text += self._inputs(operation.component) + said
         if isinstance(operation, Ramp):
             held = ", ".join(f'{name} = "held"' for name in operation.names)
             text += (

@@ -122,6 +122,7 @@ class Instance:
         self.poisoned = False
         self._initialised = False
         self._last: deque[str] = deque(maxlen=3)
+        self._refused: list[str] = []  # by what initialisation ended with: it tells later stops
         self._listen = listen
         self._key = _register(self)
         # A KeyboardInterrupt in an FMU written in Python would be told as that FMU's failure.
@@ -149,6 +150,7 @@ class Instance:
 
     def finish_initialisation(self) -> None:
         """Leave initialisation mode."""
+        self._refused.clear()
         self._call(self.library.slave.exitInitializationMode)
         self._initialised = True
         self._last.clear()
@@ -183,11 +185,13 @@ class Instance:
     def say(self, status: str, text: str, category: str = "") -> None:
         """Pass on a message, as if the FMU had sent it."""
         self._last.append(text)
+        if status in STATUS[DISCARD:] and not self._initialised:
+            self._refused.append(text)
         self._listen(Message(self.name, status, category, text))
 
     def said(self) -> str:
         """Return the FMU's last messages as lines for an error's text."""
-        return "".join(f"\n  It said: {text}" for text in self._last)
+        return "".join(f"\n  It said: {text}" for text in self._last or self._refused[-3:])
 
     def fail(self, function: str, status: int) -> NoReturn:
         """Raise RunError for a call that did not answer OK or Warning."""

@@ -135,6 +135,23 @@ def test_a_stranger_that_fails_is_an_answer(toys, tmp_path, how, kind, text):
         )  # fmt: skip
 
 
+def test_a_file_is_found_from_where_the_user_stands_and_a_wrong_parameter_is_named(
+    tmp_path, monkeypatch
+):
+    t = 0.005 * np.arange(600)
+    shaken = 2.0 * np.sin(9.0 * t)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(len(t))
+    write(tmp_path / "record.csv", {"time [s]": t, "acceleration [m/s2]": shaken})
+    data = {"time [s]": t, "ground_acceleration [m/s2]": shaken + noise}
+    data = write(tmp_path / "run.csv", data)
+    monkeypatch.chdir(tmp_path)
+    ground = ensure("GroundMotion")
+    found = compare_fmu(ground, data, values={"record": "record.csv"})
+    assert found.outputs[0].z < 1.2
+    with pytest.raises(RunError, match=r"It said: .* peak = -5\.0 lies outside"):
+        compare_fmu(ground, data, values={"record": "record.csv", "peak": "-5"})
+
+
 def test_a_stranger_that_hangs_is_ended(toys, tmp_path):
     with pytest.raises(RunError, match="took longer than 6 s"):
         compare_fmu(

@@ -12,6 +12,7 @@ from toys import Maker
 
 from bristle import run
 from bristle.errors import FmuError, RunError
+from bristle.fmu.build import ensure
 from bristle.simulate.run import IncompleteRunError
 
 
@@ -62,6 +63,42 @@ def test_fault_at_the_start_stops_before_the_first_step(scenario_of: Maker) -> N
     ) as caught:
         run(failing(scenario_of, "fault", at=0.0))
     assert len(caught.value.frame) == 1
+
+
+INERTIA = """
+schema = 1
+title = "an acceleration that no mass survives"
+
+[run]
+stop = 0.1
+step = 0.01
+
+[components.jump]
+fmu = "SignalSource"
+parameters = { kind = "steps", steps = "0:0 0.05:1e308" }
+
+[components.damper]
+fmu = "LuGreDamper"
+parameters = { displacement = 0.0, velocity = 0.0, voltage = 4.0, "fluid_inertia.on" = true, \
+"fluid_inertia.m_f" = 50.0 }
+
+[connections]
+"damper.acceleration" = "jump.value"
+"""
+
+
+def test_what_the_fmu_said_of_its_fault_stands_in_the_error(tmp_path: Path) -> None:
+    (tmp_path / "inertia.toml").write_text(INERTIA)
+    with pytest.raises(IncompleteRunError, match=r"It said: damper: .* not finite: force"):
+        run(tmp_path / "inertia.toml")
+
+
+def test_what_the_fmu_said_of_a_parameter_stands_in_the_error(tmp_path: Path) -> None:
+    fmu = ensure("GroundMotion")
+    text = f'schema = 1\n[run]\nstop = 0.1\nstep = 0.01\n[components.ground]\nfmu = "{fmu}"\n'
+    (tmp_path / "own.toml").write_text(f'{text}parameters = {{ record = "nosuch.csv" }}\n')
+    with pytest.raises(IncompleteRunError, match=r"It said: ground: .* there is no such file"):
+        run(tmp_path / "own.toml")
 
 
 def test_nan_of_a_foreign_fmu_is_recorded_and_the_run_goes_on(scenario_of: Maker) -> None:
