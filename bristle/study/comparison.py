@@ -24,11 +24,14 @@ def comparer(study: Study, role: str = "holdout") -> RigComparer:
     Raises
     ------
     StudyError
-        If an effect of the present model acts at no site of the rig, or there is no test run.
+        If an effect of the present model acts at no site of the rig, or there is no test run; if
+        study.toml is another one than the study was opened with.
     RecordError
         If a run cannot be read or lacks a channel that is needed.
     """
-    model, runs = study.model(), study.runs()
+    model = study.model()
+    study.refuse_if_changed()  # where it was opened before others wrote in it
+    runs = study.runs()
     if role == TEST:
         runs = runs_for_test(study, runs)
     tell("holding the model against the runs")

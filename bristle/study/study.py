@@ -235,6 +235,9 @@ class Study:
         TrustError
             If the model has an effect whose code must not run yet.
         """
+        # Another study that was opened since may have own ones of the same names.
+        load(self.laws_folder, "law")
+        load(self.effects_folder)
         try:
             model = read_model(self.folder / "model.toml", to_show=to_show)
         except StudyError as error:

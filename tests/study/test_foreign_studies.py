@@ -12,6 +12,7 @@ from made import write_runs
 
 from bristle import __version__
 from bristle.cli import main
+from bristle.physics.effect import EFFECTS
 from bristle.study import Study, create_study
 
 COMMANDS = ("study check", "identify", "compare", "diagnose", "report", "export", "undo")
@@ -156,3 +157,15 @@ def test_a_damaged_verdict_or_model_is_one_message(
     (rig / "verdict.json").unlink()
     (rig / "model.toml").write_bytes(b"\xff\xfe\x00law")
     assert "model.toml" in refused(rig, capsys, "identify", "compare", "report")
+
+
+def test_two_studies_with_effects_of_one_name_keep_their_own(rig: Path, tmp_path: Path) -> None:
+    assert main(["effects", "new", "seal", "--study", str(rig)]) == 0
+    first = Study(rig, trust=True)
+    first.add_step("add seal", "to see", first.model().with_effect("seal"))
+    other = shutil.copytree(rig, tmp_path / "other")
+    changed(other / "effects" / "seal.py", 'Parameter(0.2, "N"', 'Parameter(0.3, "N"')
+    second = Study(other, trust=True)
+    for study, value in ((first, 0.2), (second, 0.3), (first, 0.2)):
+        study.model()
+        assert EFFECTS["seal"].parameters["f_s"].value == value

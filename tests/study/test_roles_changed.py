@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from study.made import write_runs
 
+import bristle
 from bristle.cli import main
 from bristle.data.corrections import Correction
 from bristle.errors import StudyError
@@ -143,3 +144,9 @@ def test_the_command_says_what_to_do_next(study: Study, capsys: pytest.CaptureFi
     judged(study)
     assert main(["study", "roles", str(study.folder), "--holdout", "run_3"]) == 0
     assert "Identify it again:  bristle identify" in capsys.readouterr().out
+
+
+def test_a_study_that_was_opened_before_is_not_compared_by_its_old_roles(study: Study) -> None:
+    Study(study.folder).with_roles({"run_3": "holdout"})
+    with pytest.raises(StudyError, match="open the study again first"):
+        bristle.compare(study)
