@@ -104,9 +104,12 @@ def _syntax(text: str, message: str) -> Finding:
     line = int(position[1]) if position and position[1] else len(rows)
     what = _POSITION.sub("", message)
     column = f" in column {position[2]}" if position and position[2] else " at the end"
-    row = rows[min(line, len(rows)) - 1].strip()
+    row = rows[min(line, len(rows)) - 1]
     hint = next((f"; {words}" for start, words in _HINTS if what.startswith(start)), "")
-    return Finding(line, "error", f"not TOML: {what}{column} of `{row[:80]}`{hint}.")
+    at = row[int(position[2]) - 1 :][:1] if position and position[2] else ""
+    if at.isalpha() and not at.isascii() and what.startswith("Expected"):
+        hint = f'; a name with "{at}" needs quotes'
+    return Finding(line, "error", f"not TOML: {what}{column} of `{row.strip()[:80]}`{hint}.")
 
 
 def flatten(

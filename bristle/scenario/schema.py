@@ -13,12 +13,14 @@ from ..component import OVER_STEP
 from ..fmu.description import Description, Variable
 from ..physics.forms import FORMS
 from .checks import SCHEMA
+from .connections import FACTOR, FROM, OFFSET
 from .library import Library, installed
 from .parameters import choices
 from .parts import ALGORITHMS
 
 _TYPES = {"Real": "number", "Boolean": "boolean", "String": "string"}
 _TIME = {"type": "number", "exclusiveMinimum": 0}
+_PORT = r"^[^.]+\.."
 
 
 def schema_text() -> str:
@@ -52,13 +54,26 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
                 "description": '"component.input" = "component.output"',
                 "additionalProperties": {
                     "anyOf": [
-                        {"type": "string", "pattern": r"^[^.]+\.."},
+                        {"type": "string", "pattern": _PORT},
+                        _transformed(),
                         {"type": "object", "additionalProperties": {"type": ["string", "object"]}},
                     ]
                 },
             },
         },
         "definitions": definitions,
+    }
+
+
+def _transformed() -> dict[str, Any]:
+    """Return the schema of a connection that gives factor x output + offset."""
+    numbers = {name: {"type": "number"} for name in (FACTOR, OFFSET)}
+    return {
+        "type": "object",
+        "description": "input = factor x output + offset",
+        "required": [FROM],
+        "additionalProperties": False,
+        "properties": {FROM: {"type": "string", "pattern": _PORT}, **numbers},
     }
 
 

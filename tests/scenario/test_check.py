@@ -128,11 +128,13 @@ WRONG = [
     ("80.0", "-80.0"),
     ("gas_spring.k", "gas_sprng.k"),
     ('"voltage.voltage"', '["voltage.voltage"]'),
+    ('"voltage.voltage"', '{ from = "voltage.voltage", factr = 2.0 }'),
 ]
 RIGHT = [
     ("", ""),
     ('"gas_spring.on" = true, "gas_spring.k"', "gas_spring.on = true, gas_spring.k"),
     ('"structure.damper_force"', "structure.damper_force"),
+    ('"voltage.voltage"', '{ from = "voltage.voltage", factor = 2.0 }'),
     ('fmu = "Structure"', 'fmu = "Structure"\nbuilding = "house.toml"'),
     ('fmu = "Structure"', 'fmu = "../Mine.fmu"\nparameters = { anything = 1 }'),
 ]

@@ -200,6 +200,10 @@ MISTAKES = [
     # TOML itself
     ("no TOML", "step = 0.002", "step == 0.002", "step =", ["not TOML", "step == 0.002"]),
     ("decimal comma", "step = 0.002", "step = 0,002", "step =", ["not TOML", "one key = value"]),
+    ("umlaut in a table", "[components.damper]", "[components.dämpfer]", "dämpfer",
+     ['a name with "ä" needs quotes']),
+    ("umlaut in a key", '"damper.voltage" =', "dämpfer.voltage =", "dämpfer",
+     ['a name with "ä" needs quotes']),
     ("no quotes", '"gauss-seidel"', "gauss-seidel", "algorithm", ["text needs quotes"]),
     ("broken inline table", '{ "gas_spring.on" = true,', '{ "gas_spring.on" = true,\n',
      "gas_spring.on", ["stays on one line"]),
