@@ -71,6 +71,15 @@ SHARED_HOOKS = ("force", "rate", "advance")
 SHARED_SIGNALS = ("x", "v", "dt", "energy", "halt", "stiffness")
 """What a damper and a structure both call and offer: an effect of both sites uses no other."""
 
+OFFERED = {
+    "damper": (
+        "x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt", "stiffness",
+    ),
+    "structure": (*SHARED_SIGNALS, "force", "drift", "drift_rate", "storey"),
+    "sensor": ("value", "dt"),
+}  # fmt: skip
+"""The signals of each site; the others of `Q` are zero there."""
+
 _ALL_LAWS_OF_ONCE = ("bingham", "lugre")
 """Effects named the laws that they join until laws had parts; those that name all join any."""
 
@@ -393,6 +402,11 @@ def _check(effect: type[Effect]) -> None:
     unknown = [need for need in effect.needs if need not in Q._fields]
     if unknown:
         raise PhysicsError(f"{where}: needs {unknown}; q offers {list(Q._fields)}.")
+    for site in effect.sites:
+        zero = [need for need in effect.needs if need not in OFFERED[site]]
+        if zero:
+            there = list(OFFERED[site])
+            raise PhysicsError(f"{where}: needs {zero}; at the site {site} there are {there}.")
     if effect.site == "sensor" and effect.shows not in CHANNELS:
         raise PhysicsError(f"{where}: shows = {effect.shows!r} is none of {CHANNELS}.")
     if (effect.site == "sensor") != ("channel" in effect.hooks()):

@@ -11,6 +11,7 @@ from typing import Any, Callable
 from .effect import Effect, Q, Sizes
 from .parameter import CHOICES
 from .probe_call import call, refuse_jump
+from .probe_reads import refuse_reads
 from .user_text import FlawError
 
 RANGES = {
@@ -38,8 +39,8 @@ def probe(effect: type[Effect]) -> None:
     Raises
     ------
     FlawError
-        If one raises, returns what is no finite number or too few of them, jumps with a signal or
-        a parameter, or if a parameter moves nothing.
+        If one raises, returns what is no finite number or too few of them, reads a signal that is
+        not named or not there, jumps with a signal or a parameter, or if a parameter moves nothing.
     """
     defaults = {name: p.value for name, p in effect.parameters.items()}
     corners = [defaults]
@@ -54,6 +55,8 @@ def probe(effect: type[Effect]) -> None:
                 for dt in (0.0, inf):  # without time, and before the first step
                     if dt == 0.0 or effect.site != "sensor":
                         _call(effect, "advance", q._replace(dt=dt), z, values, dt < inf)
+    for q, hook in product(_signals(effect), effect.hooks()):
+        refuse_reads(effect, hook, q, _state(effect, q, defaults), effect.values_of(defaults))
     _smooth_in_signals(effect, defaults)
     _smooth_in_parameters(effect, defaults)
     for values in corners:

@@ -44,8 +44,8 @@ def probe_law(law: type[Law]) -> None:
     ------
     FlawError
         If a hook raises, returns what is no finite number or too few of them, jumps with a signal
-        or a parameter; if a parameter moves nothing; if a step gives a force that is not finite, or
-        a closed cycle gives energy.
+        or a parameter; if a parameter moves nothing, or cannot be zero though the force is said to
+        be linear in it; if a step gives a force that is not finite, or a closed cycle gives energy.
     """
     defaults = {name: p.value for name, p in law.parameters.items()}
     for values in [{**defaults, **end} for end in ends(law)]:
@@ -58,6 +58,7 @@ def probe_law(law: type[Law]) -> None:
                 _call(law, "advance", q._replace(dt=inf), z, values, finite=False)
     _smooth(law, defaults)
     _moving(law, defaults)
+    _at_zero(law, defaults)
     damper.regenerate()
     for values in ends(law):
         for amplitude, frequency, V in CYCLES:
@@ -202,6 +203,20 @@ def _moving(law: type[Law], values: dict[str, float]) -> None:
         if not any(_moves(law, name, values) for name in names):
             line = getattr(law, next(iter(law.hooks()))).__code__.co_firstlineno
             raise FlawError(f"p.{field} moves nothing: no measurement could tell it.", line)
+
+
+def _at_zero(law: type[Law], values: dict[str, float]) -> None:
+    """Refuse a parameter that may not be zero, and that no `shapes` names: a fit begins there."""
+    for name in law.linear():
+        for q, hook in product(_signals()[1:], _forces(law)):
+            try:
+                _call(law, hook, q, _state(law, q, values), {**values, name: 0.0})
+            except FlawError as flaw:
+                raise FlawError(
+                    f"{hook} is not linear in {name}, for it cannot be zero. Name what the force "
+                    f'is not linear in: shapes = {{"{name}": Shape(...)}} is right.',
+                    flaw.line,
+                ) from None
 
 
 def _moves(law: type[Law], name: str, values: dict[str, float]) -> bool:

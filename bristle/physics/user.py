@@ -446,6 +446,13 @@ def _check(made: Any, tree: ast.Module, kind: _Kind) -> None:
             right = units.canonical(unit)
             if right != unit:
                 raise FlawError(f'unit "{unit}" is spelled "{right}" here.')
+            si = units.si_unit(unit)
+            if (
+                "%" not in unit
+                and si != unit
+                and units.parse(si).factor != units.parse(unit).factor
+            ):
+                raise FlawError(f'unit "{unit}": hooks compute in SI units; "{si}" is right.')
     except (FlawError, UnitError) as error:
         raise FlawError(str(error), line) from None
 

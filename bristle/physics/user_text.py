@@ -9,11 +9,14 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
 
 from .effect import HOOKS, Q
+from .effect_check import FIELDS as OF_EFFECTS
 from .law_check import ALL_HOOKS
+from .law_check import FIELDS as OF_LAWS
 
 
 class FlawError(Exception):
@@ -46,14 +49,15 @@ class Dialect(NamedTuple):
     """What a kind of file may say.
 
     `word` is what the file defines, `base` its class; `modules` are those that it may import from,
-    each with what; `hooks` those of the kind, `signals` what their `q` offers; `needs` says whether
-    the class lists the signals that its hooks read.
+    each with what; `hooks` those of the kind, `data` its class data, `signals` what `q` of a hook
+    offers; `needs` says whether the class lists the signals that its hooks read.
     """
 
     word: str
     base: str
     modules: Mapping[str, tuple[str, ...]]
     hooks: tuple[str, ...]
+    data: tuple[str, ...]
     signals: tuple[str, ...]
     needs: bool
 
@@ -67,6 +71,7 @@ EFFECT = Dialect(
     "Effect",
     {"bristle.physics.effect": ("Effect", "Parameter", "Table", "bilinear", "interpolate")},
     HOOKS,
+    (*OF_EFFECTS, "label_span", "in_words", "tie", "yield_share"),
     Q._fields,
     needs=True,
 )
@@ -83,6 +88,7 @@ LAW = Dialect(
         "bristle.physics.falling": ("EXPONENT", "STANDARD", "falling"),
     },
     ALL_HOOKS,
+    tuple(OF_LAWS),
     ("x", "v", "a", "V", "dt", "energy"),
     needs=False,
 )
@@ -105,6 +111,7 @@ _REFUSED = {
     ast.Lambda: "a function with def and a name is right",
     ast.NamedExpr: "an assignment of its own is right",
 }
+_NEAR = 0.8  # how alike a name is that is misspelled
 _CONTAINERS = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp)
 
 
@@ -140,6 +147,7 @@ def read(tree: ast.Module, dialect: Dialect) -> None:
                 )
     for owner in tree.body:
         if isinstance(owner, ast.ClassDef):
+            _refuse_misspelled(owner, dialect)
             _read_hooks(owner, dialect)
 
 
@@ -215,6 +223,22 @@ def _read_function(function: ast.FunctionDef, ready: set[str]) -> None:
                 "z and p.",
                 line,
             )
+
+
+def _refuse_misspelled(owner: ast.ClassDef, dialect: Dialect) -> None:
+    """Refuse what is nearly the name of class data or of a hook: nothing would read it."""
+    known = (*dialect.hooks, *dialect.data)
+    for node in owner.body:
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        named = [one.id for one in targets if isinstance(one, ast.Name)]
+        named += [node.name] if isinstance(node, ast.FunctionDef) else []
+        for name in named:
+            near = get_close_matches(name, known, n=1, cutoff=_NEAR)
+            if near and name not in known:
+                raise FlawError(
+                    f'nothing reads "{name}": "{near[0]}" is right, or a name that is not alike.',
+                    node.lineno,
+                )
 
 
 def _stated_needs(owner: ast.ClassDef) -> set[str] | None:

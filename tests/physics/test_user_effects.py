@@ -112,7 +112,16 @@ BAD = [
     ({'"N"': '"Nm2"'}, "Nm2", "class Seal"),
     ({'"f_s"': '"on"', "p.f_s": "p.on"}, "cannot be named", "class Seal"),
     ({"class Seal(Effect)": "class Seal"}, "0 effects", ""),
-]
+    ({FORCE: "return p.f_s * tanh(q[0] / p.v_s)"}, 'reads q.x: add "x" to needs', "def force"),
+    ({'needs = ("v",)': 'needs = ("v", "drift")'}, "needs ['drift']; at the site", "class Seal"),
+    (
+        {'sites = ("damper",)': 'sites = ("structure",)', "def force(": "def spring("},
+        "spring reads q.v, which is 0 there; it may read dt, energy, halt", "def force",
+    ),
+    ({'amount = "f_s"': 'amout = "f_s"'}, 'nothing reads "amout": "amount"', 'amount = "f_s"'),
+    ({"def force(": "def forces("}, 'nothing reads "forces": "force"', "def force"),
+    ({'"m/s", (': '"mm/s", ('}, 'hooks compute in SI units; "m/s" is right', "class Seal"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("changes", "says", "at"), BAD, ids=[says for _, says, _ in BAD])

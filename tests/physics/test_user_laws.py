@@ -87,7 +87,12 @@ BAD = [
     ({'"c": ': '"stroke": ', "p.c ": "p.stroke "}, "cannot be named", "class Rubbing"),
     ({'Linear("f_c", "f_v")}': 'Linear("f_c", "f_w")}'}, "f_w", "class Rubbing"),
     ({"Shape(0.02, 5.0, 9,": "Shape(5.0, 0.02, 9,"}, "shapes = ", "class Rubbing"),
-]
+    (
+        {'shapes = {"v_s": Shape(0.02, 5.0, 9, ("f_c", "f_v"))}': "assumed = ()"},
+        "not linear in v_s, for it cannot be zero", YIELDING,
+    ),
+    ({"contains = ": "contain = "}, 'nothing reads "contain": "contains"', "contains = "),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("changes", "says", "at"), BAD, ids=[says for _, says, _ in BAD])
