@@ -123,9 +123,7 @@ def _further(
     return found
 
 
-def _step_for(
-    arguments: argparse.Namespace, file: Path, overrides: dict[str, bool | int | float | str]
-) -> float:
+def _step_for(arguments: argparse.Namespace, file: Path, overrides: dict[str, object]) -> float:
     """Return the step [s] that keeps the tolerance, and say it."""
     from ..errors import not_usable
     from ..scenario.scenario import load_scenario

@@ -21,12 +21,18 @@ LAW_KEYS = ("law", "command", "command_knots")
 COMPONENT_KEYS = (
     *("fmu", *LAW_KEYS, "building", "controller", "effects", "step", "over_step", "parameters"),
 )
+INSTEAD = {"law": "fmu", "fmu": "law"}
+"""Which of them takes the place of which: a component has one."""
+LISTS = ("command_knots", "effects")
+"""Those whose value is a list."""
 MADE_FROM = ("building", "controller")
 """Those of them that name a file which a component is made from."""
 FILE_PARAMETERS = ("record", "file")
 """Parameters that may name a file, relative to the scenario's folder."""
 
 _POSITION = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+_SHORT = re.compile(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+"""Numbers that TOML does not know: .5 and 5."""
 _HINTS = (
     ("Invalid value", 'text needs quotes, numbers have a decimal point: 0.5, "text", true'),
     ("Invalid initial character for a key", "an inline table { ... } stays on one line"),
@@ -156,6 +162,9 @@ def apply_overrides(
             before = {name: old for name, old, _ in flatten(table, ())}
             _drop(table, key)
             table[key] = _as_in_file(value, key)
+            other = INSTEAD.get(key, "") if len(target) == 3 else ""
+            if (*tables, other) not in document.overridden:
+                table.pop(other, None)
             document.overridden[target] = str(name)
             if key not in before or before[key] != table[key]:
                 document.changed.add(target)
@@ -209,6 +218,8 @@ def _as_in_file(value: object, key: str) -> object:
     A file is looked for in the current folder first, because there its name was typed.
     """
     value = plain(value)
+    if isinstance(value, list):
+        return [_as_in_file(one, key) for one in value]
     is_file_name = key in (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
     if is_file_name and isinstance(value, str) and Path(value).suffix:
         here = Path(value).absolute()
@@ -227,7 +238,8 @@ def exists(path: Path) -> bool:
 def parse_override(text: str) -> tuple[str, bool | int | float | str]:
     """Return (name, value) of a command-line override such as `damper.f_c=2`.
 
-    The value follows TOML: `true`, `2`, `1e-3`, `"text"`; anything else is text as it stands.
+    The value follows TOML: `true`, `2`, `1e-3`, `"text"`; `.5` is a number, too, and anything else
+    is text as it stands.
 
     Raises
     ------
@@ -240,6 +252,8 @@ def parse_override(text: str) -> tuple[str, bool | int | float | str]:
         raise ScenarioError(f'--set "{text}": NAME=VALUE is right, as in --set damper.f_c=2.')
     if "#" in value and value[:1] not in ("'", '"'):
         return name, value  # TOML would take the rest for a comment
+    if _SHORT.fullmatch(value):
+        return name, float(value)
     try:
         parsed = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
@@ -250,17 +264,28 @@ def parse_override(text: str) -> tuple[str, bool | int | float | str]:
     return name, found
 
 
-def parse_overrides(texts: list[str]) -> dict[str, bool | int | float | str]:
-    """Return the overrides of a command line by name.
+def _list(text: str) -> object:
+    """Return the list that a text is in TOML, else the text."""
+    try:
+        found = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return found["value"] if len(found) == 1 and isinstance(found["value"], list) else text
+
+
+def parse_overrides(texts: list[str]) -> dict[str, object]:
+    """Return the overrides of a command line by name; lists of what takes a list.
 
     Raises
     ------
     ScenarioError
         If one cannot be read or a name is given twice.
     """
-    overrides: dict[str, bool | int | float | str] = {}
+    overrides: dict[str, object] = {}
     for text in texts:
         name, value = parse_override(text)
+        if name.rpartition(".")[2] in LISTS and isinstance(value, str):
+            value = _list(value)
         if name in overrides:
             raise ScenarioError(f'--set: "{name}" is given twice; once is right.')
         overrides[name] = value

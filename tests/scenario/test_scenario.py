@@ -164,6 +164,16 @@ def test_an_override_can_exchange_the_damper(write):
     assert scenario.component("damper").parameters["f_c"] == 2.0
 
 
+def test_a_law_and_an_fmu_take_the_place_of_each_other(write):
+    named = load(write(VALID), {"damper.law": "lugre"})
+    assert named.component("damper").law.name == "lugre"
+    text = VALID.replace('fmu = "LuGreDamper"', 'law = "lugre"')
+    again = load(write(text), {"damper.fmu": "LuGreDamper"})
+    assert (again.component("damper").fmu, again.component("damper").law) == ("LuGreDamper", None)
+    with pytest.raises(ScenarioError, match="one of them must go"):
+        load(write(VALID), {"damper.law": "lugre", "damper.fmu": "LuGreDamper"})
+
+
 def test_a_scenario_knows_what_was_laid_over_its_file(write):
     assert load(write(VALID)).overrides == {}
     assert load(write(VALID), {"damper.gas_spring.k": np.int64(70)}).overrides == {
@@ -226,6 +236,10 @@ def test_a_wrong_override_is_named(write, overrides, words):
         ("damper.f_c = 2.5", "damper.f_c", 2.5),
         ("a.b=1e-3", "a.b", 1e-3),
         ("a.b=1_000", "a.b", 1000),
+        ("a.b=.005", "a.b", 0.005),
+        ("a.b=-5.", "a.b", -5.0),
+        ("a.b=.", "a.b", "."),
+        ("a.b=1.2.3", "a.b", "1.2.3"),
         ("a.b=true", "a.b", True),
         ("a.b=True", "a.b", "True"),
         ("a.b=lugre", "a.b", "lugre"),
@@ -263,6 +277,11 @@ def test_an_override_given_twice_is_refused():
     assert parse_overrides(["a.b=1", "a.c=2"]) == {"a.b": 1, "a.c": 2}
     with pytest.raises(ScenarioError, match=r'"a\.b" is given twice'):
         parse_overrides(["a.b=1", "a.b=2"])
+
+
+def test_what_takes_a_list_is_given_one():
+    texts = ["a.command_knots=[0, 2.5]", "a.effects=['x.py']", "a.b=[1]", "b.effects=x.py"]
+    assert list(parse_overrides(texts).values()) == [[0, 2.5], ["x.py"], "[1]", "x.py"]
 
 
 # Files
