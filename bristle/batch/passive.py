@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data import read_ground_motion
 from ..errors import ScenarioError
 from ..findings import unknown
 from ..progress import Progress
@@ -87,6 +89,8 @@ class Passive:
         motion's own best, as a ratio).
     runs : int
         How many runs it took.
+    notes : tuple of str
+        What a reader has to know: a record that the runs do not take to its end.
     """
 
     motions: tuple[Motion, ...]
@@ -98,6 +102,7 @@ class Passive:
     best: list[Optimum]
     goals: dict[str, Optimum]
     runs: int
+    notes: tuple[str, ...] = ()
 
     @property
     def what(self) -> str:
@@ -187,7 +192,8 @@ def optimise_passive(
         goals = _goals(cases, voltages, values, best, done)
     runs = sum(len(case.known) for case in cases)
     return Passive(
-        chosen, output, statistic, cases[0].unit, voltages, values, best, goals, runs
+        chosen, output, statistic, cases[0].unit, voltages, values, best, goals, runs,
+        tuple(dict.fromkeys(case.cut_off for case in cases if case.cut_off)),
     )  # fmt: skip
 
 
@@ -211,6 +217,7 @@ class _Case:
         elif "peak" in ground.parameters:
             own[f"{ground.name}.peak"] = 0.0
         self.scenario = load_scenario(file, {**overrides, **own})
+        self.cut_off = _cut_off(self.scenario, ground.name)
         columns = {
             c.name: c for c in make_columns(base, {p.name: p.description for p in base.components})
         }
@@ -265,6 +272,21 @@ def _refuse_own(overrides: Mapping[str, object], ground: str, source: str) -> No
     for name in overrides:
         if why := taken.get(plain_target(name)):
             raise ScenarioError(f'override "{name}" would have no effect: {why}.')
+
+
+def _cut_off(scenario: Scenario, ground: str) -> str:
+    """Return in a sentence that the runs end before a record does; "" where they do not."""
+    given = scenario.component(ground).parameters
+    record = str(given["record"])
+    time = read_ground_motion(record, scenario.file.parent).time
+    end = float(time[-1]) + float(given.get("start", 0.0))
+    if end <= scenario.stop + scenario.step:
+        return ""
+    name = Path(record).stem if Path(record).suffix else record
+    return (
+        f"The runs end at {scenario.stop:g} s, the record {name} at {end:g} s: what comes later "
+        f"does not count. --set run.stop={ceil(end):g} takes all of it."
+    )
 
 
 def _largest_voltage(scenario: Scenario) -> float:

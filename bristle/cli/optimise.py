@@ -136,6 +136,7 @@ def _answer(found: Passive) -> dict[str, Any]:
         "motions": motions,
         "set": {goal: vars(optimum) for goal, optimum in found.goals.items()},
         "runs": found.runs,
+        "notes": list(found.notes),
     }
 
 
@@ -151,6 +152,8 @@ def _print(found: Passive, files: dict[str, Path]) -> None:
     print("for all of them")
     for text, voltage, value in found.for_all():
         print(f"  {text}: {voltage:.2f} V ({value})")
+    for note in found.notes:
+        print(f"Note: {note}")
     print(f"{found.runs} runs")
     for path in files.values():
         print(f"  {path}")

@@ -108,6 +108,13 @@ def test_a_record_as_recorded_and_another_v_max(tmp_path: Path) -> None:
     )
     assert found.grid.tolist() == [0.0, 1.0, 2.0]
     assert found.motions[0].name == "shake"
+    assert found.notes == ()
+
+
+def test_a_record_that_goes_on_after_the_runs_is_told() -> None:
+    (note,) = published().notes  # one for four intensities
+    assert "The runs end at 20 s, the record el_centro_1940_ns at 31.18 s" in note
+    assert "--set run.stop=32" in note
 
 
 def test_the_command(
