@@ -66,13 +66,13 @@ def _setting(found: ControllerComparison) -> str:
     building, damper = setting.site.building, setting.damper
     frequencies = ", ".join(f"{plain(f, 3)}" for f in setting.site.frequencies[:4])
     more = " ..." if len(setting.site.frequencies) > 4 else ""
-    base = "isolated base" if building.isolated else "fixed base"
+    base = "an isolated base" if building.isolated else "a fixed base"
     floors = building.size - building.isolated
     place = setting.site.device.place(building.levels())
     mass = quantity(sum(building.M[i][i] for i in range(building.size)), "kg")
     law = f", law {damper.law}" if damper.law else ""
     texts = [
-        f"{building.name}: {floors} floors on an {base}, {mass}, natural frequencies {frequencies}"
+        f"{building.name}: {floors} floors on {base}, {mass}, natural frequencies {frequencies}"
         f"{more} Hz. The damper acts {place}: {damper.name}{law}, up to {damper.most:g} "
         f"{damper.drive.unit}."
     ]
