@@ -85,6 +85,8 @@ _PLAIN: dict[str, tuple[float, Exponents]] = {
     "ft": (0.3048, _LENGTH),
     "lbf": (4.4482216152605, _FORCE),
     "kip": (4448.2216152605, _FORCE),
+    "kgf": (STANDARD_GRAVITY, _FORCE),
+    "daN": (10.0, _FORCE),  # of many load cells; "da" is no prefix else
     "psi": (4.4482216152605 / 0.0254**2, _PRESSURE),
     "bar": (1e5, _PRESSURE),
 }

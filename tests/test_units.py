@@ -78,6 +78,8 @@ def test_every_spelling_comes_out_in_one(text: str, name: str) -> None:
         ("g", 9.80665, exponents(m=1, s=-2)),
         ("in", 0.0254, exponents(m=1)),
         ("lbf", 4.4482216152605, exponents(kg=1, m=1, s=-2)),
+        ("kgf", 9.80665, exponents(kg=1, m=1, s=-2)),
+        ("daN", 10.0, exponents(kg=1, m=1, s=-2)),
         ("psi", pytest.approx(6894.757, rel=1e-7), exponents(kg=1, m=-1, s=-2)),
         ("Gal", 0.01, exponents(m=1, s=-2)),
     ],

@@ -9,7 +9,7 @@ from dataclasses import replace
 from ..errors import UnitError
 from ..units import Unit
 from ..units import parse as parse_unit
-from .channels import meaning
+from .channels import meaning, quantity_of_unit
 from .columns import Column, column
 
 _PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
@@ -20,7 +20,7 @@ _NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none")
 
 
 def title(index: int, text: str) -> Column:
-    """Return a column from its title: `force [kN]`, `F (kN)`, `F_kN`, `F / kN`, `F, kN`, `F in kN`.
+    """Return a column from its title: `force [kN]`, `F (kN)`, `F_kN`, `F/kN`, `F, kN`, `F in kN`.
 
     Parameters
     ----------
@@ -39,7 +39,21 @@ def title(index: int, text: str) -> Column:
         unit = unit_or_none(parted["unit"]) if parted else None
         if parted and unit is not None:
             return replace(found, name=parted["name"], unit=unit)
+        return _by_slash(found)
     return found
+
+
+def _by_slash(column: Column) -> Column:
+    """Return a column called `F/kN`: a symbol or a word for a quantity, by a unit.
+
+    `m/s` is the unit of a speed and no name; `s/mm` is the unit of nothing.
+    """
+    name, _, spelled = column.text.partition("/")
+    whole, unit = unit_or_none(column.text), unit_or_none(spelled)
+    told = whole is not None and quantity_of_unit(whole.name) is not None
+    if unit is None or told or meaning(name, None) is None:
+        return column
+    return replace(column, name=name, unit=unit)
 
 
 def titles(names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Column, ...]:

@@ -20,6 +20,7 @@ from bristle.data.measurement import measurements_of
 from bristle.data.pieces import pieces_of, wrong_split
 from bristle.data.read import files_in, read_table
 from bristle.data.table import Table
+from bristle.data.titles import title
 from bristle.errors import RecordError
 
 N = 400
@@ -215,6 +216,26 @@ def test_decimal_commas_in_quotes_between_commas(tmp_path: Path) -> None:
     ]
     titles = "Zeit [s],Weg [mm],Kraft [kN],Strom [A]"
     same(table_of(tmp_path, "\n".join([titles, *quoted]) + "\n"))
+
+
+def test_symbols_by_their_units_are_titles(tmp_path: Path) -> None:
+    times = [f"{1e3 * one:.6f}" for one in T]
+    table = table_of(tmp_path, "t/ms;s/mm;F/kN;I/A\n" + rows("%.9f", ";", times))
+    assert [one.name for one in table.columns] == ["t", "s", "F", "I"]
+    same(table)
+    kept = {"m/s": None, "N/mm": None, "Ch1/A": None, "F/I": None, "v/mm/s": "mm/s"}
+    for text, unit in kept.items():
+        found = title(0, text)
+        assert (found.unit.name if found.unit else None) == unit, text
+
+
+def test_a_group_with_a_time_of_its_own_is_told(tmp_path: Path) -> None:
+    lines = [f"{t:.4f};{x:.9f};{t + 0.05:.4f};{f:.9f}" for t, x, f in zip(T, X, F, strict=True)]
+    table = table_of(tmp_path, "\n".join(["Zeit 1 [s];Weg [mm];Zeit 2 [s];Kraft [kN]", *lines]))
+    assert '"Zeit 2 [s]" is up to 0.05 s apart' in guess_channels(table)[0].doubt
+    lines = [f"{t:.4f};{x:.9f};{t:.4f};{f:.9f}" for t, x, f in zip(T, X, F, strict=True)]
+    table = table_of(tmp_path, "\n".join(["Zeit 1 [s];Weg [mm];Zeit 2 [s];Kraft [kN]", *lines]))
+    assert not guess_channels(table)[0].doubt
 
 
 # -- TDMS, HDF5

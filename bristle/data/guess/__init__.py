@@ -8,10 +8,11 @@ the doubt is said, for either of the two columns could be wrong.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...quantity import plain
 from ...units import parse as parse_unit
 from ..channels import ChannelSpec, device_channel, meaning, quantity_of_unit
 from ..columns import Column
@@ -19,12 +20,15 @@ from ..extra import unit_as_written
 from ..labels import TEMPERATURE
 from ..table import Table
 from .bench import bench_guesses
-from .candidates import Search, candidate_of
+from .candidates import Search, candidate_of, joined
 from .fitting import fit_signs, fit_units
 from .levels import structure_guesses
 
 _KELVIN = parse_unit("K").dimension
 _AT_DAMPER = frozenset({"damper", "oil", "fluid", "mrf", "mr", "housing"})
+
+_PLAIN_NAME = re.compile(r"[\W\d_]+")
+_SAME_TIME = 0.02  # of a step, by which times that are the same may differ
 
 FEWEST = 10
 """Rows of numbers below which no column is taken for the time."""
@@ -165,7 +169,33 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
         guess = Guess("time", column.text, unit or assumed, 1, reason, doubt)
         if best is None or score > best[0]:
             best = score, guess, float(np.median(spacing)) * parse_unit(unit or "s").factor
-    return (best[1], best[2]) if best else (None, 0.0)
+    if best is None:
+        return None, 0.0
+    doubt = joined(best[1].doubt, _other_times(table, best[1].column))
+    return replace(best[1], doubt=doubt), best[2]
+
+
+def _other_times(table: Table, chosen: str) -> str:
+    """Return that columns have a time of their own, "" where the time of all is the same.
+
+    Some loggers write a time beside every group of channels, by one name but for a number.
+    """
+    own = table.find(chosen)
+    for column in table.columns:
+        alike = _PLAIN_NAME.sub("", column.name) == _PLAIN_NAME.sub("", own.name)
+        if column.text == chosen or not alike or column.unit != own.unit:
+            continue
+        apart = table.values[column.text] - table.values[chosen]
+        step = float(np.nanmedian(np.diff(table.values[chosen])))
+        good = apart[np.isfinite(apart)]
+        most = float(np.max(np.abs(good))) if good.size else 0.0
+        if most > _SAME_TIME * abs(step):
+            unit = own.unit.name if own.unit else "s"
+            return (
+                f'"{column.text}" is up to {plain(most)} {unit} apart: channels beside it were '
+                "sampled at other times"
+            )
+    return ""
 
 
 def _assumed_unit(column: Column, spacing: float) -> tuple[str, str]:
