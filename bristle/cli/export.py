@@ -54,8 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Export; say what was written, and what was left out."""
     if arguments.web is not None:
-        if arguments.as_one or arguments.inputs:
-            raise ScenarioError("--as-one and --input are for an FMU, --web is for a page.")
+        _refuse_for_fmus(arguments)
         return _web(arguments)
     if arguments.slider:
         raise StudyError("--slider belongs to --web, which writes a page with sliders.")
@@ -88,6 +87,19 @@ def main(arguments: argparse.Namespace) -> int:
     for note in found.notes:
         print(f"{note[:1].upper()}{note[1:]}")
     return 0
+
+
+def _refuse_for_fmus(arguments: argparse.Namespace) -> None:
+    """Refuse options of FMUs beside --web, which would do nothing."""
+    given = {
+        "--as-one": arguments.as_one, "--input": arguments.inputs, "--native": arguments.native,
+        "--platform": arguments.platforms, "--sources": arguments.sources,
+        "--fmi": arguments.fmi != 2,
+    }  # fmt: skip
+    named = [option for option, is_given in given.items() if is_given]
+    if named:
+        verb = "is" if len(named) == 1 else "are"
+        raise ScenarioError(f"{' and '.join(named)} {verb} for an FMU, --web is for a page.")
 
 
 def _as_one(arguments: argparse.Namespace) -> int:
@@ -130,7 +142,7 @@ def _web(arguments: argparse.Namespace) -> int:
 
     if arguments.out is not None:
         raise ScenarioError("--out is for a study; --web DIR says where the page goes.")
-    sliders = dict(_slider(text) for text in arguments.slider)
+    sliders = _sliders(arguments.slider)
     if arguments.what in component_names():
         if sliders or arguments.overrides:
             raise ScenarioError("--slider and --set are for a scenario; a component has no page.")
@@ -153,6 +165,17 @@ def _web(arguments: argparse.Namespace) -> int:
     if files[0].suffix == ".html":
         print(f"Open {files[0]} in a browser.")
     return 0
+
+
+def _sliders(texts: list[str]) -> dict[str, tuple[float | None, float | None]]:
+    """Return sliders by name; ScenarioError where one is given twice."""
+    found: dict[str, tuple[float | None, float | None]] = {}
+    for text in texts:
+        name, ends = _slider(text)
+        if name in found:
+            raise ScenarioError(f"--slider {name} is given twice; once is right.")
+        found[name] = ends
+    return found
 
 
 def _slider(text: str) -> tuple[str, tuple[float | None, float | None]]:

@@ -138,6 +138,21 @@ def test_ends_that_are_no_numbers_are_refused(
     assert "NAME=LOW..HIGH is right" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("more", "text"),
+    [
+        (["--slider", "voltage.level", "--slider", "voltage.level=0..8"], "is given twice"),
+        (["--native", "--fmi", "3"], "--native and --fmi are for an FMU"),
+        (["--platform", "win64"], "--platform is for an FMU"),
+    ],
+)
+def test_what_would_do_nothing_is_refused(
+    more: list[str], text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", PASSIVE, "--web", str(tmp_path), *more]) == ScenarioError.exit_code
+    assert text in capsys.readouterr().err
+
+
 def test_the_page_needs_no_other_file(numbers: Numbers) -> None:
     page = body(b"\0asm", described(numbers, {"voltage.level": (0.0, 8.0)}))
     script = page.partition('<script type="module">')[2]
