@@ -124,14 +124,14 @@ def step(
 ) -> int:  # fmt: skip
     """Move all parts over a communication step, in substeps of the coupled engine.
 
-    An input is held at its newest value, or linear from that of the last step; see `rows.HELD`.
+    An input is held at its newest value, or linear from that at the begin; see `rows.HELD`. The
+    latter is that of the last step, but where a host has set a derivative with a new value.
 
     Parameters
     ----------
     clock : tuple
         Time at the begin [s], dt [s], sweep (not used).
-    before : not used: the state knows the inputs of the last step
-    now : inputs, as in `start`
+    before, now : inputs at the begin and at the end of the step, as in `start`
     c : Constants
         As `discretise` has left them for a step of dt.
     state, new_state : one and the same sequence, as in `start`, moved on in place
@@ -157,10 +157,11 @@ def step(
     slots, held, since = row(c.baked, SLOTS), row(c.baked, HELD), work[0 : len(now)]
     jumps = False
     for j in range(len(now)):
-        since[j] = run.kept[j]
+        since[j] = before[j]
         if held[j] != 0.0:
-            jumps = jumps or since[j] != now[j]
-            since[j] = s[int(slots[j])] = now[j]
+            jumps = jumps or run.kept[j] != now[j]
+            since[j] = now[j]
+        s[int(slots[j])] = since[j]
     if jumps:
         respond(run.dampers, run.structures, s)
     played, sampled = (run.sources, c.times, c.samples), (run.sampled, c.store, run.memory)

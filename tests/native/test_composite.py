@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.composite import functions
 from bristle.composite.assembly import Assembly
 from bristle.composite.export import plan_of
 from bristle.errors import BuildError, ScenarioError, StudyError
 from bristle.fmu.build import ensure
+from bristle.native.entrance import entrance_of
 from bristle.native.prepare import component_of, prepare
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.simulate.pushed import symmetric_eigenvalues
@@ -62,6 +64,44 @@ def test_inputs_are_what_is_open_and_what_is_named() -> None:
     assert "voltage.level" not in slave.parameter_names()
     driven = Assembly(PASSIVE, None, ["damper.voltage"]).inputs
     assert [one.name for one in driven if not one.optional] == ["damper.voltage"]
+
+
+def velocity_after_a_step(begin: float, end: float, monkeypatch: pytest.MonkeyPatch) -> float:
+    """Return the base's velocity behind one step of a ground acceleration, in plain Python."""
+    slave = component_of(plan_of(PASSIVE, None, ["structure.ground_acceleration"]))
+    call = entrance_of(slave.flat_functions())
+    whole = functions.opened
+
+    def opened(state: Any, baked: Any) -> Any:  # records with attributes, as compiled code has them
+        run = whole(state, baked)
+        kinds = ("sources", "dampers", "structures", "sampled")
+        return run._replace(**{kind: getattr(run, kind).view(np.recarray) for kind in kinds})
+
+    monkeypatch.setattr(functions, "opened", opened)
+    values, given = np.array(slave.flat_values()), np.array(slave.inputs_set())
+    baked, dt = np.array(slave.bake()), 0.002
+    played = [one.samples() for one in slave.assembly.parts.values() if one.played()]
+    times, samples = (
+        np.array([x for one in played for x in (len(one[k]), *one[k])]) for k in (0, 1)
+    )
+    none, counts = np.zeros(0), np.zeros(4)
+    given_rows = values, given, baked, times, samples
+    call(0, 0.0, 0.0, *given_rows, none, none, none, none, none, none, counts)
+    store, state, outputs, work = (np.zeros(int(count)) for count in counts)
+    now = np.array([slave._values[index] for index in slave._inputs])
+    before = now.copy()
+    rows = *given_rows, store, state, state, before, now, outputs, work
+    assert [call(order, 0.0, 0.0, *rows) for order in (1, 2)] == [0, 0]
+    before[0], now[0] = begin, end
+    assert [call(order, 0.0, dt, *rows) for order in (5, 3)] == [0, 0]
+    names = [slave.vars[index].name for index in slave._outputs]
+    return float(outputs[names.index("structure.base_velocity")])
+
+
+def test_an_input_goes_from_its_value_by_its_derivative(monkeypatch: pytest.MonkeyPatch) -> None:
+    # What stands at the begin is not what the last step ended with where a host sets both.
+    from_zero, from_five = (velocity_after_a_step(begin, 6.0, monkeypatch) for begin in (0.0, 5.0))
+    assert from_five / from_zero == pytest.approx(5.5 / 3.0, rel=0.05)
 
 
 def test_outputs_follow_the_inputs_that_reach_them_through_other_parts() -> None:
