@@ -75,7 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.file)
     if arguments.tolerance is not None:
-        overrides["run.step"] = _step_for(arguments, file, overrides)
+        overrides |= _steps_for(arguments, file, overrides)
     folder = Path(arguments.out or Path("results", run_name(file, overrides)))
     output = Output(folder, arguments.format, lambda line: print(line, file=sys.stderr, flush=True))
     code, trouble = 0, ""
@@ -123,8 +123,13 @@ def _further(
     return found
 
 
-def _step_for(arguments: argparse.Namespace, file: Path, overrides: dict[str, object]) -> float:
-    """Return the step [s] that keeps the tolerance, and say it."""
+def _steps_for(
+    arguments: argparse.Namespace, file: Path, overrides: dict[str, object]
+) -> dict[str, object]:
+    """Return the step that keeps the tolerance, as overrides, and say it.
+
+    Components with a step of their own step the more often, the shorter that of the run is.
+    """
     from ..errors import not_usable
     from ..scenario.scenario import load_scenario
     from ..simulate.run import run_quietly
@@ -135,9 +140,11 @@ def _step_for(arguments: argparse.Namespace, file: Path, overrides: dict[str, ob
     tolerance = _share(arguments.tolerance)
     again = partial(run_quietly, fmus=arguments.fmus)
     scenario = find_step(load_scenario(file, overrides), tolerance, again)
-    said = f"a step of {1e3 * scenario.step:.6g} ms keeps the coupling error below"
-    print(f"{said} {100 * tolerance:.3g} %", file=sys.stderr)
-    return scenario.step
+    own = {one.name: one.step for one in scenario.components if one.step is not None}
+    of_own = ", ".join(f"{1e3 * step:.6g} ms of {name}" for name, step in own.items())
+    said = f"a step of {1e3 * scenario.step:.6g} ms{f' ({of_own})' if own else ''} keeps"
+    print(f"{said} the coupling error below {100 * tolerance:.3g} %", file=sys.stderr)
+    return {"run.step": scenario.step, **{f"{name}.step": step for name, step in own.items()}}
 
 
 def _share(text: str) -> float:

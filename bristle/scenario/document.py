@@ -283,9 +283,9 @@ def parse_overrides(texts: list[str]) -> dict[str, object]:
     """
     overrides: dict[str, object] = {}
     for text in texts:
-        name, value = parse_override(text)
-        if name.rpartition(".")[2] in LISTS and isinstance(value, str):
-            value = _list(value)
+        name, found = parse_override(text)
+        may_be_list = name.rpartition(".")[2] in LISTS and isinstance(found, str)
+        value = _list(str(found)) if may_be_list else found
         if name in overrides:
             raise ScenarioError(f'--set: "{name}" is given twice; once is right.')
         overrides[name] = value

@@ -218,6 +218,19 @@ def test_a_tolerance_finds_the_largest_step_that_keeps_it(scenario_of: Maker) ->
         assert np.abs(frame["one.x"] - exact).max() / 2.0 <= 1.1 * tolerance
 
 
+def test_a_tolerance_shortens_the_own_steps_of_components_too(
+    scenario_of: Maker, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = oscillator(scenario_of, "midpoint")
+    given = ["run", str(file), "--no-figure", "--out", str(tmp_path / "out")]
+    assert main([*given, "--tolerance", "0.003%"]) == 0
+    made = load_results(tmp_path / "out").attrs["made"]
+    step = find_step(load_scenario(file), 3e-5, run_quietly).step
+    assert step < load_scenario(file).step
+    assert made["overrides"] == {"run.step": step, "two.step": step / 2}
+    assert f"({1e3 * step / 2:.6g} ms of two)" in capsys.readouterr().err
+
+
 def test_a_tolerance_that_nothing_keeps_is_refused(scenario_of: Maker) -> None:
     scenario = load_scenario(oscillator(scenario_of, "midpoint"))
     quiet = run_quietly(scenario, "fmu")
