@@ -267,13 +267,21 @@ class _Reader:
             return None
         try:
             varied = Varied(name, distribution, place_of(name, base, engine))
-            mistake = _try(varied, base) or _idle(varied, base, self._table("vary"))
+            mistake = self._repeated(name) or _try(varied, base)
+            mistake = mistake or _idle(varied, base, self._table("vary"))
         except EnsembleError as error:
             mistake = str(error)
         if mistake:
             self.error(keys, mistake)
             return None
         return varied
+
+    def _repeated(self, name: str) -> str:
+        """Return the words for a name that varies twice, by another spelling; "" if it does not."""
+        names = list(self._table("vary"))
+        before = names[: names.index(name)]
+        twin = next((one for one in before if plain_target(one) == plain_target(name)), "")
+        return f'"{name}" is "{twin}" once more; one of them must go.' if twin else ""
 
     def _distribution(self, keys: KeyPath, name: str, table: dict[str, Any]) -> Distribution | None:
         kinds = [key for key in table if key in KINDS]

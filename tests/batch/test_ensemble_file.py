@@ -168,6 +168,7 @@ def test_the_stock_ensembles_are_right() -> None:
         ("building.masses.2", "building.masses", "not a single number"),
         ("seed = 7", 'engine = "fmu"', "compiled"),
         ("voltage.level", "damper.voltage", "fed by voltage.voltage"),
+        ("voltage.level", "components.damper.parameters.sigma_a", "one of them must go"),
         ("voltage.level", "damper.gas_spring.k", "nothing while damper.gas_spring.on is false"),
         ("{ each = [0.0, 4.0] }", "{ each = [0.0, 4000000.0] }", "lies above"),
         ("{ each = [0.0, 4.0] }", '{ each = [0.0, "four"] }', "a number"),
