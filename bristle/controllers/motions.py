@@ -13,7 +13,7 @@ from ..data import list_ground_motions, read_ground_motion
 from ..errors import ScenarioError
 from ..findings import unknown, written
 from .choice import Choice, Value, choices_of, refuse_twice
-from .folder import Folder, Part
+from .folder import Folder, Part, plain_name
 
 _IN_G = re.compile(r"([-+.\deE]+)\s*g")
 _KEYS = ("peak", "factor", "start", "stop")
@@ -65,6 +65,7 @@ def motions_of(given: Sequence[str | Path], folder: Folder, step: float) -> list
         )
     found = [_motion(one, folder, step) for one in choices_of(given, "--motions")]
     refuse_twice([motion.name for motion in found], "--motions")
+    refuse_twice([plain_name(motion.name) for motion in found], "--motions")  # their folders
     return found
 
 

@@ -62,6 +62,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["--motions", "el_centro,peek=1", "--controller", "Skyhook"], 'Did you mean "peak"?'),
         (["--motions", "el_centro,peak=high", "--controller", "Skyhook"], "5.9 (m/s2) or 0.6g"),
         (["--motions", MOTION, MOTION, "--controller", "Skyhook"], "is there twice"),
+        (["--motions", f"{MOTION},label=a b", f"{MOTION},label=a_b", "--controller", "Skyhook"],
+         '"a_b" is there twice'),
         (["--motions", MOTION, "--controller", "Skyhook", "Skyhook"], "is there twice"),
         (["--motions", MOTION, "--controller", "Skyhook,label=limit"], "is there twice"),
         (["--motions", MOTION, "--controller", "Skyhook,gian=3"], "gian"),
