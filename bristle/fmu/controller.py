@@ -9,6 +9,7 @@ damper, whose force follows the voltage at once.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
@@ -18,7 +19,7 @@ from ..control.controller import Controller, read_controller
 from ..control.policy import LARGEST
 from ..errors import BristleError
 from ..physics import damper as damper_laws
-from ..physics.laws import DEFAULT, Law, law_code, laws_of
+from ..physics.laws import DEFAULT, DEFAULT_OF_DESIGN, Law, law_code, laws_of
 from .component import ComponentSlave
 from .slave import Slave
 
@@ -141,6 +142,11 @@ class LinearSlave(ControllerSlave):
             self.wrong = str(error)
         self.declare_period(self.controller.sample_period if self.controller else SAMPLE_PERIOD)
 
+    def declare(self) -> None:
+        super().declare()
+        if self.controller is not None:
+            take_damper(self, self.controller.design.get("damper", {}))
+
     def designed(self) -> Controller | None:
         if self.wrong:
             raise ValueError(self.wrong)
@@ -186,6 +192,27 @@ def declare_inverse(slave: ControllerSlave) -> None:
     slave.add_parameter("still", inverse.STILL, "m/s", text, (0.0, 10.0))
     text = "least force per volt that is divided by"
     slave.add_parameter("least_slope", inverse.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
+
+
+def take_damper(slave: LinearSlave, damper: Mapping[str, Any]) -> None:
+    """Let largest voltage and inverted law be those of a design's damper.
+
+    A design that names no damper has the default of designs, which the default inverse fits.
+    """
+    known = {law.name: law for law in invertible()}
+    name = str(damper.get("law", ""))
+    law = next((one for one in known if name == one or name.startswith(f"{one}_")), "")
+    given = damper.get("parameters", {})
+    taken: dict[str, Any] = {"v_max": damper.get("v_max")}
+    if law:
+        declared = known[law].parameters
+        own = {key: given.get(key, parameter.value) for key, parameter in declared.items()}
+        usual = all(own[key] == parameter.value for key, parameter in declared.items())
+        if name != DEFAULT_OF_DESIGN or not usual:
+            taken |= {"inverse": law, **{f"{law}.{key}": value for key, value in own.items()}}
+    for key, value in taken.items():
+        if value is not None and key in slave._index:
+            slave._values[slave._index[key]] = value if isinstance(value, str) else float(value)
 
 
 def declare_trained(slave: LinearSlave) -> None:

@@ -8,6 +8,8 @@ import pytest
 
 from bristle.control.controller import read_controller
 from bristle.controllers import compare_controllers
+from bristle.design import design
+from bristle.fmu import catalogue
 from bristle.physics.building import PAPER
 from bristle.physics.laws import LAWS
 
@@ -34,10 +36,32 @@ def test_a_small_damper_is_inverted_as_a_large_one(tmp_path: Path) -> None:
     assert found[1] == pytest.approx(found[0], rel=0.03)
 
 
+def test_a_controller_takes_largest_voltage_and_inverse_from_the_damper_of_its_design(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "mine.json"
+
+    def starts(component: str, damper: dict[str, object]) -> dict[str, object]:
+        made = design({"kind": "hinf", "damper": damper}).controller
+        made.save(file)
+        there = catalogue.describe(component, controller=file).variables
+        names = ("v_max", "inverse", "bouc_wen.f_v", "bouc_wen.rho")
+        return {name: there[name].start for name in names if name in there}
+
+    damper = {"law": "bouc_wen", "parameters": {"f_v": 2.0}, "v_max": 4.0}
+    assert starts("HinfInverse", damper) == {
+        "v_max": 4.0, "inverse": "bouc_wen", "bouc_wen.f_v": 2.0, "bouc_wen.rho": 500.0,
+    }  # fmt: skip
+    assert starts("ClippedOptimal", damper) == {"v_max": 4.0}
+    usual = starts("HinfInverse", {})
+    assert (usual["v_max"], usual["inverse"]) == (8.0, "lugre")
+
+
 def test_a_design_file_without_a_building_is_for_that_of_the_comparison(tmp_path: Path) -> None:
     tower, file = tmp_path / "tower.toml", tmp_path / "mine.toml"
     tower.write_text(
-        "schema = 1\nmasses = [4.0, 2.0, 2.0, 2.0]\nstiffnesses = [1500.0, 4000.0, 3500.0, 3000.0]\n"
+        "schema = 1\nmasses = [4.0, 2.0, 2.0, 2.0]\n"
+        "stiffnesses = [1500.0, 4000.0, 3500.0, 3000.0]\n"
         'base = "isolated"\ndamping_ratio = 0.01\n'
     )
     file.write_text('schema = 1\nkind = "hinf"\norder = 9\n')  # the library's plant has 8 states
