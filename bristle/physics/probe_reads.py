@@ -44,7 +44,7 @@ def _offered(effect: type[Effect], hook: str, site: str) -> tuple[str, ...]:
         layer = hook != "spring" and (hook not in _STATES or "spring" not in effect.hooks())
         if hook in _STATES and {"force", "spring"} <= {*effect.hooks()}:
             return OFFERED[site]  # called for the layer and for each storey
-        others = ("drift", "drift_rate", "storey") if layer else ("x", "v")
+        others: tuple[str, ...] = ("drift", "drift_rate", "storey") if layer else ("x", "v")
         others += () if hook in _STATES else ("force",)
         return tuple(name for name in OFFERED[site] if name not in others)
     if site == "damper" and hook not in (*_STATES, "reaction"):
