@@ -217,7 +217,8 @@ def osp_text(system: WrittenSystem) -> str:
 
 
 def _function(connection: WrittenConnection) -> str:
-    return f"{connection.target}_{connection.input}"
+    # A dot, which no component has in its name: d_x.in and d.x_in are two.
+    return f"{connection.target}.{connection.input}"
 
 
 def _osp_connection(connections: Element, one: WrittenConnection) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -22,6 +23,7 @@ from bristle.scenario.export_ssp import export_ssp
 from bristle.scenario.scenario import Scenario, load_scenario
 from bristle.simulate.elsewhere import expect
 from bristle.simulate.run import run_quietly
+from bristle.ssp.write import WrittenConnection, WrittenSystem, osp_text
 
 SCENARIO = """
 schema = 1
@@ -358,3 +360,10 @@ def test_the_package_runs_here_as_the_scenario_does(package: Path, rows: pd.Data
     wanted = rows.select_dtypes("float").to_numpy()
     found = again.select_dtypes("float").to_numpy()
     assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
+
+
+def test_functions_of_osp_have_names_of_their_own() -> None:
+    ends = (("d", "x_in"), ("d_x", "in"))
+    wires = tuple(WrittenConnection("a", "y", *end, 2.0, 0.0, True) for end in ends)
+    text = osp_text(WrittenSystem("t", 1.0, 0.1, "jacobi", (), wires))
+    assert len(set(re.findall(r'<LinearTransformation name="([^"]*)"', text))) == len(ends)
