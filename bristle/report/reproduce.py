@@ -30,9 +30,9 @@ def commands(study: Study) -> list[str]:
     lines = [_new(study, old, new)]
     read = {run.file for run in study.settings.runs}
     # What is left out may be what no command can read.
-    for file in dict.fromkeys(run.file for run in study.settings.excluded):
-        if file not in read:
-            lines.append(_copy(f"{old}/{file}", f"{new}/{file}"))
+    for out in dict.fromkeys(run.file for run in study.settings.excluded):
+        if out not in read:
+            lines.append(_copy(f"{old}/{out}", f"{new}/{out}"))
     lines.append(_copy(f"{old}/study.toml", f"{new}/study.toml"))
     own_laws = sorted(study.laws_folder.glob("*.py"))
     if own_laws:  # `study new` makes a folder for effects alone

@@ -91,8 +91,8 @@ def identify_study(
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
     # Before is what the study had: at its defaults another law would be nobody's model.
-    present = present if present.law != model.law else None
-    task = replace(task, laws=all_of_them, present=present)
+    before = present if present.law != model.law else None
+    task = replace(task, laws=all_of_them, present=before)
     found = identify_model(study, model, task)
     if not write:
         return found
