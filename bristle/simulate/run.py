@@ -168,10 +168,10 @@ def execute(
         if engine not in ENGINES:
             raise not_usable(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}.')
         ensure = ensure_of(fmus, engine)
-        if isinstance(scenario, Scenario) and overrides:
-            scenario, overrides = scenario.file, {**scenario.overrides, **overrides}
         if not isinstance(scenario, Scenario):
             scenario = load_scenario(scenario, overrides)
+        elif overrides:
+            scenario = load_scenario(scenario.file, {**scenario.overrides, **overrides})
         for line in scenario.remarks():
             output.show(line)
         job = _Job(scenario, engine, output, ensure)

@@ -91,8 +91,8 @@ def identify_study(
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
     # Before is what the study had: at its defaults another law would be nobody's model.
-    before = present if present.law != model.law else None
-    task = replace(task, laws=all_of_them, present=before)
+    other = present.law != model.law
+    task = replace(task, laws=all_of_them, present=present if other else None)
     found = identify_model(study, model, task)
     if not write:
         return found
