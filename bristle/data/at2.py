@@ -18,7 +18,8 @@ _SHORTEST = 1e-6  # s; times are rounded to a thousandth of it
 _LONGEST = 60.0  # s; what takes longer between two samples is no shaking
 _NUMBER = r"([-+]?[0-9]*\.?[0-9]+(?:[ED][-+]?[0-9]+)?)"
 _COUNT = re.compile(rf"NPTS\s*=?\s*{_NUMBER}", re.IGNORECASE)
-_STEP = re.compile(rf"\bDT\s*=?\s*{_NUMBER}", re.IGNORECASE)
+_STEP = re.compile(rf"\bDT\s*=?\s*{_NUMBER}(?![0-9.]*\s*/\s*[0-9])", re.IGNORECASE)
+"""Not the first number of a fraction such as 1/200."""
 _BOTH_BEFORE = re.compile(rf"^\s*{_NUMBER}\s+{_NUMBER}\s+NPTS\b.*\bDT\b", re.IGNORECASE)
 _UNITS = re.compile(r"UNITS?\s*(?:OF|[:=])\s*([A-Z/0-9^*.]+)", re.IGNORECASE)
 

@@ -24,15 +24,18 @@ FLIPS = 499
 
 
 def patterns_of(trial: Trial, held_out: Problem) -> list[ResidualPattern]:
-    """Return along which coordinates a trial's residual is organised, the most telling first."""
+    """Return along which coordinates a trial's residual is organised, the most telling first.
+
+    Samples that were not measured are left out: their residual is 0.
+    """
     normalised, raw, coordinates, begin = [], [], [], 0
     for run in held_out.runs:
-        size = len(run.force) - run.skip
-        normalised.append(trial.residual[begin : begin + size])
+        size, kept = len(run.force) - run.skip, run.judged
+        normalised.append(trial.residual[begin : begin + size][kept])
         raw.append(normalised[-1] * run.noise)
         along = coordinates_of_run(run)
         along["rest"] = late_speed_of(run)
-        coordinates.append({name: values[run.skip :] for name, values in along.items()})
+        coordinates.append({name: values[run.skip :][kept] for name, values in along.items()})
         begin += size
     return residual_patterns(normalised, raw, coordinates, flips=FLIPS)
 

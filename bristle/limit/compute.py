@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import RunError, ScenarioError
 from ..findings import unknown
 from ..progress import Count, counted, tell
-from ..scenario.scenario import Scenario, load_scenario
+from ..scenario.scenario import Scenario, loaded_with
 from ..simulate.coupled import simulate
 from ..simulate.run import run
 from .bound import FASTER, bound_of, largest_force
@@ -98,7 +98,7 @@ def limit(
     seen = _checked(statistic, previews, starts)
     if out is not None:
         refuse_folder(Path(out))
-    loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
+    loaded = loaded_with(scenario, overrides)
     case = case_of(loaded, output)
     tell("compiling the laws, once")
     whole = Problem(case)

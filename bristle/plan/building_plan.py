@@ -57,7 +57,7 @@ class BuildingPlan(Plan):
                 about += f", {test.command.words(drive.name, drive.unit)}"
             moved = quantity(float(np.max(np.abs(self.predicted[k]))), "m")
             about += f"; {place_of(self.level)} moves by {moved}"
-            out.append(PlannedRun(f"plan_{k + 1}", self.roles[k], about, one.time, channels))
+            out.append(PlannedRun(self.name(k), self.roles[k], about, one.time, channels))
         return out
 
     def sentences(self) -> list[str]:

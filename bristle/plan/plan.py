@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 MANY = 10
 """How many times as many tests as are planned are still told of."""
 
+NAMED = "plan_"
+"""How the names of tests begin; a number follows."""
+
 GAINED = 0.1
 """Share by which a plan must lower its figures on average; below that nothing is left to gain."""
 
@@ -54,6 +57,8 @@ class Plan:
         What each test is for: "train" or "holdout".
     notes : tuple of str
         What weakens the plan, in sentences.
+    first : int
+        The number in the name of the first test; the others count on.
 
     Examples
     --------
@@ -85,6 +90,7 @@ class Plan:
     gain: float
     roles: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    first: int = 1
     rig: ClassVar[str] = "bench"
 
     @property
@@ -101,8 +107,12 @@ class Plan:
             if drive is not None:
                 channels[drive.name] = signals.V
             about = test.words(signals, drive)
-            out.append(PlannedRun(f"plan_{k + 1}", self.roles[k], about, signals.time, channels))
+            out.append(PlannedRun(self.name(k), self.roles[k], about, signals.time, channels))
         return out
+
+    def name(self, k: int) -> str:
+        """Return the name of test k, counted from 0: of its run, of its file, and measured too."""
+        return f"{NAMED}{self.first + k}"
 
     def sentences(self) -> list[str]:
         """Return the plan as an engineer would say it."""

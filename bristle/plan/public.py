@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from ..study.study import Study
 from .bench import plan_study
 from .building import plan_building
 from .new_rig import plan_new
-from .plan import Plan
+from .plan import NAMED, Plan
 from .rig_file import limits_given, read_rig
 from .wish import Wish, notes_of_change
 
@@ -113,7 +114,18 @@ def plan(
     else:
         found = plan_study(opened, wish, limits=limits, seed=seed)
     opened.refuse_if_changed()
-    return replace(found, notes=(*notes_of_change(opened), *found.notes))
+    notes = (*notes_of_change(opened), *found.notes)
+    return replace(found, notes=notes, first=_first_free(opened))
+
+
+def _first_free(study: Study) -> int:
+    """Return the number of the first test: the next one where an earlier plan is measured.
+
+    Its runs, and their files, would else have the names of those that the study has.
+    """
+    files = [path.stem for path in (study.folder / "data").glob("*")]
+    taken = [re.fullmatch(f"{NAMED}([0-9]{{1,6}})", one, re.IGNORECASE) for one in files]
+    return 1 + max((int(one[1]) for one in taken if one), default=0)
 
 
 def _names(names: Names) -> tuple[str, ...] | None:

@@ -50,7 +50,8 @@ def plan_section(study: Study) -> str:
 def _performed(study: Study, plan: PlanFolder, others: bool) -> bool:
     """Return whether the runs of a plan are in a study.
 
-    Where there are `others`, names are not enough: each plan calls its runs plan_1, plan_2 ...
+    Where there are `others`, names are not enough: plans that are made before any is measured call
+    their runs alike.
     """
     there = {Path(run.file).stem for run in study.settings.runs}
     if not all(run.name in there for run in plan.runs):

@@ -38,6 +38,7 @@ __all__ = [
     "check_scenario",
     "fmu_parameters",
     "load_scenario",
+    "loaded_with",
     "parse_override",
     "parse_overrides",
     "resolve_scenario",
@@ -164,6 +165,23 @@ def load_scenario(
             raise ScenarioError(lines[0])
         raise ScenarioError("\n  ".join([f"{file}: {len(lines)} mistakes", *lines]))
     return scenario
+
+
+def loaded_with(
+    scenario: Scenario | str | Path, overrides: Mapping[str, object] | None
+) -> Scenario:
+    """Return a scenario with overrides beside those that it has, where it is loaded already.
+
+    Raises
+    ------
+    ScenarioError
+        As `load_scenario`.
+    """
+    if not isinstance(scenario, Scenario):
+        return load_scenario(scenario, overrides)
+    if not overrides:
+        return scenario
+    return load_scenario(scenario.file, {**scenario.overrides, **overrides})
 
 
 def check_scenario(

@@ -17,7 +17,7 @@ from ..findings import written
 from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
 from ..progress import Progress, listening, tell
-from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
+from ..scenario.scenario import Scenario, fmu_parameters, loaded_with
 from ..scenario.text import scenario_text
 from ..version import __version__
 from .coupling_error import as_data, estimate
@@ -168,10 +168,7 @@ def execute(
         if engine not in ENGINES:
             raise not_usable(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}.')
         ensure = ensure_of(fmus, engine)
-        if not isinstance(scenario, Scenario):
-            scenario = load_scenario(scenario, overrides)
-        elif overrides:
-            scenario = load_scenario(scenario.file, {**scenario.overrides, **overrides})
+        scenario = loaded_with(scenario, overrides)
         for line in scenario.remarks():
             output.show(line)
         job = _Job(scenario, engine, output, ensure)

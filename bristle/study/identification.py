@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 
 import numpy as np
 
@@ -81,6 +82,8 @@ def identify_study(
     """
     if starts < 1:
         raise StudyError(f"starts = {starts}; 1 or more is right.")
+    if cutoff is not None and not 0.0 <= cutoff < inf:
+        raise StudyError(f"cut-off {cutoff:g} Hz; 0 for none, or a positive number is right.")
     refuse_in_building(law, study.settings.has_building)
     all_of_them, law = law == ALL, None if law == ALL else law
     if law is not None:

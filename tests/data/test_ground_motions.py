@@ -373,6 +373,7 @@ def test_a_csv_that_must_not_be_trusted(
         (AT2.replace("NPTS=      7", "NPTS=    7.5"), "NPTS is a count"),
         (AT2.replace("DT=   .0100", "DT=   .0000"), "DT is from 1e-06 to 60 s"),
         (AT2.replace("DT=   .0100", "DT=   1E308"), "DT is from 1e-06 to 60 s"),
+        (AT2.replace("DT=   .0100", "DT=   10/1000"), "does not give both NPTS and DT"),
         (AT2.replace("DT=", "dt of"), "does not give both NPTS and DT"),
         (AT2.replace(" IN UNITS OF G", ""), "lines 1 to 4: the title lines name no unit"),
         (AT2.replace("UNITS OF G", "UNITS OF CM/SEC"), "line 3: .* no acceleration.*not VT2"),

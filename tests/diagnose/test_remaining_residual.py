@@ -11,7 +11,7 @@ from bristle.compare.patterns import LEVEL, ResidualPattern
 from bristle.diagnose import remaining_residual
 from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.finding import Finding
-from bristle.diagnose.remaining_residual import most_telling, ringing
+from bristle.diagnose.remaining_residual import most_telling, patterns_of, ringing
 from bristle.diagnose.rule import BENCH
 from bristle.identify.model import Problem, Run
 
@@ -75,6 +75,19 @@ def _rung(dt: float) -> tuple[Run, np.ndarray]:
     noise = 0.3 * np.random.default_rng(0).standard_normal(len(t))
     run = Run("r", dt, v, v, v, v, v, 1.0, np.zeros((0, len(t), 4)), skip=0)
     return run, np.sin(2.0 * np.pi * 60.0 * t) + noise
+
+
+def test_samples_that_were_not_measured_make_no_pattern_smaller():
+    t = np.arange(0.0, 16.0, 0.002)
+    x, v = np.sin(2.0 * t), 2.0 * np.cos(2.0 * t)
+    lost = np.abs(x) > 0.8
+    noise = np.random.default_rng(0).standard_normal(len(t))
+    left = np.where(lost, 0.0, 3.0 * x + noise)
+    run = Run("r", 0.002, x, v, x, v, v, 1.0, np.zeros((0, len(t), 4)), skip=0, measured=~lost)
+    found = patterns_of(SimpleNamespace(residual=left), Problem([run]))
+    along = next(one for one in found if one.coordinate == "displacement")
+    assert np.abs(along.centre).max() < 0.8
+    assert along.mean == pytest.approx(3.0 * along.centre, abs=0.3)
 
 
 def test_nothing_is_named_where_there_is_no_place(rings):

@@ -33,6 +33,7 @@ from bristle.plan.search import Planner
 from bristle.plan.seen import Goal, Seen, roles_of
 from bristle.plan.wish import Wish, default_wish, notes_of_change
 from bristle.quantity import quantity
+from bristle.study.extend import extend_study
 from bristle.study.identification import as_model
 
 SHEET = """schema = 1
@@ -311,6 +312,21 @@ def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     assert "f_v" in (folder / "plan.md").read_text()
     with pytest.raises(StudyError):
         found.write(tmp_path / "plan")
+
+
+def test_tests_after_those_that_are_measured_have_the_next_numbers(
+    rig: bristle.Study, tmp_path: Path
+) -> None:
+    folder = shutil.copytree(rig.folder, tmp_path / "rig")
+    measured = [tmp_path / f"plan_{number}.csv" for number in (1, 12)]
+    lines = rig.files("train")[0].read_text().split("\n")
+    for file, count in zip(measured, (1500, 2000), strict=True):
+        file.write_text("\n".join(lines[:count]) + "\n")
+    roles = {file.name: "train" for file in measured}
+    study = extend_study(bristle.Study(folder), measured, roles=roles).study
+    again = bristle.plan(study, sharpen=["f_v"], runs=2, duration="4 s")
+    assert [run.name for run in again.runs()] == ["plan_13", "plan_14"]
+    assert (again.write(tmp_path / "plan") / "plan_14.png").is_file()
 
 
 def test_the_same_seed_gives_the_same_plan(sheet: Path) -> None:

@@ -15,6 +15,7 @@ from bristle.scenario.scenario import (
     check_scenario,
     fmu_parameters,
     load_scenario,
+    loaded_with,
     parse_override,
     parse_overrides,
     resolve_scenario,
@@ -179,6 +180,14 @@ def test_a_scenario_knows_what_was_laid_over_its_file(write):
     assert load(write(VALID), {"damper.gas_spring.k": np.int64(70)}).overrides == {
         "damper.gas_spring.k": 70
     }
+
+
+def test_overrides_go_beside_those_of_a_loaded_scenario():
+    loaded = load_scenario("half_sine_pulse", {"run.stop": 1.0})
+    assert loaded_with(loaded, {}) is loaded
+    both = loaded_with(loaded, {"voltage.level": 2.0})
+    assert both.stop == 1.0
+    assert both.component("voltage").parameters["level"] == 2.0
 
 
 def test_an_override_can_rewire(write):

@@ -224,6 +224,8 @@ def test_wrong_choices_are_refused(tmp_path):
     study = study_of(tmp_path, [bench_frame(1)[0]])
     with pytest.raises(StudyError, match="starts"):
         identify_study(study, starts=0)
+    with pytest.raises(StudyError, match="cut-off -5 Hz"):
+        identify_study(study, cutoff=-5.0)
     with pytest.raises(StudyError, match="there are"):
         identify_study(study, law="coulomb")
 
