@@ -31,6 +31,7 @@ from .data_digest import building_in, data_digest, other_than
 from .history import History, Step
 from .joined_corrections import joined_corrections
 from .new import make_folder, parse_channel
+from .old_reports import keep_reports, make_room
 from .reading import place_of_run, read_runs
 from .role_changes import refuse_too_few, roles_by_place
 from .run_file import EXCLUDE, ROLES, TEST
@@ -40,12 +41,6 @@ from .settings_text import with_corrections, with_excluded, with_mask, with_role
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-OF_MODEL = (
-    "identify.png", "identify.json", "force_budget.png", "compare.png", "diagnose.png",
-    "report.html",
-)  # fmt: skip
-"""Reports that show a model: they are set aside when another becomes the present one."""
 
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
@@ -304,8 +299,7 @@ class Study:
             text = model_text(model, self.folder / "model.toml")
             data = data_digest(self.folder, self.settings, model.building)
             self.history.add(step, text, data)
-            self._set_aside(step.number - 1)
-            self._make_room(step.number)
+            self._move_reports(step.number - 1, step.number)
             self._seen, self._seen_data = self._state(), data
         return step
 
@@ -323,7 +317,7 @@ class Study:
             self._keep_edit()
             step = self.history.undo()
             note_undone(self, added, step.number)
-            self._set_aside(step.number)
+            keep_reports(self.reports_folder, step.number)
             self._seen, self._seen_data = self._state(), ""
         return step
 
@@ -489,33 +483,12 @@ class Study:
         edited = (self.folder / "model.toml").stat().st_mtime_ns
         self.history.keep_edit()
         number = self.history.numbers()[-1]
-        self._set_aside(number - 1, before=edited)
-        self._make_room(number)
+        self._move_reports(number - 1, number, before=edited)
 
-    def _set_aside(self, number: int, before: float = inf) -> None:
-        """Put the reports of a step's model into a folder of that step.
-
-        Parameters
-        ----------
-        number : of the step
-        before : ns, a date of files: those that are not older stay
-        """
-        for name in OF_MODEL:
-            old = self.reports_folder / name
-            if old.is_file() and old.stat().st_mtime_ns < before:
-                kept = self.reports_folder / f"step_{max(number, 0):03d}"
-                kept.mkdir(exist_ok=True)
-                old.replace(kept / name)
-
-    def _make_room(self, number: int) -> None:
-        """Put the reports of a step that was undone aside, for another step has its number now."""
-        kept = self.reports_folder / f"step_{number:03d}"
-        if kept.is_dir():
-            place = self.reports_folder / "undone" / self.history.undone(number).name
-            while place.exists():
-                place = place.with_name(f"{place.name}_")
-            place.parent.mkdir(exist_ok=True)
-            kept.replace(place)
+    def _move_reports(self, old: int, new: int, before: float = inf) -> None:
+        """Keep reports of a step's model apart, and those of an undone step with a new number."""
+        keep_reports(self.reports_folder, old, before)
+        make_room(self.reports_folder, new, self.history.undone(new).name)
 
     def plot(self) -> Figure:
         """Return the figure: the error of each model of the history, or the first run before any.
