@@ -19,6 +19,7 @@ from bristle.diagnose.verdict_text import (
     untestable,
 )
 from bristle.errors import StudyError
+from bristle.study.history import History
 from bristle.study.study import Study
 
 
@@ -135,7 +136,7 @@ def test_a_verdict_of_schema_1_is_read_in_the_words_of_schema_2(tmp_path):
     assert sentences(now) == [headline(now), OLD["words"]]
     assert current({**OLD, "kind": "effect"})["kind"] == "effect"
     study = Study.__new__(Study)
-    study.folder = tmp_path
+    study.folder, study.history = tmp_path, History(tmp_path)
     assert study.verdict() is None
     (tmp_path / "verdict.json").write_text(json.dumps(OLD))
     assert study.verdict() == now
