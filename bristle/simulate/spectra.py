@@ -45,7 +45,7 @@ def spectra(columns: Mapping[str, Array], step: float) -> dict[str, Array]:
     Raises
     ------
     RunError
-        If no output is an absolute acceleration, or the rows are too far apart.
+        If no output is an absolute acceleration, one is not finite, or the rows are too far apart.
     """
     names = accelerations(columns)
     periods = usual_periods(step)
@@ -56,6 +56,9 @@ def spectra(columns: Mapping[str, Array], step: float) -> dict[str, Array]:
         )
     if not len(periods):
         raise not_usable(f"rows {step:g} s apart are too few for a response spectrum.")
+    broken = [name for name in names if not np.isfinite(columns[name]).all()]
+    if broken:
+        raise not_usable(f"{', '.join(broken)}: not finite, so that there is no response spectrum.")
     found = {name: response_spectrum(columns[name], step, periods) for name in names}
     return {"period": periods, **found}
 

@@ -53,3 +53,9 @@ def test_a_run_that_failed_in_its_first_step_has_no_spectrum(tmp_path: Path) -> 
     frame = pd.DataFrame({"ground.ground_acceleration": [0.0]}, index=[0.0])
     with pytest.raises(RunError, match="one row alone"):
         write_spectra(frame, tmp_path / "spectrum.csv")
+
+
+def test_an_acceleration_that_is_not_finite_has_no_spectrum() -> None:
+    broken = np.where(np.arange(100) == 7, np.nan, 0.0)
+    with pytest.raises(RunError, match=r"ground\.ground_acceleration: not finite"):
+        spectra({"ground.ground_acceleration": broken}, 0.002)
