@@ -1,19 +1,21 @@
 """The figure of a run: what the structure feels, and what the dampers do about it."""
 
+# Longer than 300 lines: all that can be drawn of one frame is one class.
+
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..draw.cycles import largest
 from ..draw.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
+from .feeds import NOTHING, Feed, feeds_of
 from .summary import by_component, foreign, judged_by, reals
 
 if TYPE_CHECKING:
@@ -97,17 +99,6 @@ def _draw_histories(figure: Figure, grid: GridSpec, histories: list[Draw]) -> No
             shared.set_xlabel("time [s]", loc="right", labelpad=0)
 
 
-class _Wire(NamedTuple):
-    """What feeds an input, which gets factor source + offset; "" where nothing does."""
-
-    source: str = ""
-    factor: float = 1.0
-    offset: float = 0.0
-
-
-_NOTHING = _Wire()
-
-
 @dataclass(frozen=True)
 class _Run:
     """What can be drawn of a frame of results; `shown` are the outputs that panels have so far."""
@@ -147,7 +138,7 @@ class _Run:
         for component, floor in tops.items():
             of = f", {component}" if many else ""
             name = f"{component}.floor{floor}_acceleration_absolute"
-            ground = self.wire(f"{component}.ground_acceleration")
+            ground = self.feeds.get(f"{component}.ground_acceleration", NOTHING)
             what = f"Absolute acceleration of floor {floor}{of}"
             made.append(partial(self.history, name, what, ground=ground))
             base = f"{component}.base_displacement"
@@ -166,25 +157,23 @@ class _Run:
         names = [name for name in self.reals() if name.endswith(".voltage")]
         return [name for name in names if self._moves(name)]
 
-    def wire(self, target: str) -> _Wire:
-        """Return what feeds an input, by the connections of the scenario."""
-        text = self.made.get("scenario", "")
-        said = tomllib.loads(text).get("connections", {}).get(target, "")
-        plain = isinstance(said, str)
-        return _Wire(said) if plain else _Wire(said["from"], said["factor"], said["offset"])
+    @cached_property
+    def feeds(self) -> dict[str, Feed]:
+        """What feeds each input."""
+        return feeds_of(self.made.get("scenario", ""))
 
     def history(
-        self, name: str, title: str, *, stroke: bool = False, ground: _Wire = _NOTHING
+        self, name: str, title: str, *, stroke: bool = False, ground: Feed = NOTHING
     ) -> Draw:
         """Return what draws one output over time, its peak marked, over that of the ground."""
-        self.shown.update((name, ground.source))
+        self.shown.update((name, ground.output))
 
         def draw(axes: Axes) -> None:
             time = self.frame.index.to_numpy()
             values, unit = self._shown(name)
             axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)
-            if ground.source in self.frame:
-                axes.plot(time, self._taken(ground), color="#9a9a9a", linewidth=0.8)
+            if ground.output in self.frame:
+                axes.plot(time, self._given(ground), color="#9a9a9a", linewidth=0.8)
                 axes.set_title("grey: ground", loc="right", fontsize=8.5, color=GREY)
             axes.plot(time, values, color=BLUE, linewidth=0.9)
             axes.set_title(title + _bracketed(unit))
@@ -247,21 +236,21 @@ class _Run:
         draws = []
         for motion in _MOTIONS:
             pairs = [
-                (damper, wire)
+                (damper, feed)
                 for damper in dampers
-                if (wire := self.wire(f"{damper}.{motion}")).source in self.frame
+                if (feed := self.feeds.get(f"{damper}.{motion}", NOTHING)).output in self.frame
             ]
             if pairs:
                 self.shown.update(f"{damper}.force" for damper, _ in pairs)
-                self.shown.update(wire.source for _, wire in pairs)
+                self.shown.update(feed.output for _, feed in pairs)
                 draws.append(self._loop(motion, pairs))
         return draws
 
-    def _loop(self, motion: str, pairs: list[tuple[str, _Wire]]) -> Draw:
+    def _loop(self, motion: str, pairs: list[tuple[str, Feed]]) -> Draw:
         def draw(axes: Axes) -> None:
             zero_lines(axes)
-            for number, (damper, wire) in enumerate(pairs):
-                across, unit = self._fed(wire, damper, motion)
+            for number, (damper, feed) in enumerate(pairs):
+                across, unit = self._felt(feed, damper, motion)
                 force, force_unit = self._shown(f"{damper}.force")
                 colour, cycle = COLOURS[number % len(COLOURS)], self._largest_cycle(damper)
                 thin = PALE if cycle else colour
@@ -282,21 +271,21 @@ class _Run:
 
     def _largest_cycle(self, damper: str) -> slice | None:
         """Return the samples of a damper's largest cycle: all of an earthquake are a tangle."""
-        motion = [self.wire(f"{damper}.{name}") for name in _MOTIONS]
-        known = all(wire.source in self.frame for wire in motion)
-        return largest(*(self._taken(wire) for wire in motion)) if known else None
+        motion = [self.feeds.get(f"{damper}.{name}", NOTHING) for name in _MOTIONS]
+        known = all(feed.output in self.frame for feed in motion)
+        return largest(*(self._given(feed) for feed in motion)) if known else None
 
-    def _taken(self, wire: _Wire) -> Array:
+    def _given(self, feed: Feed) -> Array:
         """Return the values that an input gets, in its own unit."""
-        return wire.factor * self.frame[wire.source].to_numpy() + wire.offset
+        return feed.given(self.frame[feed.output].to_numpy())
 
-    def _fed(self, wire: _Wire, damper: str, motion: str) -> tuple[Array, str]:
+    def _felt(self, feed: Feed, damper: str, motion: str) -> tuple[Array, str]:
         """Return what a damper feels as it is shown, and its unit ("" where that is not known)."""
-        if wire[1:] == (1.0, 0.0):
-            return self._shown(wire.source)
+        if feed.is_plain:
+            return self._shown(feed.output)
         unit = "" if damper in foreign(self.frame) else _MOTIONS[motion]
         factor, shown = SHOWN.get(unit, (1.0, unit))
-        return self._taken(wire) * factor, shown
+        return self._given(feed) * factor, shown
 
     def _shown(self, name: str) -> tuple[Array, str]:
         """Return an output as it is shown, and its unit ("" without one)."""
