@@ -82,7 +82,7 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     folder = study.folder / "export" if out is None else out
     notes: list[str] = []
     with _writing(folder):
-        fmu = build(_damper(study, model, (measurement, runs), notes), folder)
+        fmu = build(_damper(study, model, runs, notes), folder)
 
         def damper(parameters: Parameters) -> str:
             return part_text("damper", {"fmu": fmu.name}, parameters)
@@ -114,7 +114,7 @@ def write_editable(study: Study, folder: Path) -> Editable:
     notes: list[str] = []
     own = _bare(study, model, notes)
     values = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
-    found = _range(study, model, (measurement, runs), notes)
+    found = _range(study, model, runs, notes)
     limit = drive_named(measurement.drive).limit
     values |= {VOLTAGE.limit if name == limit else name: value for name, value in found.items()}
 
@@ -180,20 +180,18 @@ def _signals(damper: StudyModel) -> Collection[str]:
     return following(damper.effects)
 
 
-def _damper(
-    study: Study, model: StudyModel, of: tuple[Measurement, Runs], notes: list[str]
-) -> Plan:
+def _damper(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> Plan:
     """Plan the damper with the model's values as its defaults."""
     own = _bare(study, model, notes)
     starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
-    starts |= _range(study, model, of, notes)
+    starts |= _range(study, model, runs, notes)
     files = own_effects()
     return plan(
         component_of_law(own.base_law),
         name=_model_name(study.name),
         starts=starts,
         effects=[files[name] for name in own.effects if EFFECTS[name].own],
-        drive=drive_named(of[0].drive).name,
+        drive=drive_named(runs.all[0].drive).name,
     )
 
 
@@ -214,34 +212,26 @@ def _with_stroke(study: Study, model: StudyModel, measurement: Measurement) -> M
     )
 
 
-def _range(
-    study: Study, model: StudyModel, of: tuple[Measurement, Runs], notes: list[str]
-) -> dict[str, float]:
+def _range(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> dict[str, float]:
     """Return the command's limit and stroke [m] that hold what was measured in all runs.
 
     Where the defaults do they are left out. The run that is played alone does not tell: another
     one, to which the model was fitted, may go further.
     """
     found = {}
-    measurement, runs = of
-    drive = drive_named(measurement.drive)
-    if not measurement.drive:
+    drive = drive_named(runs.all[0].drive)  # that of all runs
+    if not runs.all[0].drive:
         notes.append("neither voltage nor current was measured: the scenario holds 0 V.")
     tops = [float(one[drive.name].max()) for one in runs.all if one.has(drive.name)]
     if max(tops, default=0.0) > drive.largest:
         found[drive.limit] = float(ceil(1.05 * max(tops)))
-    moved = [_with_stroke(study, model, one) for one in runs.all]
-    most = max(
-        (
-            float(np.abs(one[channel]).max())
-            for one in moved
-            for channel in ("displacement", "base_displacement")
-            if one.has(channel)
-        ),
-        default=0.0,
-    )
-    if most > 0.02:
-        found["stroke"] = float(f"{1.05 * most:.3g}")
+    moved = [
+        float(np.abs(one[channel]).max())
+        for one in (_with_stroke(study, model, run) for run in runs.all)
+        for channel in ("displacement", "base_displacement") if one.has(channel)
+    ]  # fmt: skip
+    if max(moved, default=0.0) > 0.02:
+        found["stroke"] = float(f"{1.05 * max(moved):.3g}")
     return found
 
 
