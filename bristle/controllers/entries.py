@@ -125,7 +125,7 @@ class Maker:
             task = replace(task, damper=known)
         found = design(task).controller
         kept = self._save(found, file.stem)
-        self._check_place(found, file)
+        self.site.check_design(found, str(file))
         return self._designed(self._component(found.kind), name, dict(choice.settings), kept)
 
     def _of_source(self, choice: Choice, name: str) -> Entry:
@@ -248,22 +248,8 @@ class Maker:
         found = read_controller(file)
         if found.kind != kind:
             raise DesignError(f"{file}: is of the kind {found.kind}; {kind or 'none'} is right.")
-        self._check_place(found, file)
+        self.site.check_design(found, str(file))
         return self.folder.keep(file)
-
-    def _check_place(self, found: Controller, file: Path) -> None:
-        """Refuse a design for another building, or for another of its dampers."""
-        building, here = self.site.building, self.site.device
-        found.check_building(building, str(file))
-        made, n = str(found.design.get("device", "")), building.size
-        known = made in ("", *(device.name for device in building.devices))
-        if known and building.device(made).incidence(n) == here.incidence(n):
-            return
-        first = "the damper on the first level"
-        raise DesignError(
-            f"{file}: was designed for {made or first}, not for {here.name or first}; --device "
-            "says which damper controllers command."
-        )
 
     def _anew(self, kind: str) -> str:
         if kind not in self._designs:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..batch.plan import Output
-from ..errors import ScenarioError
+from ..control.controller import Controller
+from ..errors import DesignError, ScenarioError
 from ..fmu import catalogue
 from ..fmu.controller import MEASURED
 from ..physics.building import PAPER, Building, frequencies, paper_building, read_building
@@ -38,6 +39,30 @@ class Site:
     def ports(self) -> Ports:
         """The Structure's ports at the damper."""
         return self.building.ports(self.device)
+
+    def check_design(self, controller: Controller, where: str) -> None:
+        """Refuse a controller that was designed for another building, or another of its dampers.
+
+        Parameters
+        ----------
+        controller : as read from its file, or designed
+        where : what the message calls it
+
+        Raises
+        ------
+        DesignError
+            Naming both.
+        """
+        controller.check_building(self.building, where)
+        made, n = str(controller.design.get("device", "")), self.building.size
+        known = made in ("", *(device.name for device in self.building.devices))
+        if known and self.building.device(made).incidence(n) == self.device.incidence(n):
+            return
+        first = "the damper on the first level"
+        raise DesignError(
+            f"{where}: was designed for {made or first}, not for {self.device.name or first}; "
+            "--device says which damper controllers command."
+        )
 
     @property
     def top(self) -> str:
