@@ -254,23 +254,17 @@ def parse_override(text: str) -> tuple[str, bool | int | float | str]:
         return name, value  # TOML would take the rest for a comment
     if _SHORT.fullmatch(value):
         return name, float(value)
-    try:
-        parsed = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError):
-        return name, value
-    found = parsed.pop("value")
-    if parsed or not isinstance(found, bool | int | float | str):
-        return name, value
-    return name, found
+    found = _in_toml(value)
+    return name, found if isinstance(found, bool | int | float | str) else value
 
 
-def _list(text: str) -> object:
-    """Return the list that a text is in TOML, else the text."""
+def _in_toml(text: str) -> object:
+    """Return the value that a text is in TOML, else the text."""
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
         return text
-    return found["value"] if len(found) == 1 and isinstance(found["value"], list) else text
+    return found["value"] if len(found) == 1 else text
 
 
 def parse_overrides(texts: list[str]) -> dict[str, object]:
@@ -284,8 +278,10 @@ def parse_overrides(texts: list[str]) -> dict[str, object]:
     overrides: dict[str, object] = {}
     for text in texts:
         name, found = parse_override(text)
-        may_be_list = name.rpartition(".")[2] in LISTS and isinstance(found, str)
-        value = _list(str(found)) if may_be_list else found
+        value: object = found
+        if name.rpartition(".")[2] in LISTS and isinstance(found, str):
+            listed = _in_toml(found)
+            value = listed if isinstance(listed, list) else found
         if name in overrides:
             raise ScenarioError(f'--set: "{name}" is given twice; once is right.')
         overrides[name] = value
