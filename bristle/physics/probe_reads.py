@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from .effect import OFFERED, Effect, Q
@@ -40,17 +41,27 @@ def refuse_reads(effect: type[Effect], hook: str, q: Q, z: Any, p: Any) -> None:
 
 def _offered(effect: type[Effect], hook: str, site: str) -> tuple[str, ...]:
     """Return the signals that a hook gets at a site; all others are 0."""
+    zero: tuple[str, ...] = ()
     if site == "structure":
-        layer = hook != "spring" and (hook not in _STATES or "spring" not in effect.hooks())
-        if hook in _STATES and {"force", "spring"} <= {*effect.hooks()}:
-            return OFFERED[site]  # called for the layer and for each storey
-        others: tuple[str, ...] = ("drift", "drift_rate", "storey") if layer else ("x", "v")
-        others += () if hook in _STATES else ("force",)
-        return tuple(name for name in OFFERED[site] if name not in others)
-    if site == "damper" and hook not in (*_STATES, "reaction"):
-        known = effect.contact and hook == "force"
-        return OFFERED[site] if known else tuple(n for n in OFFERED[site] if n != "force")
-    return OFFERED[site]
+        zero = _zero_in_structure(hook, effect.hooks())
+    elif site == "damper" and hook not in (*_STATES, "reaction"):
+        # The law's force is known to what is computed after it alone.
+        zero = () if effect.contact and hook == "force" else ("force",)
+    return tuple(name for name in OFFERED[site] if name not in zero)
+
+
+def _zero_in_structure(hook: str, hooks: Collection[str]) -> tuple[str, ...]:
+    """Return the signals that are 0 where a structure calls a hook.
+
+    `force` is called for the isolation layer, which has x and v, and `spring` for each storey,
+    which has a drift; states move on beside either, and know its force.
+    """
+    moves_on = hook in _STATES
+    if moves_on and "force" in hooks and "spring" in hooks:
+        return ()
+    of_storey = hook == "spring" or (moves_on and "spring" in hooks)
+    zero = ("x", "v") if of_storey else ("drift", "drift_rate", "storey")
+    return zero if moves_on else (*zero, "force")
 
 
 def _reads(function: Any, q: Q, z: Any, p: Any) -> set[str]:

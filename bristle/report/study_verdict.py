@@ -48,8 +48,7 @@ def verdict_section(verdict: Verdict | None, name: str, told: Collection[str] = 
         f'<div class="kind">{html.escape(heading)}</div>',
         html.paragraphs(texts[0], kind="say"),
         html.paragraphs(*texts[1:]),
-        "</div>",
-        html.items([note for note in (verdict or {}).get("notes") or [] if note not in told]),
+        "</div>" + html.items(_notes(verdict, told)),
     ]
     if verdict and verdict.get("laws"):
         inner.append("<h3>The laws</h3>")
@@ -76,6 +75,11 @@ def verdict_section(verdict: Verdict | None, name: str, told: Collection[str] = 
         inner.append(html.table(header, cells, numbers=(1, 2), strong=strong))
     inner.append(html.paragraphs(noise_floor(verdict), kind="soft"))
     return "\n".join(part for part in inner if part)
+
+
+def _notes(verdict: Verdict | None, told: Collection[str]) -> list[str]:
+    """Return the notes of a verdict that are not told elsewhere."""
+    return [note for note in (verdict or {}).get("notes") or [] if note not in told]
 
 
 def _undiagnosed(name: str) -> list[str]:
