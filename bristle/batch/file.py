@@ -277,11 +277,15 @@ class _Reader:
         return varied
 
     def _repeated(self, name: str) -> str:
-        """Return the words for a name that varies twice, by another spelling; "" if it does not."""
+        """Return the words for a name that varies twice or is set as well; "" if it is neither."""
         names = list(self._table("vary"))
         before = names[: names.index(name)]
         twin = next((one for one in before if plain_target(one) == plain_target(name)), "")
-        return f'"{name}" is "{twin}" once more; one of them must go.' if twin else ""
+        if twin:
+            return f'"{name}" is "{twin}" once more; one of them must go.'
+        if plain_target(name) in map(plain_target, self._table("set")):
+            return f'"{name}" is in [set] as well, where it would do nothing; one must go.'
+        return ""
 
     def _distribution(self, keys: KeyPath, name: str, table: dict[str, Any]) -> Distribution | None:
         kinds = [key for key in table if key in KINDS]

@@ -142,6 +142,7 @@ def test_the_stock_ensembles_are_right() -> None:
         ('scenario = "half_sine_pulse"', "", "names the base"),
         ("half_sine_pulse", "half_sine_plus", 'mean "half_sine_pulse"'),
         ('"run.stop" = 0.5', '"run.stop" = "x"', "run.stop"),
+        ("[vary]", '"components.damper.parameters.sigma_a" = 600.0\n[vary]', "in [set] as well"),
         ("[vary]", "[verify]", 'mean "vary"'),
         ("damper.sigma_a", "damper.sigma_x", 'no parameter "sigma_x"'),
         ("damper.sigma_a", "dampr.sigma_a", 'no component "dampr"'),
