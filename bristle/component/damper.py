@@ -90,6 +90,15 @@ def present_force(
     return force_at(c.setup, now, state, work)
 
 
+def is_measured(inputs: Row, c: Constants) -> bool:
+    """Return whether the acceleration among inputs is one that was measured.
+
+    Many hosts write 0 to an input that nothing is connected to. Of an acceleration that is 0 the
+    differences of the velocity tell as much.
+    """
+    return c.measured and inputs[ACCELERATION] != 0.0
+
+
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
     """Begin without energy and without a step behind.
 
@@ -110,7 +119,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     """
     state[ENERGY] = state[ENERGY_SHOWN] = state[ENERGY_AT_BEGIN] = 0.0
     state[LAST_STEP] = inf
-    state[ACCELERATION_AT_END] = inputs[ACCELERATION] if c.measured else 0.0
+    state[ACCELERATION_AT_END] = inputs[ACCELERATION] if is_measured(inputs, c) else 0.0
     code = output(time, inputs, c, state, outputs, work)
     remember(inputs, c, state, outputs)
     return code
@@ -129,7 +138,7 @@ def remember(inputs: Row, c: Constants, state: Row, outputs: Row) -> None:
     state[DISPLACEMENT_AT_END] = inputs[DISPLACEMENT]
     state[VELOCITY_AT_END], state[FORCE_AT_END] = inputs[VELOCITY], outputs[FORCE]
     state[VOLTAGE_AT_END] = limited(inputs[VOLTAGE], 0.0, c.v_max)
-    if c.measured:
+    if is_measured(inputs, c):
         state[ACCELERATION_AT_END] = inputs[ACCELERATION]
 
 
@@ -163,7 +172,7 @@ def step(
     V1 = limited(now[VOLTAGE], 0.0, c.v_max)
     V0 = limited(before[VOLTAGE], 0.0, c.v_max) if c.linear else V1
     a0 = state[ACCELERATION_AT_END]
-    a1 = now[ACCELERATION] if c.measured else (v1 - v0) / dt
+    a1 = now[ACCELERATION] if is_measured(now, c) else (v1 - v0) / dt
     force0, energy = state[FORCE_AT_END], state[ENERGY_SHOWN]
     if state[VOLTAGE_AT_END] != V0:
         shown = state[DISPLACEMENT_AT_END], state[VELOCITY_AT_END], a0
@@ -213,7 +222,7 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
         0 or `SATURATED`.
     """
     V = limited(inputs[VOLTAGE], 0.0, c.v_max)
-    a = inputs[ACCELERATION] if c.measured else state[ACCELERATION_AT_END]
+    a = inputs[ACCELERATION] if is_measured(inputs, c) else state[ACCELERATION_AT_END]
     x, v, holding = inputs[DISPLACEMENT], inputs[VELOCITY], inputs[HOLDING_FORCE]
     dt, V_end = state[LAST_STEP], state[VOLTAGE_AT_END]
     force, friction = present_force((x, v, a), V, holding, c, state, work)

@@ -110,7 +110,7 @@ class DamperSlave(ComponentSlave):
         ]
 
     def _bind(self) -> None:
-        """Take the acceleration for measured from the moment on at which a host sets it."""
+        """Take the acceleration into account from the moment on at which a host sets it."""
         damper.bind(self.inputs_set(), self._store)
         self.constants = damper.constants(self._store)
 

@@ -503,6 +503,30 @@ def test_an_input_that_the_build_sets_is_measured_as_one_that_a_host_sets() -> N
     assert force({"acceleration": 3.0}, {}) == pytest.approx(force({}, {}) + 2.0 * 3.0)
 
 
+def test_an_acceleration_that_a_host_keeps_at_0_is_one_that_was_not_measured() -> None:
+    starts = {"fluid_inertia.on": True, "fluid_inertia.m_f": 2.0}
+    kind = catalogue.component_class(catalogue.source("LuGreDamper"))
+
+    def forces(accelerations: list[float | None]) -> list[float]:
+        slave = kind(baked={"name": "One", "starts": starts}, instance_name="one")
+        slave.setup_experiment(0.0)
+        slave.enter_initialization_mode()
+        slave.exit_initialization_mode()
+        found = []
+        for k, a in enumerate(accelerations):
+            slave.set_real([slave._index["velocity"]], [5e-5 * k * k])
+            if a is not None:
+                slave.set_real([slave._index["acceleration"]], [a])
+            assert slave.do_step(1e-3 * k, 1e-3)
+            found.append(float(slave["force"]))
+        return found
+
+    unconnected = forces([None] * 5)
+    assert forces([0.0] * 5) == unconnected
+    assert forces([0.0] * 4 + [0.9])[:4] == unconnected[:4]  # from the first value on it is taken
+    assert forces([0.0] * 4 + [0.9])[4] != unconnected[4]
+
+
 # -- what is refused
 
 
