@@ -152,7 +152,7 @@ def late(run, steps: float):
     return replace(run, force=np.interp(at - steps, at, run.force))
 
 
-@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("named", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_logger_that_began_apart_is_told_beside_a_missing_effect(named):
     """The late run alone leaves more than noise, and is no other form of the spring."""
     found, opened = sprung_finding(1, 1.0)

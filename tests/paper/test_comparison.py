@@ -345,6 +345,7 @@ def test_what_is_printed_holds_tables_and_verdicts(
     assert max(map(len, said.splitlines())) < 400
 
 
+@pytest.mark.slow
 def test_without_northridge_the_rest_is_done_and_the_gap_is_said(
     report: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

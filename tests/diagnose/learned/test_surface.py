@@ -113,7 +113,8 @@ def test_a_channel_besides_is_the_second_signal():
 @pytest.mark.parametrize(
     ("part", "second"),
     [
-        ("force", "voltage"), ("friction", "speed"), ("viscous", "slowing"),
+        ("force", "voltage"), ("friction", "speed"),
+        pytest.param("viscous", "slowing", marks=pytest.mark.slow),
         pytest.param("fluid", "acceleration", marks=pytest.mark.slow),
         *(pytest.param(part, "travel", marks=pytest.mark.slow) for part in PARTS_OF_SURFACE),
     ],
