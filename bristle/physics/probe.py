@@ -10,6 +10,7 @@ from typing import Any, Callable
 
 from .effect import Effect, Q, Sizes
 from .parameter import CHOICES
+from .probe_amount import refuse_amount
 from .probe_call import call, refuse_jump
 from .probe_reads import refuse_reads
 from .user_text import FlawError
@@ -40,7 +41,8 @@ def probe(effect: type[Effect]) -> None:
     ------
     FlawError
         If one raises, returns what is no finite number or too few of them, reads a signal that is
-        not named or not there, jumps with a signal or a parameter, or if a parameter moves nothing.
+        not named or not there, jumps with a signal or a parameter, if a parameter moves nothing, or
+        if the effect does not vanish with its `amount`.
     """
     defaults = {name: p.value for name, p in effect.parameters.items()}
     corners = [defaults]
@@ -59,8 +61,17 @@ def probe(effect: type[Effect]) -> None:
         refuse_reads(effect, hook, q, _state(effect, q, defaults), effect.values_of(defaults))
     _smooth_in_signals(effect, defaults)
     _smooth_in_parameters(effect, defaults)
+    refuse_amount(effect, _signals(effect)[1:], partial(_at_amount, effect, defaults))
     for values in corners:
         _start(effect, values)
+
+
+def _at_amount(
+    effect: type[Effect], defaults: dict[str, float], hook: str, q: Q, amount: float
+) -> tuple[float, ...]:
+    """Return what a hook gives where the parameter that `amount` names has a value."""
+    values = {**defaults, effect.amount.removeprefix("1/"): amount}
+    return _call(effect, hook, q, _state(effect, q, values), values)
 
 
 def _start(effect: type[Effect], values: dict[str, float]) -> None:

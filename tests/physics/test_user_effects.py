@@ -119,6 +119,7 @@ BAD = [
         "spring reads q.v, which is 0 there; it may read dt, energy, halt", "def force",
     ),
     ({'amount = "f_s"': 'amout = "f_s"'}, 'nothing reads "amout": "amount"', 'amount = "f_s"'),
+    ({'amount = "f_s"': 'amount = "v_s"'}, "no smaller at v_s = 1e-05 than", ""),
     ({"def force(": "def forces("}, 'nothing reads "forces": "force"', "def force"),
     ({'"m/s", (': '"mm/s", ('}, 'hooks compute in SI units; "m/s" is right', "class Seal"),
 ]  # fmt: skip
