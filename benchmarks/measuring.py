@@ -56,6 +56,7 @@ def _seven(folder: Path) -> list[Row]:
     second = _cost(["diagnose", study], {**cold, "BRISTLE_CACHE": str(folder / "colder")})
     identify, given = _cost(["identify", study], cold), _warm(["diagnose", study], cold)
     free = _warm(["diagnose", study, "--law", "all"], cold)
+    limits, rest = _limits(study, cold)
     what = "7 runs of 12 s at 500 Hz"
     return [
         _row(f"identify, {what}, cold", first, 5.0),
@@ -63,7 +64,23 @@ def _seven(folder: Path) -> list[Row]:
         _row(f"diagnose, {what}, law given, cold", second, 30.0),
         _row(f"diagnose, {what}, law given, warm", given, 15.0),
         _row(f"diagnose, {what}, law free, warm", free, 3.0 * given.seconds),
+        Row(
+            "limits with a verdict, of the rest",
+            f"{limits / rest:.1%}",
+            "<= 10 %",
+            10.0 * limits / rest,
+        ),
     ]
+
+
+def _limits(study: str, environment: dict[str, str]) -> tuple[float, float]:
+    """Return the seconds that the limits of a diagnosis take, and those of all the rest of it."""
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks._limits_time", study],
+        env=environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    limits, rest = map(float, done.stdout.split()[-2:])
+    return limits, rest
 
 
 def _thirty(folder: Path) -> list[Row]:
