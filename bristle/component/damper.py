@@ -91,10 +91,15 @@ def present_force(
 
 
 def is_measured(inputs: Row, c: Constants) -> bool:
-    """Return whether the acceleration among inputs is one that was measured.
+    """Return whether the acceleration among inputs was measured.
 
-    Many hosts write 0 to an input that nothing is connected to. Of an acceleration that is 0 the
-    differences of the velocity tell as much.
+    Many hosts write 0 to an input that nothing is connected to. Where the acceleration really is 0,
+    differences of the velocity show that as well.
+
+    Parameters
+    ----------
+    inputs : (5,) as in `start`
+    c : Constants
     """
     return c.measured and inputs[ACCELERATION] != 0.0
 

@@ -1,4 +1,4 @@
-"""Whether the parameter that `amount` names is one with which an effect vanishes."""
+"""Checks that an effect vanishes with the parameter that its `amount` names."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from .effect import Effect, Q
 from .user_text import FlawError
 
 _ONES = ("yield_factor", "viscous_factor", "reach", "factor")
+"""Hooks that return a factor: 1 where there is no effect."""
 
 
 def refuse_amount(
     effect: type[Effect], signals: list[Q], value: Callable[[str, Q, float], tuple[float, ...]]
 ) -> None:
-    """Refuse an `amount` towards whose end the effect does not become smaller.
+    """Refuse an `amount` with which the effect does not become smaller.
 
-    Effects of a joint are left out: their motion comes from an equation, not from a hook alone.
+    Effects with a `joint` are not checked: the integrator solves for their motion, so that hooks
+    alone do not show it.
 
     Parameters
     ----------
