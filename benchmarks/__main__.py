@@ -4,7 +4,8 @@ A benchmark is a module of this folder with `run() -> list[Row]`; names choose a
 named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
 table here shows what its last run found. So have `compatibility`, `exits`, `instruments`, `lab`,
 `law_free`, `learned`, `limits`, `native`, `plan`, `prediction` and `calibrate`, whose own table
-shows what each value of the rule trades.
+shows what each value of the rule trades. `paper` and `train` are commands of their own: they
+repeat the paper that bristle follows, and train the stock policy.
 """
 
 from __future__ import annotations
@@ -32,6 +33,14 @@ def main() -> int:
         from .blind import main as blind
 
         return blind(sys.argv[2:])
+    if sys.argv[1:2] == ["paper"]:
+        from .paper.command import main as paper
+
+        return paper(sys.argv[2:])
+    if sys.argv[1:2] == ["train"]:
+        from .training.train import main as train
+
+        return train(sys.argv[2:])
     if sys.argv[1:2] == ["characterise"] and len(sys.argv) > 2:
         from .characterise import main as characterise
 
@@ -48,7 +57,8 @@ def main() -> int:
     if sys.argv[1:2] and sys.argv[1] in COUNTED and len(sys.argv) > 2:
         asked: int = importlib.import_module(f"benchmarks.{sys.argv[1]}").main(sys.argv[2:])
         return asked
-    names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
+    found = pkgutil.iter_modules(folder)
+    names = [m.name for m in found if not (m.ispkg or m.name.startswith("_"))]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
     parser.add_argument("--json", action="store_true", help="print the rows as JSON")

@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.control.controller import read_controller
-from bristle.design import Damper, Task, Training
-from bristle.design.policy.closed_loop import Motion, Policy
-from bristle.design.policy.runs import Loop, Run, disturbed, plant_of, setup_of
+from bristle.design import Damper
 from bristle.errors import RecordError
 from bristle.fmu.catalogue import instantiate
 from bristle.physics.damper import start_states
@@ -28,6 +26,9 @@ from bristle.simulate.coupled import simulate
 from ._motions import DATA, NEWHALL, REPORTED, G, recorded
 from ._rows import Row
 from ._semi_active import PARTS
+from .training.closed_loop import Motion, Policy
+from .training.runs import Loop, Run, disturbed, plant_of, setup_of
+from .training.training import PolicyTask, Training
 
 Array = NDArray[np.float64]
 
@@ -120,7 +121,7 @@ def closed_loop(ground: Array) -> tuple[float, float]:
     """
     c = read_controller(POLICY)
     hidden = int(c.design["motions"]["hidden"])
-    task = Task("policy", damper=Damper("lugre"), motions=Training(synthetic=1, hidden=hidden))
+    task = PolicyTask(damper=Damper("lugre"), motions=Training(synthetic=1, hidden=hidden))
     samples = ground[::PARTS].copy()
     A, B, W, scales = (np.array(each) for each in (c.A, c.B, c.W, c.C))
     policy = Policy(False, 0.0, c.n, hidden, A, B, W, scales)

@@ -21,8 +21,8 @@ FIGURES = ROOT / "docs" / "figures"
 def figures() -> None:
     """Draw the figures of README and pages into docs/figures."""
     import bristle
-    from bristle.paper.comparison.make import make as comparison
-    from bristle.paper.figures import make, paper_figures
+    from benchmarks.paper.comparison.make import make as comparison
+    from benchmarks.paper.figures import make, paper_figures
     from bristle.simulate.picture import run_figure
 
     with tempfile.TemporaryDirectory() as name:

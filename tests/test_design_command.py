@@ -26,9 +26,6 @@ IMPROPER = "[weights]\ncommand = { numerator = [1, 2, 3], denominator = [1, 4] }
 ROLLING_OFF = "[weights]\ncommand = { gain = 2.0, corner = 50.0 }"
 UNSTABLE_WEIGHT = "[weights]\nacceleration = { gain = 1.5, corner = -12.0 }"
 CANCELLING = "[weights]\nacceleration = { numerator = [1, 5], denominator = [1, 5] }"
-MOTIONS = "[motions]\nsynthetic = 8\n"
-SEEN = '[motions]\nrecords = ["el_centro_1940_ns"]\nreported = ["el_centro_1940_ns"]\n'
-BRAKES = MOTIONS + '[damper]\nlaw = "lugre"\nparameters = { sigma_0 = 0.0, sigma_b = 0.0 }\n'
 BUILDINGS = {
     "undamped": "masses = [2, 1]\nstiffnesses = [1e3, 1e3]\ndamping_ratio = 0.0\n",
     "apart": "M = [[2.0, 0], [0, 1]]\nC = [[5.0, 0], [0, 1]]\nK = [[2e3, 0], [0, 1e3]]\n",
@@ -131,18 +128,7 @@ def test_what_a_task_weighs_is_known_before_its_design() -> None:
         (["lpv", "bad.toml"], 'kind = "lpv"\n[damper]\nv_max = -1.0', "nothing to control"),
         (["lpv", "bad.toml"], 'kind = "lpv"\n[damper]\nv_max = nan', "finite number"),
         (["lqg", "bad.toml"], 'kind = "lqg"\nsample_period = -0.002', "must be positive"),
-        (["policy", "bad.toml"], 'kind = "policy"', "trained on motions, and there are none"),
-        (["policy", "bad.toml"], 'kind = "policy"\n[motions]', "none to train on"),
-        (["policy", "bad.toml"], 'kind = "policy"\n[motions]\nsynthetic = 2.5', "whole number"),
-        (["policy", "bad.toml"], 'kind = "policy"\n[motions]\nrecords = 3', "list of names"),
-        (["policy", "bad.toml"], f'kind = "policy"\n{SEEN}', "el_centro_1940_ns is trained on and"),
-        (["policy", "bad.toml"], f'kind = "policy"\n{MOTIONS}[damper]\nv_max = 0.0', "to control"),
-        (["policy", "bad.toml"], f'kind = "policy"\n{BRAKES}', "does not follow the voltage"),
-        (
-            ["policy", "bad.toml"],
-            f'kind = "policy"\nsample_period = 0.1\n{MOTIONS}',
-            "too long for",
-        ),
+        (["hinf", "bad.toml"], 'kind = "policy"', "there are hinf, lpv, lqg"),
         (["hinf", "my_hinf.toml", "--out", "my_hinf.toml"], None, "named FILE.json"),
         (["hinf", "my_hinf.toml", "--out", "gone/my.json"], None, "cannot be written"),
     ],

@@ -14,12 +14,12 @@ from types import ModuleType
 import pytest
 
 import bristle
+from benchmarks.paper.figures import paper_figures
 from bristle.cli import build_parser
 from bristle.cli.effects import tell
 from bristle.data.equation import formulas
 from bristle.draw.mathml import formula_html
 from bristle.fmu import catalogue
-from bristle.paper.figures import paper_figures
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
 
@@ -223,7 +223,7 @@ def test_every_command_is_documented() -> None:
 def test_every_figure_is_in_the_gallery() -> None:
     text = (DOCS / "figures.md").read_text(encoding="utf-8")
     for name in paper_figures():
-        assert f"bristle figures {name}" in text
+        assert f"python -m benchmarks paper figures {name}" in text
         assert f"(figures/{name}.png)" in text
         assert (DOCS / "figures" / f"{name}.png").is_file()
 

@@ -37,7 +37,7 @@ SIMULATE = (
 )
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = (
-    {"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"page"}, {"cli"},
+    {"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"page"}, {"cli"},
 )  # fmt: skip
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))
 PLAIN = ("physics", "control", "component", "units", "errors")

@@ -27,7 +27,6 @@ KEPT = {
     "export": _COMPILED.replace("FMU", "file"),
     "export-ssp": "A package that is there is whole; its coupling error is not yet known. The same "
     "command begins anew, and finds FMUs that were built.",
-    "figures": "Figures that were named are whole; the others follow by  bristle figures NAME .",
     "identify": _AS_IT_WAS,
     "laws check": _ANEW,
     "learn": _AS_IT_WAS,

@@ -1,137 +1,224 @@
-"""Compare controllers: those of the paper, or your own on your building and ground motions.
+"""Compare controllers on your building, damper and ground motions.
 
-Without options the command runs the paper's comparison: Tables IV and V, figures, a list of its
-claims. With --motions and --controller it compares any controllers and constant voltages on any
-building and damper: tables, a report, and a scenario of each case.
+The command writes tables, a report, and a scenario of each case.
 """
 
 from __future__ import annotations
 
 import argparse
-import textwrap
-from itertools import zip_longest
+import json
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import _controllers
+from ._consent import add_trust
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from ..controllers.result import ControllerComparison
 
-    from ..paper.comparison.make import Report
+HELP = "compare controllers on your building, damper and ground motions"
 
-HELP = "compare controllers: those of the paper, or any on your building and ground motions"
-
-_WIDTH = 14
-"""Of a column of numbers."""
+OPTIONS = (
+    "building", "motions", "controller", "damper", "device", "output", "statistic", "grid",
+    "limit", "ensemble", "spread", "noise", "delay", "step", "engine", "fmus", "workers",
+)  # fmt: skip
+"""What makes the comparison again."""
+ANSWER = "answer.json"
+"""What --json prints, beside the report: the page shows it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle controllers`."""
     parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of report, tables and figures; older ones are replaced; else "
-        "results/controllers/, or results/comparison/BUILDING/ for your own",
+        "--motions", nargs="+", metavar="RECORD",
+        help="ground motions: names or files, with values, e.g. "
+        "el_centro_1940_ns,peak=0.4g,factor=0.5",
+    )  # fmt: skip
+    parser.add_argument(
+        "--controller", nargs="+", action="extend", metavar="WHAT",
+        help="stock names, controller files (.json) or design files (.toml) of `bristle design`, "
+        "your own components (.py), FMUs, with values, e.g. Skyhook,gain=80,label=mine",
+    )  # fmt: skip
+    parser.add_argument(
+        "--building", metavar="FILE", help="building file; else the library's building"
     )
     parser.add_argument(
-        "--newhall",
-        type=Path,
-        metavar="FILE.AT2",
-        help="record of Newhall Fire Station 360 deg, Northridge 1994; no package contains it",
+        "--damper", metavar="WHAT",
+        help="a component, a law, the folder of a study or a model.toml, an FMU, with values; "
+        "else LuGreDamper",
+    )  # fmt: skip
+    text = "device of the building that the controllers command; else the damper on the first level"
+    parser.add_argument("--device", metavar="NAME", help=text)
+    text = "judged output; else the top level's absolute acceleration"
+    parser.add_argument("--output", metavar="NAME", help=text)
+    parser.add_argument("--statistic", choices=("peak", "rms"), help="its statistic; else peak")
+    text = "number of constant voltages to try; else 17"
+    parser.add_argument("--grid", type=int, metavar="N", help=text)
+    parser.add_argument(
+        "--limit", action="store_const", const=True,
+        help="compute the limit of any voltage under each motion: up to a minute each",
+    )  # fmt: skip
+    parser.add_argument(
+        "--ensemble", type=int, metavar="N",
+        help="run each case with N varied buildings, dampers and sensors, to find the worst case",
+    )  # fmt: skip
+    text = "variation of masses, stiffnesses and damper parameters to either side; else 10%%"
+    parser.add_argument("--spread", metavar="SHARE", help=text)
+    text = "noise of the sensors, a share of each signal's RMS; else 1%%"
+    parser.add_argument("--noise", metavar="SHARE", help=text)
+    text = "longest delay of the sensors [s]; else 0.004"
+    parser.add_argument("--delay", type=float, metavar="S", help=text)
+    text = "interval of the rows and step of FMUs [s]; else 0.002, or a share of a sample period"
+    parser.add_argument("--step", type=float, metavar="S", help=text)
+    text = "solve built-in components together (compiled), or step all as FMUs (fmu)"
+    parser.add_argument("--engine", choices=("compiled", "fmu"), help=text)
+    parser.add_argument("--fmus", choices=("python", "native"), help="kind of FMUs")
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="number of processes; else one per core"
     )
-    _controllers.add_arguments(parser)
+    parser.add_argument("--no-figure", action="store_true", help="write only tables, no report")
+    parser.add_argument(
+        "--out", type=Path, metavar="FOLDER",
+        help="folder of report, tables and scenarios; older ones are replaced; else "
+        "results/comparison/BUILDING/",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_trust(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Design, run, judge, draw and write; print tables and verdicts."""
-    if _controllers.asked(arguments):
-        return _controllers.main(arguments)
-    from ..interrupt import keeps
-    from ..paper.comparison.make import make
+    """Compare, write scenarios, tables and report; print tables and verdict."""
+    from ..controllers import compare_controllers
+    from ..controllers.folder import plain_name
+    from ..data.files import write_whole
 
-    keeps("No report was written. The same command begins anew.")
-    folder = arguments.out or Path("results", "controllers")
-    report = make(folder, arguments.newhall, progress=True)
+    name = Path(arguments.building).stem if arguments.building else "building"
+    folder: Path = arguments.out or Path("results", "comparison", plain_name(name))
+    given = {
+        key: value
+        for key in ("building", "damper", "device", "output", "statistic", "grid", "step",
+                    "engine", "fmus", "workers")
+        if (value := getattr(arguments, key)) is not None
+    }  # fmt: skip
+    found = compare_controllers(
+        arguments.motions or [], arguments.controller or [], **given,
+        limit=bool(arguments.limit), spread=_spread(arguments), out=folder,
+    )  # fmt: skip
+    files = found.write(folder)
+    if not arguments.no_figure:
+        from ..progress import tell
+        from ..report.controllers_page import controllers_report
+
+        tell("drawing")
+        files.insert(0, folder / "report.html")
+        write_whole(files[0], controllers_report(found))
+    answer = {"command": _said(arguments), **_answer(found, files)}
+    write_whole(folder / ANSWER, json.dumps(answer, indent=1, allow_nan=False))
     if arguments.json:
-        import json
-
-        print(json.dumps(_answer(report), indent=2, allow_nan=False))
+        print(json.dumps(answer, indent=2, allow_nan=False))
     else:
-        _print(report)
+        _print(found, folder, files)
     return 0
 
 
-def _answer(report: Report) -> dict[str, Any]:
+def _said(arguments: argparse.Namespace) -> str:
+    """Return the command that makes the same comparison."""
+    from ..findings import command
+
+    words: list[object] = []
+    for name in (*OPTIONS, "out"):
+        value = getattr(arguments, name)
+        if value is True:
+            words.append(f"--{name}")
+        elif value is not None:
+            words += [f"--{name}", *(value if isinstance(value, list) else [value])]
+    return command("controllers", *words)
+
+
+def _spread(arguments: argparse.Namespace) -> Any:
+    """Return how far reality may lie from the case, None where nobody asks."""
+    from ..controllers import Spread
+
+    given = {
+        "share": _share("--spread", arguments.spread), "noise": _share("--noise", arguments.noise),
+        "members": arguments.ensemble, "delay": arguments.delay,
+    }  # fmt: skip
+    given = {name: value for name, value in given.items() if value is not None}
+    return Spread(**given) if given else None
+
+
+def _share(option: str, text: str | None) -> float | None:
+    """Return a share [1] from a text such as "10%" or "0.1"."""
+    from ..errors import not_usable
+
+    if text is None:
+        return None
+    try:
+        value = float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
+    except ValueError:
+        value = float("nan")
+    if not (isfinite(value) and value >= 0.0):
+        raise not_usable(f"{option} {text!r}: a share, as 10% or 0.1, is right.")
+    return value
+
+
+def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
+    from ..controllers.tables import footnotes, header, lowest, rows
+
+    def values(frame: Any) -> list[dict[str, Any]]:
+        return [
+            {key: None if value != value else value for key, value in row.items()}
+            for row in frame.to_dict(orient="records")
+        ]  # JSON has no NaN
+
+    judged = found.setting.judged
     return {
-        "seconds": round(report.seconds, 1),
-        "left_out": report.comparison.left_out,
-        "beyond_stroke": _beyond_stroke(report),
-        "tables": {
-            name: table.to_dict(orient="records") for name, table in report.tables.items()
-        },
-        "ledger": [
-            {
-                "number": s.number, "section": s.section, "statement": s.text,
-                "verdict": v.verdict, "measured": v.measured, "decided_by": s.rule, "why": v.why,
-            }
-            for s, v in report.ledger
+        "verdict": found.verdict,
+        "judged": {"output": judged.column, "statistic": judged.statistic, "unit": judged.unit},
+        "units": found.units,
+        "cases": values(found.table),
+        "worst": None if found.worst is None else values(found.worst),
+        "limits": {name: one._asdict() for name, one in found.limits.items()},
+        "notes": list(found.notes),
+        "tables": [
+            {"motion": name, "rows": rows(found, name), "lowest": lowest(found, name)}
+            for name in found.motions
         ],
-        "files": [str(path.absolute()) for path in report.files],
+        "header": header(found), "footnotes": footnotes(found),
+        "seconds": round(found.seconds, 1),
+        "files": [str(path.absolute()) for path in files],
     }  # fmt: skip
 
 
-def _beyond_stroke(report: Report) -> list[dict[str, Any]]:
-    """Return the runs in which the base leaves the damper's stroke, with the drift [mm]."""
-    from ..paper.comparison.experiment import BEYOND
-    from ..paper.comparison.tables import beyond_stroke
+def _print(found: ControllerComparison, folder: Path, files: list[Path]) -> None:
+    from ..controllers.tables import footnotes, header, rows
 
-    names = ["motion", "intensity [g]", "law", "peak base drift [mm]", BEYOND]
-    rows: Any = beyond_stroke(report.comparison)[names].to_dict(orient="records")
-    return list(rows)
-
-
-def _print(report: Report) -> None:
-    from ..paper.comparison.tables import stroke_lines, stroke_text
-
-    for name, table in report.tables.items():
-        _print_table(name, table)
-    beyond = stroke_text(report.comparison)
-    if beyond:
-        print(beyond)
-        print("".join(f"  {line}\n" for line in stroke_lines(report.comparison)))
-    if report.comparison.left_out:
-        print(f"Left out. {report.comparison.left_out}\n")
-    print("The paper's statements")
-    for statement, verdict in report.ledger:
-        print(f"{statement.number:3}  {verdict.verdict:14}  {statement.text}")
-        print(f"{'':21}{verdict.measured}")
-    print(f"\n{report.seconds:.0f} s; {len(report.files)} files in {report.folder}")
-    print(f"  {report.files[0]}")
+    for motion in found.motions:
+        _print_table(motion, header(found)[1:], rows(found, motion))
+    for text in footnotes(found):
+        print(text)
+    print()
+    for text in found.verdict:
+        print(text)
+    for text in found.notes:
+        print(f"Note: {text}")
+    print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
+    for path in files:
+        print(f"  {path}")
 
 
-def _print_table(name: str, table: pd.DataFrame) -> None:
-    """Print Table IV or V; drifts beyond the damper's stroke are marked."""
-    from ..paper.comparison.experiment import BEYOND
-    from ..paper.comparison.tables import MARK, TABLES, columns, shown
+def _print_table(title: str, titles: list[str], rows: list[list[str]]) -> None:
+    import textwrap
+    from itertools import zip_longest
 
-    kind, title = TABLES[name]
-    window = ", over the record as published" if kind == "rms" else ""
-    marked = f"; {MARK} beyond the damper's stroke" if kind == "peak" else ""
-    print(f"{title}{window}{marked}")
-    listed = columns(kind)
-    wrapped = [textwrap.wrap(heading, _WIDTH - 2) for heading, _ in listed]
+    wrapped = [textwrap.wrap(text, 12) for text in titles]
+    widths = [max(6, *(len(line) for line in lines)) + 2 for lines in wrapped]
+    first = max(len(row[0]) for row in rows) + 2
     for line in zip_longest(*wrapped, fillvalue=""):
-        print(f"{'':25}" + "".join(f"{text:>{_WIDTH}}" for text in line))
-    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
-    for (motion, g), group in groups:
-        print(f"{motion} {g:g} g")
-        for _, row in group.iterrows():
-            texts = [shown(row[column], column) for _, column in listed]
-            # The mark stands beside the column, so that the digits stay below each other.
-            first = texts[0] + (MARK if row.get(BEYOND, 0.0) > 0.0 else " ")
-            print(f"  {row['law']:23}{first:>{_WIDTH + 1}}{texts[1]:>{_WIDTH - 1}}"
-                  + "".join(f"{text:>{_WIDTH}}" for text in texts[2:]))  # fmt: skip
+        cells = "".join(f"{text:>{n}}" for text, n in zip(line, widths, strict=True))
+        print(f"{'':{first}}{cells}".rstrip())
+    print(title)
+    for name, *texts in rows:
+        cells = "".join(f"{text:>{n}}" for text, n in zip(texts, widths, strict=True))
+        print(f"  {name:{first - 2}}{cells}".rstrip())
     print()

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 HELP = "design a controller and verify it"
 
 _COMPONENTS = {"hinf": "HinfInverse or ClippedOptimal", "lpv": "Lpv", "lqg": "LqgClipped"}
-_COMPONENTS["policy"] = "TrainedPolicy"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,10 +109,7 @@ def _print(answer: dict[str, Any], out: Path) -> None:
               f"(without control {facts['open_loop_norm']:.5g})")  # fmt: skip
     elif "gamma" in facts:
         _print_table(facts)
-    if answer["kind"] == "policy":
-        _print_policy(facts)
-    else:
-        _print_poles(facts)
+    _print_poles(facts)
     if "margins" in answer:
         print("  margins at the measurement: " + _margins(answer["margins"]))
     for path in answer["files"]:
@@ -145,17 +141,6 @@ def _print_poles(facts: dict[str, Any]) -> None:
         listed = [f"{a:.4g}" + (f" ± {b:.4g}j" if b else "") for a, b in poles if b >= 0.0]
         print(f"  poles [rad/s]: {', '.join(listed)}")
     print(f"  sampled closed loop: largest pole of modulus {facts['sampled_loop_modulus']:.6f}")
-
-
-def _print_policy(facts: dict[str, Any]) -> None:
-    def below(key: str) -> str:
-        return f"{100 * (1 - facts[key]):.1f} % below clipped-optimal control"
-
-    print(f"  {facts['weights']} weights, trained on {facts['motions']} motions: peak "
-          f"{below('peak_ratio_trained')} on the mean")  # fmt: skip
-    print(f"  {facts['held_out']} motions held out, which chose round {facts['chosen_round']}: "
-          f"{below('peak_ratio')}")  # fmt: skip
-    print(f"  the same with noise, delay and wrong parameters: {below('peak_ratio_disturbed')}")
 
 
 def _margins(found: dict[str, Any]) -> str:

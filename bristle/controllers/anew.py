@@ -49,8 +49,9 @@ def task_for(kind: str, site: Site, damper: Damper) -> Task:
     """
     if kind == POLICY:
         raise DesignError(
-            f"the library's {kind} was trained for its own building and damper. Training takes "
-            f"minutes: `bristle design {kind} my_{kind}.toml`, then --controller my_{kind}.json."
+            f"the library's {kind} was trained for its own building and damper. Train one for "
+            f"yours in a checkout: `python -m benchmarks train my_{kind}.toml`, then --controller "
+            f"my_{kind}.json."
         )
     known = DesignDamper() if damper.usual else damper.for_design()
     if known is None and COMMAND_UNITS[kind] == VOLTAGE.unit:

@@ -19,7 +19,6 @@ from ..errors import DesignError
 from ..findings import written
 from .file import SCHEMA, damper_from_model, read_task, task_from_data
 from .plausible import implausible
-from .policy.training import Training
 from .result import DesignResult
 from .sliding import Damper
 from .task import Scheduling, Task
@@ -32,7 +31,6 @@ __all__ = [
     "LqgWeights",
     "Scheduling",
     "Task",
-    "Training",
     "Weight",
     "Weights",
     "damper_from_model",
@@ -76,12 +74,9 @@ def design(task: Task | str | Path | Mapping[str, Any]) -> DesignResult:
     from .hinf import design_hinf
     from .lpv import design_lpv
     from .lqg import design_lqg
-    from .policy.design import design_policy
 
     chosen = _task(task)
-    return {
-        "hinf": design_hinf, "lpv": design_lpv, "lqg": design_lqg, "policy": design_policy,
-    }[chosen.kind](chosen)  # fmt: skip
+    return {"hinf": design_hinf, "lpv": design_lpv, "lqg": design_lqg}[chosen.kind](chosen)
 
 
 def _task(given: object) -> Task:

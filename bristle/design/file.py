@@ -1,7 +1,7 @@
 """The design file: TOML in, a checked task out.
 
 schema = 1
-kind = "lpv"                     # or "hinf", "lqg", "policy"; the rest may be left out
+kind = "lpv"                     # or "hinf", "lqg"; the rest may be left out
 building = "my_building.toml"    # else the paper's model
 device = "brace"                 # what is commanded; else the damper on the first level
 sample_period = 0.002            # s
@@ -26,11 +26,6 @@ rate = 1.0                       # m/s2
 [passive]                        # dampers at other places, which are not commanded
 damper = { damping = 80.0, stiffness = 650.0 }         # N.s/m, N/m; "damper": on the first level
 
-[motions]                        # policy: what it is trained on
-synthetic = 300
-records = ["kobe_1995_shin_osaka_000"]
-reported = ["el_centro_1940_ns"] # refused among the records
-
 [lqg]                            # lqg: acceleration, drift, force, ground, noise
 force = 0.2
 """
@@ -51,7 +46,6 @@ from ..errors import BristleError, DesignError, StudyError
 from ..physics.building import Building, paper_building, read_building
 from ..physics.laws import DEFAULT_OF_DESIGN
 from .passive import Share
-from .policy.training import Training
 from .sliding import Damper
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
@@ -61,8 +55,6 @@ T = TypeVar("T")
 SCHEMA = 1
 _TABLES = {"hinf": {"weights", "damper"}, "lpv": {"weights", "damper", "scheduling"}}
 _TABLES["lqg"] = {"lqg", "damper"}
-_TABLES["policy"] = {"motions", "damper"}
-_WHOLE = ("synthetic", "hidden", "rounds", "seed")
 _NO_NUMBERS = ("grid", "rows", "varies")
 _TOP = {"schema", "kind", "title", "building", "device", "sample_period", "tau", "order", "passive"}
 _WEIGHT_FORMS: dict[frozenset[str], Callable[..., Weight]] = {
@@ -137,7 +129,6 @@ def task_from_data(
         "scheduling": _scheduling,
         "lqg": lambda table, at: _plain(LqgWeights, table, at),
         "passive": _passive,
-        "motions": lambda table, at: _motions(table, folder, at),
     }
     for name in sorted((_TABLES[kind] | {"passive"}) & set(data)):
         if not isinstance(data[name], dict):
@@ -229,19 +220,6 @@ def _passive(table: Mapping[str, Any], where: str) -> dict[str, Share]:
             **{key: _number(value, key, f"{where} {name}") for key, value in share.items()}
         )
     return shares
-
-
-def _motions(table: Mapping[str, Any], folder: Path, where: str) -> Training:
-    _known(table, {f.name for f in fields(Training)} - {"folder"}, where)
-    given: dict[str, Any] = {}
-    for name, value in table.items():
-        if name in ("records", "reported"):
-            if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
-                raise DesignError(f"{where}: {name} must be a list of names or files.")
-            given[name] = tuple(value)
-        else:
-            given[name] = (_whole if name in _WHOLE else _number)(value, name, where)
-    return Training(**given, folder=folder)
 
 
 def _scheduling(table: Mapping[str, Any], where: str) -> Scheduling:

@@ -82,10 +82,8 @@ def _loops(result: DesignResult) -> Page:
 
 
 def _poles(result: DesignResult) -> Page:
-    """Return the poles of an LQG design or of a policy's estimator, without a weighted loop."""
+    """Return the poles of an LQG design, without a weighted loop."""
     subtitle = "Rings: the building with the regulator. Crosses: the controller."
-    if "regulator_poles" not in result.facts:
-        subtitle = "Crosses: the estimator in front of the network."
     page = Page(6.4, 3.8, headline(result), subtitle)
     with look():
         axes = page.figure.add_subplot(page.grid(1, 1, left=0.75, top=0.15)[0, 0])

@@ -48,11 +48,7 @@ def implausible(task: Task) -> list[str]:
         Empty where nothing looks unmeant.
     """
     reach = reach_of(task)
-    found = [
-        *_sampling(task),
-    ]
-    if task.kind == "policy":
-        return found
+    found = _sampling(task)
     found += _lqg(task, reach) if task.kind == "lqg" else _weights(task, reach)
     return [*found, *(_scheduling(task) if task.kind == "lpv" else [])]
 

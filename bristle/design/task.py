@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.controller import KINDS, POLICY
+from ..control.controller import KINDS
 from ..errors import DesignError
 from ..physics.building import Building, frequencies, paper_building
 from ..physics.device import Device
 from .lmi import VARIES
 from .passive import Share, with_share
 from .plant import check_building
-from .policy.training import Training
 from .sliding import Damper, spring, stiffness
 from .weights import LqgWeights, Weights
 
@@ -110,8 +109,8 @@ class Task:
 
     Attributes
     ----------
-    kind : {"hinf", "lpv", "lqg", "policy"}
-        "hinf" and "lqg" command a force; "lpv" commands the signed voltage, "policy" a voltage.
+    kind : {"hinf", "lpv", "lqg"}
+        "hinf" and "lqg" command a force; "lpv" commands the signed voltage.
     tau : float
         At least 1; holds X Y >= tau^2, which keeps the controller slow enough to be sampled. 1
         gives the least gamma and a controller that cannot be built.
@@ -127,8 +126,6 @@ class Task:
     passive : dict
         What dampers at other places add to the plant, by the device's name; "damper" is the one on
         the first level. A device that is not named here adds nothing.
-    motions : Training or None
-        What a policy is trained on; the other kinds need none.
 
     Raises
     ------
@@ -151,16 +148,10 @@ class Task:
     sample_period: float = 0.002
     device: str = ""
     passive: dict[str, Share] = field(default_factory=dict)
-    motions: Training | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in (*KINDS, POLICY):
-            raise DesignError(f"kind = {self.kind!r}; there are {', '.join((*KINDS, POLICY))}.")
-        if self.kind == POLICY and self.motions is None:
-            raise DesignError(
-                "a policy is trained on motions, and there are none: [motions] synthetic = 300 is "
-                "usual."
-            )
+        if self.kind not in KINDS:
+            raise DesignError(f"kind = {self.kind!r}; there are {', '.join(KINDS)}.")
         if not (isfinite(self.tau) and self.tau >= 1.0):
             raise DesignError(f"tau = {self.tau!r} must be at least 1.")
         if self.order is not None and not 1 <= self.order <= self.states:
@@ -211,7 +202,7 @@ class Task:
         effects: the law's own is in that force, which an inverse takes apart. None where the
         measured force enters an estimator, for it holds them all.
         """
-        if self.kind in ("lqg", POLICY):
+        if self.kind == "lqg":
             return 0.0
         return stiffness(self.damper) + (spring(self.damper) if self.kind == "lpv" else 0.0)
 
@@ -242,8 +233,6 @@ class Task:
             content["passive"] = {name: share._asdict() for name, share in self.passive.items()}
         if self.kind == "lqg":
             return {**content, "lqg": dict(vars(self.lqg))}
-        if self.motions is not None:
-            return {**content, "motions": self.motions.data()}
         content |= {"tau": self.tau, "order": self.order}
         content["weights"] = {
             "acceleration": self.weights.acceleration.data(),

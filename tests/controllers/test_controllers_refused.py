@@ -79,7 +79,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["--motions", MOTION, "--controller", "other.json", "--building", "tower.toml"],
          "designed for the building"),
         (["--motions", MOTION, "--controller", "TrainedPolicy", "--building", "tower.toml"],
-         "bristle design policy my_policy.toml"),
+         "python -m benchmarks train my_policy.toml"),
         (["--motions", MOTION, "--controller", "gone.fmu"], "gone.fmu"),
         (["--motions", MOTION, "--controller", "gone.py"], "gone.py"),
         (["--motions", MOTION, "--controller", "windy.py"], "windy.py,wind=0"),
@@ -104,7 +104,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["--motions", MOTION, "--controller", "Skyhook", "--grid", "1"], "3 to 1000"),
         (["--motions", MOTION, "--controller", "Skyhook", "--ensemble", "1"], "2 or more members"),
         (["--motions", MOTION, "--controller", "Skyhook", "--spread", "wide"], "10% or 0.1"),
-        (["--motions", MOTION, "--controller", "Skyhook", "--newhall", "a.AT2"], "--motions"),
     ],
 )  # fmt: skip
 def test_one_message_says_what_is_right(

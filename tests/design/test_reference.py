@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.paper import reference
 from bristle.control.controller import Controller, read_controller
 from bristle.design import DesignResult, Task
 from bristle.errors import DesignError
-from bristle.paper import reference
 from bristle.physics.building import paper_building
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bristle.paper.comparison.claims import STATEMENTS, ledger
-from bristle.paper.comparison.experiment import (
+from benchmarks.paper.comparison.claims import STATEMENTS, ledger
+from benchmarks.paper.comparison.experiment import (
     BINGHAM,
     CLIPPED,
     CONTROLLERS,
@@ -25,8 +25,8 @@ from bristle.paper.comparison.experiment import (
     SYLMAR,
     ZERO,
 )
-from bristle.paper.comparison.identification import STIFFNESS
-from bristle.paper.comparison.numbers import NOT, REPRODUCED, UNDECIDABLE, Numbers
+from benchmarks.paper.comparison.identification import STIFFNESS
+from benchmarks.paper.comparison.numbers import NOT, REPRODUCED, UNDECIDABLE, Numbers
 
 LAWS = (NONE, ZERO, FOUR, CLIPPED, HINF, LPV, BINGHAM, LPV_0, LPV_400)
 CASES = [(EL_CENTRO, 0.2), (EL_CENTRO, 0.6), (SYLMAR, 0.3), (SYLMAR, 0.7)]

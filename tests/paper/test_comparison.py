@@ -14,12 +14,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bristle.cli import main
-from bristle.cli.controllers import _answer, _print
-from bristle.draw.style import look
-from bristle.errors import RecordError
-from bristle.paper.comparison import experiment, make
-from bristle.paper.comparison.experiment import (
+from benchmarks.paper.command import answer, main, show
+from benchmarks.paper.comparison import experiment, make
+from benchmarks.paper.comparison.experiment import (
     BEYOND,
     CLIPPED,
     EL_CENTRO,
@@ -36,10 +33,12 @@ from bristle.paper.comparison.experiment import (
     motions,
     scenario,
 )
-from bristle.paper.comparison.identification import NOISE, gain
-from bristle.paper.comparison.make import Report
-from bristle.paper.comparison.tables import MARK, beyond_stroke
-from bristle.paper.runs import Runs
+from benchmarks.paper.comparison.identification import NOISE, gain
+from benchmarks.paper.comparison.make import Report
+from benchmarks.paper.comparison.tables import MARK, beyond_stroke
+from benchmarks.paper.runs import Runs
+from bristle.draw.style import look
+from bristle.errors import RecordError
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "ground_motion"
 AT_NEWHALL = DATA / "northridge_1994_newhall_360_peer_rsn1044.csv"
@@ -73,7 +72,7 @@ def at_hand() -> dict[str, Motion]:
 @pytest.fixture(scope="session")
 def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return controller files that were designed on the spot."""
-    from bristle.paper.reference import write
+    from benchmarks.paper.reference import write
 
     paths = write(tmp_path_factory.mktemp("designs"), kinds=("hinf", "lpv"))
     return {path.stem: path for path in paths}
@@ -270,7 +269,7 @@ def test_runs_beyond_the_stroke_are_told_in_table_and_text(
     assert gone[BEYOND].tolist() == pytest.approx((gone["peak base drift [mm]"] - 20.0).tolist())
     if len(at_hand()) == 3:
         assert len(gone) == 25, "of the 59 with a damper, both Northridge records at hand"
-    _print(report)
+    show(report)
     said = capsys.readouterr().out
     assert f"In {len(gone)} of {len(with_damper)} runs with a damper" in said
     page = (report.folder / "report.html").read_text(encoding="utf-8")
@@ -327,17 +326,17 @@ def test_figures_14_to_17_show_what_the_papers_show(report: Report) -> None:
 
 
 def test_the_answer_as_json_holds_tables_and_ledger(report: Report) -> None:
-    answer = json.loads(json.dumps(_answer(report), allow_nan=False))
-    assert [row["number"] for row in answer["ledger"]] == list(range(1, 22))
-    assert len(answer["tables"]["table4"]) == len(answer["tables"]["table5"])
-    assert len(answer["beyond_stroke"]) == len(beyond_stroke(report.comparison))
-    assert all(Path(path).is_file() for path in answer["files"])
+    told = json.loads(json.dumps(answer(report), allow_nan=False))
+    assert [row["number"] for row in told["ledger"]] == list(range(1, 22))
+    assert len(told["tables"]["table4"]) == len(told["tables"]["table5"])
+    assert len(told["beyond_stroke"]) == len(beyond_stroke(report.comparison))
+    assert all(Path(path).is_file() for path in told["files"])
 
 
 def test_what_is_printed_holds_tables_and_verdicts(
     report: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    _print(report)
+    show(report)
     said = capsys.readouterr().out
     assert "Table IV: peaks of all motions" in said
     assert "Table V: RMS of all motions, over the record as published" in said

@@ -11,11 +11,11 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_rgb
 
-from bristle.cli import main
+from benchmarks.paper import stiction
+from benchmarks.paper.command import main
+from benchmarks.paper.figures import make, paper_figures
 from bristle.draw.style import COLOURS, ramp
 from bristle.errors import RunError, ScenarioError
-from bristle.paper import stiction
-from bristle.paper.figures import make, paper_figures
 from bristle.simulate.picture import draw_run, run_figure
 from bristle.simulate.summary import summarise
 
@@ -326,7 +326,7 @@ def test_every_figure_is_an_image_with_numbers_that_say_their_source(drawn: Path
     for name in ("loops-voltage", "stiction", "passive-optimum"):
         assert (drawn / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         head = (drawn / f"{name}.csv").read_text(encoding="utf-8").splitlines()[:2]
-        assert f"bristle figures {name}" in head[0]
+        assert f"python -m benchmarks paper figures {name}" in head[0]
         assert head[1] == "# Damper parameters are reconstructed, not those of the paper's tables."
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from bristle.paper.figures import make
+from benchmarks.paper.figures import make
 
 
 @pytest.mark.slow

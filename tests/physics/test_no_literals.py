@@ -33,8 +33,7 @@ ELSEWHERE = {
     ("diagnose/building_sensors.py", "delay"): "a kind of sensor fault",
     ("component/sensors.py", "delay"): "a property of an instrument",
     ("controllers/robust.py", "delay"): "a property of an instrument",
-    ("cli/_controllers.py", "delay"): "an option: a property of an instrument",
-    ("design/policy/training.py", "delay"): "a property of an instrument",
+    ("cli/controllers.py", "delay"): "an option: a property of an instrument",
     ("simulate/records.py", "delay"): "a field of the engine's record: a source's parameter",
     ("simulate/layout.py", "delay"): "a field of the engine's record: a source's parameter",
 }

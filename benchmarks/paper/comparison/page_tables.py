@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ...draw import html
+from bristle.draw import html
+
 from .experiment import BEYOND, CONTROLLERS, NONE, Comparison
 from .tables import MARK, TABLES, columns, shown, stroke_lines, stroke_text
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...control.policy import ACCELERATION, BESIDES, FORCE, KEEP, LARGEST, SPEED
-from ...control.switching import sign
-from ...physics.vectors import dot
+from bristle.control.policy import ACCELERATION, BESIDES, FORCE, KEEP, LARGEST, SPEED
+from bristle.control.switching import sign
+from bristle.physics.vectors import dot
+
 from .closed_loop import (
     DISPLACEMENT,
     FLOOR,

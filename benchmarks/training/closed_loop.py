@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...control.linear import advance, command
-from ...control.policy import (
+from bristle.control.linear import advance, command
+from bristle.control.policy import (
     BESIDES,
     KEEP,
     LARGEST,
@@ -19,12 +19,12 @@ from ...control.policy import (
     recent_level,
     voltage_share,
 )
-from ...control.switching import clipped_voltage
-from ...physics.damper import force_at
-from ...physics.damper import step as damper_step
-from ...physics.inputs import Inputs
-from ...physics.tuples import record
-from ...physics.vectors import dot
+from bristle.control.switching import clipped_voltage
+from bristle.physics.damper import force_at
+from bristle.physics.damper import step as damper_step
+from bristle.physics.inputs import Inputs
+from bristle.physics.tuples import record
+from bristle.physics.vectors import dot
 
 FLOOR, DISPLACEMENT, VELOCITY, PUSHED = range(4)
 """Places of what is measured."""

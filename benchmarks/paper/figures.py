@@ -9,9 +9,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..draw.style import FORMATS, look
-from ..errors import ScenarioError, not_usable
-from ..progress import Progress
+from bristle.draw.style import FORMATS, look
+from bristle.errors import ScenarioError, not_usable
+from bristle.progress import Progress
+
 from . import identification, loops, optimum, stiction
 from .runs import Drawing, Runs
 
@@ -161,10 +162,11 @@ def prepare(folder: Path, format: str) -> None:
 
 def _write(table: pd.DataFrame, path: Path, name: str, what: str, engine: str) -> None:
     """Write a table as CSV; `# ` lines in front say how it was made."""
-    from ..version import __version__
+    from bristle.version import __version__
 
     head = (
-        f"# {what}; bristle {__version__}, engine {engine}, command: bristle figures {name}\n"
+        f"# {what}; bristle {__version__}, engine {engine}, "
+        f"command: python -m benchmarks paper figures {name}\n"
         "# Damper parameters are reconstructed, not those of the paper's tables.\n"
     )
     try:

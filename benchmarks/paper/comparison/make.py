@@ -14,11 +14,12 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...control.controller import read_controller
-from ...draw.style import Page, look
-from ...errors import DesignError, not_usable
-from ...progress import Progress, counted
-from ...version import __version__
+from bristle.control.controller import read_controller
+from bristle.draw.style import Page, look
+from bristle.errors import DesignError, not_usable
+from bristle.progress import Progress, counted
+from bristle.version import __version__
+
 from .. import optimum, stiction
 from ..figures import prepare
 from ..runs import Drawing, Runs
@@ -49,7 +50,7 @@ FIGURES: dict[str, tuple[str, Callable[[Comparison], Page | None]]] = {
     "voltages": ("", pictures.voltages),
 }
 """File name to the paper's number, "" for this project's own, and what draws it."""
-_PACKAGE = Path(__file__).resolve().parents[2]
+_ROOT = Path(__file__).resolve().parents[3]
 
 
 @dataclass(frozen=True)
@@ -127,10 +128,10 @@ def designing(folder: Path) -> Iterator[Callable[[], dict[str, Path]]]:
 
     Yields a function that waits for them and returns their files.
     """
-    search = os.pathsep.join([str(_PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
+    search = os.pathsep.join([str(_ROOT), os.environ.get("PYTHONPATH", "")])
     with tempfile.TemporaryFile("w+") as errors:
         child = subprocess.Popen(
-            [sys.executable, "-m", "bristle.paper.reference", "--out", str(folder.absolute()),
+            [sys.executable, "-m", "benchmarks.paper.reference", "--out", str(folder.absolute()),
              "--only", *KINDS],
             env={**os.environ, "PYTHONPATH": search}, stdout=subprocess.DEVNULL, stderr=errors,
         )  # fmt: skip
@@ -179,7 +180,7 @@ def _write_tables(
     frames = {**tables, "comparison": comparison.table, "ledger": pd.DataFrame(rows, columns=names)}
     for name, table in frames.items():
         head = (
-            f"# {name}; bristle {__version__}, command: bristle controllers\n"
+            f"# {name}; bristle {__version__}, command: python -m benchmarks paper controllers\n"
             "# Damper parameters, weights and the factor 0.45 on the ground motion are "
             "reconstructed, not the paper's own.\n"
         )

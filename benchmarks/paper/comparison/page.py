@@ -8,8 +8,9 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...draw import html
-from ...version import __version__
+from bristle.draw import html
+from bristle.version import __version__
+
 from .claims import Statement
 from .experiment import KAPPA, LAWS
 from .numbers import NOT, REPRODUCED, UNDECIDABLE, Verdict
@@ -192,7 +193,7 @@ def _designs(report: Report) -> str:
 
 def _foot(report: Report) -> str:
     given = any("Newhall" in m.name for m in report.comparison.motions)
-    command = "bristle controllers" + (" --newhall FILE.AT2" if given else "")
+    command = "python -m benchmarks paper controllers" + (" --newhall FILE.AT2" if given else "")
     seconds = f"{report.seconds:.0f} s"
     return f"""<p>bristle {__version__}; <code>{command}</code>; {len(report.comparison.table)} runs
 of the comparison and those behind Figs 5 and 9 in {seconds}, designs included. Every number is in

@@ -12,16 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ...control.policy import BESIDES, LARGEST, weight_count
-from ...jit import compiled
-from ...physics import damper
-from ...physics.building import Building
-from ...physics.inputs import Setup
-from ..plant import structure
-from ..sliding import Damper
-from ..task import Task
+from bristle.control.policy import BESIDES, LARGEST, weight_count
+from bristle.design.plant import structure
+from bristle.design.sliding import Damper
+from bristle.jit import compiled
+from bristle.physics import damper
+from bristle.physics.building import Building
+from bristle.physics.inputs import Setup
+
 from .adjoint import PULL_BACK, RESPOND, compute
 from .closed_loop import STATES, Course, Motion, Plant, Policy
+from .training import PolicyTask
 
 Array = NDArray[np.float64]
 
@@ -143,10 +144,10 @@ def _compiled(evaluate: Any, step_law: Any) -> Callable[..., None]:
     return found
 
 
-def plant_of(task: Task, random: np.random.Generator | None = None) -> Plant:
+def plant_of(task: PolicyTask, random: np.random.Generator | None = None) -> Plant:
     """Return the task's building over a sample; with `random`, one with wrong parameters."""
     building = task.plant_building
-    if random is not None and task.motions is not None:
+    if random is not None:
         building = _changed(building, task.motions.spread, random)
     s, h = structure(building, device=task.place), task.sample_period
     m = len(s.A)
@@ -192,7 +193,7 @@ def setup_of(given: Damper, spread: float, random: np.random.Generator | None = 
 
 
 def disturbed(
-    loop: Loop, run: Run, task: Task, random: np.random.Generator, worst: bool = False
+    loop: Loop, run: Run, task: PolicyTask, random: np.random.Generator, worst: bool = False
 ) -> Run:
     """Return a run with wrong parameters, noise and delay, referred to the undisturbed one.
 
@@ -203,7 +204,6 @@ def disturbed(
     worst : with the whole delay, else any up to it
     """
     motions = task.motions
-    assert motions is not None
     most = ceil(motions.delay / task.sample_period - 1e-9)
     loop.respond(run, loop.constant(PATIENT))
     N = len(run.motion.ground)

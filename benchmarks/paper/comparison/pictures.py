@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...draw.style import BLUE, GREEN, GREY, INK, PALE, RECONSTRUCTED, VERMILION, Page, label
+from bristle.draw.style import BLUE, GREEN, GREY, INK, PALE, RECONSTRUCTED, VERMILION, Page, label
+
 from .experiment import (
     CLIPPED,
     CONTROLLERS,

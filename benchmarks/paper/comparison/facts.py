@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...physics.building import frequencies, paper_building
-from ...physics.laws import law_code
-from ...physics.laws.lugre import LuGre
+from bristle.physics.building import frequencies, paper_building
+from bristle.physics.laws import law_code
+from bristle.physics.laws.lugre import LuGre
+
 from .experiment import Motion
 
 if TYPE_CHECKING:
-    from ...design import Controller
+    from bristle.design import Controller
 
 SPEEDS = tuple(float(v) for v in np.linspace(0.0025, 0.2, 80))
 """m/s, at which the steady force is taken."""
@@ -27,7 +28,7 @@ def facts(designs: dict[str, Controller], motions: list[Motion]) -> dict[str, An
     "force_at_8V" [N], "weight_corner" [rad/s], "paper_windows" {motion: s}, "designs" (facts of
     each).
     """
-    from ...fmu import catalogue
+    from bristle.fmu import catalogue
 
     building = paper_building()
     own = frequencies(building)
@@ -52,7 +53,7 @@ def facts(designs: dict[str, Controller], motions: list[Motion]) -> dict[str, An
 
 def steady_force(v: float, V: float) -> float:
     """Return the LuGre force [N] in steady sliding at v [m/s] and V [V]."""
-    from ...control.inverse import force_of_law
+    from bristle.control.inverse import force_of_law
 
     p = [parameter.value for parameter in LuGre.parameters.values()]
     bent = 1.0 / LuGre.parameters["a_0"].value

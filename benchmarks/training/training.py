@@ -1,15 +1,21 @@
-"""What a policy is trained on and how: the table [motions] of a design file."""
+"""What a policy is trained on and how: a design file of `kind = "policy"` with a table [motions]."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ...data.motion import GroundMotion, read_ground_motion
-from ...errors import DesignError, RecordError
+from bristle.control.controller import POLICY
+from bristle.data.motion import GroundMotion, read_ground_motion
+from bristle.design.file import task_from_data
+from bristle.design.task import Task
+from bristle.errors import DesignError, RecordError
 
 ALIKE = 1e-3
 """Largest difference, as a share of the peak, of two records that are the same motion."""
@@ -58,8 +64,17 @@ class Training:
             "rounds": (1, 100_000), "seed": (0, 2**32 - 1),
         }.items():  # fmt: skip
             value = getattr(self, name)
+            whole = isinstance(getattr(type(self), name), int)
+            if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
+                kind = "whole number" if whole else "number"
+                raise DesignError(f"motions: {name} = {value!r}: expected a {kind}.")
             if not (isfinite(value) and low <= value <= high):
                 raise DesignError(f"motions: {name} = {value!r} lies outside {low:g} .. {high:g}.")
+        for name in ("records", "reported"):
+            if not isinstance(value := getattr(self, name), list | tuple):
+                raise DesignError(
+                    f"motions: {name} = {value!r}: expected a list of names or files."
+                )
         if not self.synthetic and not self.records:
             raise DesignError(
                 "motions: there is none to train on; synthetic = 300 is usual, records = "
@@ -104,3 +119,54 @@ def same_motion(a: GroundMotion, b: GroundMotion) -> bool:
     time = a.time - a.time[0]
     other = np.interp(time, b.time - b.time[0], b.acceleration / b.peak, right=0.0)
     return float(np.abs(a.acceleration / a.peak - other).max()) < ALIKE
+
+
+@dataclass(frozen=True)
+class PolicyTask(Task):
+    """A training: building, damper and motions.
+
+    Like an LQG design a policy takes the measured force, which holds what the damper's springs do:
+    so it is a task of that kind, without its weights.
+    """
+
+    kind: str = "lqg"
+    motions: Training = field(default_factory=lambda: Training(synthetic=300))
+
+    def data(self) -> dict[str, Any]:
+        """Return the task as the content of a design file, the building by name."""
+        content = {**super().data(), "kind": POLICY, "motions": self.motions.data()}
+        del content["lqg"]
+        return content
+
+
+def read_policy_task(path: Path) -> PolicyTask:
+    """Return the training that a design file describes.
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        Naming the file and what was expected.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be read ({error.strerror}).") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DesignError(f"{path}: not valid TOML: {error}.") from error
+    if data.pop("kind", None) != POLICY or "lqg" in data:
+        raise DesignError(f'{path}: expected kind = "{POLICY}" and a table [motions].')
+    table = data.pop("motions", None)
+    if not isinstance(table, Mapping):
+        raise DesignError(f"{path}: a policy is trained on motions: expected a table [motions].")
+    known = {f.name for f in fields(Training)} - {"folder"}
+    unknown = sorted(set(table) - known)
+    if unknown:
+        raise DesignError(
+            f"{path} [motions]: unknown key {unknown[0]!r}; there are {', '.join(sorted(known))}."
+        )
+    try:
+        motions = Training(**table, folder=path.parent)
+    except DesignError as error:
+        raise DesignError(f"{path}: {error}") from None
+    task = task_from_data({**data, "kind": "lqg"}, path.parent, str(path))
+    return PolicyTask(**vars(task), motions=motions)

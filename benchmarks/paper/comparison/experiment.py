@@ -81,8 +81,8 @@ def motions(newhall: Path | None = None) -> tuple[list[Motion], str]:
     RecordError
         If the Newhall file cannot be read.
     """
-    from ...data import read_ground_motion
-    from ...errors import RecordError
+    from bristle.data import read_ground_motion
+    from bristle.errors import RecordError
 
     found = [Motion(EL_CENTRO, "el_centro_1940_ns", (0.2, 0.4, 0.6, 0.8), 31.18, 35.0)]
     left_out = []

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ..draw.style import Page
-from ..simulate.run import run
+from bristle.draw.style import Page
+from bristle.simulate.run import run
 
 if TYPE_CHECKING:
     import pandas as pd

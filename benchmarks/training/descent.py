@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...progress import Count
+from bristle.progress import Count
+
 from .runs import PATIENT, Loop, Run
 
 Array = NDArray[np.float64]

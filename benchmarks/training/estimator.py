@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ...errors import DesignError
-from ..plant import StateSpace
+from bristle.design.plant import StateSpace
+from bristle.errors import DesignError
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..draw.style import BLUE, GREY, PALE, RECONSTRUCTED, VERMILION, Page, label
+from bristle.draw.style import BLUE, GREY, PALE, RECONSTRUCTED, VERMILION, Page, label
+
 from .runs import Drawing, Runs
 
 if TYPE_CHECKING:

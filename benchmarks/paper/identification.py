@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..draw.style import BLUE, GREY, INK, RECONSTRUCTED, VERMILION, Page, label, zero_lines
-from ..identify.fit import Model, Problem, Run
-from ..identify.table import CUTOFF, LawError, error_table, low_pass
+from bristle.draw.style import BLUE, GREY, INK, RECONSTRUCTED, VERMILION, Page, label, zero_lines
+from bristle.identify.fit import Model, Problem, Run
+from bristle.identify.table import CUTOFF, LawError, error_table, low_pass
+
 from .runs import Drawing, Runs
 
 if TYPE_CHECKING:

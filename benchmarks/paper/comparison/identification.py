@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...control.inverse import estimate_states
-from ...physics.laws import law_code
-from ...physics.laws.lugre import LuGre
+from bristle.control.inverse import estimate_states
+from bristle.physics.laws import law_code
+from bristle.physics.laws.lugre import LuGre
+
 from ..runs import Runs
 
 if TYPE_CHECKING:

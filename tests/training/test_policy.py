@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.training import design as policy_design
+from benchmarks.training import motions
+from benchmarks.training.estimator import estimator
+from benchmarks.training.runs import Loop, Run
+from benchmarks.training.train import main
+from benchmarks.training.training import PolicyTask, Training, same_motion
 from bristle.control.policy import hidden_units, policy_inputs, voltage_share, weight_count
 from bristle.data.motion import GroundMotion
-from bristle.design import Damper, Task, Training, design
+from bristle.design import Damper
 from bristle.design.plant import structure
-from bristle.design.policy import design as policy_design
-from bristle.design.policy import motions
-from bristle.design.policy.estimator import estimator
-from bristle.design.policy.runs import Loop, Run
-from bristle.design.policy.training import same_motion
 from bristle.errors import DesignError
 from bristle.physics.building import paper_building
 
 H = 0.002
+MOTIONS = "[motions]\nsynthetic = 8\n"
+SEEN = '[motions]\nrecords = ["el_centro_1940_ns"]\nreported = ["el_centro_1940_ns"]\n'
+BRAKES = MOTIONS + '[damper]\nlaw = "lugre"\nparameters = { sigma_0 = 0.0, sigma_b = 0.0 }\n'
 
 
 def test_the_voltage_is_the_same_where_all_signs_turn() -> None:
@@ -69,6 +74,30 @@ def test_a_motion_is_known_by_its_shape() -> None:
     assert not same_motion(a, replace(a, acceleration=a.acceleration[::-1], name="c"))
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('kind = "hinf"', 'expected kind = "policy"'),
+        ('kind = "policy"', "trained on motions"),
+        ('kind = "policy"\n[motions]', "none to train on"),
+        ('kind = "policy"\n[motions]\nsynthetic = 2.5', "whole number"),
+        ('kind = "policy"\n[motions]\nsinthetic = 2', "unknown key 'sinthetic'"),
+        ('kind = "policy"\n[motions]\nrecords = 3', "list of names"),
+        (f'kind = "policy"\n{SEEN}', "el_centro_1940_ns is trained on and"),
+        (f'kind = "policy"\n{MOTIONS}[damper]\nv_max = 0.0', "nothing to control"),
+        (f'kind = "policy"\n{BRAKES}', "does not follow the voltage"),
+        (f'kind = "policy"\nsample_period = 0.1\n{MOTIONS}', "too long for"),
+    ],
+)
+def test_a_training_that_cannot_be_is_refused_before_it_begins(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "bad.toml").write_text("schema = 1\n" + text)
+    assert main([str(tmp_path / "bad.toml"), "--out", str(tmp_path / "mine.json")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "mine.json").exists()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["lugre", "bingham"])
 def test_the_derivative_is_that_of_the_response(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -80,7 +109,9 @@ def test_the_derivative_is_that_of_the_response(law: str, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(policy_design, "descend", caught)
     with pytest.raises(DesignError, match="enough"):
-        design(Task("policy", damper=Damper(law), motions=Training(synthetic=8, hidden=3)))
+        policy_design.design_policy(
+            PolicyTask(damper=Damper(law), motions=Training(synthetic=8, hidden=3))
+        )
     (loop, runs), random = found[0], np.random.default_rng(1)
     weights = loop.constant(0.25)
     if law == "lugre":
@@ -99,12 +130,9 @@ def test_the_derivative_is_that_of_the_response(law: str, monkeypatch: pytest.Mo
 
 @pytest.mark.slow
 def test_a_short_training_beats_clipped_optimal_control_on_motions_held_out() -> None:
-    task = Task(
-        "policy", damper=Damper("lugre"), motions=Training(synthetic=24, rounds=30, hidden=6)
-    )
-    result = design(task)
+    task = PolicyTask(damper=Damper("lugre"), motions=Training(synthetic=24, rounds=30, hidden=6))
+    result = policy_design.design_policy(task)
     facts = result.facts
     assert facts["peak_ratio"] < 0.9
     assert facts["peak_ratio_disturbed"] < 0.95
     assert facts["weights"] == len(result.controller.W) == weight_count(result.controller.n, 6)
-    assert result.plot() is not None

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from math import pi
 from typing import TYPE_CHECKING, Any
 
-from ..draw.style import GREY, RECONSTRUCTED, Page, label, ramp, zero_lines
+from bristle.draw.style import GREY, RECONSTRUCTED, Page, label, ramp, zero_lines
+
 from .runs import Drawing, Runs
 
 if TYPE_CHECKING:

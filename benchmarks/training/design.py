@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ...control.controller import Controller, building_digest
-from ...control.policy import weight_count
-from ...errors import DesignError
-from ...physics.damper import start_states
-from ...progress import counted, tell
-from ..hinf import design_hinf
-from ..plant import StateSpace, structure
-from ..result import DesignResult, flat, pole_list
-from ..sliding import coefficients
-from ..table import Bank
-from ..task import Task
+from bristle.control.controller import POLICY, Controller, building_digest
+from bristle.control.policy import weight_count
+from bristle.design.hinf import design_hinf
+from bristle.design.plant import StateSpace, structure
+from bristle.design.result import DesignResult, flat, pole_list
+from bristle.design.sliding import coefficients
+from bristle.design.table import Bank
+from bristle.design.task import Task
+from bristle.errors import DesignError
+from bristle.physics.damper import start_states
+from bristle.progress import counted, tell
+
 from . import motions
 from .closed_loop import Motion, Policy
 from .descent import Outcome, descend, peak_ratios
 from .estimator import GROUNDS, estimator
 from .runs import Loop, Run, disturbed, plant_of, setup_of
-from .training import Training
+from .training import PolicyTask, Training
 
 Array = NDArray[np.float64]
 
@@ -45,13 +46,13 @@ SPEEDS = np.linspace(0.0, 0.4, 41)
 """Where it is looked for a force that follows the voltage [m/s]."""
 
 
-def design_policy(task: Task) -> DesignResult:
+def design_policy(task: PolicyTask) -> DesignResult:
     """Return a trained policy from what every controller measures to a voltage.
 
     Parameters
     ----------
-    task : Task
-        Of kind "policy".
+    task : PolicyTask
+        With the motions.
 
     Raises
     ------
@@ -61,7 +62,6 @@ def design_policy(task: Task) -> DesignResult:
         controller on the motions held out.
     """
     training = task.motions
-    assert training is not None
     s, h = structure(task.plant_building, device=task.place), task.sample_period
     largest = _largest_force(task)
     unit = largest / float(np.sum(np.array(task.building.M)))
@@ -86,7 +86,7 @@ def design_policy(task: Task) -> DesignResult:
     return _packed(task, policy, outcome, facts)
 
 
-def _largest_force(task: Task) -> float:
+def _largest_force(task: PolicyTask) -> float:
     """Return the damper's largest force in steady sliding [N]; refuse one without voltage."""
     steady, per_volt = coefficients(task.damper, SPEEDS, 1e-3)
     if not per_volt.any():
@@ -97,7 +97,7 @@ def _largest_force(task: Task) -> float:
     return float(np.max(steady * SPEEDS + per_volt * task.damper.v_max))
 
 
-def _policy(task: Task, s: StateSpace, largest: float, unit: float) -> Policy:
+def _policy(task: PolicyTask, s: StateSpace, largest: float, unit: float) -> Policy:
     """Return the policy without weights.
 
     Parameters
@@ -105,7 +105,6 @@ def _policy(task: Task, s: StateSpace, largest: float, unit: float) -> Policy:
     task, s : Task, and its building
     largest, unit : the damper's largest force [N], and that per mass of the building [m/s2]
     """
-    assert task.motions is not None
     A, B = estimator(s, task.sample_period)
     keep = np.exp(-task.sample_period / LEVEL_LASTS)
     scales = np.array(
@@ -116,13 +115,15 @@ def _policy(task: Task, s: StateSpace, largest: float, unit: float) -> Policy:
     return Policy(False, 0.0, n, task.motions.hidden, A, B, np.zeros(0), scales)
 
 
-def _packed(task: Task, policy: Policy, outcome: Outcome, facts: dict[str, object]) -> DesignResult:
+def _packed(
+    task: PolicyTask, policy: Policy, outcome: Outcome, facts: dict[str, object]
+) -> DesignResult:
     """Return the result; its bank holds the estimator."""
     n, h = policy.n, float(task.sample_period)
     A, B = policy.A.reshape(n, n), policy.B.reshape(n, 4)
     poles = np.asarray(np.log(np.linalg.eigvals(A).astype(complex)) / h, dtype=complex)
     controller = Controller(
-        kind=task.kind, title=task.title, n=n, rows=1, v_top=0.0, sample_period=h,
+        kind=POLICY, title=task.title, n=n, rows=1, v_top=0.0, sample_period=h,
         A=policy.A.tolist(), B=policy.B.tolist(), W=flat(outcome.weights),
         C=policy.scales.tolist(),
         facts={"building": task.building.name, "task": task.digest(), **facts,
@@ -156,16 +157,17 @@ def _grounds(training: Training, unit: float, h: float) -> tuple[list[Array], li
     return found, drawn(max(FEWEST, len(found) // CHOOSING))
 
 
-def _clipped(task: Task, loop: Loop, longest: int, f_min: float) -> Loop:
+def _clipped(task: PolicyTask, loop: Loop, longest: int, f_min: float) -> Loop:
     """Return the clipped-optimal switch on the H-infinity design of the same building in closed
     loop; the design's weights are its default."""
-    c = design_hinf(replace(task, kind="hinf", motions=None)).controller
+    plant = {each.name: getattr(task, each.name) for each in fields(Task)}
+    c = design_hinf(Task(**{**plant, "kind": "hinf"})).controller
     scales = loop.policy.scales
     law = Policy(True, f_min, c.n, 0, np.array(c.A), np.array(c.B), np.array(c.C), scales)
     return Loop(law, longest, loop.course.z[0].tolist(), loop.course.x.shape[1])
 
 
-def _run(task: Task, ground: Array) -> Run:
+def _run(task: PolicyTask, ground: Array) -> Run:
     motion = Motion(ground, np.zeros((len(ground), 4)), 0)
     return Run(plant_of(task), setup_of(task.damper, 0.0), motion)
 

@@ -1,4 +1,4 @@
-"""Writes the controllers of the reference design: `python -m bristle.paper.reference --out DIR`.
+"""Writes the controllers of the reference design: `python -m benchmarks.paper.reference --out DIR`.
 
 The controllers that the FMUs carry unless told otherwise are these, with a coarser table: `--rows
 121 --out bristle/control/data` is a fifth of the size and, on El Centro at nominal 0.2 and 0.6 g,
@@ -15,10 +15,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..control.controller import KINDS
-from ..design import design
-from ..design.task import Scheduling, Task
-from ..errors import BristleError, DesignError
+from bristle.control.controller import KINDS
+from bristle.design import design
+from bristle.design.task import Scheduling, Task
+from bristle.errors import BristleError, DesignError
 
 TITLE = "reference design of the base-isolated two-storey model"
 
@@ -55,7 +55,7 @@ def write(folder: Path, rows: int | None = None, kinds: Sequence[str] = KINDS) -
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
-    parser = argparse.ArgumentParser(prog="python -m bristle.paper.reference", description=TITLE)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.paper.reference", description=TITLE)
     parser.add_argument("--out", type=Path, required=True, help="folder of the controller files")
     parser.add_argument("--rows", type=int, help="rows of the LPV controller's table")
     parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS, help="what is designed")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..draw.style import INK, RECONSTRUCTED, Page, label, ramp
+from bristle.draw.style import INK, RECONSTRUCTED, Page, label, ramp
+
 from .runs import Drawing, Runs
 
 if TYPE_CHECKING:
