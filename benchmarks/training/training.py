@@ -1,4 +1,4 @@
-"""What a policy is trained on and how: a design file of `kind = "policy"` with a table [motions]."""
+"""What a policy is trained on and how: a design file with a table [motions]."""
 
 from __future__ import annotations
 

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ..study.study import Study
 
 HELP = "make and change studies of measurements: new, extend, check, roles, channels, auto"
-_OLD = "first-look"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_roles(commands.add_parser("roles", help="show or change the roles of the runs"))
     add_channels(commands.add_parser("channels", help="show or correct columns, units and signs"))
     # The name until 0.1; here for one release.
-    _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
     auto = commands.add_parser(
         "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
@@ -240,8 +238,6 @@ def _check(arguments: argparse.Namespace) -> int:
     from ..study.data_check import check_data
     from ..study.study import Study
 
-    if arguments.action == _OLD:
-        print("`bristle study first-look` is now `bristle study check`.", file=sys.stderr)
     study = Study(arguments.folder)
     if arguments.mask and not study.settings.mask:
         study = study.with_mask()

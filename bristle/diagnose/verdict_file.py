@@ -1,4 +1,4 @@
-"""verdict.json as any version of this package wrote it, in the words of the present one."""
+"""verdict.json: which schema and kinds are read."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from ..errors import StudyError
 from .verdict_text import HEADINGS
 
 SCHEMA = 2
-_KIND_NOW = {"class": "ambiguous"}
-"""Kinds of schema 1 that have another name now."""
 
 
 def current(verdict: Mapping[str, Any], where: str = "verdict.json") -> dict[str, Any]:
-    """Return the content of a verdict file in the present schema.
+    """Return the content of a verdict file, checked.
 
     Parameters
     ----------
@@ -27,16 +25,14 @@ def current(verdict: Mapping[str, Any], where: str = "verdict.json") -> dict[str
         If the schema or the kind is none that this version knows.
     """
     schema, kind = verdict.get("schema"), verdict.get("kind")
-    if schema not in (1, SCHEMA):
+    if schema != SCHEMA:
         raise StudyError(
-            f"{where}: schema = {schema!r}; this version reads 1 and {SCHEMA}. "
+            f"{where}: schema = {schema!r}; this version reads {SCHEMA}. "
             "bristle diagnose writes it again."
         )
-    if schema == 1:
-        kind = _KIND_NOW.get(str(kind), kind)
     if kind not in HEADINGS:
         raise StudyError(
             f"{where}: kind = {kind!r}; there are {', '.join(HEADINGS)}. "
             "bristle diagnose writes it again."
         )
-    return {**verdict, "schema": SCHEMA, "kind": kind}
+    return dict(verdict)

@@ -32,15 +32,10 @@ HEADINGS = {
 
 def sentences(verdict: Verdict) -> list[str]:
     """Return what a verdict says, one sentence or a few in each text, the most important first."""
-    reasons = verdict.get("reasons")
-    out = [headline(verdict)]
-    if reasons is None and verdict.get("words"):  # schema 1 has the reasons in one text
-        out.append(str(verdict["words"]))
-    else:
-        out += [*law_sentences(verdict), *(reasons or []), *_besides(verdict), *_limits(verdict)]
-        out += [*_remaining(verdict), *_gains(verdict)]
+    out = [headline(verdict), *law_sentences(verdict), *(verdict.get("reasons") or [])]
+    out += [*_besides(verdict), *_limits(verdict), *_remaining(verdict), *_gains(verdict)]
     out += fault_texts(verdict, " ".join(out))
-    if reasons is not None and any(map(_is_set_right, verdict.get("sensors") or [])):
+    if any(map(_is_set_right, verdict.get("sensors") or [])):
         out.append("The verdict and its numbers are those with that set right.")
     return list(dict.fromkeys(text for text in out if text))
 

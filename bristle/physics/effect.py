@@ -80,9 +80,6 @@ OFFERED = {
 }  # fmt: skip
 """The signals of each site; the others of `Q` are zero there."""
 
-_ALL_LAWS_OF_ONCE = ("bingham", "lugre")
-"""Effects named the laws that they join until laws had parts; those that name all join any."""
-
 
 class Q(NamedTuple):
     """What a hook may ask for. Damper: motion across the fluid; structure: motion of the base.
@@ -143,8 +140,6 @@ class Effect:
     kind
         What it is a case of: "spring", "lag", "series element", "inertia" ... A law that contains
         one is not offered another. Its own name where nothing is said.
-    laws
-        Read from files of before laws had parts: the laws that the effect joins, if not all.
     starts
         States that begin with the value of a signal where a measurement begins: {state: signal}.
     bristles
@@ -247,7 +242,6 @@ class Effect:
     name: ClassVar[str] = ""
     site: ClassVar[str] = "damper"
     sites: ClassVar[tuple[str, ...]] = ("damper",)
-    laws: ClassVar[tuple[str, ...]] = ()
     acts_on: ClassVar[tuple[str, ...]] = ()
     kind: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
@@ -355,12 +349,6 @@ class Effect:
         """Return whether the effect can join a law: it has the parts, and not the effect in it."""
         if law.site not in cls.sites:
             return False
-        if (
-            cls.laws
-            and law.base.name not in cls.laws
-            and not set(cls.laws) >= set(_ALL_LAWS_OF_ONCE)
-        ):
-            return False
         if (cls.kind or cls.name) in law.contains:
             return False
         if cls.joint and not law.exact():  # the bristle beside a joint is advanced exactly
@@ -424,6 +412,10 @@ def _check(effect: type[Effect]) -> None:
         raise PhysicsError(f"{where}: joint = {effect.joint}; the names of two states are right.")
     if not (effect.__doc__ or "").strip():
         raise PhysicsError(f"{where}: a first docstring line tells users what it is.")
+    if "laws" in vars(effect):
+        raise PhysicsError(
+            f"{where}: names laws; its hooks decide which laws it joins, acts_on narrows them."
+        )
     wrong = [part for part in effect.acts_on if part not in PARTS]
     if wrong:
         raise PhysicsError(f"{where}: acts_on {wrong}; laws have parts {PARTS}.")

@@ -29,7 +29,7 @@ that was limited in slew or range behind its record."""
 FIELDS = {
     **dict.fromkeys(("name", "site", "kind", "shows", "source", "expect"), TEXT),
     **dict.fromkeys(("family", "absorbed_by", "offset", "mass", "amount"), TEXT),
-    **dict.fromkeys(("laws", "acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
+    **dict.fromkeys(("acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
     **dict.fromkeys(("sites", "excludes", "start_ties", "mimics", "faults"), TEXTS),
     **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
     **dict.fromkeys(("states", "starts", "lookalikes", "labels", "label_means"), TEXT_BY_NAME),

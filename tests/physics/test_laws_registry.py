@@ -160,23 +160,19 @@ def test_effects_join_it_by_its_parts(law: type[Law]) -> None:
     assert laws_joined(EFFECTS["gas_spring"]) == ("bingham", "dahl", "lugre")
 
 
-def test_an_old_effect_that_names_its_laws_keeps_to_them(law: type[Law]) -> None:
-    class Named(Effect):
-        """Named: of before laws had parts."""
+def test_an_effect_that_names_laws_is_refused() -> None:
+    with pytest.raises(PhysicsError, match="its hooks decide which laws it joins"):
 
-        laws = ("lugre",)
+        class Named(Effect):
+            """Named."""
 
-        @staticmethod
-        def force(q, z, p):
-            return 0.0
+            name = "named"
+            site = "damper"
+            laws = ("lugre",)
 
-    class NamesAll(Named):
-        laws = ("bingham", "lugre")
-
-    assert [Named.joins(LAWS[name]) for name in ("bingham", "lugre", "hyperbolic")] == [
-        False, True, False,
-    ]  # fmt: skip
-    assert all(NamesAll.joins(LAWS[name]) for name in ("bingham", "lugre", "hyperbolic"))
+            @staticmethod
+            def force(q, z, p):
+                return 0.0
 
 
 @pytest.mark.parametrize(

@@ -340,21 +340,6 @@ def test_wrong_commands_exit_2_and_leave_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_old_names_work_for_one_release(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    create_study(tmp_path / "rig", write_runs(tmp_path / "lab", seconds=2.0))
-    assert main(["study", "check", str(tmp_path / "rig")]) == 0
-    told = capsys.readouterr()
-    assert main(["study", "first-look", str(tmp_path / "rig")]) == 0
-    old = capsys.readouterr()
-    assert old.out == told.out
-    assert "`bristle study check`" in old.err
-    with pytest.warns(DeprecationWarning, match="data_check"):
-        from bristle.study.first_look import first_look
-    assert first_look is check_data
-
-
 def test_errors_end_the_check_with_2_and_advice_names_the_study(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
