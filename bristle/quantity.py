@@ -146,4 +146,5 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
     tail = times_ten(power) if power else ""
     texts = (f"{round(one, digits):.{places}f}".replace("-", "\u2212") for one in (scaled, width))
     number_text, wide = texts
-    return f"{number_text}{tail}", f"± {wide}{tail}"
+    power_of_zero = "" if not round(scaled, digits) else tail  # no "0 × 10³"
+    return f"{number_text}{power_of_zero}", f"± {wide}{tail}"

@@ -9,7 +9,7 @@ import pytest
 from study.made import bench_run, write
 
 from bristle.cli import main
-from bristle.quantity import log_ticks, plain, quantity, scale, short_z, tick, typed
+from bristle.quantity import log_ticks, plain, quantity, scale, short_z, tick, typed, with_interval
 from bristle.study import create_study
 
 POWER = re.compile(r"\d[eE][+-]?\d")
@@ -25,6 +25,11 @@ POWER = re.compile(r"\d[eE][+-]?\d")
 )  # fmt: skip
 def test_a_number_has_its_digits_and_no_power_of_ten(value: float, digits: int, text: str) -> None:
     assert plain(value, digits) == text
+
+
+def test_a_value_of_zero_has_no_power_beside_its_interval() -> None:
+    assert with_interval(12.0, 6e4) == ("0", "± 120 \u00d7 10³")
+    assert with_interval(-1.2e6, 9e5)[0] == "\u22121.2 \u00d7 10⁶"
 
 
 def test_the_rigs_size_decides_on_the_unit() -> None:

@@ -102,10 +102,10 @@ def _with_patterns(found: Finding, opened: Opening) -> Finding:
     patterns = list(found.patterns) or patterns_of(opened.before, opened.held_out)
     if found.kind != "unknown":
         return replace(found, patterns=tuple(patterns))
-    coordinate, patterns = remaining_residual(
+    coordinate, patterns, beside = remaining_residual(
         opened.before, found.trials, patterns, opened.held_out, opened.rule
     )
-    return replace(found, coordinate=coordinate, patterns=tuple(patterns))
+    return replace(found, coordinate=coordinate, patterns=tuple(patterns), beside=beside)
 
 
 def _with_intervals(found: Finding, opened: Opening) -> Finding:

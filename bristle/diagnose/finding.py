@@ -25,8 +25,9 @@ class Finding:
 
     `kind` and `effects` as in verdict.json; `z_before`, `z_after` on held-out runs; `share` what
     the effects explain of the excess, `detectable` the smallest share of the site's force that
-    would have been seen, NaN where nobody asked; `coordinate` that of an unknown residual. `model`
-    is what the finding names; `before` the trial of the site's model as it was, `after` that of
+    would have been seen, NaN where nobody asked; `coordinate` that of an unknown residual, of the
+    model with the effects `beside` where what they mimic hid it. `model` is what the finding names;
+    `before` the trial of the site's model as it was, `after` that of
     `model`, `trials` those of single effects, best first; `reasons` sentences.
 
     `std` is by parameter [SI], of what the data identify; `patterns` those of the residual;
@@ -58,6 +59,7 @@ class Finding:
     together: Trial | None = None
     other_law: OtherLaw | None = None
     limits: tuple[EffectLimit, ...] = ()
+    beside: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds of the site."""
@@ -77,6 +79,7 @@ class Finding:
             out["detectable"] = round(self.detectable, 5)
         if self.kind == "unknown" and self.coordinate:
             out["coordinate"] = self.coordinate
+            out["coordinate_beside"] = list(self.beside)
         if self.patterns:
             out["organised"] = [
                 {"coordinate": one.coordinate, "share": round(one.share, 4), "p": one.p}
@@ -106,5 +109,6 @@ def of_decision(
     best = decision.best
     return Finding(
         site, decision.kind, decision.effects, before.z, best.z, decision.explained,
-        float("nan"), "", best.model, trials, before, best, decision.reasons,
+        float("nan"), model=best.model, trials=trials, before=before, after=best,
+        reasons=decision.reasons,
     )  # fmt: skip

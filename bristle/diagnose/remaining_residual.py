@@ -53,8 +53,8 @@ def remaining_residual(
     rest: list[ResidualPattern],
     held_out: Problem,
     rule: DecisionRule = BENCH,
-) -> tuple[str, list[ResidualPattern]]:
-    """Return the coordinate that organises what no effect explains, and all patterns of it.
+) -> tuple[str, list[ResidualPattern], tuple[str, ...]]:
+    """Return the coordinate that organises what no effect explains, all patterns, and beside what.
 
     What an effect can mimic may hide what no effect can: where `rest` is not clear, what the
     nearest effect leaves is looked at.
@@ -70,13 +70,15 @@ def remaining_residual(
     Returns
     -------
     tuple
-        Name of the coordinate ("" where there is no pattern), and the patterns it was chosen from.
+        Name of the coordinate ("" where there is no pattern), the patterns it was chosen from, and
+        the nearest effect where they are of the model with it.
     """
     nearest = min(trials, key=lambda trial: trial.z, default=before)
     if _clear(rest, rule) or not missing(before, nearest, rule):
-        return most_telling(rest, before, held_out, rule), rest
+        return most_telling(rest, before, held_out, rule), rest, ()
     rest = patterns_of(nearest, held_out)
-    return most_telling(rest, nearest, held_out, rule), rest
+    added = tuple(name for name in nearest.effects if name not in before.effects)
+    return most_telling(rest, nearest, held_out, rule), rest, added
 
 
 def _clear(patterns: Sequence[ResidualPattern], rule: DecisionRule) -> bool:

@@ -118,6 +118,11 @@ def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
     sure = sure or any(
         one["p"] <= rule.chance for one in organised or [] if one["coordinate"] == coordinate
     )
+    if sure and (beside := at.get("coordinate_beside")):
+        return [
+            f"With {joined(beside)}, which comes nearest, the remaining error depends mainly on "
+            f"{name}; `bristle compare` shows the error of the model without it."
+        ]
     if sure:
         return [f"The remaining error depends mainly on {name}."]
     return [f"The remaining error depends on no coordinate beyond chance; the nearest is {name}."]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from bristle.data.checks.finding import Finding, grouped, sentence
 
 
@@ -34,3 +36,18 @@ def test_the_same_is_said_of_equal_sentences_alone():
 def test_runs_that_each_differ_in_their_own_way_are_told_one_by_one():
     rows = [Finding("run gain", "error", "1.4 times", run=run, channel="force") for run in "ab"]
     assert [one.run for one, _ in grouped(rows)] == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("texts", "also"),
+    [
+        (("from 12.68 to 12.9 mm it", "from 12.71 to 12.9 mm it"), "12.68 to 12.71 mm in 2 runs"),
+        (("is 1.18 x the others", "is 1.23 x the others"), "1.18 to 1.23 in 2 runs"),
+        (("3 in it", "4 in it"), "3 to 4 in 2 runs"),
+        (("off by 3 %, late", "off by 4 %, late"), "3 to 4 % in 2 runs"),
+        (("1.18 times as much", "1.2 times as much"), "1.18 to 1.2 times in 2 runs"),
+    ],
+)
+def test_a_range_over_runs_has_its_unit_alone(texts: tuple[str, str], also: str) -> None:
+    both = [Finding("off", "warning", text, run=f"r{k}") for k, text in enumerate(texts)]
+    assert sentence(*grouped(both)[0]).endswith(f" ({also})")

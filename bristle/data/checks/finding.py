@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from ...errors import UnitError
+from ...units import parse
 from ..corrections import Correction
 
 Level = Literal["error", "warning", "note"]
@@ -15,7 +17,8 @@ _OF_ONE_RUN = ("run gain", "run sign", "run zero")
 """Kinds that say how one run differs from the others."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\d)")
 """A number of a sentence, and no part of a name."""
-_UNIT = re.compile(r" [^\s,;:()]*[^\s,;:().]")
+_WORD = re.compile(r"(?: to -?[\d.]+)? ([^\s,;:()]*[^\s,;:().])")
+"""What stands behind a number, or behind the range that begins with it."""
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
@@ -84,8 +87,21 @@ def _range_text(group: Sequence[Finding]) -> str:
     for column in columns:
         texts = [match.group() for match in column]
         if len(set(texts)) > 1:
-            unit = _UNIT.match(column[0].string, column[0].end())
+            unit = _unit(column[0])
             low, high = min(texts, key=float), max(texts, key=float)
             runs = len({one.run for one in group})
-            return f"{low} to {high}{unit.group() if unit else ''} in {runs} runs"
+            return f"{low} to {high}{unit} in {runs} runs"
     return ""
+
+
+def _unit(number: re.Match[str]) -> str:
+    """Return the unit behind a number of a sentence, a blank before it, "" where none is there."""
+    word = _WORD.match(number.string, number.end())
+    text = word.group(1) if word else ""
+    if text == "in":  # the preposition: readers convert inches
+        return ""
+    try:
+        parse(text)
+    except UnitError:
+        return f" {text}" if text in ("ppm", "times") else ""
+    return f" {text}" if text else ""
