@@ -13,9 +13,10 @@ is neither Hz nor 1/s.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from functools import cache
-from math import pi
+from math import isclose, isfinite, pi
 from typing import NamedTuple
 
 from .errors import UnitError
@@ -41,6 +42,63 @@ class Unit(NamedTuple):
     factor: float
     dimension: Exponents
     offset: float = 0.0
+
+
+class Measure(NamedTuple):
+    """A unit as an FMU or a package names it; `defined` is what it says the name means.
+
+    By FMI the name is free and the BaseUnit decides. Where there is none, the name is read.
+    """
+
+    name: str
+    defined: Unit | None = None
+
+    @property
+    def unit(self) -> Unit | None:
+        """The unit that is meant, None where nothing says what it is."""
+        if self.defined is not None:
+            return self.defined
+        try:
+            return parse(self.name)
+        except UnitError:
+            return None
+
+    @property
+    def shown(self) -> str:
+        """The name in brackets, with what it means where the name does not say that."""
+        named = Measure(self.name).unit
+        if self.defined is None or (named is not None and alike(named, self.defined)):
+            return f"[{self.name}]"
+        return f"[{self.name}] (defined as {in_base_units(self.defined)})"
+
+    def change_to(self, wanted: Measure) -> tuple[float, float]:
+        """Return (factor, offset) with `value_wanted = factor * value + offset`.
+
+        Raises
+        ------
+        UnitError
+            If nothing says what one of the units is, or they are units of different quantities.
+        """
+        one, other = self.unit, wanted.unit
+        if one is None or other is None:
+            if self.name == wanted.name:
+                return 1.0, 0.0
+            strange = self.name if one is None else wanted.name
+            raise UnitError(
+                f'{self.shown} into {wanted.shown}: nothing says what the unit "{strange}" is.'
+            )
+        if alike(one, other) or (self.name == wanted.name and _but_for_angles(one, other)):
+            return 1.0, 0.0
+        if one.dimension != other.dimension:
+            raise UnitError(f"{self.shown} does not convert into {wanted.shown}.")
+        return one.factor / other.factor, (one.offset - other.offset) / other.factor
+
+
+def _but_for_angles(one: Unit, other: Unit) -> bool:
+    """Return whether two units are one if an angle has no dimension, as many FMUs have it."""
+    place = DIMENSIONS.index("rad")
+    powers = other.dimension[:place] + one.dimension[place : place + 1]
+    return alike(one, other._replace(dimension=powers))
 
 
 def _dimension(**exponents: int) -> Exponents:
@@ -94,6 +152,7 @@ _PREFIXES = {"n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9
 _ALIASES = {"sec": "s", "ohm": "Ohm", "Ω": "Ohm", "°": "deg", "°C": "degC"}
 _CELSIUS = Unit("degC", 1.0, _dimension(K=1), 273.15)
 _LONGEST = 80  # characters
+_DIGITS = 1e-6  # how far [1] two ways to write one factor may lie apart
 _COMMON = ("m/s2", "m/s", "N/m", "N.s/m", "N.s/(m.V)", "rad/s", "degC")
 _USUAL = (
     "m",
@@ -218,6 +277,84 @@ def conversion(source: str, target: str) -> tuple[float, float]:
         f'"{source}" [{_base_units(old)}] cannot become "{target}" [{_base_units(new)}]: '
         f"they differ in dimension.{note}"
     )
+
+
+def definitions(told: Iterable[tuple[str, Mapping[str, str] | None]]) -> dict[str, Measure]:
+    """Return the units that a file defines, by name.
+
+    Parameters
+    ----------
+    told : iterable
+        Name of each unit, and the attributes of its BaseUnit, None where it has none.
+
+    Raises
+    ------
+    UnitError
+        If one cannot be read, or is defined twice and differently.
+    """
+    found: dict[str, Measure] = {}
+    for name, attributes in told:
+        unit = None if attributes is None else defined(name, attributes)
+        first = found.setdefault(name, Measure(name, unit)).defined
+        if first is None:
+            found[name] = Measure(name, unit)
+        elif unit is not None and not alike(first, unit):
+            raise UnitError(
+                f'unit "{name}" is defined twice: as {in_base_units(first)} and as '
+                f"{in_base_units(unit)}; one definition is right."
+            )
+    return found
+
+
+def defined(name: str, attributes: Mapping[str, str]) -> Unit:
+    """Return the unit that a BaseUnit of FMI or SSP defines.
+
+    Parameters
+    ----------
+    name : str
+        What the FMU or package calls it.
+    attributes : mapping
+        The BaseUnit's: exponents by the names of `DIMENSIONS`, `factor`, `offset`.
+
+    Raises
+    ------
+    UnitError
+        If an attribute is no number, a power is not whole, or the factor is 0.
+    """
+
+    def number(key: str, usual: float) -> float:
+        text = attributes.get(key)
+        try:
+            value = usual if text is None else float(text)
+        except ValueError:
+            value = float("nan")
+        if not isfinite(value):
+            raise UnitError(f'unit "{name}": {key} = "{text}" is no finite number.')
+        return value
+
+    powers = [number(key, 0.0) for key in DIMENSIONS]
+    if any(power != int(power) for power in powers):
+        raise UnitError(f'unit "{name}": powers of base units are whole numbers.')
+    factor = number("factor", 1.0)
+    if factor == 0.0:
+        raise UnitError(f'unit "{name}": its factor is 0; a unit has another one.')
+    return Unit(name, factor, tuple(int(power) for power in powers), number("offset", 0.0))
+
+
+def alike(one: Unit, other: Unit) -> bool:
+    """Return whether two units are one, whatever they are called and with how many digits.
+
+    Files write pi/180 and the like with six digits or more.
+    """
+    near = isclose(one.factor, other.factor, rel_tol=_DIGITS)
+    shift = abs(one.offset - other.offset) <= _DIGITS * max(abs(one.offset), abs(other.offset))
+    return one.dimension == other.dimension and near and shift
+
+
+def in_base_units(unit: Unit) -> str:
+    """Return what a unit is in base units: `0.001 kg.m2/s2`, `1 K + 273.15`."""
+    shift = f" + {unit.offset:.9g}" if unit.offset else ""
+    return f"{unit.factor:.9g} {_base_units(unit)}{shift}"
 
 
 def si_unit(text: str) -> str:

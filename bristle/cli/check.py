@@ -49,7 +49,7 @@ def main(arguments: argparse.Namespace) -> int:
         _print_json(found)
     else:
         for file, findings in found.items():
-            _print_plain(file, findings)
+            print_findings(file, findings)
     wrong = any(finding.level == "error" for findings in found.values() for finding in findings)
     return 2 if wrong else 0
 
@@ -68,7 +68,7 @@ def _print_json(found: dict[str, list[Finding]]) -> None:
     print(json.dumps({"files": answer}, indent=2))
 
 
-def _print_plain(file: str, findings: list[Finding]) -> None:
+def print_findings(file: str, findings: list[Finding]) -> None:
     """Print one line per finding, `FILE:LINE: level: text`, which editors make clickable."""
     colour = sys.stdout.isatty()
     for line, level, text in findings:

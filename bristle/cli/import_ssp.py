@@ -22,22 +22,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Import; print the files, and what was taken to be or left aside."""
+    """Import; print the files, what was taken to be or left aside, and what a check finds.
+
+    Return 0, or 2 where the scenario cannot run as it is.
+    """
     from ..scenario.import_ssp import import_ssp
+    from ..scenario.scenario import check_scenario
+    from .check import print_findings
 
     made = import_ssp(arguments.package, arguments.out or Path(arguments.package.stem))
+    findings = check_scenario(made.scenario)
+    wrong = any(finding.level == "error" for finding in findings)
     if arguments.json:
         import json
 
         answer = {
             "scenario": str(made.scenario.absolute()),
             "fmus": [str(file.absolute()) for file in made.fmus],
-            "notes": list(made.notes),
+            "notes": [note.text for note in made.notes],
+            "findings": [finding._asdict() for finding in findings],
         }
         print(json.dumps(answer, indent=2))
-        return 0
+        return 2 if wrong else 0
     print(f"{made.scenario}: a scenario of {len(made.fmus)} FMUs.")
     for note in made.notes:
-        print(note)
-    print(f"Run it:  {command('run', made.scenario)}")
-    return 0
+        print(note.text)
+    if findings:
+        print_findings(str(made.scenario), findings)
+    if not wrong:
+        print(f"Run it:  {command('run', made.scenario)}")
+    return 2 if wrong else 0

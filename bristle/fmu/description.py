@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import FmuError
+from ..units import Measure
 from . import description_fmi3
 from .archive import (
     DESCRIPTION,
@@ -24,12 +25,16 @@ from .variables import (
     Description,
     Value,
     Variable,
+    begins,
     check_jumps,
+    items_of,
     mark_optional,
     number_of,
     over_step_of,
     reference_of,
     start_of,
+    unit_of,
+    units_of,
     unsigned,
 )
 from .xml_text import parse_xml
@@ -104,7 +109,8 @@ def describe(root: ElementTree.Element) -> Description:
         if (name := simple.get("name"))
         for child in simple
     }
-    listed = [_variable(e, types) for e in root.iterfind("ModelVariables/ScalarVariable")]
+    units = units_of(root)
+    listed = [_variable(e, types, units) for e in root.iterfind("ModelVariables/ScalarVariable")]
     variables = {v.name: v for v in listed}
     if len(variables) != len(listed):
         twice = sorted(n for n, times in Counter(v.name for v in listed).items() if times > 1)
@@ -119,6 +125,7 @@ def describe(root: ElementTree.Element) -> Description:
         description=root.get("description", ""),
         variables=variables,
         capabilities={k: v for k, v in slave.attrib.items() if k != "modelIdentifier"},
+        begins=begins(root),
     )
 
 
@@ -147,8 +154,8 @@ def _check_kind(path: Path, root: ElementTree.Element, versions: Sequence[str]) 
 
 
 def _variable(
-    element: ElementTree.Element, types: dict[str, ElementTree.Element]
-) -> Variable:  # fmt: skip
+    element: ElementTree.Element, types: dict[str, ElementTree.Element], units: dict[str, Measure]
+) -> Variable:
     name = element.get("name")
     if not name:
         raise FmuError("a variable has no name.")
@@ -172,6 +179,8 @@ def _variable(
         description=element.get("description", ""),
         over_step=over_step_of(name, _annotation(element, OVER_STEP_TAG)),
         jumps_without=_annotation(element, JUMPS_TAG),
+        defined=unit_of(own, units),
+        items=items_of(name, declared),
     )
 
 

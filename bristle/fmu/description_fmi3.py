@@ -12,16 +12,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ..errors import FmuError
+from ..units import Measure
 from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
 from .variables import (
     Description,
     Variable,
+    begins,
     check_jumps,
+    items_of,
     mark_optional,
     number_of,
     over_step_of,
     reference_of,
     start_of,
+    unit_of,
+    units_of,
 )
 
 KINDS = {
@@ -57,6 +62,7 @@ def describe(root: ElementTree.Element) -> Description:
     slave = root.find("CoSimulation")
     assert slave is not None  # read_root refuses what has none
     types = {child.get("name", ""): child for child in root.iterfind("TypeDefinitions/*")}
+    units = units_of(root)
     variables: dict[str, Variable] = {}
     check_ports(root)
     for element in root.iterfind("ModelVariables/*"):
@@ -64,7 +70,7 @@ def describe(root: ElementTree.Element) -> Description:
         if element.tag in KINDS and element.find("Dimension") is None:
             if name in variables:
                 raise FmuError(f"variables defined twice: {name}.")
-            variables[name] = _variable(element, types)
+            variables[name] = _variable(element, types, units)
     _add_dependencies(root, variables)
     mark_optional(variables, _annotation(root, "optional") or "")
     check_jumps(variables)
@@ -78,6 +84,7 @@ def describe(root: ElementTree.Element) -> Description:
             _CAPABILITIES.get(k, k): v for k, v in slave.attrib.items() if k != "modelIdentifier"
         },
         version="3.0",
+        begins=begins(root),
     )
 
 
@@ -108,7 +115,11 @@ def _refuse(element: ElementTree.Element) -> None:
         raise FmuError(f'"{name}" is an array. Ports are single numbers here.')
 
 
-def _variable(element: ElementTree.Element, types: Mapping[str, ElementTree.Element]) -> Variable:
+def _variable(
+    element: ElementTree.Element,
+    types: Mapping[str, ElementTree.Element],
+    units: Mapping[str, Measure],
+) -> Variable:
     name, kind = element.attrib["name"], KINDS[element.tag]
     declared = types.get(element.get("declaredType", ""))
     own = {**(declared.attrib if declared is not None else {}), **element.attrib}
@@ -132,6 +143,8 @@ def _variable(element: ElementTree.Element, types: Mapping[str, ElementTree.Elem
         over_step=over_step_of(name, _annotation(element, OVER_STEP_TAG)),
         jumps_without=_annotation(element, JUMPS_TAG),
         type=element.tag,
+        defined=unit_of(own, units),
+        items=items_of(name, declared if kind == "Enumeration" else None),
     )
 
 

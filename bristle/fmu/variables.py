@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from ..component import OVER_STEP
-from ..errors import FmuError
+from ..errors import FmuError, UnitError
+from ..units import Measure, Unit, definitions
 from .model_description import OVER_STEP_TAG
 
 Value = float | int | bool | str
@@ -21,7 +24,9 @@ class Variable:
     the inputs that the output follows directly, None where the FMU does not say. `over_step` is how
     an input is taken over a step, one of `component.OVER_STEP`, None where the FMU does not say.
     `jumps_without` names the input without which an output may jump, None where the FMU names none.
-    `type` is FMI 3.0's ("Float64", "Int32" ...), "" in FMI 2.0.
+    `type` is FMI 3.0's ("Float64", "Int32" ...), "" in FMI 2.0. `defined` is what the FMU's
+    BaseUnit says the unit is, None where it has none. `items` are the values of an Enumeration by
+    name, none where the FMU does not list them.
     """
 
     name: str
@@ -40,11 +45,32 @@ class Variable:
     over_step: str | None = None
     jumps_without: str | None = None
     type: str = ""
+    defined: Unit | None = None
+    items: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def measure(self) -> Measure | None:
+        """The unit with what the FMU defines it as, None without a unit."""
+        return Measure(self.unit, self.defined) if self.unit else None
+
+
+_WITHOUT_LOSS = {
+    ("Integer", "Real"), ("Enumeration", "Real"), ("Enumeration", "Integer"),
+    ("Integer", "Enumeration"),
+}  # fmt: skip
+
+
+def passes(given: str, wanted: str) -> bool:
+    """Return whether an output of one kind can feed an input of another: a text feeds nothing."""
+    return given == wanted != "String" or (given, wanted) in _WITHOUT_LOSS
 
 
 @dataclass(frozen=True)
 class Description:
-    """What a scenario needs to know of a component before it runs; `version` is that of FMI."""
+    """What a scenario needs to know of a component before it runs; `version` is that of FMI.
+
+    `begins` is the start time of its default experiment as the file writes it, "" without one.
+    """
 
     name: str
     guid: str
@@ -53,10 +79,68 @@ class Description:
     variables: dict[str, Variable] = field(default_factory=dict)
     capabilities: dict[str, str] = field(default_factory=dict)
     version: str = "2.0"
+    begins: str = ""
 
     def of(self, causality: str) -> list[Variable]:
         """Return the variables of one causality ("input", "output", "parameter"), in order."""
         return [v for v in self.variables.values() if v.causality == causality]
+
+
+def units_of(root: ElementTree.Element) -> dict[str, Measure]:
+    """Return the units that an FMU defines, by name.
+
+    Raises
+    ------
+    FmuError
+        If one cannot be read, or is defined twice and differently.
+    """
+    told = []
+    for element in root.iterfind("UnitDefinitions/Unit"):
+        base = element.find("BaseUnit")
+        told.append((element.get("name", ""), None if base is None else base.attrib))
+    try:
+        return definitions(told)
+    except UnitError as error:
+        raise FmuError(str(error)) from None
+
+
+def unit_of(own: Mapping[str, str], units: Mapping[str, Measure]) -> Unit | None:
+    """Return what the FMU defines a variable's unit as; a difference has no offset.
+
+    Parameters
+    ----------
+    own : attributes of the variable, those of its type included
+    units : the FMU's, by name
+    """
+    name = own.get("unit", "")
+    unit = units.get(name, Measure(name)).defined
+    if unit is not None and own.get("relativeQuantity", "").strip() in ("true", "1"):
+        return unit._replace(offset=0.0)
+    return unit
+
+
+def items_of(name: str, declared: ElementTree.Element | None) -> dict[str, int]:
+    """Return the values of an Enumeration by the names of its items.
+
+    Raises
+    ------
+    FmuError
+        If a value is no whole number.
+    """
+    found = {}
+    for item in () if declared is None else declared.iterfind("Item"):
+        try:
+            found[item.get("name", "")] = int(item.get("value", ""))
+        except ValueError:
+            text = f'the item "{item.get("name")}" has the value {item.get("value")!r}'
+            raise FmuError(f'variable "{name}": {text}, no whole number.') from None
+    return found
+
+
+def begins(root: ElementTree.Element) -> str:
+    """Return the start time of an FMU's default experiment as it writes it, "" without one."""
+    experiment = root.find("DefaultExperiment")
+    return "" if experiment is None else experiment.get("startTime", "")
 
 
 def reference_of(name: str, text: str | None) -> int:

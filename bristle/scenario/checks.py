@@ -342,6 +342,7 @@ def _describe(
     try:
         if part.file:
             part.description = library.describe_file(part.file)
+            _check_begin(part, path, findings)
         elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
             own = (part.effects,) if part.effects else ()
             made_of = part.law.component if part.law else part.fmu
@@ -354,3 +355,15 @@ def _describe(
             given = ["effects"]
         at = (*part.path, given[0]) if given else path
         findings.error(at, f"{where}: {error}")
+
+
+def _check_begin(part: Part, path: KeyPath, findings: Findings) -> None:
+    """Say where an FMU's default experiment begins elsewhere than a run does."""
+    begins = part.description.begins.strip() if part.description else ""
+    try:
+        if not begins or float(begins) == 0.0:
+            return
+    except ValueError:
+        pass  # no number: it is shown as it stands
+    text = f"the default experiment of its FMU begins at {begins} s; a run begins at 0 s"
+    findings.note(path, f"[components.{part.name}]: {text}.")

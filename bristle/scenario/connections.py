@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from ..errors import UnitError
 from ..findings import Findings, nearest, number, unknown, written
 from ..fmu.description import Variable
+from ..fmu.variables import passes
 from ..lines import KeyPath
-from ..units import Unit, parse
+from ..ssp.conversion import SAME
+from ..units import Measure
 from .checks import table
 from .document import Document, flatten
+from .parameters import shown_items
 from .parts import Part
 
 FROM, FACTOR, OFFSET = TRANSFORMED = ("from", "factor", "offset")
@@ -133,17 +136,9 @@ def _check_wire(
             right = False
     if not right:
         return None
-    if entry.kind != exit_.kind:
-        findings.error(
-            path, f'"{target}" is {entry.kind} and "{source}" is {exit_.kind}; both must be alike.'
-        )
-    elif isinstance(said, dict):
-        if entry.kind != "Real":
-            findings.error(
-                path, f'"{target}" is {entry.kind}: only Real has a factor and an offset.'
-            )
-    elif entry.kind == "Real":
-        _check_units(target, entry.unit, source, exit_.unit, path, findings)
+    _check_kinds(target, entry, source, exit_, path, isinstance(said, dict), findings)
+    if entry.kind == exit_.kind == "Real" and isinstance(said, str):
+        _check_units(target, entry.measure, source, exit_.measure, path, findings)
     if entry.name in to.places:
         findings.error(
             path,
@@ -202,58 +197,80 @@ def _wrong_end(end: str, part: Part, variable: Variable, wanted: str) -> str:
     )
 
 
+def _check_kinds(
+    target: str,
+    entry: Variable,
+    source: str,
+    exit_: Variable,
+    path: KeyPath,
+    transformed: bool,
+    findings: Findings,
+) -> None:
+    """Check that values can be passed on: whole numbers feed reals and enumerations too."""
+    ends = f'"{target}" is {entry.kind} and "{source}" is {exit_.kind}'
+    if entry.kind == exit_.kind == "String":
+        text = "texts are set in parameters, only numbers and Booleans are passed on."
+        findings.error(path, f"{ends}: {text}")
+    elif not passes(exit_.kind, entry.kind):
+        findings.error(path, f"{ends}; both must be alike.")
+    elif transformed and entry.kind != "Real":
+        text = f'"{target}" is {entry.kind}: only Real has a factor and an offset.'
+        findings.error(path, text)
+    elif entry.items:
+        strange = [name for name, value in exit_.items.items() if value not in entry.items.values()]
+        right = f"it takes {shown_items(entry)}"
+        if strange:
+            text = f'"{source}" may be {", ".join(strange)}'
+            findings.warning(path, f'{text}, which "{target}" does not know: {right}.')
+        elif not exit_.items:
+            text = f'{ends}: {right}, and nothing checks that "{source}" gives no other'
+            findings.note(path, f"{text} value.")
+
+
 def _check_units(
     target: str,
-    wanted: str | None,
+    wanted: Measure | None,
     source: str,
-    given: str | None,
+    given: Measure | None,
     path: KeyPath,
     findings: Findings,
 ) -> None:
-    if not wanted and not given:
+    if wanted is None and given is None:
         return
-    if not given:
-        findings.note(
-            path, f'"{source}" has no unit; "{target}" takes its values as {_shown(wanted)}.'
-        )
+    if given is None:
+        assert wanted is not None
+        text = f'"{source}" has no unit; "{target}" takes its values as {wanted.shown}.'
+        findings.note(path, text)
         return
-    if not wanted:
-        findings.note(
-            path, f'"{target}" names no unit; it takes "{source}" in {_shown(given)} as it comes.'
-        )
+    if wanted is None:
+        text = f'"{target}" names no unit; it takes "{source}" in {given.shown} as it comes.'
+        findings.note(path, text)
         return
-    into, out = _unit(wanted), _unit(given)
-    if into is None or out is None:
-        if wanted != given:
-            strange = wanted if into is None else given
-            findings.warning(
-                path,
-                f'"{target}" {_shown(wanted)} is fed by "{source}" {_shown(given)}; the unit '
-                f'"{strange}" is not known here, so whether they agree is for you to see.',
-            )
-        return
-    if into.dimension != out.dimension:
-        words = "another quantity"
-    elif (into.factor, into.offset) != (out.factor, out.offset):
-        words = "the same quantity in another unit, and nothing converts it"
-    else:
-        return
-    findings.error(
-        path,
-        f'"{target}" {_shown(wanted)} is fed by "{source}" {_shown(given)}: {words}. An output '
-        f"in {_shown(wanted)} is right.",
-    )
-
-
-def _unit(text: str) -> Unit | None:
+    ends = f'"{target}" {wanted.shown} is fed by "{source}" {given.shown}'
+    into, out = wanted.unit, given.unit
     try:
-        return parse(text)
+        factor, offset = given.change_to(wanted)
     except UnitError:
-        return None
-
-
-def _shown(unit: str | None) -> str:
-    return f"[{unit}]"
+        if into is not None and out is not None:
+            text = f"{ends}: another quantity. An output in [{wanted.name}] is right."
+            findings.error(path, text)
+            return
+        strange = wanted if into is None else given
+        findings.warning(
+            path,
+            f'{ends}; the unit "{strange.name}" is not known here, so whether they agree is for '
+            "you to see.",
+        )
+        return
+    if (factor, offset) != SAME:
+        shift = f", offset = {offset:.9g}" if offset else ""
+        findings.error(
+            path,
+            f"{ends}: the same quantity in another unit, and nothing converts it. An output in "
+            f'[{wanted.name}] is right, or {{ from = "{source}", factor = {factor:.9g}{shift} }}.',
+        )
+    elif into is not None and out is not None and into.dimension != out.dimension:
+        findings.note(path, f"{ends}: one of them counts an angle as a dimension.")
 
 
 def _check_inputs(
@@ -267,7 +284,7 @@ def _check_inputs(
             name = f"{part.name}.{variable.name}"
             if variable.optional or name in claimed or variable.name in part.places:
                 continue
-            unit = f" {_shown(variable.unit)}" if variable.unit else ""
+            unit = f" [{variable.unit}]" if variable.unit else ""
             findings.error(
                 part.path,
                 f'"{name}"{unit} has no source: connect it{_candidates(part, variable, parts)} '
@@ -282,7 +299,7 @@ def _candidates(part: Part, wanted: Variable, parts: Mapping[str, Part]) -> str:
         for other in parts.values()
         if other is not part and other.description
         for output in other.description.of("output")
-        if output.kind == wanted.kind and (output.unit == wanted.unit or output.unit is None)
+        if output.kind == wanted.kind != "String" and _unit_fits(output, wanted)
     ]
     same_name = [pair for pair in outputs if pair[1].name == wanted.name]
     ends_alike = [pair for pair in outputs if pair[1].name.split("_")[-1] in wanted.name]
@@ -292,3 +309,14 @@ def _candidates(part: Part, wanted: Variable, parts: Mapping[str, Part]) -> str:
             source, output = found[0]
             return f', e.g. "{part.name}.{wanted.name}" = "{source}.{output.name}",'
     return ""
+
+
+def _unit_fits(output: Variable, wanted: Variable) -> bool:
+    """Return whether an output's values can be taken as they are, as far as its unit says."""
+    given, into = output.measure, wanted.measure
+    if given is None or into is None:
+        return given is None
+    try:
+        return given.change_to(into) == SAME
+    except UnitError:
+        return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import re
 import shutil
@@ -10,20 +11,22 @@ import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 from .. import resources
 from ..errors import FmuError, ScenarioError
 from ..fmu.description import Description, Value, Variable, read_description, read_root
-from ..ssp.conversion import SAME
+from ..ssp.conversion import SAME, convert
 from ..ssp.flatten import FlatConnection, FlatSystem, flatten_system
 from ..ssp.flatten import Path as Names
 from ..ssp.package import Package, open_package
 from ..ssp.structure import Structure, read_structure
+from ..units import Measure
 from .checks import NAME, RESERVED, STEP_TOLERANCE
 from .parts import ALGORITHMS
 from .text import toml_key, toml_value
 
-FORM = 1
+FORM = 2
 """Version of what is written: another one unpacks packages anew."""
 USUAL_STOP = 1.0
 """Stop [s] where neither the package nor its FMUs name one."""
@@ -31,16 +34,27 @@ USUAL_STEPS = 1000
 """Steps until then where none of them names a step."""
 DIGITS = 24
 """Of a digest, in the name of a folder: 96 bits, no two packages share them."""
-_START: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Enumeration": 0, "Boolean": False}
+_NOTES = "notes.json"
+"""Beside an unpacked scenario in the cache."""
+_START: dict[str, Value] = {
+    "Real": 0.0, "Integer": 0, "Enumeration": 0, "Boolean": False, "String": "",
+}  # fmt: skip
+
+
+class Note(NamedTuple):
+    """What was taken to be or left aside; `key` is that of [run] which it is about, or ""."""
+
+    text: str
+    key: str = ""
 
 
 @dataclass(frozen=True)
 class ImportedPackage:
-    """The scenario, its FMUs, and what was taken to be or left aside, a text each."""
+    """The scenario, its FMUs, and what was taken to be or left aside."""
 
     scenario: Path
     fmus: tuple[Path, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
 
 
 def import_ssp(package: Path, folder: Path) -> ImportedPackage:
@@ -78,8 +92,8 @@ def import_ssp(package: Path, folder: Path) -> ImportedPackage:
     return ImportedPackage(folder / made.scenario.name, fmus, made.notes)
 
 
-def unpacked(package: Path) -> Path:
-    """Return the scenario that an SSP package is, in the cache, made where it is not there yet.
+def unpacked(package: Path) -> ImportedPackage:
+    """Return an SSP package as it is unpacked in the cache, which is done where it is not yet.
 
     Raises
     ------
@@ -98,13 +112,19 @@ def unpacked(package: Path) -> Path:
             with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".new-") as temporary:
                 inner = Path(temporary) / "package"
                 inner.mkdir()
-                _unpack(package, inner)
+                made = _unpack(package, inner)
+                (inner / _NOTES).write_text(json.dumps(made.notes), encoding="utf-8")
                 if not folder.is_dir():  # another process may have been faster
                     inner.replace(folder)
         except OSError as error:
             text = f"cannot be written ({error.strerror or error})."
             raise ScenarioError(f"{folder}: {text}") from None
-    return next(folder.glob("*.toml"))
+    notes = json.loads((folder / _NOTES).read_text(encoding="utf-8"))
+    return ImportedPackage(
+        next(folder.glob("*.toml")),
+        tuple(folder.glob("*.fmu")),
+        tuple(Note(text, key) for text, key in notes),
+    )
 
 
 def _unpack(path: Path, folder: Path) -> ImportedPackage:
@@ -112,8 +132,13 @@ def _unpack(path: Path, folder: Path) -> ImportedPackage:
         structure = read_structure(package)
         fmus = _Fmus(package, folder)
         flat = flatten_system(structure, package, fmus.describe)
-    notes = list(flat.notes)
+        notes = [Note(text) for text in package.notes]
     stop, step = _times(structure, fmus.files.values(), notes)
+    algorithm = structure.algorithm or ALGORITHMS[0]
+    if algorithm not in ALGORITHMS:
+        text = f'There is no algorithm "{algorithm}": {ALGORITHMS[0]} is taken.'
+        notes.append(Note(text, "algorithm"))
+        algorithm = ALGORITHMS[0]
     lines = [
         "schema = 1",
         f"title = {toml_value(structure.name or path.stem)}",
@@ -121,12 +146,11 @@ def _unpack(path: Path, folder: Path) -> ImportedPackage:
         "[run]",
         f"stop = {toml_value(stop)}",
         f"step = {toml_value(step)}",
+        f"algorithm = {toml_value(algorithm)}",
     ]
-    algorithm = structure.algorithm if structure.algorithm in ALGORITHMS else ALGORITHMS[0]
-    lines.append(f"algorithm = {toml_value(algorithm)}")
-    lines += _components(flat, fmus)
+    lines += _components(flat, fmus, notes)
     scenario = folder / f"{path.stem}.toml"
-    heads = [f"# {note}" for note in (f"From {path.name}.", *notes)]
+    heads = [f"# {note}" for note in (f"From {path.name}.", *(note.text for note in notes))]
     scenario.write_text("\n".join([*heads, "", *lines]) + "\n", encoding="utf-8")
     return ImportedPackage(scenario, tuple(dict.fromkeys(fmus.files.values())), tuple(notes))
 
@@ -166,7 +190,7 @@ def _unique(name: str, taken: Iterable[str], other: Callable[[int], str]) -> str
     return name
 
 
-def _components(flat: FlatSystem, fmus: _Fmus) -> list[str]:
+def _components(flat: FlatSystem, fmus: _Fmus, notes: list[Note]) -> list[str]:
     """Return the lines of the components and of their connections."""
     names = _names(flat)
     fed = {connection.target for connection in flat.connections}
@@ -182,8 +206,13 @@ def _components(flat: FlatSystem, fmus: _Fmus) -> list[str]:
         }
         for variable in flat.descriptions[path].of("input"):
             bare = (path, variable.name) not in fed and variable.name not in values
-            if bare and not variable.optional and variable.kind in _START:
-                start = _START[variable.kind] if variable.start is None else variable.start
+            if bare and not variable.optional:
+                start = variable.start
+                if start is None:
+                    start = next(iter(variable.items.values()), _START[variable.kind])
+                    port = ".".join((*path, variable.name))
+                    text = f'The input "{port}" has neither source nor start value: '
+                    notes.append(Note(f"{text}{toml_value(start)} is taken."))
                 values[variable.name] = start
         if values:
             pairs = [f"{toml_key(name)} = {toml_value(value)}" for name, value in values.items()]
@@ -195,11 +224,19 @@ def _components(flat: FlatSystem, fmus: _Fmus) -> list[str]:
 def _connection(one: FlatConnection, flat: FlatSystem, names: dict[Names, str]) -> str:
     ends = (one.target, one.source)
     target, source = (toml_value(f"{names[path]}.{port}") for path, port in ends)
-    units = {flat.descriptions[path].variables[port].unit for path, port in ends}
-    if one.change == SAME and (len(units) == 1 or None in units):
+    wanted, given = (flat.descriptions[path].variables[port].measure for path, port in ends)
+    if one.change == SAME and _are_one(given, wanted):
         return f"{target} = {source}"
     factor, offset = (toml_value(float(number)) for number in one.change)
     return f"{target} = {{ from = {source}, factor = {factor}, offset = {offset} }}"
+
+
+def _are_one(given: Measure | None, wanted: Measure | None) -> bool:
+    """Return whether the FMUs' own units call for no change, so that a check has nothing to say."""
+    try:
+        return convert(given, wanted) == SAME
+    except ScenarioError:
+        return False
 
 
 def _names(flat: FlatSystem) -> dict[Names, str]:
@@ -225,7 +262,7 @@ def _typed(variable: Variable, value: Value) -> Value:
     return value
 
 
-def _times(structure: Structure, fmus: Iterable[Path], notes: list[str]) -> tuple[float, float]:
+def _times(structure: Structure, fmus: Iterable[Path], notes: list[Note]) -> tuple[float, float]:
     """Return stop and step [s]: the package's, else what its FMUs say, else the usual ones."""
     stop, step = structure.stop, structure.step
     if stop is None or step is None:
@@ -236,16 +273,17 @@ def _times(structure: Structure, fmus: Iterable[Path], notes: list[str]) -> tupl
         )
         if stop is None:
             stop = max(filter(None, stops), default=USUAL_STOP)
-            notes.append(f"The package names no stop: {stop:g} s is taken.")
+            notes.append(Note(f"The package names no stop: {stop:g} s is taken.", "stop"))
         if step is None:
             step = min(filter(None, steps), default=stop / USUAL_STEPS)
-            notes.append(f"The package names no step: {step:g} s is taken.")
+            notes.append(Note(f"The package names no step: {step:g} s is taken.", "step"))
     if not 0.0 < step <= stop:
         raise ScenarioError(f"stop = {stop:g} s, step = {step:g} s: 0 < step <= stop is right.")
     count = stop / step
     if abs(count - round(count)) > STEP_TOLERANCE:
         step = stop / math.ceil(count)
-        notes.append(f"The stop is no whole number of steps: a step of {step:g} s is taken.")
+        text = f"The stop is no whole number of steps: a step of {step:g} s is taken."
+        notes.append(Note(text, "step"))
     return stop, step
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import RecordError
-from ..findings import Findings, number, unknown, written
+from ..findings import LIST_AT_MOST, Findings, number, unknown, written
 from ..fmu.description import Value, Variable
 from .document import FILE_PARAMETERS
 from .library import Library
@@ -80,6 +80,8 @@ def typed(variable: Variable, value: object) -> Value | Wrong:
         least, most = _INTEGER_RANGE
         if not least <= value <= most:
             return Wrong(f"is {written(value)}; FMI holds whole numbers from {least} to {most}.")
+        if variable.items and value not in variable.items.values():
+            return Wrong(f"is {value}, which is no item; {shown_items(variable)} are right.")
         real = float(value)
     else:
         found = number(value)
@@ -101,6 +103,13 @@ def _range(low: float | None, high: float | None, unit: str) -> str:
     if low is None:
         return f"{high:g}{unit} or less is right"
     return f"{low:g} to {high:g}{unit} is right"
+
+
+def shown_items(variable: Variable) -> str:
+    """Return the items of an Enumeration as words: `slow = 2, fast = 5`."""
+    items = [f"{name} = {value}" for name, value in variable.items.items()]
+    more = f" and {len(items) - LIST_AT_MOST} more" if len(items) > LIST_AT_MOST else ""
+    return ", ".join(items[:LIST_AT_MOST]) + more
 
 
 def choices(variable: Variable) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from .document import (
     plain,
     read_document,
 )
-from .import_ssp import unpacked
+from .import_ssp import Note, unpacked
 from .library import Library, installed
 from .naming import changed_title, needs_title
 from .parts import DamperLaw
@@ -106,7 +106,8 @@ class Scenario:
     `title` is the file's unless overrides changed what runs (see `naming.changed_title`).
 
     `algorithm` is one of `parts.ALGORITHMS`; components step in their order. `findings` are the
-    warnings and notes of its check; `overrides` what was laid over the file.
+    warnings and notes of its check; `overrides` what was laid over the file. `package` is the SSP
+    package that it was read from, None without one.
     """
 
     file: Path
@@ -118,6 +119,7 @@ class Scenario:
     connections: tuple[Connection, ...]
     findings: tuple[Finding, ...] = ()
     overrides: dict[str, object] = field(default_factory=dict)
+    package: Path | None = None
 
     @property
     def steps(self) -> int:
@@ -126,7 +128,8 @@ class Scenario:
 
     def remarks(self) -> list[str]:
         """Return the warnings and notes of the check, a line each with its place."""
-        return [f"{found.level}: {worded(self.file.name, found)}" for found in self.findings]
+        name = (self.package or self.file).name
+        return [f"{found.level}: {worded(name, found)}" for found in self.findings]
 
     def component(self, name: str) -> Component:
         """Return the component of a name."""
@@ -181,7 +184,7 @@ def loaded_with(
         return load_scenario(scenario, overrides)
     if not overrides:
         return scenario
-    return load_scenario(scenario.file, {**scenario.overrides, **overrides})
+    return load_scenario(scenario.package or scenario.file, {**scenario.overrides, **overrides})
 
 
 def check_scenario(
@@ -210,17 +213,25 @@ def worded(file: str | Path, finding: Finding) -> str:
 def _read(
     path: Path, overrides: Mapping[str, object], library: Library | None
 ) -> tuple[Scenario | None, list[Finding]]:
+    package, notes = None, tuple[Note, ...]()
     if path.suffix.lower() == ".ssp":
+        package = path
         try:
-            path = unpacked(path)
+            made = unpacked(package)
         except ScenarioError as error:
             return None, [Finding(0, "error", str(error))]
+        path, notes = made.scenario, made.notes
     document = read_document(path)
     if isinstance(document, Finding):
         return None, [document]
+    if package is not None:
+        document.lines.clear()  # of a file that the user does not have
     library = library or installed()
     findings = Findings(document.place)
     apply_overrides(document, overrides, findings)
+    for note in notes:
+        if ("run", note.key) not in document.overridden:
+            findings.note((), note.text)
     title = check_top(document, findings)
     run = check_run(document, findings)
     parts = check_components(document, library, findings)
@@ -259,7 +270,7 @@ def _read(
     laid_over = {str(name): plain(value) for name, value in overrides.items()}
     scenario = Scenario(
         path, title, run.stop, run.step, run.algorithm, components, connections, tuple(found),
-        laid_over,
+        laid_over, package,
     )  # fmt: skip
     return scenario, found
 

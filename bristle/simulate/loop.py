@@ -89,7 +89,7 @@ class Memory:
     def place(self, operation: Read | Write | Ramp) -> tuple[tuple[str, ...], int, list[str]]:
         """Return the order of the names in a call, its offset, and the lines that gather before.
 
-        In these lines m is the view of the kind of values.
+        In these lines m is the view of the kind of values, whole that of whole numbers.
         """
         node, size = self.nodes[operation.component], _SIZE[operation.kind]
         if isinstance(operation, Read):
@@ -102,10 +102,15 @@ class Memory:
         names = tuple(name for _, name in places)
         offsets = [offset for offset, _ in places]
         changed = {} if isinstance(operation, Read) else node.transformed
+        whole = {
+            name
+            for port, name in zip(ports, operation.names, strict=True)
+            if operation.kind == "Real" and self._kind(port) != "Real"
+        }
         plain = isinstance(operation, Read) or (
             isinstance(operation, Write) and not (operation.values or operation.if_changed)
         )
-        plain = plain and not changed.keys() & set(names)
+        plain = plain and not (changed.keys() | whole) & set(names)
         if plain and all(offset == offsets[0] + i * size for i, offset in enumerate(offsets)):
             return names, offsets[0], []
         if isinstance(operation, Read):
@@ -117,6 +122,8 @@ class Memory:
         for i, (name, offset) in enumerate(zip(names, offsets, strict=True)):
             past = self.past.get(node.sources[name], 0)
             value = forms[name].format(now=offset // size, past=past // size)
+            if name in whole:
+                value = f"whole[{offset // _SIZE['Integer']}]"
             if name in changed:
                 factor, shift = changed[name]
                 value = f"{factor!r} * ({value})"
@@ -135,15 +142,18 @@ class Memory:
 
     def value(self, port: Port) -> float | int:
         """Return what was last read of an output."""
-        kind = kind_of(self.nodes[port[0]].outputs[port[1]])
+        kind = self._kind(port)
         view = self.views[_FUNCTION[kind]]
         value: float | int = view[self.offsets[port] // _SIZE[kind]]
         return value
 
+    def _kind(self, port: Port) -> str:
+        return kind_of(self.nodes[port[0]].outputs[port[1]])
+
     def put(self, values: Mapping[Port, Any]) -> None:
         """Store outputs that were read by other means, as after the initialisation."""
         for port, value in values.items():
-            kind = kind_of(self.nodes[port[0]].outputs[port[1]])
+            kind = self._kind(port)
             self.views[_FUNCTION[kind]][self.offsets[port] // _SIZE[kind]] = value
         for port, offset in self.past.items():
             self.views["Real"][offset // 8] = self.value(port)
@@ -186,6 +196,7 @@ def compile_loop(
     """
     names: dict[str, Any] = {"fail": fail, "keep": rows.append, "take": memory.row.tobytes}
     names |= {"real": ctypes.c_double.from_param, "step": step, "reals": memory.views["Real"]}
+    names["whole"] = memory.views["Integer"]
     body: list[str] = []
     for place, operation in enumerate(schedule.operations):
         number = str(place)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..errors import ScenarioError
 from ..fmu.description import Description
 from ..scenario.over_step import as_told, told_over_step
 from .operations import Node, Port, is_continuous
@@ -20,11 +20,6 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
     sources: list[dict[str, Port]] = [{} for _ in scenario.components]
     transformed: list[dict[str, tuple[float, float]]] = [{} for _ in scenario.components]
     for connection in scenario.connections:
-        if descriptions[connection.target].variables[connection.input].kind == "String":
-            raise ScenarioError(
-                f'{scenario.file}: "{connection.target}.{connection.input}" is a text; texts are '
-                "set in parameters, only numbers and Booleans are passed on."
-            )
         port = numbers[connection.source], connection.output
         sources[numbers[connection.target]][connection.input] = port
         how = connection.factor, connection.offset
@@ -37,6 +32,10 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
         told = told_over_step(component)
         outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
         inputs = {v.name: as_told(v, told) for v in description.of("input")}
+        for name, (d, output) in sources[c].items():
+            source = descriptions[scenario.components[d].name].variables[output]
+            if inputs[name].kind == "Real" != source.kind:  # nothing lies between whole numbers
+                inputs[name] = replace(inputs[name], variability="discrete", over_step=None)
         takes = _interpolates(description, told) if substeps == 1 else frozenset()
         nodes.append(
             Node(component.name, inputs, outputs, sources[c], substeps, transformed[c], takes)

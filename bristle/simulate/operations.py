@@ -72,7 +72,9 @@ class Node:
     def taken(self, name: str, value: Value) -> Value:
         """Return what an input gets where its source gives a value."""
         factor, offset = self.transformed.get(name, (1.0, 0.0))
-        return factor * value + offset if isinstance(value, float) else value
+        if self.inputs[name].kind != "Real":
+            return value
+        return factor * float(value) + offset
 
     def jumps(self, output: str) -> bool:
         """Return whether an output may jump: it is discrete, or tells so of itself."""

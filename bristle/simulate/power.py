@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..component import SAMPLED
-from ..errors import UnitError
-from ..units import parse
+from ..fmu.description import Variable
+from ..units import alike, parse
 from .operations import Node, Port
 from .results import Array, Table
 from .schedule import held_inputs
@@ -59,15 +59,13 @@ def _wires(nodes: Sequence[Node], unit: str) -> Iterator[tuple[Port, Port]]:
         for name, source in node.sources.items():
             variable = node.inputs[name]
             plain = variable.over_step != SAMPLED and name not in node.transformed
-            if plain and _is_unit(variable.unit, unit):
+            if plain and _is_unit(variable, unit):
                 yield source, (c, name)
 
 
-def _is_unit(text: str | None, unit: str) -> bool:
-    try:
-        return text is not None and parse(text)[1:] == parse(unit)[1:]
-    except UnitError:  # one that bristle does not know
-        return False
+def _is_unit(variable: Variable, unit: str) -> bool:
+    found = variable.measure.unit if variable.measure else None
+    return found is not None and alike(found, parse(unit))
 
 
 def energy_residuals(

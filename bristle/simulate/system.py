@@ -53,6 +53,15 @@ class System:
                     f'{scenario.file}: "{c.target}.{c.input}" has a factor or an offset, which is '
                     "not compiled. Run it with the engine fmu."
                 )
+            given, wanted = (
+                scenario.component(name).description.variables[port]
+                for name, port in ((c.source, c.output), (c.target, c.input))
+            )
+            if given.kind != wanted.kind:
+                raise ScenarioError(
+                    f'{scenario.file}: "{c.target}.{c.input}" is {wanted.kind} and is fed by '
+                    f"{given.kind}, which is not compiled. Run it with the engine fmu."
+                )
         for component in scenario.components:
             self.names[kind_of(component, scenario)].append(component.name)
         self.slaves: dict[str, Any] = {

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from ..errors import ScenarioError, UnitError
-from ..units import DIMENSIONS, Unit, parse
+from ..units import Measure, definitions
 from .package import Element, Package, child, children
 
 Change = tuple[float, float]
@@ -15,43 +14,21 @@ Change = tuple[float, float]
 SAME: Change = (1.0, 0.0)
 
 
-class Measure(NamedTuple):
-    """A unit by its name in the package; `unit` is None where nothing says what it is."""
-
-    name: str
-    unit: Unit | None
-
-
 def read_units(units: Element | None, package: Package, where: str) -> dict[str, Measure]:
     """Return the units that an element declares, by name."""
-    found = {}
+    told = []
     for entry in children(units, "Unit"):
-        name, base = entry.get("name", ""), child(entry, "BaseUnit")
-        inside = f'{where}: <Unit "{name}">'
-        if base is None:
-            found[name] = Measure(name, None)
-            continue
-        powers = [number(base, key, 0.0, package, inside) for key in DIMENSIONS]
-        if any(power != int(power) for power in powers):
-            raise package.error(inside, "powers of base units are whole numbers.")
-        factor = number(base, "factor", 1.0, package, inside)
-        if factor == 0.0:
-            raise package.error(inside, "its factor is 0; a unit has another one.")
-        offset = number(base, "offset", 0.0, package, inside)
-        found[name] = Measure(name, Unit(name, factor, tuple(int(p) for p in powers), offset))
-    return found
+        base = child(entry, "BaseUnit")
+        told.append((entry.get("name", ""), None if base is None else base.attrib))
+    try:
+        return definitions(told)
+    except UnitError as error:
+        raise package.error(where, str(error)) from None
 
 
 def measure(name: str | None, declared: dict[str, Measure]) -> Measure | None:
-    """Return a unit by name: as declared, else as bristle reads it; None for no name."""
-    if name is None or name == "":
-        return None
-    if name in declared and declared[name].unit is not None:
-        return declared[name]
-    try:
-        return Measure(name, parse(name))
-    except UnitError:
-        return Measure(name, None)
+    """Return a unit by name, as declared where it is; None for no name."""
+    return declared.get(name, Measure(name)) if name else None
 
 
 def convert(given: Measure | None, wanted: Measure | None) -> Change:
@@ -64,18 +41,13 @@ def convert(given: Measure | None, wanted: Measure | None) -> Change:
     """
     if given is None or wanted is None:
         return SAME
-    if given.unit is None or wanted.unit is None:
-        if given.name == wanted.name:
-            return SAME
-        strange = given.name if given.unit is None else wanted.name
-        raise ScenarioError(
-            f"[{given.name}] into [{wanted.name}]: nothing says what the unit "
-            f'"{strange}" is. Declare it in <Units> with its <BaseUnit>.'
-        )
-    if given.unit.dimension != wanted.unit.dimension:
-        raise ScenarioError(f"[{given.name}] does not convert into [{wanted.name}].")
-    factor = given.unit.factor / wanted.unit.factor
-    return factor, (given.unit.offset - wanted.unit.offset) / wanted.unit.factor
+    try:
+        return given.change_to(wanted)
+    except UnitError as error:
+        cure = ""
+        if given.unit is None or wanted.unit is None:
+            cure = " Declare it in <Units> with its <BaseUnit>."
+        raise ScenarioError(f"{error}{cure}") from None
 
 
 def after(first: Change, second: Change) -> Change:

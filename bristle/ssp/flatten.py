@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from ..errors import ScenarioError
+from ..errors import ScenarioError, UnitError
 from ..fmu.description import Description, Value
-from .conversion import SAME, Change, Measure, after, convert, measure
+from ..fmu.variables import passes
+from ..units import Measure
+from .conversion import SAME, Change, after, convert
 from .package import Package
 from .structure import Block, Joint, Structure
 from .values import Given
@@ -30,16 +32,12 @@ class FlatConnection:
 
 @dataclass(frozen=True)
 class FlatSystem:
-    """Components by the names that lead to them, with their FMU, connections and values.
-
-    `notes` tell what was left aside.
-    """
+    """Components by the names that lead to them, with their FMU, connections and values."""
 
     components: dict[Path, str]
     descriptions: dict[Path, Description]
     connections: tuple[FlatConnection, ...]
     values: dict[Port, Value]
-    notes: tuple[str, ...]
 
 
 @dataclass
@@ -60,7 +58,7 @@ def flatten_system(
     ----------
     structure : Structure
     package : Package
-        For messages.
+        For messages; its notes take what is left aside.
     describe : callable
         (member, where) -> description of an FMU.
 
@@ -81,7 +79,6 @@ class _Flattener:
     ) -> None:
         self.package = package
         self.net = _Network()
-        self.notes: list[str] = []
         self.net.blocks.update(_walk(structure.system, ()))
         self.fmus = {path: b.source for path, b in self.net.blocks.items() if b.source}
         if not self.fmus:
@@ -110,6 +107,7 @@ class _Flattener:
                 target = path, name
                 source, change = self._source(target)
                 if source != target and source[0] in self.fmus:
+                    self._check_types(source, target, change)
                     connections.append(FlatConnection(source, target, change))
                     continue
                 value = self._value(source, change)
@@ -117,9 +115,7 @@ class _Flattener:
                     value = self._value(target, SAME)
                 if value is not None:
                     values[target] = value
-        return FlatSystem(
-            self.fmus, self.descriptions, tuple(connections), values, tuple(self.notes)
-        )
+        return FlatSystem(self.fmus, self.descriptions, tuple(connections), values)
 
     def _note_unused(self) -> None:
         for (path, name), given in self.net.given.items():
@@ -127,15 +123,53 @@ class _Flattener:
                 causality = self.descriptions[path].variables[name].causality
                 if causality not in ("input", "parameter"):
                     text = f'"{name}" is {causality}, which takes no value: left aside.'
-                    self.notes.append(f"{given.where}: {text}")
+                    self.package.note(given.where, text)
 
     def _check_connectors(self) -> None:
         for path in self.fmus:
             block, variables = self.net.blocks[path], self.descriptions[path].variables
-            for name in block.connectors:
+            for name, connector in block.connectors.items():
                 if name not in variables:
                     text = f'has the connector "{name}", which its FMU {block.source} lacks.'
                     raise self.package.error(block.where, text)
+                if connector.unit is not None:
+                    self._compare_units(block.where, name, connector.unit, variables[name].measure)
+
+    def _compare_units(self, where: str, name: str, told: Measure, own: Measure | None) -> None:
+        """Say where the package names another unit than the FMU: by SSP the package decides."""
+        told = _meant(told, own)
+        if own is None or own.unit is None or told.unit is None:
+            return
+        try:
+            same = own.change_to(told) == SAME
+        except UnitError:
+            same = False
+        if not same:
+            text = f'the connector "{name}" is in {told.shown}, in its FMU in {own.shown}: '
+            self.package.note(where, f"{text}taken as {told.shown}.")
+
+    def _check_types(self, source: Port, target: Port, change: Change) -> None:
+        """Refuse a connection whose values cannot be passed on."""
+        where = self.net.feeding[target][0][1].where
+        given, wanted = (
+            self.descriptions[path].variables[name].kind for path, name in (source, target)
+        )
+        ends = f'"{_shown(source)}" is {given} and "{_shown(target)}" is {wanted}'
+        if given == wanted == "String":
+            text = f"{ends}: texts are set as parameters, only numbers and Booleans are passed on."
+            raise self.package.error(where, text)
+        if not passes(given, wanted):
+            raise self.package.error(where, f"{ends}; both must be alike.")
+        if change != SAME and wanted != "Real":
+            text = f'"{_shown(target)}" is {wanted}: only Real has a factor and an offset.'
+            raise self.package.error(where, text)
+        port = self.net.feeding[target][0][0]
+        while port != source:
+            kind = self.net.blocks[port[0]].connectors[port[1]].type
+            if kind and not (passes(given, kind) and passes(kind, wanted)):
+                text = f'{ends}, and "{_shown(port)}" between them is {kind}: '
+                self.package.note(where, f"{text}values are passed on as they are.")
+            port = self.net.feeding[port][0][0]
 
     def _kind(self, port: Port, where: str) -> str:
         """Return the kind of a connector: an FMU knows better than what is written of it."""
@@ -178,7 +212,7 @@ class _Flattener:
     def _give(self, path: Path, given: Given) -> None:
         target = self._named(path, given.name)
         if target is None:
-            self.notes.append(f'{given.where}: nothing is called "{given.name}": left aside.')
+            self.package.note(given.where, f'nothing is called "{given.name}": left aside.')
         else:
             self.net.given[target] = given
 
@@ -223,12 +257,13 @@ class _Flattener:
     def _unit(self, port: Port) -> Measure | None:
         path, name = port
         block = self.net.blocks[path]
-        connector = block.connectors.get(name)
-        if connector is not None and connector.unit is not None:
-            return connector.unit
+        own = None
         if path in self.fmus and name in self.descriptions[path].variables:
-            return measure(self.descriptions[path].variables[name].unit, block.units)
-        return None
+            own = self.descriptions[path].variables[name].measure
+        connector = block.connectors.get(name)
+        if connector is None or connector.unit is None:
+            return own
+        return _meant(connector.unit, own)
 
     def _value(self, port: Port, change: Change) -> Value | None:
         """Return the value given at a port as it arrives behind a change."""
@@ -238,13 +273,21 @@ class _Flattener:
         value = given.value
         own = SAME
         if given.converts:
-            own = self._converted(given.unit, self._unit(port), given.where)
+            wanted = self._unit(port)
+            told = given.unit and _meant(given.unit, wanted)
+            own = self._converted(told, wanted, given.where)
         factor, offset = after(after(own, given.change), change)
         if (factor, offset) == SAME:
             return value
         if isinstance(value, bool | str):
             raise self.package.error(given.where, "only a number has a unit or a transformation.")
         return factor * value + offset
+
+
+def _meant(told: Measure, own: Measure | None) -> Measure:
+    """Return a unit that a package names; where it does not define the name, the FMU's counts."""
+    undefined = told.defined is None and own is not None and own.name == told.name
+    return own if undefined and own is not None else told
 
 
 def _walk(block: Block, path: Path) -> Iterator[tuple[Path, Block]]:

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -23,11 +23,15 @@ MAX_TEXT = 16 * 1024**2
 
 @dataclass(frozen=True)
 class Package:
-    """An open package: its file, the archive, the names of its members."""
+    """An open package: its file, the archive, the names of its members.
+
+    `notes` collects what was left aside while it is read, or taken otherwise than it stands there.
+    """
 
     path: Path
     archive: zipfile.ZipFile
     names: frozenset[str]
+    notes: list[str] = field(default_factory=list)
 
     def xml(self, name: str, root: str) -> Element:
         """Return the root element of a member, which must be of that name but for its prefix."""
@@ -46,6 +50,10 @@ class Package:
     def error(self, where: str, text: str) -> ScenarioError:
         """Return an error with file and element before its text."""
         return ScenarioError(f"{self.path}: {where}: {text}")
+
+    def note(self, where: str, text: str) -> None:
+        """Keep what the user should know, with file and element before it."""
+        self.notes.append(f"{where}: {text}")
 
     def member(self, source: str, base: str, where: str) -> str:
         """Return the member that a `source` names.

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .conversion import Change, Measure, is_true, linear, measure, number, read_units
+from ..fmu.description_fmi3 import KINDS
+from ..units import Measure
+from .conversion import Change, is_true, linear, measure, number, read_units
 from .names import FMU_TYPE, OMS, OSP, OWN_TYPE, SSD_TYPE, STRUCTURE
 from .package import Element, Package, child, children, local
 from .values import Given, read_bindings
@@ -12,16 +14,22 @@ from .values import Given, read_bindings
 DEEPEST = 50
 """Systems within systems that are read."""
 
+_TYPES = (*KINDS, "Real", "Integer", "Binary", "Clock")
+
 End = tuple[str, str]
 """An element of a system, "" for the system itself, and a connector of it."""
 
 
 @dataclass(frozen=True)
 class Connector:
-    """A connector of a system or component: kind as in SSP, unit if it names one."""
+    """A connector of a system or component: kind as in SSP, unit if it names one.
+
+    `type` is that of its values in the words of FMI 2.0 ("Real"), "" where it names none.
+    """
 
     kind: str
     unit: Measure | None
+    type: str
 
 
 @dataclass(frozen=True)
@@ -192,7 +200,9 @@ class _Reader:
         connectors = {}
         for entry in children(child(element, "Connectors"), "Connector"):
             unit = next((e.get("unit") for e in entry if e.get("unit")), None)
-            found = Connector(entry.get("kind", ""), measure(unit, self.units))
+            types = (KINDS.get(local(e), local(e)) for e in entry if local(e) in _TYPES)
+            kind, of_values = entry.get("kind", ""), next(types, "")
+            found = Connector(kind, measure(unit, self.units), of_values)
             connectors[entry.get("name", "")] = found
         values = read_bindings(element, self.package, self.file, where)
         return Block(where, connectors, values, self.units, source, elements or {}, joints)

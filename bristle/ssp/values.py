@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass, replace
 
 from ..fmu.description import Value
-from .conversion import SAME, Change, Measure, is_true, linear, measure, number, read_units
+from ..units import Measure
+from .conversion import SAME, Change, is_true, linear, measure, number, read_units
 from .package import Element, Package, child, children, local
 
 _REAL = re.compile(r"Real|Float(32|64)")
@@ -124,13 +125,19 @@ def _mapped(
         file = package.member(source, file, where)
         found = package.xml(file, "ParameterMapping")
     by_name = {one.name: one for one in given}
+    left = dict(by_name)
     mapped = []
     for entry in children(mapping if found is None else found, "MappingEntry"):
         name, target = entry.get("source", ""), entry.get("target", "")
         inside = f'{file}: <MappingEntry "{name}" to "{target}">'
-        if name in by_name:
+        if name not in by_name:
+            package.note(inside, f'no parameter is called "{name}": left aside.')
+        else:
+            left.pop(name, None)
             change = linear(entry, package, inside)
             converts = not is_true(entry, "suppressUnitConversion")
             one = by_name[name]
             mapped.append(replace(one, name=target, change=change, converts=converts, where=inside))
+    for one in left.values():
+        package.note(one.where, "the mapping does not name it: left aside.")
     return mapped

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from ..errors import UnitError
 from ..fmu.description import Value, Variable
-from ..units import DIMENSIONS, Unit, parse
+from ..units import DIMENSIONS, Unit, alike
 from .names import FMU_TYPE, NAMESPACES, OMS, OSP, OSP_SYSTEM, OWN, OWN_TYPE
 
 Element = ElementTree.Element
@@ -73,8 +72,9 @@ def ssd_text(system: WrittenSystem) -> str:
     root.set("version", "1.0")
     whole = _add(root, "ssd:System", name=_NAME_OF_SYSTEM)
     elements = _add(whole, "ssd:Elements")
+    declared = _declared(system.components)
     for component in system.components:
-        _component(elements, component)
+        _component(elements, component, declared)
     if system.connections:
         connections = _add(whole, "ssd:Connections")
         for connection in system.connections:
@@ -86,7 +86,7 @@ def ssd_text(system: WrittenSystem) -> str:
         information, "oms:FixedStepMaster", description="oms-ma", stepSize=step,
         absoluteTolerance=_OMS_TOLERANCE, relativeTolerance=_OMS_TOLERANCE,
     )  # fmt: skip
-    _units(root, system.components)
+    _units(root, declared)
     experiment = _add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(system.stop))
     annotations = _add(experiment, "ssd:Annotations")
     algorithm = _add(_add(annotations, "ssc:Annotation", type=OSP), "osp:Algorithm")
@@ -101,7 +101,9 @@ _OMS_TOLERANCE = "0.0001"
 """Beside a fixed step, as OMSimulator itself writes it."""
 
 
-def _component(elements: Element, component: WrittenComponent) -> None:
+def _component(
+    elements: Element, component: WrittenComponent, declared: Mapping[str, Unit]
+) -> None:
     element = _add(
         elements, "ssd:Component", name=component.name, type=FMU_TYPE, source=component.source,
     )  # fmt: skip
@@ -109,7 +111,7 @@ def _component(elements: Element, component: WrittenComponent) -> None:
         connectors = _add(element, "ssd:Connectors")
         for port in component.ports:
             connector = _add(connectors, "ssd:Connector", name=port.name, kind=port.causality)
-            _add(connector, f"ssc:{_kind(port)}", **_unit(port))
+            _add(connector, f"ssc:{_kind(port)}", **_unit(port, declared))
     if component.values:
         binding = _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding")
         values = _add(binding, "ssd:ParameterValues")
@@ -140,14 +142,24 @@ def _connection(connections: Element, connection: WrittenConnection) -> None:
         )
 
 
-def _units(root: Element, components: Iterable[WrittenComponent]) -> None:
-    named = {port.unit for component in components for port in component.ports if _unit(port)}
-    if not named:
+def _declared(components: Iterable[WrittenComponent]) -> dict[str, Unit]:
+    """Return the units of the ports by name, but for names by which FMUs mean different ones."""
+    found: dict[str, Unit | None] = {}
+    for port in (port for component in components for port in component.ports):
+        measure = port.measure if port.kind == "Real" else None
+        if measure is None or measure.unit is None:  # a foreign FMU's own
+            continue
+        first = found.setdefault(measure.name, measure.unit)
+        if first is not None and not alike(first, measure.unit):
+            found[measure.name] = None
+    return {name: unit for name, unit in found.items() if unit is not None}
+
+
+def _units(root: Element, declared: Mapping[str, Unit]) -> None:
+    if not declared:
         return
     units = _add(root, "ssd:Units")
-    for name in sorted(filter(None, named)):
-        unit = _parsed(name)
-        assert unit is not None  # `_unit` lets no other through
+    for name, unit in sorted(declared.items()):
         powers = {
             base: str(power)
             for base, power in zip(DIMENSIONS, unit.dimension, strict=True)
@@ -160,17 +172,10 @@ def _units(root: Element, components: Iterable[WrittenComponent]) -> None:
         _add(_add(units, "ssc:Unit", name=name), "ssc:BaseUnit", **powers)
 
 
-def _unit(port: Variable) -> dict[str, str]:
+def _unit(port: Variable, declared: Mapping[str, Unit]) -> dict[str, str]:
     """Return the unit of a connector, none where it cannot be declared."""
-    known = port.kind == "Real" and port.unit and _parsed(port.unit)
+    known = port.kind == "Real" and port.unit in declared
     return {"unit": str(port.unit)} if known else {}
-
-
-def _parsed(text: str) -> Unit | None:
-    try:
-        return parse(text)
-    except UnitError:  # a foreign FMU's own
-        return None
 
 
 def _kind(variable: Variable) -> str:
