@@ -187,4 +187,7 @@ def test_source_is_of_python_3_9_and_the_standard_library() -> None:
         if isinstance(node, ast.ImportFrom | ast.Import)
         for alias in node.names
     }
-    assert imported == {"__future__", "re", "difflib", "functools", "math", "typing", "errors"}
+    assert imported == {
+        *("__future__", "collections.abc", "re", "difflib", "functools", "math", "typing"),
+        "errors",
+    }

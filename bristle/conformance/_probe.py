@@ -22,15 +22,16 @@ PLAN, FINDING, BOX = "plan.json", "finding.json", "box"
 
 def main(work: Path, name: str) -> None:
     """Try one probe; the process then ends as the FMU lets it."""
-    finding = _try(Bench(Plan.load(work / PLAN), BlackBox(work / BOX)), name)
+    bench = Bench(Plan.load(work / PLAN), BlackBox(work / BOX))
+    finding = _try(bench, name)
     text = {
         "verdict": finding.verdict, "seen": finding.seen, "data": dict(finding.data),
-        "rule": finding.rule,
+        "rule": finding.rule, "said": bench.said() if finding.verdict == "fail" else "",
     }  # fmt: skip
     part = work / (FINDING + ".part")
     part.write_text(json.dumps(text))
     part.replace(work / FINDING)
-    BlackBox(work / BOX).note("leaving the process")
+    bench.box.note("leaving the process")
     if "answered Fatal" in finding.seen:
         os._exit(0)  # not even the FMU's own cleaning up may be asked for
 

@@ -19,6 +19,7 @@ from .registry import UnexpectedError
 Values = list[Value]
 GOOD = (OK, WARNING)
 NAME = "bench"
+_MOST_SAID = 400  # characters
 
 
 class Bench:
@@ -43,17 +44,24 @@ class Bench:
                 types = {v.reference: v.type for v in about.variables.values()}
                 self._library = LibraryFmi3(file, self.box, types)
             else:
-                self._library = Library(file, self.box)
+                proxy = self.plan.proxy if self.plan.listens else ""
+                self._library = Library(file, self.box, proxy)
         return self._library
 
     def instance(self, *, name: str = NAME, logging: bool = False) -> Instance:
         """Return a new instance; UnexpectedError if the FMU refuses to make one."""
         made = self.library.instantiate(
-            name, self.plan.about.guid, self.plan.resources, logging=logging
-        )
+            name, self.plan.about.guid, self.plan.resources,
+            logging=logging or self.plan.listens,
+        )  # fmt: skip
         if made is None:
             raise UnexpectedError("fmi2Instantiate answered NULL")
         return made
+
+    def said(self) -> str:
+        """Return what the FMU said of its failure, "" for nothing."""
+        texts = () if self._library is None else self._library.said()
+        return told(" / ".join(" ".join(text.split()) for text in texts))
 
     def ready(
         self, instance: Instance | None = None, *, drive: bool | None = None, stop: bool = False
@@ -164,6 +172,11 @@ class Bench:
                 if not _same(a, b):
                     return f"{variable.name} at {self._at(k)} is {a!r} instead of {b!r}"
         return ""
+
+
+def told(text: str) -> str:
+    """Return what an FMU said, cut to a length that a row holds."""
+    return text if len(text) <= _MOST_SAID else f"{text[:_MOST_SAID]} ..."
 
 
 def good(status: int, function: str) -> None:

@@ -11,6 +11,7 @@ import ctypes
 import mmap
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
@@ -24,6 +25,7 @@ STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 _DO_STEP_STATUS, _TERMINATED = 0, 3
 _MOST_MESSAGES = 1000
+_LAST = 3  # messages that are told of a failure
 
 _LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 _ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
@@ -50,37 +52,57 @@ class MissingFunctionError(Exception):
 
 
 class BlackBox:
-    """Remembers the call under way in a file, where it outlives a crash of this process."""
+    """Remembers the call under way, and what the FMU said in it, where it outlives a crash."""
 
-    SIZE = 256
+    SIZE, SAID = 256, 1024
+    """Bytes of the call's name; of the message behind it."""
 
     def __init__(self, file: Path) -> None:
-        file.write_bytes(bytes(self.SIZE))
+        file.write_bytes(bytes(self.SIZE + self.SAID))
         with file.open("r+b") as stream:
-            self._map = mmap.mmap(stream.fileno(), self.SIZE)
+            self._map = mmap.mmap(stream.fileno(), self.SIZE + self.SAID)
+        self._heard = False
 
     def note(self, text: str) -> None:
         """Write what happens next."""
-        self._map[:] = text.encode("ascii", "replace")[: self.SIZE].ljust(self.SIZE, b"\0")
+        self._map[: self.SIZE] = text.encode("ascii", "replace")[: self.SIZE].ljust(
+            self.SIZE, b"\0"
+        )
+        if self._heard:
+            self._map[self.SIZE :] = bytes(self.SAID)
+            self._heard = False
+
+    def hear(self, text: str) -> None:
+        """Write what the FMU says meanwhile."""
+        self._map[self.SIZE :] = text.encode()[: self.SAID].ljust(self.SAID, b"\0")
+        self._heard = True
 
     def text(self) -> str:
         """Return what was noted last, "" if that is over."""
-        return bytes(self._map[:]).rstrip(b"\0").decode("ascii")
+        return bytes(self._map[: self.SIZE]).rstrip(b"\0").decode("ascii")
 
-    @staticmethod
-    def read(file: Path) -> str:
-        """Return what was noted last, "" if nothing was."""
-        return file.read_bytes().rstrip(b"\0").decode("ascii") if file.exists() else ""
+    @classmethod
+    def read(cls, file: Path) -> tuple[str, str]:
+        """Return what was noted last and what was said then, "" for nothing."""
+        data = file.read_bytes() if file.exists() else b""
+        noted, heard = (part.rstrip(b"\0") for part in (data[: cls.SIZE], data[cls.SIZE :]))
+        return noted.decode("ascii"), heard.decode("utf-8", "ignore")
 
 
 class Library:
-    """A loaded FMU library; `messages` holds what its instances logged."""
+    """A loaded FMU library; `messages` holds what its instances logged.
+
+    `proxy` is a library that puts the numbers into a message which an FMU gives in printf's form.
+    """
 
     prefix = "fmi2"
     required, optional, results = REQUIRED, OPTIONAL, RESULTS
 
-    def __init__(self, file: Path, box: BlackBox) -> None:
+    def __init__(self, file: Path, box: BlackBox, proxy: str = "") -> None:
         self.box = box
+        self._latest: deque[str] = deque(maxlen=_LAST)  # in the call under way
+        self._complaints: deque[str] = deque(maxlen=_LAST)
+        self._refused: list[str] = []  # with the last call that was refused
         self.messages: list[tuple[str, int, str, str]] = []
         self.bad_messages = 0
         box.note("loading the library")
@@ -104,6 +126,8 @@ class Library:
             _FINISHED(0),
             None,
         )
+        if proxy:
+            ctypes.CDLL(proxy).addLoggerProxy(byref(self._callbacks))
 
     def _log(
         self, _: int | None, name: bytes | None, status: int, kind: bytes | None, text: bytes | None
@@ -113,6 +137,15 @@ class Library:
         if len(self.messages) < _MOST_MESSAGES:
             parts = [(part or b"").decode("utf-8", "replace") for part in (name, kind, text)]
             self.messages.append((parts[0], status, parts[1], parts[2]))
+        said = (text or b"").decode("utf-8", "replace")
+        self.box.hear(said)
+        self._latest.append(said)
+        if status != OK:
+            self._complaints.append(said)
+
+    def said(self) -> list[str]:
+        """Return what the FMU said of the last call that it refused, else its last complaints."""
+        return self._refused or list(self._complaints)
 
     def missing(self) -> tuple[list[str], list[str]]:
         """Return the functions that every FMU needs, and the others, that are not exported."""
@@ -127,6 +160,7 @@ class Library:
         if function is None:
             raise MissingFunctionError(f"the library does not export {name}")
         self.box.note(name)
+        self._latest.clear()
         result = function(*arguments)
         self.box.note("")
         return result
@@ -134,6 +168,8 @@ class Library:
     def status(self, name: str, *arguments: Any) -> int:
         """Call a function that returns a status; raise FatalAnswerError for Fatal."""
         status = int(self.call(name, *arguments))
+        if status in (DISCARD, ERROR, FATAL):
+            self._refused = list(self._latest)
         if status == FATAL:
             raise FatalAnswerError(name)
         return status
@@ -159,6 +195,7 @@ class Library:
             0,
             int(logging),
         )
+        self._refused = [] if handle else list(self._latest)
         return Instance(self, handle) if handle else None
 
     def close(self) -> None:

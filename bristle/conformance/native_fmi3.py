@@ -53,6 +53,7 @@ class LibraryFmi3(Library):
             "fmi3InstantiateCoSimulation", name.encode(), guid.encode(), resources.encode(),
             False, logging, False, False, None, 0, len(self._names), self._logger, None,
         )  # fmt: skip
+        self._refused = [] if handle else list(self._latest)
         return InstanceFmi3(self, handle) if handle else None
 
 

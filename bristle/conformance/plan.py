@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..fmu.description import Description, Variable
+from ..units import Unit
 
 
 @dataclass
@@ -18,7 +19,8 @@ class Plan:
     `steps` is how many communication steps the comparing probes take, `instances` how often
     the repeating ones instantiate; both shrink for an FMU that is slow. `driven` says whether
     real inputs may be moved. `ours` says that bristle's rules for faults apply. `fmi3` is also
-    known where the variables cannot be read.
+    known where the variables cannot be read. `listens` has every instance log for debugging, and
+    `proxy` is a library that puts the numbers into its messages (see `native.Library`).
     """
 
     fmu: str
@@ -35,6 +37,8 @@ class Plan:
     repeatable: bool = True
     ours: bool = False
     fmi3: bool = False
+    listens: bool = False
+    proxy: str = ""
     categories: list[str] = field(default_factory=list)
     beside: Plan | None = None
 
@@ -86,5 +90,9 @@ def _description(raw: dict[str, Any]) -> Description:
     for name, fields in raw["variables"].items():
         causes = fields["dependencies"]
         fields["dependencies"] = None if causes is None else tuple(causes)
+        defined = fields["defined"]
+        if defined is not None:
+            unit, factor, dimension, offset = defined
+            fields["defined"] = Unit(unit, factor, tuple(dimension), offset)
         variables[name] = Variable(**fields)
     return Description(**{**raw, "variables": variables})

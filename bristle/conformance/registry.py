@@ -20,13 +20,14 @@ class Finding:
     """What one probe saw, in words, and how that is to be judged.
 
     `data` is for the probes that follow (step count, whether inputs may be driven). `rule` is which
-    rule was broken where that is not the probe's own.
+    rule was broken where that is not the probe's own. `said` is what the FMU itself said of it.
     """
 
     verdict: Verdict
     seen: str
     data: Mapping[str, float | bool] = field(default_factory=dict)
     rule: Rule | None = None
+    said: str = ""
 
 
 class UnexpectedError(Exception):

@@ -9,15 +9,18 @@ import signal
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Collection
+from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from ..errors import BristleError, FmuError
-from ..fmu.archive import extract
+from ..fmu.archive import extract, platform_folder
 from ..fmu.description import NATIVE, describe, read_description, read_root
 from ..fmu.description_fmi3 import check_ports
 from ..progress import Count
 from ._probe import BOX, FINDING, PLAN
+from .bench import told
 from .native import BlackBox
 from .plan import Plan
 from .probes import PROBES
@@ -109,6 +112,7 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
         plan.description = describe(root)
     except FmuError:
         return plan  # "modelDescription.xml" will say why
+    plan.proxy = "" if plan.fmi3 else _proxy()
     plan.ours = _ours(plan, root.get("generationTool", ""))
     plan.categories = [c.get("name", "") for c in root.iterfind("LogCategories/Category")]
     experiment = root.find("DefaultExperiment")
@@ -118,6 +122,16 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     step = _time(times.get("stepSize"), 0.0)
     plan.step = step or _usual_step(plan, root)
     return plan
+
+
+def _proxy() -> str:
+    """Return fmpy's library that puts numbers into messages of printf's form, "" without it."""
+    spec = find_spec("fmpy")
+    for folder in (spec and spec.submodule_search_locations) or ():
+        found = sorted(Path(folder, "logging", platform_folder("2.0")).glob("logging.*"))
+        if found:
+            return str(found[0])
+    return ""
 
 
 def _usual_step(plan: Plan, root: ElementTree.Element) -> float:
@@ -264,7 +278,24 @@ class _Session:
             self.plan.instances = max(3, min(self.plan.instances, most))
 
     def start(self, probe: Probe) -> Finding:
-        """Run a probe in a process of its own and say how that ended."""
+        """Run a probe and say how that ended, with what the FMU says of a failure.
+
+        Many FMUs say it only where they are asked to log. That may change what they do, so it is
+        asked in a second run, which is for the words alone.
+        """
+        finding = self._once(probe)
+        if finding.verdict != "fail":
+            return finding
+        said = finding.said
+        if not finding.data.get("hung"):
+            self.plan.listens = True
+            again = self._once(probe)
+            self.plan.listens = False
+            said = (again.said if again.verdict == "fail" else "") or said
+        seen = f"{finding.seen}; the FMU said: {said}" if said else finding.seen
+        return replace(finding, seen=seen, said=said)
+
+    def _once(self, probe: Probe) -> Finding:
         work = Path(self.plan.work)
         self.plan.save(work / PLAN)
         for name in (FINDING, BOX):
@@ -277,16 +308,19 @@ class _Session:
 
 def _finding(work: Path, code: int | None, timeout: float) -> Finding:
     """Turn what a process left behind into a finding."""
-    under_way = BlackBox.read(work / BOX)
+    under_way, heard = BlackBox.read(work / BOX)
+    said = told(" ".join(heard.split()))
     where = f" in {under_way}" if under_way else ""
     file = work / FINDING
-    told: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
-    after = f" (before that: {told['seen']})" if told else ""
+    found: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+    after = f" (before that: {found['seen']})" if found else ""
     if code is None:
-        return failed(f"hung{where}: no answer within {timeout:g} s{after}", ended=True)
-    if code < 0:
+        ended = failed(f"hung{where}: no answer within {timeout:g} s{after}", ended=True, hung=True)
+    elif code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
-        return failed(f"crashed{where}: {name}{after}", ended=True)
-    if code != 0 or not told:
-        return failed(f"left the process{where} with exit code {code}{after}", ended=True)
-    return Finding(told["verdict"], told["seen"], told["data"], told["rule"])
+        ended = failed(f"crashed{where}: {name}{after}", ended=True)
+    elif code != 0 or not found:
+        ended = failed(f"left the process{where} with exit code {code}{after}", ended=True)
+    else:
+        return Finding(found["verdict"], found["seen"], found["data"], found["rule"], found["said"])
+    return replace(ended, said=said)

@@ -137,7 +137,7 @@ def _check_wire(
     if not right:
         return None
     _check_kinds(target, entry, source, exit_, path, isinstance(said, dict), findings)
-    if entry.kind == exit_.kind == "Real" and isinstance(said, str):
+    if entry.kind == "Real" and passes(exit_.kind, "Real") and isinstance(said, str):
         _check_units(target, entry.measure, source, exit_.measure, path, findings)
     if entry.name in to.places:
         findings.error(
