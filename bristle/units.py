@@ -357,6 +357,20 @@ def in_base_units(unit: Unit) -> str:
     return f"{unit.factor:.9g} {_base_units(unit)}{shift}"
 
 
+def spelling(unit: Unit) -> str | None:
+    """Return how this module spells a unit that a file defines, None where it has no name for it.
+
+    The name that the file uses is kept where it means the same here.
+    """
+    prefixed = (prefix + symbol for symbol in _PREFIXABLE for prefix in ("", *_PREFIXES))
+    known = (*_USUAL, *_COMMON, *_PLAIN, *prefixed)
+    for name in (unit.name, *known, _base_units(unit)):
+        read = Measure(name).unit
+        if read is not None and alike(read, unit):
+            return name
+    return None
+
+
 def si_unit(text: str) -> str:
     """Return the SI unit of the dimension that a unit has, as engineers spell it: `bar`, Pa.
 

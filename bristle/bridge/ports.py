@@ -12,7 +12,7 @@ from ..data.titles import title, unit_or_none
 from ..errors import FmuError, UnitError
 from ..findings import unknown
 from ..fmu.description import Description, Variable
-from ..units import conversion, same_dimension
+from ..units import conversion, in_base_units, same_dimension, spelling
 
 PASSED_ON = ("fault",)
 
@@ -175,7 +175,17 @@ def unit_of(variable: Variable) -> str | None:
 
     An ending counts where it is a unit of what the name means; `x_in` and the like go in.
     """
-    return variable.unit or _named_unit(variable)
+    return told_unit(variable) or _named_unit(variable)
+
+
+def told_unit(variable: Variable) -> str | None:
+    """Return the unit that the FMU gives a port, as its BaseUnit defines it, None without one.
+
+    Where there is no name for that, it is the definition, which no signal fits.
+    """
+    if variable.defined is None:
+        return variable.unit
+    return spelling(variable.defined) or in_base_units(variable.defined)
 
 
 def _named_unit(variable: Variable) -> str | None:
@@ -209,17 +219,18 @@ def channel_of(variable: Variable) -> str:
 def _port(variable: Variable, signal: str, reason: str) -> Port:
     """Return a port that was found, refused where its unit is in doubt."""
     name, unit, named = variable.name, unit_of(variable), _named_unit(variable)
+    told = told_unit(variable)
     if not unit:
         raise FmuError(
             f"{name}: its unit is in doubt: neither the FMU nor its name gives one. "
             f"--map {name}={signal}@UNIT says it."
         )
-    if variable.unit and named and not _same_unit(variable.unit, named):
+    if told and named and not _same_unit(told, named):
         raise FmuError(
-            f"{name}: its unit is in doubt: the FMU says {variable.unit}, and its name {named}. "
-            f"--map {name}={signal}@{variable.unit} or @{named} says which."
+            f"{name}: its unit is in doubt: the FMU says {told}, and its name {named}. "
+            f"--map {name}={signal}@{told} or @{named} says which."
         )
-    if not variable.unit:
+    if not told:
         reason += f"; in {unit} by its name"
     return Port(name, unit, signal, reason)
 
@@ -242,15 +253,14 @@ def _fits(unit: str | None, other: str) -> bool:
 
 
 def _left(variable: Variable, signals: Mapping[str, str]) -> str:
-    unit = f" [{variable.unit}]" if variable.unit else ""
+    told = told_unit(variable)
+    unit = f" [{told}]" if told else ""
     stays = (
         f"{variable.name}{unit} is fed from nothing and stays at its start value {variable.start}"
     )
     if variable.optional:
         return f"{stays} (it is optional)"
-    same = (
-        [name for name in signals if _fits(variable.unit, signals[name])] if variable.unit else []
-    )
+    same = [name for name in signals if _fits(told, signals[name])] if told else []
     there = (
         f"measured in that unit: {', '.join(same)}" if same else "nothing of that unit was measured"
     )

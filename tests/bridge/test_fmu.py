@@ -6,11 +6,13 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bristle import units
 from bristle.bridge.fmu import compare_fmu
 from bristle.bridge.ports import map_ports
 from bristle.cli import main
@@ -251,6 +253,24 @@ def test_a_port_whose_unit_is_in_doubt_is_refused(own, text):
         map_ports(described(own, out), SIGNALS, {}, {})
     found = map_ports(described(own, out), SIGNALS, {own.name: "velocity@mm/s"}, {})
     assert (found.inputs[0].unit, found.inputs[0].unit_given) == ("mm/s", True)
+
+
+def test_the_unit_of_a_port_is_what_the_fmu_defines_it_as():
+    """A moment called mN is no force, and a name that is not known here is read all the same."""
+    joule, kilo = {"kg": "1", "m": "2", "s": "-2"}, {"kg": "1", "m": "1", "s": "-2"}
+    kilo["factor"] = "1000"
+    ports = map_ports(
+        described(
+            replace(port("a", "mN"), defined=units.defined("mN", joule)),
+            replace(port("b", "rpm"), defined=units.defined("rpm", {"rad": "1", "factor": "0.1"})),
+            replace(port("c", "Kraft", "output"), defined=units.defined("Kraft", kilo)),
+        ),
+        {"displacement": "m", "force": "N"}, {}, {},
+    )  # fmt: skip
+    assert ports.inputs == ()
+    assert [(one.name, one.unit, one.signal) for one in ports.outputs] == [("c", "kN", "force")]
+    assert ports.left[0].startswith("a [J] is fed from nothing")
+    assert ports.left[1].startswith("b [0.1 rad] is fed from nothing")
 
 
 def test_data_without_noise_are_judged_by_a_stated_floor(toys, tmp_path):
