@@ -309,13 +309,13 @@ def _refuse_nothing(
 ) -> None:
     there = ", ".join(f"{name} [{unit}]" for name, unit in signals.items())
     if not out:
-        has = ", ".join(f"{v.name} [{v.unit or '?'}]" for v in outputs.values()) or "none"
+        has = ", ".join(f"{v.name} [{told_unit(v) or '?'}]" for v in outputs.values()) or "none"
         raise FmuError(
             f"{description.name}: no output matches a measured channel. It has: {has}; "
             f"measured: {there}. --map OUTPUT=CHANNEL says which belong together."
         )
     if description.of("input") and not into:
-        has = ", ".join(f"{v.name} [{v.unit or '?'}]" for v in description.of("input"))
+        has = ", ".join(f"{v.name} [{told_unit(v) or '?'}]" for v in description.of("input"))
         raise FmuError(
             f"{description.name}: no input matches a measured channel. It has: {has}; "
             f"measured: {there}. --map INPUT=CHANNEL says which belong together."
