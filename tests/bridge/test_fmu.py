@@ -263,7 +263,7 @@ def test_the_unit_of_a_port_is_what_the_fmu_defines_it_as():
         described(
             port("x", "m"),
             replace(port("a", "mN"), defined=units.defined("mN", joule)),
-            replace(port("b", "rpm"), defined=units.defined("rpm", {"rad": "1", "factor": "0.1"})),
+            replace(port("b", "rpm"), defined=units.defined("rpm", {"rad": "1", "factor": "0.17"})),
             replace(port("c", "Kraft", "output"), defined=units.defined("Kraft", kilo)),
         ),
         {"displacement": "m", "force": "N"}, {}, {},
@@ -271,7 +271,7 @@ def test_the_unit_of_a_port_is_what_the_fmu_defines_it_as():
     assert [one.name for one in ports.inputs] == ["x"]
     assert [(one.name, one.unit, one.signal) for one in ports.outputs] == [("c", "kN", "force")]
     assert ports.left[0].startswith("a [J] is fed from nothing")
-    assert ports.left[1].startswith("b [0.1 rad] is fed from nothing")
+    assert ports.left[1].startswith("b [0.17 rad] is fed from nothing")
 
 
 def test_data_without_noise_are_judged_by_a_stated_floor(toys, tmp_path):
