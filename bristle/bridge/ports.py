@@ -12,7 +12,7 @@ from ..data.titles import title, unit_or_none
 from ..errors import FmuError, UnitError
 from ..findings import unknown
 from ..fmu.description import Description, Variable
-from ..units import conversion, in_base_units, same_dimension, spelling
+from ..units import Measure, conversion, in_base_units, same_dimension, spelling
 
 PASSED_ON = ("fault",)
 
@@ -203,7 +203,8 @@ def channel_of(variable: Variable) -> str:
     """Return the channel that a port's name means, "" where it means none."""
     own = variable.name.rpartition(".")[2]
     own = title(0, own).name if _named_unit(variable) else own
-    meant = meaning(own, unit_of(variable))
+    unit = unit_of(variable)
+    meant = meaning(own, unit if unit and Measure(unit).unit else None)
     if meant is None or meant.rank == 0:
         return ""
     if meant.quantity == "drift":
