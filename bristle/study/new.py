@@ -284,8 +284,14 @@ def _refuse_incomplete(
     for guess in guesses:
         if not guess.unit:
             right = channel_unit(guess.channel)
+            problem = table.find(guess.column).problem.removesuffix(".")
+            why = (
+                f'"{guess.column}": {problem}'
+                if problem
+                else (f'the unit of "{guess.column}" is not given')
+            )
             wrong.append(
-                f'{guess.channel}: the unit of "{guess.column}" is not given: '
+                f"{guess.channel}: {why}: "
                 f'--channel "{guess.channel}={guess.column}@{right}", or what it is in'
             )
     if wrong:
