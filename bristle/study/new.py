@@ -11,7 +11,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..data.channels import DRIVE, ChannelSpec, at_device, channel_unit, no_device
+from ..data.channels import (
+    DRIVE,
+    ChannelSpec,
+    at_device,
+    channel_unit,
+    meaning,
+    no_device,
+)
 from ..data.decimate import FAST, RATE
 from ..data.extra import found_in
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
@@ -276,7 +283,13 @@ def _refuse_incomplete(
                 "no column can be a displacement or velocity: --channel velocity=COLUMN@m/s"
             )
         if "force" not in there:
-            wrong.append("no column can be the force: --channel force=COLUMN@N")
+            words = next((text for text in table.not_numeric if _may_be(table, text, "force")), "")
+            wrong.append(
+                f'no column can be the force: "{words}" is not all numbers: '
+                f"{table.not_numeric[words]}"
+                if words
+                else "no column can be the force: --channel force=COLUMN@N"
+            )
     elif not any(name.startswith(("base_", "floor", "drift")) for name in there):
         wrong.append(
             "no column can be the response of a level: --channel base_displacement=COLUMN@m"
@@ -309,6 +322,13 @@ def _refuse_incomplete(
         )
 
 
+def _may_be(table: Table, text: str, quantity: str) -> bool:
+    """Return whether a column is called a quantity."""
+    column = table.find(text)
+    meant = meaning(column.name, column.unit.name if column.unit else None)
+    return meant is not None and meant.quantity == quantity
+
+
 def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -> None:
     """Refuse a table that lacks columns of the first, or has them in other units.
 
@@ -330,6 +350,13 @@ def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -
                 f'{table.source}: there is no column "{guess.column}" ({guess.channel}), as in '
                 f"{first.source}; there are {', '.join(there)}. All runs of a study have the same "
                 "columns."
+            )
+        doubt, of_first = there[guess.column].doubt, first.find(guess.column).doubt
+        if bool(doubt) != bool(of_first):
+            where, other = (table, first) if doubt else (first, table)
+            raise StudyError(
+                f'{where.source}: "{guess.column}": {doubt or of_first}. In {other.source} the '
+                "numbers tell it. Write all files without groups of thousands."
             )
         stated, unit = there[guess.column].unit, guess.unit
         if stated is not None and first.find(guess.column).unit is not None:

@@ -20,13 +20,15 @@ from ..columns import Column
 from ..table import Table
 from ..titles import is_unit_row, title_rows, titles
 from ._instants import seconds_of
-from ._rows import Body, Layout, is_comment, read_fast, read_slow, state_of
+from ._rows import Body, Layout, is_comment, is_grouped, read_fast, read_slow, state_of
+from ._thousands import read_groups
 
 ORDER = 2
 HEADER = 4
 """Rows of titles, units and what loggers add, at the most."""
 
 _TOKEN = re.compile(r'"[^"]*"|\S+(?: ?[\[(][^\])]*[\])])?')  # a title and its unit in brackets
+_GROUP = re.compile(r"\d{3}(?:\.\d*)?")
 _RIGHT = 'Titles with units are, for example, "time [s];force [kN]".'
 
 
@@ -54,6 +56,7 @@ def read(content: bytes, name: str) -> Table:
     columns = _header(lines[:first], layout, name, first, notes)
     lines = _without_repeated(lines, first, layout, notes)
     body = read_fast(lines, first, layout) or read_slow(lines, first, layout, name)
+    columns = read_groups(columns, body, lines, layout)
     columns, body = _without_empty(columns, body)
     if any("bristle results" in line for line in lines[:1]) and any(
         re.match(r"# status: incomplete", line) for line in lines[:first]
@@ -151,24 +154,37 @@ def _try_layout(rows: list[str], delimiter: str, comma: bool) -> tuple[float, La
     ]
     if not any(layout.numeric):
         return None
-    share = sum(column.count("number") for column in states) / sum(map(len, states))
+    # What needs no groups of thousands is the better reading.
+    grouped = sum(is_grouped(text, comma) for fields in same for text in fields)
+    numbers = sum(column.count("number") for column in states) - 0.02 * grouped
+    share = numbers / sum(map(len, states))
     # Points win where both would do: whole numbers have neither.
     return (often / len(rows)) * share + 0.01 * min(count, 5) - 0.001 * comma, layout
 
 
 def _refuse_comma_for_both(lines: list[str], layout: Layout, name: str) -> None:
-    """Refuse `0,001,2,5`, where a comma parts columns and decimals alike."""
+    """Refuse `0,001,2,5`, where a comma parts columns and decimals alike, or thousands."""
     if layout.delimiter != ",":
         return
+    wide = len(layout.numeric)
     for k, line in enumerate(lines[:400]):
         if _is_data(line, layout) and k:
             above = [t for t in layout.split(lines[k - 1].strip()) if t.strip()]
-            wide = len(layout.numeric)
             if wide == 2 * len(above) and not any(state_of(t, False) == "number" for t in above):
                 raise RecordError(
                     f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles. Commas part "
                     "columns and decimals alike here: save the file with semicolons between "
                     "columns, or with decimal points."
+                )
+            if wide != len(above) + 1:
+                return
+            rows = [layout.split(_without_ends(one)) for one in lines[k:] if _is_data(one, layout)]
+            last = {row[-1] for row in rows}
+            if len(last) > 1 and all(map(_GROUP.fullmatch, last)):
+                raise RecordError(
+                    f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles, the last one "
+                    "always of three digits. Commas part columns and thousands alike here: save "
+                    "the file with semicolons between columns, or without groups of thousands."
                 )
             return
 

@@ -91,7 +91,9 @@ def guess_channels(
         for channel, one in found.items()
     ] + own
     known = {taken, *(guess.column for guess in guesses)}
-    return ([time] if time else []) + guesses + _find_temperature(table, known)
+    every = ([time] if time else []) + guesses + _find_temperature(table, known)
+    doubts = {column.text: column.doubt for column in table.columns}
+    return [replace(one, doubt=joined(one.doubt, doubts[one.column])) for one in every]
 
 
 def _find_temperature(table: Table, known: set[str]) -> list[Guess]:
