@@ -28,6 +28,7 @@ from ..data.model_text import model_text
 from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
+from ..data.tone import Tone, tone_of
 from ..errors import BristleError, StudyError, UnitError
 from ..findings import command
 from ..physics.building import Building, read_building, with_damper
@@ -109,10 +110,13 @@ def make_folder(
     ignored = [guess.column for guess in seen if guess.channel in without]
     extra = found_in(first, [*taken, *ignored], specs)
     names = _names([Path(file) for file in files])
-    about, notes = facts_of([Path(file) for file in files], choices, _commanded(specs, studied))
     found = _parts(names, tables, specs, choices.split)
-    of_file = dict(zip(names, about, strict=True))
     is_test = dict(zip(names, closed, strict=True))
+    about, notes = facts_of(
+        [Path(file) for file in files], choices, _commanded(specs, studied),
+        _tones(names, found, is_test),
+    )  # fmt: skip
+    of_file = dict(zip(names, about, strict=True))
     copies = _copies(found, is_test)
     kept = [one for one in found if one not in copies]
     listed, said = roles_of([one.name for one in kept], [is_test[one.file] for one in kept])
@@ -140,12 +144,16 @@ def make_folder(
 
 @dataclass(frozen=True)
 class _Part:
-    """A run of a new study: its file in data/, its number there or 0, digests, samples per s."""
+    """A run of a new study.
+
+    Its file in data/, its number there or 0, digests, samples per s, and the tone of its motion.
+    """
 
     file: str
     piece: int
     digests: tuple[str, ...]
     rate: float
+    tone: Tone | None = None
 
     @property
     def name(self) -> str:
@@ -161,8 +169,22 @@ def _parts(
         for number, piece in enumerate(pieces_of(table, split, specs) if split else [table], 1):
             read = measurements_of(piece, specs, estimate=False)
             digests = tuple(one.digest() for one in read)
-            out.append(_Part(name, number if split else 0, digests, read[0].sampling.rate))
+            tone = tone_of(read[0]) if len(read) == 1 else None
+            rate = read[0].sampling.rate
+            out.append(_Part(name, number if split else 0, digests, rate, tone))
     return out
+
+
+def _tones(
+    names: Sequence[str], parts: Sequence[_Part], is_test: Mapping[str, bool]
+) -> list[Tone | None]:
+    """Return the tone of each file that holds one run; a choice must not see those of tests."""
+    own: dict[str, list[_Part]] = {
+        name: [one for one in parts if one.file == name] for name in names
+    }
+    return [
+        own[name][0].tone if len(own[name]) == 1 and not is_test[name] else None for name in names
+    ]
 
 
 def _with_facts(part: _Part, role: str, facts: Mapping[str, Facts]) -> RunFile:

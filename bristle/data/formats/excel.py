@@ -275,9 +275,9 @@ def _refuse_merged(part: bytes, table: Table, above: Sequence[str], where: str) 
     where : the file and the sheet, for messages
     """
     rows = [line.split("\t") for line in above[-delimited.HEADER :]]
-    titled, of_units = title_rows(rows) if rows else (0, None)
-    top = titled if of_units is None else min(titled, of_units)
-    first = int(table.lines[0]) - len(rows) + top
+    titles, of_units = title_rows(rows) if rows else (0, None)
+    highest = titles if of_units is None else min(titles, of_units)
+    first = int(table.lines[0]) - len(rows) + highest
     for match in _MERGED.finditer(part):
         left, top, right, bottom = (one.decode() for one in match.groups())
         if int(bottom) >= first and (left != right or int(bottom) > int(top)):
