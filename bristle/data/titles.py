@@ -9,13 +9,18 @@ from dataclasses import replace
 from ..errors import UnitError
 from ..units import Unit
 from ..units import parse as parse_unit
-from .channels import meaning, quantity_of_unit
+from .channels import meaning, of_a_sensor, quantity_of_unit
 from .columns import Column, column
 
 _PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
 _BRACKET = re.compile(r".*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]")
 _BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
 _WHOLE = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
+_DEGREES = re.compile(r"(?:deg(?:rees?|\.)?|grad|[°º])? ?[cC](?:elsius)?")
+_CELSIUS = re.compile(
+    rf"(?P<name>.*?\S)\s*(?:[\[(]\s*(?:{_DEGREES.pattern})\s*[\])]|[_/] ?(?:{_DEGREES.pattern})"
+    rf"|(?:,| in) (?:{_DEGREES.pattern}))\s*"
+)
 _NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none")
 
 
@@ -30,6 +35,8 @@ def title(index: int, text: str) -> Column:
         Its title in the file.
     """
     found = column(index, text)
+    if found.unit is None and (celsius := _celsius(found)) is not None:
+        return celsius
     if found.unit is None and found.problem:
         bracket = _BRACKET.fullmatch(found.text)
         unit = unit_or_none(bracket["unit"]) if bracket else None  # "(amp)" is no unit, but meant
@@ -41,6 +48,18 @@ def title(index: int, text: str) -> Column:
             return replace(found, name=parted["name"], unit=unit)
         return _by_slash(found)
     return found
+
+
+def _celsius(column: Column, spelled: str = "") -> Column | None:
+    """Return a column in degrees Celsius that are written "C"; None for another quantity."""
+    match = _CELSIUS.fullmatch(column.text) if not spelled else None
+    name = match["name"] if match else column.name
+    meant = meaning(name, None)
+    if (match is None and not _DEGREES.fullmatch(spelled)) or (
+        meant is not None and meant.quantity != "time" and not of_a_sensor(name)
+    ):
+        return None
+    return replace(column, name=name, unit=parse_unit("degC"), problem="", written="")
 
 
 def _by_slash(column: Column) -> Column:
@@ -85,6 +104,8 @@ def titles(
 def _in_unit(column: Column, text: str) -> Column:
     """Return a column in the unit that a row of units says; in none where its title denies it."""
     unit = row_unit(text)
+    if unit is None and (celsius := _celsius(column, text.strip("[]() "))) is not None:
+        return celsius
     if unit is not None and _differs(column, unit):
         assert column.unit is not None
         problem = f"the title says {column.unit.name}, and the row of units {unit.name}."

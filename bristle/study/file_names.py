@@ -208,6 +208,9 @@ def _by_names(
         return 0
     heads, tails = [one[0] for one in used], [one[1] for one in used]
     if mark == _UNIT:
+        of_head = [sorted({int(t) for h, t in used if h == head}) for head in {*heads}]
+        if all(one == list(range(1, len(one) + 1)) for one in of_head):
+            return -1  # they count repeated runs: 2A1, 2A2
         return 1 if {*tails} <= _DIGITS and {*tails} != {"0"} and "0" in heads else 0
     if any(len(head) > 1 and head[0] == "0" for head in heads):  # of a date, or a counter
         return -1
@@ -222,7 +225,7 @@ def _by_names(
         return 1 if sure and not (counting and mark not in _LETTERS and not some) else 0
     if mark in _LETTERS:
         return 1 if len({*tails}) > 1 and not counting else 0
-    return -1 if counting or len({*heads}) == 1 else 0
+    return -1 if not some and (counting or len({*heads}) == 1) else 0
 
 
 def _open_text(
@@ -272,8 +275,8 @@ def _digits(
     if digits:
         name = next(iter(digits))
         why.append(
-            f'"{texts[name][0]}" and the like in the names have {digits[name]} decimals, by the '
-            "measured motion"
+            f'"{texts[name][0]}" and the like in the names have {digits[name]} '
+            f"decimal{'s' * (digits[name] > 1)}, by the measured motion"
         )
     doubts = {}
     for name in wide:

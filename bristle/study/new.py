@@ -26,6 +26,7 @@ from ..data.measurement import measurements_of
 from ..data.model import new_model
 from ..data.model_text import model_text
 from ..data.pieces import pieces_of
+from ..data.raw_signals import raw_signals
 from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
@@ -133,6 +134,10 @@ def make_folder(
     _refuse_one_role(settings.runs)
     if settings.excluded:
         notes.append(settings.excluded_text.removesuffix("."))
+    raw = [(one, of) for one, of in raw_signals(first).items() if one not in taken]
+    if raw:
+        pairs = ", ".join(f'"{one}" of "{of}"' for one, of in raw)
+        notes.append(f"raw signals beside calibrated columns are not used: {pairs}")
     notes += said if not any(one.role for one in about) else []
     notes += _copies_text(folder, copies, settings)
     data = dict(zip(names, map(Path, files), strict=True))

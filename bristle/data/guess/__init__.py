@@ -18,6 +18,7 @@ from ..channels import ChannelSpec, device_channel, meaning, quantity_of_unit
 from ..columns import Column
 from ..extra import unit_as_written
 from ..labels import TEMPERATURE
+from ..raw_signals import raw_signals
 from ..table import Table
 from .bench import bench_guesses
 from .candidates import Search, candidate_of, joined
@@ -75,7 +76,7 @@ def guess_channels(
     search = Search(table, step)
     taken = time.column if time else ""
     own = device_guesses(table, devices or [])
-    theirs = {guess.column for guess in own}
+    theirs = {*(guess.column for guess in own), *raw_signals(table)}
     candidates = [
         one
         for column in table.columns
