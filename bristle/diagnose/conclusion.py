@@ -21,7 +21,7 @@ LAYER = "layer"
 """The site beside which a building's damper stands, as a rule."""
 
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
-NOT_DRIVEN = "Neither voltage nor current was recorded: a drive that changed would look like this."
+NOT_DRIVEN = "No command was recorded: one that changed would look like this."
 
 
 @dataclass(frozen=True)

@@ -196,8 +196,7 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     recorded = every
     if study.settings.rate:  # nulls and lines are where the file has its samples
         recorded = read_runs(study.folder, replace(study.settings, rate=0.0))
-    for run in recorded:
-        findings += check_recording(run)
+    findings += check_recording(recorded)
     doubted = [] if study.settings.has_building else list(check_labels(every))
     findings += doubted
     # Where levels may be others than their runs' names say, no sensor is to blame for the force.
