@@ -21,7 +21,7 @@ _CELSIUS = re.compile(
     rf"(?P<name>.*?\S)\s*(?:[\[(]\s*(?:{_DEGREES.pattern})\s*[\])]|[_/] ?(?:{_DEGREES.pattern})"
     rf"|(?:,| in) (?:{_DEGREES.pattern}))\s*"
 )
-_NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none")
+_NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none", "ts", "rn")
 
 
 def title(index: int, text: str) -> Column:

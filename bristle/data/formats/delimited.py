@@ -169,7 +169,10 @@ def _refuse_comma_for_both(lines: list[str], layout: Layout, name: str) -> None:
     wide = len(layout.numeric)
     for k, line in enumerate(lines[:400]):
         if _is_data(line, layout) and k:
-            above = [t for t in layout.split(lines[k - 1].strip()) if t.strip()]
+            fields = layout.split(lines[k - 1].strip())
+            above = [t for t in fields if t.strip()]
+            if len(fields) == wide:
+                return
             if wide == 2 * len(above) and not any(state_of(t, False) == "number" for t in above):
                 raise RecordError(
                     f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles. Commas part "
