@@ -102,7 +102,8 @@ def label_doubt(labels: Labels, found: Tone) -> str:
     frequency, amplitude = labels.get("frequency"), labels.get("amplitude")
     wrong = []
     most = SAME if found.even else FAR
-    if isinstance(frequency, float) and frequency_off(frequency, found) > log(most):
+    slow = frequency == 0.0 and not found.even  # a ramp is called 0 Hz
+    if isinstance(frequency, float) and not slow and frequency_off(frequency, found) > log(most):
         wrong.append(
             f"frequency is {label_text('frequency', frequency)} by its label, and the motion has "
             f"{'' if found.even else 'about '}{quantity(found.frequency, 'Hz', 3)}"
