@@ -10,8 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...quantity import plain
 from ..columns import Column
@@ -35,12 +37,13 @@ def read_groups(
     """
     mark = "," if layout.comma else "."
 
-    def texts(index: int) -> list[str]:
-        rows = (layout.split(lines[at - 1].strip(" \r\n")) for at in body.lines)
+    def texts(index: int, of: NDArray[np.bool_] | None = None) -> list[str]:
+        places = body.lines if of is None else body.lines[of]
+        rows = (layout.split(lines[at - 1].strip(" \r\n")) for at in places)
         return [row[index].strip().strip('"').strip() for row in rows]
 
     kinds = {
-        k: _kind(values, lambda k=k: texts(k), mark)  # type: ignore[misc]
+        k: _kind(values, partial(texts, k), mark)
         for k, values in enumerate(body.values)
         if k not in body.not_numeric and k not in body.grouped
     }
@@ -88,20 +91,26 @@ def _refused(k: int, body: Body, texts: list[str], layout: Layout) -> str:
     return ""
 
 
-def _kind(values: Array, texts: Callable[[], list[str]], mark: str) -> str:
+def _kind(values: Array, texts: Callable[[NDArray[np.bool_]], list[str]], mark: str) -> str:
     """Return what the marks in a column are: "decimal", "groups", or "open" where nothing tells.
 
     "whole" where no value has decimals, so that it may have no marks at all.
+
+    Parameters
+    ----------
+    values : (n,) as read with decimals
+    texts : returns the fields of some rows (n,)
+    mark : the decimal mark
     """
-    good = np.abs(values[np.isfinite(values)])
+    finite = np.isfinite(values)
+    good = np.abs(values[finite])
     parts = good[good != np.round(good)]
     if not parts.size:
         return "whole"
-    if parts.min() < 1.0 or parts.max() >= 1000.0 or np.any(
-        np.abs(1e3 * parts - np.round(1e3 * parts)) > 1e-6
-    ):  # fmt: skip
+    if parts.min() < 1.0 or parts.max() >= 1000.0 or not _whole(1e3 * parts).all():
         return "decimal"
-    own = [text for text in texts() if text.lstrip("+-").replace(mark, "").isdigit()]
+    # All others have three digits behind the mark.
+    own = _numbers(texts(finite & _whole(100.0 * np.where(finite, values, 0.0))), mark)
     bare = [abs(int(text)) for text in own if mark not in text]
     grouped = re.compile(rf"[+-]?[1-9]\d{{0,2}}\{mark}\d{{3}}")
     if max(bare, default=0) >= 1000 or not all(
@@ -110,9 +119,18 @@ def _kind(values: Array, texts: Callable[[], list[str]], mark: str) -> str:
         return "decimal"
     if not any(bare):
         return "open"
+    own = _numbers(texts(finite), mark)
     with_decimals = _unevenness(np.array([plain_number(text.replace(mark, ".")) for text in own]))
     with_groups = _unevenness(np.array([plain_number(text.replace(mark, "")) for text in own]))
     return "groups" if with_groups < _EVEN * with_decimals else "decimal"
+
+
+def _whole(values: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(values - np.round(values)) <= 1e-6)
+
+
+def _numbers(texts: list[str], mark: str) -> list[str]:
+    return [text for text in texts if text.lstrip("+-").replace(mark, "").isdigit()]
 
 
 def _unevenness(values: Array) -> float:
