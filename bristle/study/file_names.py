@@ -225,7 +225,10 @@ def _by_names(
         return 1 if sure and not (counting and mark not in _LETTERS and not some) else 0
     if mark in _LETTERS:
         return 1 if len({*tails}) > 1 and not counting else 0
-    return -1 if not some and (counting or len({*heads}) == 1) else 0
+    parted = any(len(re.findall(r"\d+", a[name].number)) > 1 for a in plain if name in a)
+    if some and parted:  # others have a decimal mark that is sure: 1_0A beside 0p5A
+        return 0
+    return -1 if counting or len({*heads}) == 1 else 0
 
 
 def _open_text(
