@@ -147,8 +147,13 @@ _PLACES = {
     "damper": "damper mr fluid friction rod dampfer amortecedor coil measured meas",
     "other": "normal axial spring preload holding extra command cmd setpoint soll ref reference "
     "desired target vertical lateral temperature torque",
+    "sensed": "temperature temp temperatur temperatura thermocouple thermoelement termopar tc "
+    "pt100 pressure druck pression presion pressao torque drehmoment strain dehnung humidity "
+    "feuchte accelerometer gauge dms",  # commands nothing, whatever unit its signal has
 }
-_GROUND, _BASE, _FLOOR, _DAMPER, _OTHER = (frozenset(ws.split()) for ws in _PLACES.values())
+_GROUND, _BASE, _FLOOR, _DAMPER, _OTHER, _SENSED = (
+    frozenset(ws.split()) for ws in _PLACES.values()
+)
 _KNOWN = frozenset().union(_BY_WORD, _GROUND, _BASE, _FLOOR, _DAMPER, _OTHER)
 
 
@@ -176,6 +181,11 @@ def meaning(name: str, unit: str | None) -> Meaning | None:
         place = f"floor{number}"
     rank = 2 + bool(_DAMPER & set(words)) + (name.lower() in PLAIN)
     return Meaning(quantity, place, number, 0 if _OTHER & set(words) else rank)
+
+
+def of_a_sensor(name: str) -> bool:
+    """Return whether a column is called by what is measured and commands nothing, as a pressure."""
+    return bool(_SENSED & set(_words(name)))
 
 
 def quantity_of_unit(unit: str | None) -> str | None:

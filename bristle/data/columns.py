@@ -27,7 +27,8 @@ class Column:
     """One column: where it stands, its text in the header, and what that means.
 
     `unit` is None where the text gives none that can be read; `problem` then says why, if it
-    gives one at all, and `written` is that of a row of units.
+    gives one at all, and `written` is that of a row of units. `doubt` is what speaks against how
+    its values were read.
     """
 
     index: int
@@ -36,6 +37,7 @@ class Column:
     unit: Unit | None
     problem: str = ""
     written: str = ""
+    doubt: str = ""
 
     def is_a(self, dimension: tuple[int, ...], *names: str) -> bool:
         """Return whether the unit has that dimension and the name is one of those, if any."""

@@ -16,6 +16,9 @@ from .study_model import StudyModel
 _COMMAND = re.compile(r"\bV(?=(_felt)?\b)")
 """The command in formulas, which are declared for a voltage; `V_felt` is what reaches the fluid."""
 
+_NOTHING = re.compile(r"(?<!\w)\((\([^()]*\)|[^()\s]+) \+ 0 V(?:_felt)?\)| \+ 0 V(?:_felt)?\b")
+"""A term of the command that is zero."""
+
 _APART = re.compile(r"[,;]\s{2,}")
 """What stands between two formulas in a line."""
 
@@ -83,9 +86,18 @@ def equations(model: StudyModel) -> list[Equation]:
         own = {n.removeprefix(begin): t for n, t in texts.items() if n.startswith(begin)}
         out += _with(effect, known.__doc__ or "", own)
     symbol = drive_named(model.drive).symbol
+    out = [
+        one._replace(numbers=_without_zero(one.numbers), intervals=_without_zero(one.intervals))
+        for one in out
+    ]
     return [
         Equation(one.of, *(_COMMAND.sub(symbol, formula) for formula in one[1:])) for one in out
     ]
+
+
+def _without_zero(formula: str) -> str:
+    """Return a formula without terms of the command that are zero."""
+    return _NOTHING.sub(lambda match: match[1] or "", formula)
 
 
 def symbols(model: StudyModel, told: Sequence[Equation]) -> str:

@@ -20,6 +20,7 @@ from ..units import conversion, parse, si_unit
 from .channels import ChannelSpec, is_channel
 from .columns import Column
 from .labels import UNITS
+from .raw_signals import raw_signals
 from .table import Array, Table
 
 FEWEST = 20
@@ -117,8 +118,8 @@ def unit_of(spec: ChannelSpec) -> str:
 def found_in(table: Table, used: Iterable[str], names: Iterable[str]) -> dict[str, ChannelSpec]:
     """Return the channels in the columns of a table that have a title and a unit, by name.
 
-    Not those that hold the same as another column, in other units as well, nor a second time or
-    index: what grows by the same amount from sample to sample.
+    Not those that hold the same as another column, in other units or as raw volts as well, nor a
+    second time or index: what grows by the same amount from sample to sample.
 
     Parameters
     ----------
@@ -130,7 +131,10 @@ def found_in(table: Table, used: Iterable[str], names: Iterable[str]) -> dict[st
     seen = [table.values[text] for text in used]
     counted = np.arange(table.rows, dtype=float)
     out: dict[str, ChannelSpec] = {}
+    raw = raw_signals(table)
     for column in table.columns:
+        if column.text in raw:
+            continue
         unit = unit_as_written(column)
         if len(out) == MOST:
             break

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 MAINS = (50.0, 60.0)
 """Frequencies of the mains [Hz]."""
 
@@ -33,7 +35,9 @@ def _folded(frequency: float, step: float) -> float:
     return abs(frequency - rate * round(frequency / rate))
 
 
-def mains_of(frequency: float, step: float, width: float) -> tuple[float, int, bool]:
+def mains_of(
+    frequency: float, step: float, width: float, among: Sequence[float] = MAINS
+) -> tuple[float, int, bool]:
     """Return the mains frequency [Hz] that a line is of, the order, and whether it is folded.
 
     Parameters
@@ -41,6 +45,7 @@ def mains_of(frequency: float, step: float, width: float) -> tuple[float, int, b
     frequency : Hz, as recorded
     step : sampling step [s]
     width : Hz within which it is known
+    among : mains frequencies [Hz] that it may be of
 
     Returns
     -------
@@ -49,7 +54,7 @@ def mains_of(frequency: float, step: float, width: float) -> tuple[float, int, b
     """
     half = 0.5 / step
     for folded in (False, True):
-        for mains in MAINS:
+        for mains in among:
             for order in _orders(mains, step):
                 whole = order * mains
                 if (whole > half) is not folded:

@@ -458,5 +458,5 @@ def _what_is_missing(values: Sequence[str]) -> list[str]:
     if bench and v and not x:
         notes.append("no displacement: it follows from the velocity up to where it begins")
     if bench and not any(drive in values for drive in DRIVE):
-        notes.append("no voltage and no current: the command is constant at an unknown level")
+        notes.append("no command: if there is one, it is constant at an unknown level")
     return notes

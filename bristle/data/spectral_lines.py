@@ -10,13 +10,13 @@ mains hum may be on several channels, and is none where the displacement moves w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .channels import DRIVE
 from .line_removal import BETA, amplitude_of, drifting_amplitude, without_slow
-from .mains import MAINS_OFF, mains_lines, mains_of
+from .mains import MAINS, MAINS_OFF, mains_lines, mains_of
 from .noise import is_switched
 from .table import Array
 
@@ -106,6 +106,42 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
         rms = float(np.sqrt(np.mean(able[name] ** 2)))
         out += [one for one in found if one.amplitude < _MOST_OF_SIGNAL * rms]
     return [line for line in out if not _is_driven(line, out, spectra, able, step)]
+
+
+def of_one_mains(
+    runs: Sequence[Sequence[SpectralLine]], steps: Sequence[float], samples: Sequence[int]
+) -> list[list[SpectralLine]]:
+    """Return the lines of runs of one laboratory, which has one mains, or none.
+
+    It is that of most lines, and of the lowest order among equals; a line of the other one may be
+    of it as well, or is of no mains.
+
+    Parameters
+    ----------
+    runs : (n,) lines of each run
+    steps, samples : (n,) of each run, s and their number
+    """
+    every = [
+        (line, step, 2.0 / (step * size))
+        for lines, step, size in zip(runs, steps, samples, strict=True)
+        for line in lines
+    ]
+    if len({line.mains for line, _, _ in every if line.mains}) < 2:
+        return [list(lines) for lines in runs]
+    scores = {}
+    for mains in MAINS:
+        found = [mains_of(line.frequency, step, width, (mains,)) for line, step, width in every]
+        orders = [order + 100 * folded for own, order, folded in found if own]
+        scores[mains] = (len(orders), -min(orders, default=0))
+    best = max(MAINS, key=lambda mains: scores[mains])
+    out = []
+    for lines, step, size in zip(runs, steps, samples, strict=True):
+        known = [mains_of(one.frequency, step, 2.0 / (step * size), (best,)) for one in lines]
+        out.append([
+            replace(one, mains=mains, order=order, folded=folded)
+            for one, (mains, order, folded) in zip(lines, known, strict=True)
+        ])  # fmt: skip
+    return out
 
 
 def _is_able(name: str, y: Array) -> bool:

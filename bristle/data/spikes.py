@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..quantity import plain, quantity
-from .channels import channel_unit
+from .channels import DRIVE, channel_unit, device_channel
 from .noise import is_switched
 from .table import Array
 
@@ -81,7 +81,10 @@ def spikes_of(time: Array, channels: Mapping[str, Array], *, mask: bool) -> tupl
     """
     found = []
     for channel, y in channels.items():
+        commands = (device_channel(channel) or ("", channel))[1] in DRIVE
         for begin, end in find_spikes(y):
+            if commands and _at_a_switch(y, begin, end):
+                continue
             before, after = (part[np.isfinite(part)] for part in (y[:begin], y[end:]))
             beside = np.concatenate([before[-LONGEST:], after[:LONGEST]])
             part = y[begin:end] - float(np.median(beside))
@@ -90,6 +93,16 @@ def spikes_of(time: Array, channels: Mapping[str, Array], *, mask: bool) -> tupl
             if mask:
                 y[begin:end] = np.nan
     return tuple(found)
+
+
+def _at_a_switch(y: Array, begin: int, end: int) -> bool:
+    """Return whether samples of a command overshoot where it is switched from level to level."""
+    before, after = y[max(begin - LONGEST, 0) : begin], y[end : end + LONGEST]
+    if not (np.isfinite(before).any() and np.isfinite(after).any()):
+        return False
+    levels = np.array([np.nanmedian(before), np.nanmedian(after)])
+    size = float(np.nanmax(np.min(np.abs(y[begin:end, None] - levels), axis=1)))
+    return float(np.ptp(levels)) >= size
 
 
 def spikes_text(spikes: tuple[Spike, ...]) -> str:

@@ -9,14 +9,19 @@ from dataclasses import replace
 from ..errors import UnitError
 from ..units import Unit
 from ..units import parse as parse_unit
-from .channels import meaning, quantity_of_unit
+from .channels import meaning, of_a_sensor, quantity_of_unit
 from .columns import Column, column
 
 _PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
 _BRACKET = re.compile(r".*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]")
 _BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
 _WHOLE = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
-_NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none")
+_DEGREES = re.compile(r"(?:deg(?:rees?|\.)?|grad|[°º])? ?[cC](?:elsius)?")
+_CELSIUS = re.compile(
+    rf"(?P<name>.*?\S)\s*(?:[\[(]\s*(?:{_DEGREES.pattern})\s*[\])]|[_/] ?(?:{_DEGREES.pattern})"
+    rf"|(?:,| in) (?:{_DEGREES.pattern}))\s*"
+)
+_NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none", "ts", "rn")
 
 
 def title(index: int, text: str) -> Column:
@@ -30,6 +35,8 @@ def title(index: int, text: str) -> Column:
         Its title in the file.
     """
     found = column(index, text)
+    if found.unit is None and (celsius := _celsius(found)) is not None:
+        return celsius
     if found.unit is None and found.problem:
         bracket = _BRACKET.fullmatch(found.text)
         unit = unit_or_none(bracket["unit"]) if bracket else None  # "(amp)" is no unit, but meant
@@ -41,6 +48,18 @@ def title(index: int, text: str) -> Column:
             return replace(found, name=parted["name"], unit=unit)
         return _by_slash(found)
     return found
+
+
+def _celsius(column: Column, spelled: str = "") -> Column | None:
+    """Return a column in degrees Celsius that are written "C"; None for another quantity."""
+    match = _CELSIUS.fullmatch(column.text) if not spelled else None
+    name = match["name"] if match else column.name
+    meant = meaning(name, None)
+    if (match is None and not _DEGREES.fullmatch(spelled)) or (
+        meant is not None and meant.quantity != "time" and not of_a_sensor(name)
+    ):
+        return None
+    return replace(column, name=name, unit=parse_unit("degC"), problem="", written="")
 
 
 def _by_slash(column: Column) -> Column:
@@ -56,11 +75,15 @@ def _by_slash(column: Column) -> Column:
     return replace(column, name=name, unit=unit)
 
 
-def titles(names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Column, ...]:
+def titles(
+    names: Sequence[str],
+    units: Sequence[str] | None = None,
+    others: Sequence[Sequence[str]] = (),
+) -> tuple[Column, ...]:
     """Return the columns of a header and of the row of units below it, each title once.
 
     Columns without a title are called `column 3`, counted from 1; a title that is met again gets a
-    number: `F`, `F (2)`.
+    number: `F`, `F (2)`. Without a row of units, no other row of the header may deny the units.
     """
     out: list[Column] = []
     met: dict[str, int] = {}
@@ -72,18 +95,109 @@ def titles(names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Co
             found = replace(found, text=f"{text} ({met[text]})")
         if units is not None and units[index].strip().lower() not in _NOTHING:
             found = _in_unit(found, units[index].strip().strip('"').strip())
+        for row in others if units is None else ():
+            found = _undenied(found, title(index, row[index]))
         out.append(found)
     return tuple(out)
 
 
 def _in_unit(column: Column, text: str) -> Column:
-    """Return a column in the unit that a row of units says."""
+    """Return a column in the unit that a row of units says; in none where its title denies it."""
     unit = row_unit(text)
+    if unit is None and (celsius := _celsius(column, text.strip("[]() "))) is not None:
+        return celsius
+    if unit is not None and _differs(column, unit):
+        assert column.unit is not None
+        problem = f"the title says {column.unit.name}, and the row of units {unit.name}."
+        return replace(column, unit=None, problem=problem)
     if unit is not None:
         return replace(column, unit=unit, problem="")
     written = _WHOLE.fullmatch(text)
     spelled = text[1:-1].strip() if written else text
     return replace(column, unit=None, problem=f'unit "{spelled}" is not known.', written=spelled)
+
+
+def _differs(column: Column, unit: Unit) -> bool:
+    """Return whether a title tells another unit, in brackets or of the same quantity.
+
+    The ending of a name need not be a unit: "voltage_in" is in no inches.
+    """
+    own = column.unit
+    if own is None or (own.factor, own.dimension, own.offset) == unit[1:]:
+        return False
+    return own.dimension == unit.dimension or _BRACKET.fullmatch(column.text) is not None
+
+
+def _undenied(column: Column, other: Column) -> Column:
+    """Return a column, in no unit where another row of the header says another one in brackets."""
+    if other.unit is None or not _BRACKET.fullmatch(other.text) or not _differs(column, other.unit):
+        return column
+    assert column.unit is not None
+    problem = f'the title says {column.unit.name}, and "{other.text}" in the header another unit.'
+    return replace(column, unit=None, problem=problem)
+
+
+def title_rows(rows: Sequence[Sequence[str]]) -> tuple[int, int | None]:
+    """Return which of the rows above the numbers holds the titles, and which their units, if any.
+
+    Names and units may be followed, or parted, by a row of channel numbers, types, descriptions or
+    processing. The row of units and the row of names are those that belong together: the units are
+    those of what the names say. Without a row of units the last row counts, but where one above it
+    tells a time, and as much.
+
+    Parameters
+    ----------
+    rows : one or more, each with a field per column, from the highest to the lowest
+    """
+    pairs = [
+        (_fit(names, units), t == u - 1, t, u)
+        for u, units in enumerate(rows)
+        if len(rows) > 1 and is_unit_row(units) and not _denies_time(units, rows)
+        for t, names in enumerate(rows)
+        if t != u
+    ]
+    if pairs:
+        *_, names, units = max(pairs)
+        return names, units
+    last = len(rows) - 1
+    told = [_told(row) for row in rows]
+    able = [k for k, row in enumerate(rows) if told[k] >= told[last] and any(map(_is_time, row))]
+    return max(able, key=lambda k: told[k], default=last), None
+
+
+def _fit(names: Sequence[str], units: Sequence[str]) -> int:
+    """Return in how many columns a unit is that of the quantity which the name says."""
+    pairs = [(title(0, name), row_unit(text)) for name, text in zip(names, units, strict=True)]
+    return sum(
+        unit is not None
+        and (by_unit := quantity_of_unit(unit.name)) is not None
+        and (meant := meaning(one.name, unit.name)) is not None
+        and meant.quantity == by_unit
+        for one, unit in pairs
+    )
+
+
+def _told(names: Sequence[str]) -> int:
+    """Return how much titles tell: a quantity counts, and so does a unit."""
+    columns = [title(0, name) for name in names]
+    known = [meaning(one.name, one.unit.name if one.unit else None) for one in columns]
+    return sum(one is not None for one in known) + sum(one.unit is not None for one in columns)
+
+
+def _is_time(name: str) -> bool:
+    meant = meaning(title(0, name).name, None)
+    return meant is not None and meant.quantity == "time"
+
+
+def _denies_time(units: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether a row gives what is called a time another unit: such as N, for "number"."""
+    known = [row_unit(text) for text in units]
+    return any(
+        unit is not None and quantity_of_unit(unit.name) != "time" and _is_time(name)
+        for row in rows
+        if row is not units
+        for name, unit in zip(row, known, strict=True)
+    )
 
 
 def row_unit(text: str) -> Unit | None:

@@ -21,7 +21,7 @@ LAYER = "layer"
 """The site beside which a building's damper stands, as a rule."""
 
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
-NOT_DRIVEN = "Neither voltage nor current was recorded: a drive that changed would look like this."
+NOT_DRIVEN = "No command was recorded: one that changed would look like this."
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,8 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     if about.force == "measured" and about.beside_layer:
         damper = findings.get(DAMPER)
         findings = {site: _after_the_force(found, damper) for site, found in findings.items()}
+    if not about.driven:
+        findings = {site: _without_command(found) for site, found in findings.items()}
     reconstructed = about.force == "reconstructed" and about.beside_layer
     sensors = _sensors(findings, about)
     parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
@@ -84,6 +86,16 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
         unknown.coordinate if unknown else "", sites,
         tuple(one for one in alike if one not in EFFECTS), about.force, about.noise,
     )  # fmt: skip
+
+
+def _without_command(found: Finding) -> Finding:
+    """Return a finding that does not speak of effects of a command, where none was recorded."""
+    of_it = {effect.name for effect in EFFECTS.values() if "V" in effect.needs}
+    return replace(
+        found,
+        untestable=tuple(name for name in found.untestable if name not in of_it),
+        limits=tuple(one for one in found.limits if one.effect not in of_it),
+    )
 
 
 def _sensors(findings: Mapping[str, Finding], about: About) -> tuple[SensorFault, ...]:

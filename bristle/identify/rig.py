@@ -197,7 +197,7 @@ def bench_rig(
     site = Site(DAMPER, problem)
     notes: tuple[str, ...] = ()
     if not any(run.has(channel) for run in (*train, *holdout) for channel in DRIVE):
-        notes = ("Neither voltage nor current was measured: the parameters hold at its level.",)
+        notes = ("No command was recorded: if there is one, the parameters hold at its level.",)
     return Rig(lambda _model: {DAMPER: site}, notes=notes)
 
 

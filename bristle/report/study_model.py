@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from ..data.equation import equations
@@ -28,8 +29,10 @@ def _equations(content: Content) -> list[str]:
     for of in dict.fromkeys(one.of for one in found):
         parts.append(f"<h3>{html.escape(of)}</h3>")
         parts += [html.formula(one.intervals) for one in found if one.of == of]
+    acts = any(re.search(rf"\b{drive.symbol}(_felt)?\b", one.intervals) for one in found)
+    command = f"{drive.symbol} is the {drive.name} [{drive.unit}], " if acts else ""
     note = (
-        f"In SI units; {drive.symbol} is the {drive.name} [{drive.unit}], x and v are displacement "
+        f"In SI units; {command}x and v are displacement "
         "and velocity of the rod. The numbers are those of the present model with half of their "
         "95 % intervals; a number without one was held, or these data do not identify it."
     )

@@ -122,7 +122,7 @@ def _where(content: Content) -> str:
     caption = (
         f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
         "interval, the blue band twice the expected noise. Below: its spectrum against that of "
-        f"the noise; z by speed and {content.model.drive}."
+        f"the noise; z by speed{f' and {content.model.drive}' if content.study.drive else ''}."
     )
     title, say = headline(now), now.sentences
     return html.section(
@@ -238,7 +238,7 @@ def _before_after(content: Content) -> str:
 
 
 def _parameters(content: Content) -> str:
-    header, rows, notes = parameter_table(content.model)
+    header, rows, notes = parameter_table(content.model, content.study.drive)
     return html.section(
         "Parameters", html.table(header, rows, numbers=(1, 2)),
         html.paragraphs(*notes, kind="soft"),

@@ -10,6 +10,7 @@ import numpy as np
 from ..compare.tables import run_table
 from ..data.labels import label_text
 from ..draw.style import percent
+from ..physics.laws import LAWS
 from ..quantity import plain, quantity
 from ..quantity import with_interval as with_interval
 from ..study.reading import names_of_runs, place_of_run
@@ -33,11 +34,16 @@ _COLOURS = {
 }
 
 
-def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list[str]]:
-    """Return header, rows and notes of a model's parameters with their 95 % intervals."""
+def parameter_table(model: StudyModel, drive: str) -> tuple[list[str], list[list[str]], list[str]]:
+    """Return header, rows and notes of a model's parameters with their 95 % intervals.
+
+    Without a command (`drive` "") those that act through one alone are left out.
+    """
     header = ["parameter", "value", "95 % interval", "unit", "origin", "what it is"]
     rows, edges = [], []
-    for name, value in model.flat().items():
+    driven = LAWS[model.law].driven() if not drive and model.law in LAWS else ()
+    flat = {name: value for name, value in model.flat().items() if name not in driven}
+    for name, value in flat.items():
         text, half = with_interval(value.value, value.std)
         origin = value.origin if value.free else f"{value.origin}, held"
         rows.append([name, text, half, "" if value.unit == "1" else value.unit, origin,
@@ -49,9 +55,7 @@ def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list
     ]
     if edges:
         notes.append(f"{', '.join(edges)}: at a bound of the fit, so the interval means little.")
-    silent = [
-        n for n, v in model.flat().items() if v.free and v.std is None and v.origin == "assumed"
-    ]
+    silent = [n for n, v in flat.items() if v.free and v.std is None and v.origin == "assumed"]
     if silent:
         notes.append(f"Not identified by these data: {', '.join(silent)}.")
     return header, rows, notes

@@ -10,9 +10,11 @@ from pathlib import Path
 from ..data.channels import DRIVE
 from ..data.files import write_whole
 from ..data.guess import Guess
+from ..data.measurement import measurements_of
 from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
+from ..data.tone import Tone, tone_of
 from ..errors import StudyError
 from ..progress import counted
 from .added_runs import FILE as ADDED
@@ -74,7 +76,10 @@ def extend_study(
     _refuse_names(study, paths)
     tables = [read_table(path) for path in counted(paths, "reading file")]
     _refuse_other_columns(study, tables)
-    about, notes = facts_of(paths, choices, bool({*DRIVE} & {*study.settings.channels}))
+    about, notes = facts_of(
+        paths, choices, bool({*DRIVE} & {*study.settings.channels}), _tones(study, tables),
+        [Path(run.file) for run in (*study.settings.runs, *study.settings.excluded)],
+    )  # fmt: skip
     listed, said = _roles(paths, roles or {}, holdout)
     split = study.settings.split
     runs = tuple(
@@ -86,6 +91,14 @@ def extend_study(
         notes += said
     _written(study, paths, runs)
     return Extended(Study(study.folder), runs, tuple(notes))
+
+
+def _tones(study: Study, tables: Sequence[Table]) -> list[Tone | None]:
+    """Return the tone of the motion in each file; None where files hold several runs."""
+    if study.settings.split:
+        return [None] * len(tables)
+    read = [measurements_of(table, study.settings.channels, estimate=False) for table in tables]
+    return [tone_of(runs[0]) if len(runs) == 1 else None for runs in read]
 
 
 def _refuse_names(study: Study, paths: Sequence[Path]) -> None:

@@ -93,7 +93,7 @@ def knots_of(runs: Sequence[Measurement]) -> tuple[float, ...]:
     drives = drives_of(runs)
     if not drives:
         raise StudyError(
-            "neither voltage nor current was measured: what depends on the command cannot be told. "
+            "no command was measured: what depends on it cannot be told. "
             f"--command {LINEAR_FORM} is right."
         )
     levels = command_levels(runs)

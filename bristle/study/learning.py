@@ -9,7 +9,6 @@ from typing import Any
 
 from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose_rig
-from ..diagnose.faults import SensorFault
 from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
 from ..findings import command, unknown
@@ -76,7 +75,6 @@ def diagnose_study(
         else:
             fitted = is_identified(model)
             found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
-    found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))
     return found
@@ -103,22 +101,21 @@ def take_law(study: Study, found: Diagnosis) -> Identified | None:
     return identify_study(study, model=with_law(model, found.law), table=False)
 
 
-def _turned(study: Study) -> list[SensorFault]:
-    """Return the channels whose sign the study turns: their files have the other one."""
+def _turned(study: Study) -> list[str]:
+    """Return the sentences about channels whose sign the study turns: no fault, but a choice."""
     return [
-        SensorFault(
-            name, "sign", -1.0, 0.0,
-            f"{name.capitalize()} has the other sign in its files; study.toml reverses it.",
-        )
+        f"{name.capitalize()} has the other sign in its files; study.toml reverses it."
         for name, channel in study.settings.channels.items()
         if channel.sign < 0
-    ]  # fmt: skip
+    ]
 
 
 def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
     """Return the content of verdict.json, with what weakens the split and what is left out."""
     verdict = found.as_dict()
-    notes = [*study.runs().notes, *(f"Left out: {why}" for why in study.left_out())]
+    notes = [
+        *study.runs().notes, *_turned(study), *(f"Left out: {why}" for why in study.left_out()),
+    ]  # fmt: skip
     return {**verdict, "notes": notes} if notes else verdict
 
 

@@ -11,7 +11,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..data.channels import DRIVE, ChannelSpec, at_device, channel_unit, no_device
+from ..data.channels import (
+    DRIVE,
+    ChannelSpec,
+    at_device,
+    channel_unit,
+    meaning,
+    no_device,
+)
 from ..data.decimate import FAST, RATE
 from ..data.extra import found_in
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
@@ -19,8 +26,10 @@ from ..data.measurement import measurements_of
 from ..data.model import new_model
 from ..data.model_text import model_text
 from ..data.pieces import pieces_of
+from ..data.raw_signals import raw_signals
 from ..data.read import read_table
 from ..data.table import Table
+from ..data.tone import Tone, tone_of
 from ..errors import BristleError, StudyError, UnitError
 from ..findings import command
 from ..physics.building import Building, read_building, with_damper
@@ -102,10 +111,13 @@ def make_folder(
     ignored = [guess.column for guess in seen if guess.channel in without]
     extra = found_in(first, [*taken, *ignored], specs)
     names = _names([Path(file) for file in files])
-    about, notes = facts_of([Path(file) for file in files], choices, _commanded(specs, studied))
     found = _parts(names, tables, specs, choices.split)
-    of_file = dict(zip(names, about, strict=True))
     is_test = dict(zip(names, closed, strict=True))
+    about, notes = facts_of(
+        [Path(file) for file in files], choices, _commanded(specs, studied),
+        _tones(names, found, is_test),
+    )  # fmt: skip
+    of_file = dict(zip(names, about, strict=True))
     copies = _copies(found, is_test)
     kept = [one for one in found if one not in copies]
     listed, said = roles_of([one.name for one in kept], [is_test[one.file] for one in kept])
@@ -122,6 +134,10 @@ def make_folder(
     _refuse_one_role(settings.runs)
     if settings.excluded:
         notes.append(settings.excluded_text.removesuffix("."))
+    raw = [(one, of) for one, of in raw_signals(first).items() if one not in taken]
+    if raw:
+        pairs = ", ".join(f'"{one}" of "{of}"' for one, of in raw)
+        notes.append(f"raw signals beside calibrated columns are not used: {pairs}")
     notes += said if not any(one.role for one in about) else []
     notes += _copies_text(folder, copies, settings)
     data = dict(zip(names, map(Path, files), strict=True))
@@ -133,12 +149,16 @@ def make_folder(
 
 @dataclass(frozen=True)
 class _Part:
-    """A run of a new study: its file in data/, its number there or 0, digests, samples per s."""
+    """A run of a new study.
+
+    Its file in data/, its number there or 0, digests, samples per s, and the tone of its motion.
+    """
 
     file: str
     piece: int
     digests: tuple[str, ...]
     rate: float
+    tone: Tone | None = None
 
     @property
     def name(self) -> str:
@@ -154,8 +174,22 @@ def _parts(
         for number, piece in enumerate(pieces_of(table, split, specs) if split else [table], 1):
             read = measurements_of(piece, specs, estimate=False)
             digests = tuple(one.digest() for one in read)
-            out.append(_Part(name, number if split else 0, digests, read[0].sampling.rate))
+            tone = tone_of(read[0]) if len(read) == 1 else None
+            rate = read[0].sampling.rate
+            out.append(_Part(name, number if split else 0, digests, rate, tone))
     return out
+
+
+def _tones(
+    names: Sequence[str], parts: Sequence[_Part], is_test: Mapping[str, bool]
+) -> list[Tone | None]:
+    """Return the tone of each file that holds one run; a choice must not see those of tests."""
+    own: dict[str, list[_Part]] = {
+        name: [one for one in parts if one.file == name] for name in names
+    }
+    return [
+        own[name][0].tone if len(own[name]) == 1 and not is_test[name] else None for name in names
+    ]
 
 
 def _with_facts(part: _Part, role: str, facts: Mapping[str, Facts]) -> RunFile:
@@ -276,7 +310,13 @@ def _refuse_incomplete(
                 "no column can be a displacement or velocity: --channel velocity=COLUMN@m/s"
             )
         if "force" not in there:
-            wrong.append("no column can be the force: --channel force=COLUMN@N")
+            words = next((text for text in table.not_numeric if _may_be(table, text, "force")), "")
+            wrong.append(
+                f'no column can be the force: "{words}" is not all numbers: '
+                f"{table.not_numeric[words]}"
+                if words
+                else "no column can be the force: --channel force=COLUMN@N"
+            )
     elif not any(name.startswith(("base_", "floor", "drift")) for name in there):
         wrong.append(
             "no column can be the response of a level: --channel base_displacement=COLUMN@m"
@@ -284,8 +324,14 @@ def _refuse_incomplete(
     for guess in guesses:
         if not guess.unit:
             right = channel_unit(guess.channel)
+            problem = table.find(guess.column).problem.removesuffix(".")
+            why = (
+                f'"{guess.column}": {problem}'
+                if problem
+                else (f'the unit of "{guess.column}" is not given')
+            )
             wrong.append(
-                f'{guess.channel}: the unit of "{guess.column}" is not given: '
+                f"{guess.channel}: {why}: "
                 f'--channel "{guess.channel}={guess.column}@{right}", or what it is in'
             )
     if wrong:
@@ -301,6 +347,13 @@ def _refuse_incomplete(
             + (f"\n  The guess so far:{seen}" if seen else "")
             + rest
         )
+
+
+def _may_be(table: Table, text: str, quantity: str) -> bool:
+    """Return whether a column is called a quantity."""
+    column = table.find(text)
+    meant = meaning(column.name, column.unit.name if column.unit else None)
+    return meant is not None and meant.quantity == quantity
 
 
 def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -> None:
@@ -324,6 +377,13 @@ def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -
                 f'{table.source}: there is no column "{guess.column}" ({guess.channel}), as in '
                 f"{first.source}; there are {', '.join(there)}. All runs of a study have the same "
                 "columns."
+            )
+        doubt, of_first = there[guess.column].doubt, first.find(guess.column).doubt
+        if bool(doubt) != bool(of_first):
+            where, other = (table, first) if doubt else (first, table)
+            raise StudyError(
+                f'{where.source}: "{guess.column}": {doubt or of_first}. In {other.source} the '
+                "numbers tell it. Write all files without groups of thousands."
             )
         stated, unit = there[guess.column].unit, guess.unit
         if stated is not None and first.find(guess.column).unit is not None:

@@ -13,17 +13,23 @@ from ..data.channels import DRIVE, PLAIN
 from ..data.formats.delimited import decoded
 from ..data.labels import UNITS, Label, label_text
 from ..data.titles import title, unit_or_none
+from ..data.tone import Tone, label_doubt
 from ..errors import RecordError, StudyError, UnitError
-from ..units import convert, same_dimension
+from ..units import convert
+from .file_names import (
+    DOUBTFUL,
+    SIGN,
+    SPELLED,
+    Reading,
+    number_in,
+    quantity_of,
+    reading_of,
+    tokens_of,
+    value_of,
+)
 from .run_file import EXCLUDE, ROLES
 from .run_titles import counted_names
 
-_NUMBER = r"\d+(?:[.,p]\d+)?"  # "1p5" stands for 1.5 where a point would end a name
-_UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
-_SIGN = r"(?:(?<![^_= ])-)?"  # T=-10C and cold_-10C have one; in run-10C the minus parts words
-_SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s1 is none
-_TOKEN = re.compile(rf"(?<![\d.])({_SIGN}{_NUMBER})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})")
-_SPELLED = {"pct": "%", "percent": "%", "C": "degC"}
 _FILE = ("file", "run", "name", "datei", "filename")
 
 
@@ -72,7 +78,11 @@ class Facts:
 
 
 def facts_of(
-    files: Sequence[Path], choices: RunChoices, commanded: bool
+    files: Sequence[Path],
+    choices: RunChoices,
+    commanded: bool,
+    tones: Sequence[Tone | None] = (),
+    others: Sequence[Path] = (),
 ) -> tuple[list[Facts], list[str]]:
     """Return what is known of each file's run, and where it is from, in sentences.
 
@@ -81,19 +91,24 @@ def facts_of(
     files : one run or more each
     choices : patterns and table that were given
     commanded : whether the files hold a channel of the command: then names give no level unasked
+    tones : what the motion of each file is, against which its name is held; none by default
+    others : files of the same campaign, whose names tell how numbers are written, too
 
     Raises
     ------
     StudyError
         If a pattern fits no name, two sources differ, or the table cannot be read.
     """
-    found, notes = _offered(files, choices, commanded)
+    tones = tones or [None] * len(files)
+    reading = reading_of([*files, *others], [*tones, *([None] * len(others))])
+    found, notes = _offered(files, choices, commanded, reading)
     for pattern in choices.levels:
-        rows = [_matched(file, pattern, level=True) for file in files]
+        rows = [_matched(file, pattern, reading, level=True) for file in files]
         found = _joined(found, rows)
         notes.append(_levels_found(rows, pattern))
     for pattern in choices.labels:
-        found = _joined(found, [_matched(file, pattern, level=False) for file in files])
+        rows = [_matched(file, pattern, reading, level=False) for file in files]
+        found = _joined(found, rows)
     if choices.table is not None:
         rows = rows_of_table(choices.table, files, commanded)
         found = _joined(found, rows)
@@ -108,7 +123,26 @@ def facts_of(
         )
     if len(asked) > 1:
         raise StudyError(f"{' and '.join(sorted(asked))} both as levels; one command is right.")
-    return found, notes
+    return found, [*notes, *_doubted(files, found, tones)]
+
+
+def _doubted(
+    files: Sequence[Path], found: Sequence[Facts], tones: Sequence[Tone | None]
+) -> list[str]:
+    """Return that labels contradict the measured motion, in one sentence."""
+    wrong = [
+        (file.name, text)
+        for file, one, tone in zip(files, found, tones, strict=True)
+        if tone is not None and (text := label_doubt(one.labels, tone))
+    ]
+    if not wrong:
+        return []
+    name, text = wrong[0]
+    more = f", and so in {len(wrong) - 1} more of {len(files)} runs" if len(wrong) > 1 else ""
+    return [
+        f"{name}: {text}{more}: what the names say is doubtful, the level of a command as well. "
+        "--runs FILE, a table with a row per file, says it"
+    ]
 
 
 def _levels_found(rows: Sequence[Facts], pattern: str) -> str:
@@ -127,10 +161,10 @@ def _joined(first: list[Facts], more: list[Facts]) -> list[Facts]:
 
 
 def _offered(
-    files: Sequence[Path], choices: RunChoices, commanded: bool
+    files: Sequence[Path], choices: RunChoices, commanded: bool, reading: Reading
 ) -> tuple[list[Facts], list[str]]:
     """Return what all names tell without being asked, and the sentences that say so."""
-    tokens = [_tokens(file) for file in files]
+    tokens = [tokens_of(file, reading) for file in files]
     shared = [name for name in tokens[0] if all(name in one for one in tokens)] if tokens else []
     given = {pattern.partition("=")[0] for pattern in choices.labels}
     found, notes = [Facts() for _ in files], []
@@ -138,25 +172,30 @@ def _offered(
         drive = name in DRIVE
         if (drive and (commanded or choices.levels or choices.table)) or name in given:
             continue
-        values = [one[name][0] for one in tokens]
+        if name in reading.open:
+            notes.append(reading.open[name])
+            continue
+        values = [one[name].value for one in tokens]
+        seen, pattern = tokens[0][name].text, tokens[0][name].pattern
         if drive and _counts(values):
-            pattern = tokens[0][name][2]
             notes.append(
-                f'"{tokens[0][name][1]}" and the like in the names may count the files; '
+                f'"{seen}" and the like in the names may count the files; '
                 f"--level '{pattern}' takes them for the {name}"
             )
             continue
         unit = PLAIN[name] if drive else ""
         levels = ", ".join(label_text(name, value, unit) for value in sorted(set(values)))
-        seen = tokens[0][name][1]
         text = f'{name} of each run: from the names of the files, as in "{seen}": {levels}'
+        if name in reading.doubts:
+            text += f". Doubtful: {reading.doubts[name]}"
         if drive:
-            text += f". No column holds a command. --level '{tokens[0][name][2]}' says the same"
+            text += ". No column holds a command"
+            text += f". --level '{pattern}' says the same" if not reading.digits.get(name) else ""
         notes.append(text)
         for k, value in enumerate(values):
             more = Facts(levels={name: value}) if drive else Facts(labels={name: value})
             found[k] = found[k].and_(more)
-    return found, notes
+    return found, [*notes, *(reading.why if notes else ())]
 
 
 def _counts(values: Sequence[float]) -> bool:
@@ -164,40 +203,7 @@ def _counts(values: Sequence[float]) -> bool:
     return len(values) > 2 and sorted(values) == [float(k) for k in range(1, len(values) + 1)]
 
 
-def _tokens(file: Path) -> dict[str, tuple[float, str, str]]:
-    """Return what a name tells: quantity to value, the text that tells it, and its pattern.
-
-    What is told twice tells nothing.
-    """
-    out: dict[str, tuple[float, str, str]] = {}
-    twice = set()
-    for match in _TOKEN.finditer(file.stem):
-        number, spelled = match.groups()
-        unit = _SPELLED.get(spelled, spelled)
-        name = _quantity(unit)
-        letter = re.search(r"[A-Za-z]*$", file.stem[: match.start()])
-        before = letter.group() if letter else ""
-        if name in out:
-            twice.add(name)
-        target = PLAIN.get(name) or UNITS[name]
-        value = convert(_number(number), unit, target)
-        out[name] = value, before + match.group(), f"{before}{{}}{spelled}"
-    return {name: found for name, found in out.items() if name not in twice}
-
-
-def _quantity(unit: str) -> str:
-    """Return the command or the label that a unit in a name tells."""
-    for name in (*DRIVE, *UNITS):
-        if same_dimension(unit, PLAIN.get(name) or UNITS[name]):
-            return name
-    raise UnitError(f'unit "{unit}" tells neither a command nor a label.')
-
-
-def _number(text: str) -> float:
-    return float(text.replace(",", ".").replace("p", "."))
-
-
-def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
+def _matched(file: Path, pattern: str, reading: Reading, *, level: bool) -> Facts:
     """Return what a pattern such as "I{}A" or "oil=batch{}" finds in a name."""
     asked = f'{"--level" if level else "--label"} "{pattern}"'
     named, _, rest = pattern.rpartition("=")
@@ -207,7 +213,7 @@ def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
         raise StudyError(f"{asked}: {right}, where {{}} is the value.")
     before, after = rest.split("{}")
     spelled = re.match(r"[A-Za-z%]*", after)
-    unit = _SPELLED.get(spelled.group(), spelled.group()) if spelled else ""
+    unit = SPELLED.get(spelled.group(), spelled.group()) if spelled else ""
     known = unit_or_none(unit) if unit else None
     if level:
         named = named or (_quantity_or_none(known.name) if known else "")
@@ -218,15 +224,21 @@ def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
             )
     target = PLAIN.get(named) or UNITS.get(named, "")
     number = target != "" or known is not None
-    sign = "[-+]?" if before else rf"(?:\+|{_SIGN})"  # alone, a pattern reads as names are read
-    wanted = sign + _NUMBER if number else r"[A-Za-z0-9.]+"
-    match = re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}", file.stem + "_")
-    match = match or re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}$", file.stem)
+    sign = "[-+]?" if before else rf"(?:\+|{SIGN})"  # alone, a pattern reads as names are read
+    # Where a number fits no other way, what stands between its digits is its decimal mark.
+    forms = [number_in(reading.marks), number_in(DOUBTFUL)] if number else [r"[A-Za-z0-9.]+"]
+    forms = [sign + one for one in forms] if number else forms
+    found = (
+        re.search(rf"{re.escape(before)}({one}){re.escape(after)}{end}", f"{file.stem}{more}")
+        for one in forms
+        for more, end in (("_", ""), ("", "$"))
+    )
+    match = next((one for one in found if one), None)
     if match is None:
         raise StudyError(f'{asked}: it fits no part of "{file.name}".')
     if not number:
         return Facts(labels={named: match.group(1)})
-    value = _number(match.group(1))
+    value = value_of(match.group(1))
     if known is not None and target:
         try:
             value = convert(value, known.name, target)
@@ -237,7 +249,7 @@ def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
 
 def _quantity_or_none(unit: str) -> str:
     try:
-        return _quantity(unit)
+        return quantity_of(unit)
     except UnitError:
         return ""
 

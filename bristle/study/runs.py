@@ -83,7 +83,7 @@ def split_in_time(pieces: list[Measurement]) -> Runs:
     rest = 100.0 * (1.0 - cut / sum(sizes))
     note = (
         f"There is one run. It is split in time, the last {rest:.0f} % held out: weaker than a "
-        "separate run, because its motion, voltage and temperature are like those in training."
+        "separate run, because motion, command and temperature are like those in training."
     )
     return Runs(train, holdout, (note,))
 

@@ -40,7 +40,7 @@ def test_a_run_s_finding_names_channel_and_rate_and_leaves_the_command():
     force, ramp = np.interp(T, coarse, motion(coarse)), np.interp(T, [0.0, 4.0, 8.0], [0, 5, 1])
     columns = {"displacement [m]": 1e-3 * motion(T), "force [N]": force, "voltage [V]": ramp}
     (run,) = measurements_of_frame(pd.DataFrame({"time [s]": T, **columns}), "run")
-    (found,) = [one for one in check_recording(run) if one.kind == "interpolated"]
+    (found,) = [one for one in check_recording([run]) if one.kind == "interpolated"]
     assert (found.channel, found.level) == ("force", "warning")
     assert "100 samples per second were measured" in found.text
     assert "rate = 100" in found.do

@@ -417,8 +417,8 @@ def test_a_column_of_words_is_told_with_the_first_of_them(tmp_path) -> None:
     lines = path.read_text().splitlines()
     for k in range(1, len(lines)):
         fields = lines[k].split(",")
-        fields[at] = '"1,234.5"'
+        fields[at] = '"12,34.5"'
         lines[k] = ",".join(fields)
     path.write_text("\n".join(lines))
-    with pytest.raises(StudyError, match=r'Not used: .* \(line 2: "1,234.5" is no number\)'):
+    with pytest.raises(StudyError, match=r'Not used: .* \(line 2: "12,34.5" is no number\)'):
         create_study(tmp_path / "rig", [path])

@@ -142,7 +142,7 @@ def test_runs_at_too_few_levels_are_refused(levels: tuple[float, ...]) -> None:
 
 def test_a_command_that_was_not_measured_carries_no_form() -> None:
     runs = [one.drop(columns="voltage [V]") for one in campaign(1.0, 2.0)]
-    with pytest.raises(StudyError, match="neither voltage nor current"):
+    with pytest.raises(StudyError, match="no command was measured"):
         bristle.identify(runs, "bingham", command="table")
 
 

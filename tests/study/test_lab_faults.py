@@ -126,7 +126,7 @@ def test_the_finding_says_where_the_line_is_from():
     def hum(channels):
         channels["force"] = channels["force"] + 4.0 * np.sin(0.2 * np.pi * np.arange(3000))
 
-    (found,) = check_recording(measured(1, hum))
+    (found,) = check_recording([measured(1, hum)])
     assert (found.kind, found.channel, found.run) == ("lines", "force", "run_1")
     assert "a line at 50 Hz of 3." in found.text
     assert "the mains of 50 Hz" in found.text

@@ -12,18 +12,24 @@ from ..corrections import Correction
 from ..interpolated import interpolated
 from ..measurement import Measurement
 from ..moving_average import moving_average
-from ..spectral_lines import SpectralLine, spectral_lines
+from ..spectral_lines import SpectralLine, of_one_mains, spectral_lines
 from .finding import Finding
 
 
-def check_recording(run: Measurement) -> Iterator[Finding]:
-    """Yield what the spectra of a run's channels say of how they were recorded.
+def check_recording(runs: Sequence[Measurement]) -> Iterator[Finding]:
+    """Yield what the spectra of the channels of runs say of how they were recorded.
 
     Parameters
     ----------
-    run : with all samples of its file: fewer show neither nulls nor lines where they are
+    runs : with all samples of their files: fewer show neither nulls nor lines where they are
     """
-    lines = spectral_lines(run.channels, run.step)
+    found = [spectral_lines(run.channels, run.step) for run in runs]
+    found = of_one_mains(found, [run.step for run in runs], [len(run.time) for run in runs])
+    for run, lines in zip(runs, found, strict=True):
+        yield from _of_run(run, lines)
+
+
+def _of_run(run: Measurement, lines: Sequence[SpectralLine]) -> Iterator[Finding]:
     for channel in dict.fromkeys(line.channel for line in lines):
         yield _of_lines(run, [line for line in lines if line.channel == channel])
     if run.sampling.resampled:

@@ -161,9 +161,9 @@ def _drive(runs: list[Excitation]) -> Iterator[Finding]:
         yield Finding(
             "drive",
             "warning",
-            "neither voltage nor current was recorded: it is taken as constant at an unknown "
-            "level, and coil_lag, remanence and saturation cannot be tested.",
-            "Record the coil's voltage or current.",
+            "no command was recorded: if there is one, it is taken as constant at an unknown "
+            "level, and no effect of it can be tested.",
+            "Record the command, if there is one.",
         )
         return
     name = driven[0].drive

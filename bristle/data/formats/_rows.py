@@ -22,6 +22,15 @@ _MISSING = frozenset(
 _INFINITE = frozenset(("inf", "-inf", "+inf", "infinity", "-infinity", "1.#inf", "-1.#inf"))
 _POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eEdD][+-]?\d+)?")
+_BLANKS = "'\u2019 \u00a0\u202f\u2009"
+# By whether the decimal mark is a comma: a decimal mark that comes twice parts groups, too.
+_GROUPED = {
+    comma: re.compile(
+        rf"[+-]?[1-9]\d{{0,2}}(?:(?:(?P<mark>[{other}{_BLANKS}])\d{{3}})(?:(?P=mark)\d{{3}})*"
+        rf"(?:{own}\d*)?|(?:{own}\d{{3}}){{2,}})"
+    )
+    for comma, own, other in ((False, r"\.", ","), (True, ",", "."))
+}
 
 
 @dataclass
@@ -52,21 +61,43 @@ class Layout:
 
 @dataclass
 class Body:
-    """What is read: values (n,) per column, words that stand among them, the line of each row."""
+    """What is read: values (n,) per column, words that stand among them, the line of each row.
+
+    `grouped` has the first number with groups of thousands of each column that has some.
+    """
 
     values: list[Array]
     lines: NDArray[np.int64]
     not_numeric: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    grouped: dict[int, str] = field(default_factory=dict)
 
 
 def state_of(text: str, comma: bool) -> str:
     """Return whether a field is a "number", "missing", or a "word"."""
     plain = text.strip().strip('"').strip()
-    if (_COMMA if comma else _POINT).fullmatch(plain):
+    if (_COMMA if comma else _POINT).fullmatch(plain) or is_grouped(plain, comma):
         return "number"
     lower = plain.lower().replace("+", "")
     return "missing" if lower in _MISSING or lower in _INFINITE else "word"
+
+
+def is_grouped(text: str, comma: bool) -> bool:
+    """Return whether a field is a number with groups of thousands that are no decimals."""
+    return _GROUPED[comma].fullmatch(text.strip().strip('"').strip()) is not None
+
+
+def without_groups(text: str, comma: bool) -> str:
+    """Return a number without what parts its thousands, with a decimal point."""
+    found = _GROUPED[comma].fullmatch(text)
+    own = "," if comma else "."
+    mark = (found["mark"] or own) if found else ""
+    return (text.replace(mark, "") if mark else text).replace(own, ".")
+
+
+def plain_number(text: str) -> float:
+    """Return a number with a decimal point; NaN where a text is missing, infinite or a word."""
+    return float(text.lower().replace("d", "e")) if _POINT.fullmatch(text) else float("nan")
 
 
 def is_comment(line: str) -> bool:
@@ -146,6 +177,7 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
     rows: list[list[float]] = []
     places: list[int] = []
     not_numeric: dict[int, str] = {}
+    grouped: dict[int, str] = {}
     notes: list[str] = []
     full = [k for k in _full(lines, first, layout) if not is_comment(lines[k])]
     infinite = 0
@@ -164,6 +196,8 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
         row = []
         for index, text in enumerate(fields):
             value = _value(text, layout.comma)
+            if value is not None and abs(value) >= 1e3 and is_grouped(text, layout.comma):
+                grouped.setdefault(index, text.strip().strip('"').strip())
             if value is None:
                 why = f'line {k + 1}: "{shortened(text.strip())}" is no number'
                 not_numeric.setdefault(index, why)
@@ -174,7 +208,8 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
     if infinite:
         notes.append(f"{infinite} infinite values are taken as missing")
     array = np.array(rows, dtype=float).reshape(len(rows), wide)
-    return Body([array[:, k].copy() for k in range(wide)], np.array(places), not_numeric, notes)
+    values = [array[:, k].copy() for k in range(wide)]
+    return Body(values, np.array(places), not_numeric, notes, grouped)
 
 
 def _value(text: str, comma: bool) -> float | None:
@@ -182,6 +217,8 @@ def _value(text: str, comma: bool) -> float | None:
     plain = text.strip().strip('"').strip()
     if (_COMMA if comma else _POINT).fullmatch(plain):
         return float(plain.replace(",", ".").replace("D", "E").replace("d", "e"))
+    if is_grouped(plain, comma):
+        return plain_number(without_groups(plain, comma))
     lower = plain.lower().replace("+", "")
     if lower in _INFINITE:
         return float("inf")

@@ -18,13 +18,17 @@ from ...physics.record import shortened
 from ...units import parse as parse_unit
 from ..columns import Column
 from ..table import Table
-from ..titles import is_unit_row, titles
+from ..titles import is_unit_row, title_rows, titles
 from ._instants import seconds_of
-from ._rows import Body, Layout, is_comment, read_fast, read_slow, state_of
+from ._rows import Body, Layout, is_comment, is_grouped, read_fast, read_slow, state_of
+from ._thousands import read_groups
 
 ORDER = 2
+HEADER = 4
+"""Rows of titles, units and what loggers add, at the most."""
 
 _TOKEN = re.compile(r'"[^"]*"|\S+(?: ?[\[(][^\])]*[\])])?')  # a title and its unit in brackets
+_GROUP = re.compile(r"\d{3}(?:\.\d*)?")
 _RIGHT = 'Titles with units are, for example, "time [s];force [kN]".'
 
 
@@ -48,10 +52,11 @@ def read(content: bytes, name: str) -> Table:
     text, notes = decoded(content, name)
     lines = lines_of(text)
     layout = _find_layout(lines, name)
-    first = next(k for k, line in enumerate(lines) if _is_data(line, layout))
+    first = _first_row(lines, layout)
     columns = _header(lines[:first], layout, name, first, notes)
     lines = _without_repeated(lines, first, layout, notes)
     body = read_fast(lines, first, layout) or read_slow(lines, first, layout, name)
+    columns = read_groups(columns, body, lines, layout)
     columns, body = _without_empty(columns, body)
     if any("bristle results" in line for line in lines[:1]) and any(
         re.match(r"# status: incomplete", line) for line in lines[:first]
@@ -149,24 +154,40 @@ def _try_layout(rows: list[str], delimiter: str, comma: bool) -> tuple[float, La
     ]
     if not any(layout.numeric):
         return None
-    share = sum(column.count("number") for column in states) / sum(map(len, states))
+    # What needs no groups of thousands is the better reading.
+    grouped = sum(is_grouped(text, comma) for fields in same for text in fields)
+    numbers = sum(column.count("number") for column in states) - 0.02 * grouped
+    share = numbers / sum(map(len, states))
     # Points win where both would do: whole numbers have neither.
     return (often / len(rows)) * share + 0.01 * min(count, 5) - 0.001 * comma, layout
 
 
 def _refuse_comma_for_both(lines: list[str], layout: Layout, name: str) -> None:
-    """Refuse `0,001,2,5`, where a comma parts columns and decimals alike."""
+    """Refuse `0,001,2,5`, where a comma parts columns and decimals alike, or thousands."""
     if layout.delimiter != ",":
         return
+    wide = len(layout.numeric)
     for k, line in enumerate(lines[:400]):
         if _is_data(line, layout) and k:
-            above = [t for t in layout.split(lines[k - 1].strip()) if t.strip()]
-            wide = len(layout.numeric)
+            fields = layout.split(lines[k - 1].strip())
+            above = [t for t in fields if t.strip()]
+            if len(fields) == wide:
+                return
             if wide == 2 * len(above) and not any(state_of(t, False) == "number" for t in above):
                 raise RecordError(
                     f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles. Commas part "
                     "columns and decimals alike here: save the file with semicolons between "
                     "columns, or with decimal points."
+                )
+            if wide != len(above) + 1:
+                return
+            rows = [layout.split(_without_ends(one)) for one in lines[k:] if _is_data(one, layout)]
+            last = {row[-1] for row in rows}
+            if len(last) > 1 and all(map(_GROUP.fullmatch, last)):
+                raise RecordError(
+                    f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles, the last one "
+                    "always of three digits. Commas part columns and thousands alike here: save "
+                    "the file with semicolons between columns, or without groups of thousands."
                 )
             return
 
@@ -186,11 +207,10 @@ def _header(
     last = rows[-1] if rows else None
     if last and last not in fitting and len(layout.split(last[1][0])) == 1 and not fitting:
         last = None
-    units = None
-    if fitting and fitting[-1] == last and len(fitting) > 1 and is_unit_row(fitting[-1][1]):
-        units = fitting.pop()[1]
     if fitting:
-        k, names = fitting[-1]
+        block = _last_block(fitting, above) if fitting[-1] == last else fitting[-1:]
+        at, of_units = title_rows([fields for _, fields in block])
+        k, names = block[at]
         if sum(state_of(one, layout.comma) == "number" for one in names) > wide / 2:
             raise RecordError(
                 f'{name}, line {k + 1}: "{shortened(above[k].strip())}" is neither titles nor a '
@@ -198,7 +218,15 @@ def _header(
             )
         if k:
             notes.append(f"titles in line {k + 1}, numbers from line {first + 1} on")
-        return titles(names, units)
+        notes += [
+            f'line {line + 1}, "{shortened(above[line].strip())}", is taken as a description: '
+            f"titles are in line {k + 1}"
+            + (f", units in line {block[of_units][0] + 1}" if of_units is not None else "")
+            for row, (line, _) in enumerate(block)
+            if row not in (at, of_units) and row > min(at, at if of_units is None else of_units)
+        ]
+        rest = [fields for row, (_, fields) in enumerate(block) if row != at]
+        return titles(names, None if of_units is None else block[of_units][1], rest)
     in_comment = [
         fields
         for line in above[-1:]
@@ -210,6 +238,49 @@ def _header(
         return titles(in_comment[0])
     notes.append("no titles: columns are called column 1, column 2, ... and have no units")
     return titles([""] * wide)
+
+
+def _last_block(rows: list[tuple[int, list[str]]], above: list[str]) -> list[tuple[int, list[str]]]:
+    """Return the last rows with nothing but empty lines between them, four at the most."""
+    block = rows[-1:]
+    for row in reversed(rows[:-1]):
+        if any(above[k].strip() for k in range(row[0] + 1, block[0][0])) or len(block) == HEADER:
+            break
+        block.insert(0, row)
+    return block
+
+
+def _first_row(lines: list[str], layout: Layout) -> int:
+    """Return the index of the first line of data.
+
+    Numbers that count the columns, 1 to n or 0 to n - 1, are those of channels, and belong to the
+    titles, unless the next rows go on as evenly; so does what stands above a row of units.
+    """
+    for k, line in enumerate(lines):
+        if not _is_data(line, layout):
+            continue
+        full = (one for one in islice(lines, k + 1, None) if one.strip())
+        rows = [layout.split(_without_ends(one)) for one in (line, *islice(full, 2))]
+        if is_unit_row(rows[1] if len(rows) > 1 and len(rows[1]) == len(rows[0]) else []):
+            continue
+        if not _counts_columns(rows[0]) or _goes_on(rows, layout):
+            return k
+    return next(k for k, line in enumerate(lines) if _is_data(line, layout))
+
+
+def _counts_columns(fields: list[str]) -> bool:
+    there = [(k, text.strip().strip('"')) for k, text in enumerate(fields) if text.strip()]
+    return len(there) > 2 and any(
+        all(text == str(k + begin) for k, text in there) for begin in (0, 1)
+    )
+
+
+def _goes_on(rows: list[list[str]], layout: Layout) -> bool:
+    """Return whether the first of three rows is as far from the second as that from the third."""
+    if len(rows) < 3 or not all(state_of(row[0], layout.comma) == "number" for row in rows):
+        return False
+    first, second, third = (float(row[0].strip(' "').replace(",", ".")) for row in rows)
+    return abs((second - first) - (third - second)) <= 0.01 * abs(third - second)
 
 
 def _without_repeated(lines: list[str], first: int, layout: Layout, notes: list[str]) -> list[str]:
@@ -279,6 +350,6 @@ def _instants(
             continue
         body.values[index] = seconds
         del body.not_numeric[index]
-        out[index] = replace(columns[index], unit=parse_unit("s"))
+        out[index] = replace(columns[index], unit=parse_unit("s"), problem="", written="")
         body.notes.append(f'"{columns[index].text}" holds instants: taken as s since the first')
     return tuple(out)

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 from ...errors import RecordError
 from ...units import parse as parse_unit
 from ..table import Table
-from ..titles import is_unit_row
+from ..titles import title_rows
 from . import delimited
 from ._extra import library
 
@@ -84,7 +84,7 @@ def read(content: bytes, name: str) -> Table:
     sheet, table = _chosen(read, name)
     _refuse_without_values(sheet.part, sheet.where)
     lines = ["", *delimited.lines_of(sheet.text)]
-    _refuse_merged(sheet.part, table, lines[int(table.lines[0]) - 1], sheet.where)
+    _refuse_merged(sheet.part, table, lines[1 : int(table.lines[0])], sheet.where)
     table = _in_percent(table, _percent_columns(sheet.part, int(table.lines[0]), shares))
     return _with_notes(table, sheet.part, notes, [one.title for one in read], sheet.title)
 
@@ -264,17 +264,20 @@ def _refuse_without_values(part: bytes, where: str) -> None:
         )
 
 
-def _refuse_merged(part: bytes, table: Table, above: str, where: str) -> None:
+def _refuse_merged(part: bytes, table: Table, above: Sequence[str], where: str) -> None:
     """Refuse merged cells in the table, its titles or their units; elsewhere they do no harm.
 
     Parameters
     ----------
     part : the sheet's XML
     table : as read from the sheet's text
-    above : the row above the first one of numbers
+    above : the rows above the first one of numbers
     where : the file and the sheet, for messages
     """
-    first = int(table.lines[0]) - 1 - is_unit_row(above.split("\t"))
+    rows = [line.split("\t") for line in above[-delimited.HEADER :]]
+    titles, of_units = title_rows(rows) if rows else (0, None)
+    highest = titles if of_units is None else min(titles, of_units)
+    first = int(table.lines[0]) - len(rows) + highest
     for match in _MERGED.finditer(part):
         left, top, right, bottom = (one.decode() for one in match.groups())
         if int(bottom) >= first and (left != right or int(bottom) > int(top)):

@@ -18,6 +18,7 @@ from ..channels import ChannelSpec, device_channel, meaning, quantity_of_unit
 from ..columns import Column
 from ..extra import unit_as_written
 from ..labels import TEMPERATURE
+from ..raw_signals import raw_signals
 from ..table import Table
 from .bench import bench_guesses
 from .candidates import Search, candidate_of, joined
@@ -75,7 +76,7 @@ def guess_channels(
     search = Search(table, step)
     taken = time.column if time else ""
     own = device_guesses(table, devices or [])
-    theirs = {guess.column for guess in own}
+    theirs = {*(guess.column for guess in own), *raw_signals(table)}
     candidates = [
         one
         for column in table.columns
@@ -91,7 +92,9 @@ def guess_channels(
         for channel, one in found.items()
     ] + own
     known = {taken, *(guess.column for guess in guesses)}
-    return ([time] if time else []) + guesses + _find_temperature(table, known)
+    every = ([time] if time else []) + guesses + _find_temperature(table, known)
+    doubts = {column.text: column.doubt for column in table.columns}
+    return [replace(one, doubt=joined(one.doubt, doubts[one.column])) for one in every]
 
 
 def _find_temperature(table: Table, known: set[str]) -> list[Guess]:

@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Meaning, channel_unit, is_channel, meaning, quantity_of_unit
+from ..channels import (
+    DRIVE,
+    Meaning,
+    channel_unit,
+    is_channel,
+    meaning,
+    of_a_sensor,
+    quantity_of_unit,
+)
 from ..columns import Column
 from ..relation import differentiated
 from ..table import Array, Table
@@ -64,6 +72,8 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
     by_unit = quantity_of_unit(unit) if unit else None
     if meant is None:
         if by_unit in (None, "time", "duty"):  # a share in per cent can be one of anything
+            return None
+        if by_unit in DRIVE and of_a_sensor(column.name):  # a signal that is not yet calibrated
             return None
         return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")
     return _by_name(column, meant, unit, by_unit)

@@ -1,0 +1,155 @@
+"""Levels in file names: how decimals are written is settled by all names and the motion."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bristle.cli import main
+
+RATE = 100.0
+
+
+def made(folder: Path, names: dict[str, tuple[float, float]], amplitude: float = 0.01) -> str:
+    """Return a folder of sines on a damper: name to frequency [Hz] and current [A]."""
+    folder.mkdir()
+    for k, (name, (frequency, level)) in enumerate(names.items()):
+        rng = np.random.default_rng(k)
+        t = np.arange(round(max(6.0, 4.0 / frequency) * RATE)) / RATE
+        w = 2.0 * np.pi * frequency
+        x, v = amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
+        force = (
+            (50.0 + 800.0 * level) * np.tanh(v / 4e-3) + 900.0 * v + rng.normal(0.0, 2.0, t.size)
+        )
+        rows = (f"{a:.3f},{1e3 * b:.4f},{c:.3f}" for a, b, c in zip(t, x, force, strict=True))
+        (folder / f"{name}.csv").write_text("time [s],x [mm],F [N]\n" + "\n".join(rows) + "\n")
+    return str(folder / "*.csv")
+
+
+def runs(study: Path) -> dict[str, tuple[float | None, float | None]]:
+    """Return frequency and current of each run by its file's name."""
+    read = tomllib.loads((study / "study.toml").read_text())["runs"]
+    return {
+        Path(run["file"]).stem: (run.get("frequency"), run.get("current", run.get("voltage")))
+        for run in read
+    }
+
+
+def told(name: str, mark: str) -> str:
+    return name.replace(".", mark)
+
+
+CAMPAIGN = {
+    f"{f}Hz_{i}A": (float(f), float(i))
+    for f, i in (("0.5", "0.0"), ("0.5", "0.5"), ("1.5", "0.5"), ("1.5", "1.5"), ("2.5", "1.0"))
+}
+
+
+@pytest.mark.parametrize("mark", ["_", "-", "x", "X", "d", "p", "P", "pt", ",", ".", "point", " "])
+def test_a_decimal_mark_is_settled_by_the_measured_frequency(tmp_path, mark) -> None:
+    names = {f"run_{told(name, mark)}": value for name, value in CAMPAIGN.items()}
+    data = made(tmp_path / "lab", names)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert runs(tmp_path / "rig") == names
+
+
+@pytest.mark.parametrize("mark", ["x", "_"])
+def test_numbers_without_a_space_and_a_mark_in_some_names_only(tmp_path, mark, capsys) -> None:
+    names = {
+        told(f"10mm{f:g}Hz{i:g}A", mark): (f, i) for f in (0.25, 0.5, 1.0) for i in (0.0, 0.25, 1.0)
+    }
+    data = made(tmp_path / "lab", names)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert f'"{mark}" in the names is a decimal mark' in capsys.readouterr().out
+    assert runs(tmp_path / "rig") == names
+    assert main(["study", "check", str(tmp_path / "rig")]) == 0
+    said = capsys.readouterr().out
+    assert "load cell" not in said
+    assert "by its label" not in said
+
+
+def test_numbers_without_a_mark_have_the_decimals_that_the_motion_tells(tmp_path, capsys) -> None:
+    names = {"050Hz_000V": (0.5, 0.0), "150Hz_050V": (1.5, 0.5), "250Hz_150V": (2.5, 1.5)}
+    data = made(tmp_path / "lab", names)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert "have 2 decimals, by the measured motion" in capsys.readouterr().out
+    assert runs(tmp_path / "rig") == names
+
+
+def test_a_unit_may_stand_for_the_decimal_mark(tmp_path) -> None:
+    names = {"s_0Hz5_0A5": (0.5, 0.5), "s_1Hz5_1A0": (1.5, 1.0), "s_2Hz5_1A5": (2.5, 1.5)}
+    data = made(tmp_path / "lab", names)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert runs(tmp_path / "rig") == names
+
+
+@pytest.mark.parametrize(
+    ("names", "values"),
+    [
+        (("run_1_5A", "run_2_10A", "run_3_15A"), (5.0, 10.0, 15.0)),
+        (("run_0_0A", "run_1_5A", "run_2_10A"), (0.0, 5.0, 10.0)),
+        (("MR2_5A", "MR2_10A", "MR2_0A"), (5.0, 10.0, 0.0)),
+        (("run_05_1A", "run_06_2A", "run_07_0A"), (1.0, 2.0, 0.0)),
+        (("2A1", "2A2", "1A1"), (2.0, 2.0, 1.0)),
+        (("500mA", "1000mA", "0mA"), (0.5, 1.0, 0.0)),
+        (("I0_5A", "I1A", "I0_25A"), (0.5, 1.0, 0.25)),
+        (("0.8712V_ensaio1_2_2", "0.0000V_ensaio10_1", "3.2120V_A_10"), (0.8712, 0.0, 3.212)),
+    ],
+)  # fmt: skip
+def test_names_alone_settle_what_counts_and_what_is_a_level(tmp_path, names, values) -> None:
+    data = made(tmp_path / "lab", {n: (1.0 + 0.1 * k, v) for k, (n, v) in
+                                   enumerate(zip(names, values, strict=True))})  # fmt: skip
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    read = runs(tmp_path / "rig")
+    assert [read[name][1] for name in names] == pytest.approx(values)
+
+
+def test_two_names_of_one_level_that_may_be_two_are_not_taken(tmp_path, capsys) -> None:
+    data = made(tmp_path / "lab", {"run_0_5A": (1.0, 0.5), "run_1_5A": (2.0, 1.5)})
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "nothing settles" in line]
+    assert len(said) == 1
+    assert "5 A or 0.5 A" in said[0]
+    assert "--runs FILE" in said[0]
+    assert {level for _, level in runs(tmp_path / "rig").values()} == {None}
+
+
+def test_a_pattern_takes_a_number_whole_where_it_fits_no_other_way(tmp_path) -> None:
+    data = made(tmp_path / "lab", {"run_0_5A": (1.0, 0.5), "run_1_5A": (2.0, 1.5)})
+    study = str(tmp_path / "rig")
+    assert main(["study", "new", study, "--data", data, "--level", "run_{}A"]) == 0
+    assert [level for _, level in runs(tmp_path / "rig").values()] == [0.5, 1.5]
+
+
+def test_a_label_that_the_motion_contradicts_is_said_and_blames_no_sensor(tmp_path, capsys):
+    names = {f"f{f}Hz_I{i}A": (0.3 * f, 0.2 * i) for f in (3, 6) for i in (0, 2, 5)}
+    data = made(tmp_path / "lab", names)
+    study = str(tmp_path / "rig")
+    assert main(["study", "new", study, "--data", data]) == 0
+    said = capsys.readouterr().out
+    assert "frequency is 3 Hz by its label, and the motion has 0.9" in said
+    assert "in 5 more of 6 runs" in said
+    assert main(["study", "check", study]) == 0
+    said = capsys.readouterr().out
+    assert "by its label, and the motion has" in said
+    assert "load cell" not in said
+
+
+def test_two_names_that_say_the_same_of_different_motions(tmp_path, capsys) -> None:
+    names = {"a_1Hz_0.5A": (1.0, 0.5), "b_1Hz_0.5A": (2.0, 0.5), "c_1Hz_1A": (1.0, 1.0)}
+    data = made(tmp_path / "lab", names)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "by its label" in line]
+    assert len(said) == 1
+    assert said[0].startswith(
+        "b_1Hz_0.5A.csv: frequency is 1 Hz by its label, and the motion has 2"
+    )
+
+
+def test_a_stroke_in_the_name_and_a_rig_that_reaches_less_are_no_contradiction(tmp_path, capsys):
+    data = made(tmp_path / "lab", {"20mm_1Hz_1A": (1.0, 1.0), "20mm_2Hz_2A": (1.9, 2.0)}, 0.009)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert "by its label" not in capsys.readouterr().out
