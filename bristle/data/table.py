@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
+from ..findings import listed
 from .columns import Column
 from .titles import titles
 
@@ -55,7 +56,7 @@ class Table:
         named = [column for column in self.columns if column.name == called]
         if len(named) == 1:
             return named[0]
-        there = ", ".join(f'"{column.text}"' for column in self.columns)
+        there = listed(f'"{column.text}"' for column in self.columns)
         what = "several columns are" if named else "no column is"
         raise RecordError(f'{self.source}: {what} called "{called}"; there are {there}.')
 

@@ -14,6 +14,7 @@ from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import StudyError
+from ..findings import listed
 from ..progress import counted
 from .added_runs import FILE as ADDED
 from .added_runs import note_addition
@@ -100,7 +101,7 @@ def _refuse_names(study: Study, paths: Sequence[Path]) -> None:
     there = [path.name for path in paths if path.name.lower() in taken]
     if there:
         raise StudyError(
-            f"{study.folder / 'data'}: {', '.join(there)} {'is' if len(there) == 1 else 'are'} "
+            f"{study.folder / 'data'}: {listed(there)} {'is' if len(there) == 1 else 'are'} "
             "there already. Rename the new runs, if these are others."
         )
 
@@ -123,7 +124,7 @@ def _roles(
     """Return the role of each file's runs, and why, in sentences."""
     for pattern in holdout:
         if not any(fnmatchcase(path.name, pattern) for path in paths):
-            names = ", ".join(path.name for path in paths)
+            names = listed(path.name for path in paths)
             raise StudyError(f'--holdout "{pattern}": none of the new files is it: {names}.')
     known = dict(roles)
     if holdout:

@@ -22,7 +22,7 @@ from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
-from ..findings import command
+from ..findings import command, listed
 from ..physics.building import Building, read_building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
@@ -294,7 +294,7 @@ def _refuse_incomplete(
             f"{text} ({table.not_numeric[text]})" if text in table.not_numeric else text
             for text in left_out(table, guesses)
         ]
-        rest = f"\n  Not used: {', '.join(unused)}." if unused else ""
+        rest = f"\n  Not used: {listed(unused)}." if unused else ""
         raise StudyError(
             f"{table.source}: some channels cannot be guessed."
             + "".join(f"\n  {line}" for line in wrong)
@@ -322,7 +322,7 @@ def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -
         if guess.column not in there:
             raise StudyError(
                 f'{table.source}: there is no column "{guess.column}" ({guess.channel}), as in '
-                f"{first.source}; there are {', '.join(there)}. All runs of a study have the same "
+                f"{first.source}; there are {listed(there)}. All runs of a study have the same "
                 "columns."
             )
         stated, unit = there[guess.column].unit, guess.unit

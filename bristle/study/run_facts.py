@@ -14,6 +14,7 @@ from ..data.formats.delimited import decoded
 from ..data.labels import UNITS, Label, label_text
 from ..data.titles import title, unit_or_none
 from ..errors import RecordError, StudyError, UnitError
+from ..findings import listed
 from ..units import convert, same_dimension
 from .run_file import EXCLUDE, ROLES
 from .run_titles import counted_names
@@ -265,9 +266,7 @@ def rows_of_table(path: Path, files: Sequence[Path], commanded: bool = False) ->
     header, *rows = csv.reader(lines, delimiter=delimiter)
     at = [k for k, name in enumerate(header) if name.strip().lower() in _FILE]
     if not at:
-        raise StudyError(
-            f'--runs {path}: no column is called "file"; there are {", ".join(header)}.'
-        )
+        raise StudyError(f'--runs {path}: no column is called "file"; there are {listed(header)}.')
     named = [name.strip() for name in header if name.strip()]
     twice = next((name for name in named if named.count(name) > 1), "")
     if twice:

@@ -14,7 +14,7 @@ from itertools import islice
 import numpy as np
 
 from ...errors import RecordError
-from ...physics.record import shortened
+from ...physics.record import shortened, without_end_mark
 from ...units import parse as parse_unit
 from ..columns import Column
 from ..table import Table
@@ -76,6 +76,7 @@ def decoded(content: bytes, name: str) -> tuple[str, list[str]]:
             return content.decode("utf-16"), []
         except UnicodeDecodeError as error:
             raise RecordError(f"{name}: this is no whole UTF-16 text ({error.reason}).") from None
+    content = without_end_mark(content)
     if b"\0" in content[:65536]:
         raise RecordError(
             f"{name}: this is binary data of a kind that is not read. "
