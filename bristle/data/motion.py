@@ -151,8 +151,8 @@ def _what_there_is() -> str:
     needs = "; ".join(dict.fromkeys(row.needs for row in rows if row.needs))
     more = f"; some need: {needs}" if needs else ""
     return (
-        f"There are {listed(row.name for row in rows)} (all: bristle list records{more}), or the path of a PEER AT2 file, or "
-        f'of a CSV with units in its header, as in "{HEADER}".'
+        f"There are {listed(row.name for row in rows)} (all: bristle list records{more}), or the "
+        f'path of a PEER AT2 file, or of a CSV with units in its header, as in "{HEADER}".'
     )
 
 

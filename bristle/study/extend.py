@@ -18,7 +18,7 @@ from ..findings import listed
 from ..progress import counted
 from .added_runs import FILE as ADDED
 from .added_runs import note_addition
-from .new import refuse_other_columns
+from .new import refuse_other_columns, remarks_on
 from .reading import read_runs
 from .roles import roles_added
 from .run_facts import RunChoices, facts_of
@@ -76,11 +76,12 @@ def extend_study(
     tables = [read_table(path) for path in counted(paths, "reading file")]
     _refuse_other_columns(study, tables)
     about, notes = facts_of(paths, choices, bool({*DRIVE} & {*study.settings.channels}))
-    listed, said = _roles(paths, roles or {}, holdout)
+    notes += remarks_on([path.name for path in paths], tables)
+    assigned, said = _roles(paths, roles or {}, holdout)
     split = study.settings.split
     runs = tuple(
         RunFile(f"data/{path.name}", one.role or role, one.levels, one.labels, number)
-        for path, table, one, role in zip(paths, tables, about, listed, strict=True)
+        for path, table, one, role in zip(paths, tables, about, assigned, strict=True)
         for number in _numbers(table, split, study)
     )
     if not any(one.role for one in about):

@@ -357,7 +357,7 @@ def lvm(time: str, segments: int = 1, comma: bool = False) -> str:
     for part in range(segments):
         lines += [
             "Channels\t3\t\t", f"Samples\t{size}\t{size}\t{size}", "Y_Unit_Label\tmm\tkN\tA",
-            "X_Dimension\tTime\tTime\tTime", f"X0\t{T[part * size]}\t0\t0",
+            "X_Dimension\tTime\tTime\tTime", "\t".join(["X0", *3 * [str(T[part * size])]]),
             "Delta_X\t0.005\t0.005\t0.005", "***End_of_Header***\t\t\t",
             "X_Value\tDisplacement\tLoad\tCurrent\tComment",
         ]  # fmt: skip
