@@ -259,6 +259,6 @@ def write_settings(path: Path, settings: Settings) -> None:
                 table.add(tomlkit.comment(line))
             table.update(channel_as_toml(spec))
             channels.add(name, table)
-        if listed:
+        if specs:
             document.add(key, channels)
     write_whole(path, tomlkit.dumps(document))

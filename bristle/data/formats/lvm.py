@@ -65,15 +65,14 @@ def read(content: bytes, name: str) -> Table:
             row += bool(line.strip())
     if titles is None:
         raise RecordError(f"{name}: the header of this LabVIEW file does not end with titles.")
-    one_time = all(len(line.clocks) == 1 for line in found if line)
-    out = ["" if line is None else _row(line, one_time, comma) for line in found]
     named, at = titles
-    times = [f"time {k} [s]" for k in range(len(named))]
-    out[at] = "\t".join(["time [s]", *named] if one_time else _alternate(times, named))
+    if any(len(line.clocks) > 1 for line in found if line):
+        return _on_one_time(found, named, comma, name, tuple(notes))
+    rows = [None if line is None else _cells(line, 1, comma) for line in found]
+    out = ["" if row is None else "\t".join([*row[0], *row[1]]) for row in rows]
+    out[at] = "\t".join(["time [s]", *named])
     table = delimited.read("\n".join(out).encode(), name)
-    table = replace(table, notes=(*notes, *table.notes))
-    steps = [clock.step for clock in clocks] * (len(named) if len(clocks) == 1 else 1)
-    return table if one_time else _on_one_time(table, len(named), steps, name)
+    return replace(table, notes=(*notes, *table.notes))
 
 
 class _Clock(NamedTuple):
@@ -136,42 +135,62 @@ def _instants(about: dict[str, list[str]], count: int) -> list[float]:
     return [0.0] * count if found is None else found.tolist()
 
 
-def _on_one_time(table: Table, count: int, steps: list[float], name: str) -> Table:
+def _on_one_time(
+    found: list[_Line | None], named: list[str], comma: bool, name: str, notes: tuple[str, ...]
+) -> Table:
     """Return the table of channels that have a time each, on one.
 
     Parameters
     ----------
-    table : with the time of each channel before it
-    count : of channels
-    steps : of the header, by channel [s]
-    name : the file, for messages
+    found : the lines of the file, None where it is no row
+    named : titles of the channels
+    comma : whether decimals have commas
+    name, notes : the file, for messages, and what is to be known of it
     """
+    rows = [_numbers_of(line, len(named), comma, at, name) for at, line in enumerate(found) if line]
+    times, values = (np.array([row[k] for row in rows]) for k in (0, 1))
+    times -= np.nanmin(times)
+    stated = sorted({clock.step for line in found if line for clock in line.clocks})
     series: dict[bytes, Series] = {}
-    stated = sorted(set(steps))
-    columns = table.columns[1::2][:count]
-    for clock, column, own in zip(table.columns[::2], columns, steps, strict=False):
-        time, values = table.values[clock.text], table.values[column.text]
-        there = np.isfinite(time) & np.isfinite(values)
-        if int(there.sum()) < 2 or not (np.diff(time[there]) > 0.0).all():
+    for k, title in enumerate(named):
+        there = np.flatnonzero(np.isfinite(values[:, k]))
+        part = slice(there[0], there[-1] + 1) if there.size else slice(0)
+        time = times[part, k]
+        if len(time) < 2 or not (np.diff(time) > 0.0).all():
             raise RecordError(
-                f'{name}: the times of "{column.text}" do not increase from sample to sample, and '
-                "its channels have different times. Save channels of one time in one file."
+                f'{name}: the times of "{title}" do not increase from sample to sample, and its '
+                "channels have different times. Save channels of one time in one file."
             )
-        apart = float(np.median(np.diff(time[there])))
+        apart = float(np.median(np.diff(time)))
+        own = rows[part.start][2][k]
         if len(stated) > 1 and abs(apart - own) > 0.01 * own:
             raise RecordError(
                 f"{name}: its channels differ in Delta_X ({', '.join(map(str, stated))}), and the "
-                f'times of "{column.text}" are {apart:g} s apart. Save the file anew with times '
-                "that agree."
+                f'times of "{title}" are {apart:g} s apart. Save the file anew with times that '
+                "agree."
             )
-        one = series.setdefault(time[there].tobytes(), Series(time[there], {}))
-        one.data[column.text] = values[there]
-    joined = on_one_time(list(series.values()), name) if len(series) > 1 else None
-    (first, *_) = series.values()
-    time, data = (first.time, first.data) if joined is None else (joined.time, joined.data)
-    data = {column.text: data[column.text] for column in columns}
-    remarks = joined.remarks if joined else ()
-    return from_arrays({"time [s]": time, **data}, name, None, table.notes, remarks)
+        series.setdefault(time.tobytes(), Series(time, {})).data[title] = values[part, k]
+    joined = on_one_time(list(series.values()), name)
+    data = {"time [s]": joined.time, **{title: joined.data[title] for title in named}}
+    return from_arrays(data, name, None, notes, joined.remarks)
+
+
+def _numbers_of(
+    line: _Line, count: int, comma: bool, at: int, name: str
+) -> tuple[list[float], list[float], list[float]]:
+    """Return the times, values and stated steps in a row, by channel; NaN where one is missing."""
+    if len(line.kept) - 1 != count:
+        raise RecordError(
+            f"{name}, line {at + 1}: a segment of {len(line.kept) - 1} channels, and the first one "
+            f"has {count}. Save each segment as a file."
+        )
+    steps = [clock.step for clock in line.clocks]
+    try:
+        times, values = _cells(line, count, comma)
+        numbers = [[float(one) if one else np.nan for one in texts] for texts in (times, values)]
+    except ValueError as error:
+        raise RecordError(f"{name}, line {at + 1}: {error}; numbers are right.") from None
+    return numbers[0], numbers[1], steps * (count if len(steps) == 1 else 1)
 
 
 def _titled(fields: list[str], kept: list[int], about: dict[str, list[str]]) -> list[str]:
@@ -181,23 +200,21 @@ def _titled(fields: list[str], kept: list[int], about: dict[str, list[str]]) -> 
     return [f"{n} [{unit}]" if unit else n for n, unit in zip(names, units, strict=True)]
 
 
-def _row(line: _Line, one_time: bool, comma: bool) -> str:
-    """Return a row of what is kept, with the times that count where none is written."""
+def _cells(line: _Line, count: int, comma: bool) -> tuple[list[str], list[str]]:
+    """Return the texts of `count` times and of all channels in a row.
+
+    Where no time is written, that of the header counts.
+    """
     texts = [one.strip().replace(",", ".") if comma else one.strip() for one in line.fields]
     values = [texts[k] if k < len(texts) else "" for k in line.kept[1:]]
-    clocks = line.clocks if one_time or len(line.clocks) > 1 else line.clocks * len(values)
     times = []
-    for clock in clocks:
+    for clock in line.clocks if len(line.clocks) > 1 else line.clocks * count:
         written = texts[clock.column] if 0 <= clock.column < len(texts) else ""
         if not written:
             times.append(repr(clock.start + line.row * clock.step))
         else:
             times.append(repr(float(written) + clock.late) if clock.late else written)
-    return "\t".join([*times, *values] if one_time else _alternate(times, values))
-
-
-def _alternate(times: list[str], values: list[str]) -> list[str]:
-    return [text for pair in zip(times, values, strict=True) for text in pair]
+    return times, values
 
 
 def _of_channels(about: dict[str, list[str]], key: str, count: int) -> list[str]:

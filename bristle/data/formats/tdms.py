@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 from collections import Counter
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,7 +65,7 @@ def read(content: bytes, name: str) -> Table:
     if not groups:
         raise RecordError(f"{name}: the TDMS file holds no samples.")
     chosen = max(groups, key=lambda key: _size(groups[key]))
-    zero = min((one.start for one in _every(groups) if one.start is not None), default=None)
+    zero = min(_instants(groups), default=None)
     clocks = {key: _series(channels, zero) for key, channels in groups.items()}
     beside, remarks = _beside(groups, clocks, chosen)
     remarks += _assumed({k: one for key in (chosen, *beside) for k, one in groups[key].items()})
@@ -122,8 +123,13 @@ def _seconds(given: Any, key: str) -> float:
     return value * unit.factor
 
 
-def _every(groups: dict[str, Channels]) -> list[_Channel]:
-    return [one for channels in groups.values() for one in channels.values()]
+def _instants(groups: dict[str, Channels]) -> Iterator[np.datetime64]:
+    """Yield the instants at which the channels begin, as far as they are told."""
+    for one in (one for channels in groups.values() for one in channels.values()):
+        if one.array.dtype.kind == "M":
+            yield one.array[0]
+        elif one.start is not None:
+            yield one.start
 
 
 def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
@@ -243,14 +249,15 @@ def _table(
         return from_arrays(data, name, units, tuple(notes), tuple(remarks))
     made = any(clocks[group].made for group in read)
     times = {key for group in read for key in clocks[group].times}
-    if len(series) > 1:
-        series = [one for one in series if set(one.data) - times] or series[:1]
+    series = [one for one in series if set(one.data) - times] or series[:1]
     if len(series) == 1:
         size, step = len(series[0].time), series[0].step
         time, found = np.arange(size) * step, series[0].data
+        made = made and not set(found) & times
     else:
-        joined = on_one_time(series, name)
-        time, found = joined.time, {k: v for k, v in joined.data.items() if k not in times}
+        bare = [({k: v for k, v in one.data.items() if k not in times}, one) for one in series]
+        joined = on_one_time([Series(one.time, data) for data, one in bare], name)
+        time, found = joined.time, joined.data
         made, remarks = True, [*joined.remarks, *remarks]
     data = {key: found[key] for key in every if key in found}
     if made:
