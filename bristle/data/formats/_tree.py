@@ -29,6 +29,7 @@ AnyArray: TypeAlias = NDArray[Any]
 
 _STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step")
 _RATES = ("fs", "rate", "samplerate", "sample_rate", "sampling_rate", "fsample", "f_s")
+_STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
 _TIMES = ("t", "time", "tout", "zeit")
 _NAMES = ("name", "label", "signalname", "channelname")
 _VALUES = ("data", "values", "value", "samples", "signal", "y")
@@ -105,31 +106,47 @@ def table_of(tree: Mapping[str, Node], name: str) -> Table:
         If there is no vector of numbers, or channels do not overlap in time.
     """
     found = _Found()
-    for key, runs in _runs(tree):
-        if len(tree) > len(runs):
-            _scope(found, "", {k: one for k, one in tree.items() if k not in runs and k != key})
-        return _run_by_run(found, key, runs, name)
-    _scope(found, "", tree)
-    return _one_table(found, name)
+    runs = next(_runs(tree), None)
+    if runs is None:
+        _scope(found, "", tree)
+        return _one_table(found, name)
+    _scope(found, "", {key: one for key, one in tree.items() if key not in runs.within})
+    return _run_by_run(found, runs, tree, name)
 
 
-def _runs(tree: Mapping[str, Node]) -> Iterator[tuple[str, dict[str, Node]]]:
-    """Yield runs, by name, that a file holds beside each other, with what they are called.
+@dataclass(frozen=True)
+class _Runs:
+    """Runs by name; `called` is that of their array, `within` the variables that hold them."""
 
-    An array of structures with several channels each, or structures whose names differ by a number.
+    called: str
+    nodes: dict[str, Node]
+    within: frozenset[str]
+
+
+def _runs(tree: Mapping[str, Node]) -> Iterator[_Runs]:
+    """Yield runs that a file holds beside each other.
+
+    They are an array of structures with several channels each, or structures whose names differ by
+    a number.
     """
     for key, node in tree.items():
         if isinstance(node, list) and len(node) > 1 and _is_runs(node):
-            yield key, {f"{key}({number})": one for number, one in enumerate(node, 1)}
-        elif isinstance(node, dict) and len(tree) == 1 and not _is_signal(node):
-            yield from _runs(node)
+            nodes = {f"{key}({number})": one for number, one in enumerate(node, 1)}
+            yield _Runs(key, nodes, frozenset({key}))
+        elif isinstance(node, dict) and not (_is_signal(node) or _is_recorder(node)):
+            yield from (_Runs(one.called, one.nodes, frozenset({key})) for one in _runs(node))
     stems: dict[str, dict[str, Node]] = {}
     for key, node in tree.items():
         if isinstance(node, dict) and re.search(r"\d", key):
             stems.setdefault(re.sub(r"\d+", "", key), {})[key] = node
     for stem, nodes in stems.items():
         if len(nodes) > 1 and _is_runs(list(nodes.values())):
-            yield stem, nodes
+            yield _Runs(stem, nodes, frozenset(nodes))
+
+
+def _is_recorder(node: Mapping[str, Any]) -> bool:
+    """Return whether a structure holds signals as Simulink or dSPACE write them."""
+    return isinstance(_get(node, ("signals",)), dict | list) or _named_all(node)
 
 
 def _is_runs(nodes: list[Node]) -> bool:
@@ -152,26 +169,30 @@ def _is_signal(node: Node) -> bool:
     """Return whether a structure is one signal: its name and values, or its time and values."""
     if not isinstance(node, dict):
         return False
+    signals = _get(node, ("signals",))
+    if signals is not None or _named_all(node):
+        return isinstance(signals, dict)
     known = {key.lower() for key in node}
-    if "signals" in known:
-        return isinstance(_get(node, ("signals",)), dict)
-    if {"x", "y"} <= known and _named_all(node):
-        return False
     if known & {*_NAMES} and known & {*_VALUES}:
         return True
     vectors = [key for key, one in node.items() if _vector(one) is not None]
     return len(vectors) == 2 and sum(_is_time_name(key) for key in vectors) == 1
 
 
-def _run_by_run(found: _Found, key: str, runs: Mapping[str, Node], name: str) -> Table:
-    """Return the table of several runs, one below the other, with a column of their numbers."""
+def _run_by_run(beside: _Found, runs: _Runs, tree: Mapping[str, Node], name: str) -> Table:
+    """Return the table of several runs, one below the other, with a column of their numbers.
+
+    Parameters
+    ----------
+    beside : what the file holds beside the runs, of which the step counts for all
+    runs, tree : the runs, and all that the file holds
+    name : the file, for messages
+    """
+    texts = {key: one for key, one in tree.items() if _texts(one)}
     tables = []
-    for called, node in runs.items():
-        inside = _Found(loose={}, scalars=dict(found.scalars))
-        if isinstance(node, dict):
-            _scope(inside, "", node)
-        else:
-            _scope(inside, "", {key or called: node})
+    for called, node in runs.nodes.items():
+        inside = _Found(scalars=dict(beside.scalars))
+        _scope(inside, "", node if isinstance(node, dict) else {**texts, runs.called: node})
         tables.append(_one_table(inside, f"{name}, {called}"))
     first = tables[0]
     alike = [one for one in first.columns if all(one.text in table.values for table in tables)]
@@ -180,12 +201,14 @@ def _run_by_run(found: _Found, key: str, runs: Mapping[str, Node], name: str) ->
     units = {one.text: one.unit.name for one in alike if one.unit}
     lost = {one.text for table in tables for one in table.columns} - set(data)
     remarks = [
-        f"it holds {len(runs)} runs ({listed(runs, 4)}), here one below the other: "
+        f"it holds {len(runs.nodes)} runs ({listed(runs.nodes, 4)}), here one below the other: "
         "--split 'column run' cuts them",
         *dict.fromkeys(remark for table in tables for remark in table.remarks),
     ]
     if lost:
         remarks.append(f"not in all runs, and left out: {listed(sorted(lost))}")
+    if others := [*beside.loose, *(key for _, _, data in beside.clocks for key in data)]:
+        remarks.append(f"beside the runs, and left out: {listed(others)}")
     notes = tuple(dict.fromkeys(note for table in tables for note in table.notes))
     title_free = next(text for text in ("run", "run of file") if text not in data)
     return from_arrays(
@@ -195,6 +218,7 @@ def _run_by_run(found: _Found, key: str, runs: Mapping[str, Node], name: str) ->
 
 def _one_table(found: _Found, name: str) -> Table:
     """Return the table of one run."""
+    found.clocks += [] if found.clocks else _by_steps(found)
     clocks = _merged(found)
     if not clocks:
         return _without_time(found, name)
@@ -249,6 +273,34 @@ def _in_seconds(key: str, time: AnyArray, units: Mapping[str, str | None]) -> An
     return np.asarray(time, dtype=float) * factor
 
 
+def _by_steps(found: _Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
+    """Return clocks by the steps and starts that stand beside channels, [] where all are alike."""
+    starts: dict[str, float] = {}
+    steps: dict[str, float] = {}
+    for key, value in found.scalars.items():
+        place, short = key.rpartition(".")[0], _short(key)
+        if short in _STARTS and np.isfinite(value):
+            starts[place] = value
+        elif short in (*_STEPS, *_RATES) and 0.0 < value < np.inf:
+            steps.setdefault(place, value if short in _STEPS else 1.0 / value)
+    if len({(starts.get(place, 0.0), step) for place, step in steps.items()}) < 2:
+        return []
+    clocks: dict[Any, tuple[str, AnyArray, dict[str, AnyArray]]] = {}
+    for key, array in found.loose.items():
+        own = [place for place in steps if key == place or key.startswith(f"{place}.")]
+        if not own and "" not in steps:
+            continue
+        place = max(own, key=len, default="")
+        clock = (starts.get(place, 0.0), steps[place], len(array))
+        time = clock[0] + clock[1] * np.arange(len(array))
+        called = f"{place}.time" if place else "time"
+        clocks.setdefault(clock, (called, time, {}))[2][key] = array
+    for _, _, data in clocks.values():
+        for key in data:
+            del found.loose[key]
+    return list(clocks.values())
+
+
 def _without_time(found: _Found, name: str) -> Table:
     """Return the table of the vectors of the commonest length; a step or a rate gives the time."""
     lengths = Counter(map(len, found.loose.values()))
@@ -288,7 +340,7 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     long = {one: f"{key}.{one}" if key else one for one in fields}
     vectors = {one: array for one, node in fields.items() if (array := _vector(node)) is not None}
     for one, node in fields.items():
-        if isinstance(node, Leaf) and node.array.size == 1:
+        if isinstance(node, Leaf) and node.array.size == 1 and node.array.dtype.kind in "fiu":
             found.scalars[long[one]] = float(node.array.ravel()[0])
         elif isinstance(node, Unread):
             found.remarks.append(
@@ -424,6 +476,9 @@ def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
     """Add one signal with its name, or with its own time."""
     named = _name_and_data(node)
     vectors = {one: array for one, v in node.items() if (array := _vector(v)) is not None}
+    for one, leaf in node.items():
+        if isinstance(leaf, Leaf) and leaf.array.size == 1 and leaf.array.dtype.kind in "fiu":
+            found.scalars[f"{key}.{one}"] = float(leaf.array.ravel()[0])
     timed = next((one for one in vectors if _is_time_name(one)), None)
     if named is not None:
         text, array, unit = named
@@ -434,7 +489,7 @@ def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
             _scope(found, key, node)
             return
         stated = _get(node, _UNITS)
-        array, unit = vectors[value], stated if isinstance(stated, str) else ""
+        array, unit = vectors[value], stated if isinstance(stated, str) else node[value].unit
         short = value if isinstance(node, Bare) else f"{key}.{value}"
         called = found.free(key if value.lower() in _VALUES else short, f"{key}.{value}")
     _note_unit(found, called, unit)
