@@ -18,7 +18,7 @@ from .titles import unit_or_none
 _TITLE_LINES = 10  # at most; four in the files of the database
 _SHORTEST = 1e-6  # s; times are rounded to a thousandth of it
 _LONGEST = 60.0  # s; what takes longer between two samples is no shaking
-_NUMBER = r"([-+]?[0-9]*\.?[0-9]+(?:[ED][-+]?[0-9]+)?)"
+_NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[ED][-+]?[0-9]+)?)"
 _WHOLE = rf"([1-9][0-9]{{0,2}}(?:[,' ][0-9]{{3}})+(?![0-9.])|{_NUMBER[1:-1]})"
 """A count, which may have its thousands in groups: 1,200."""
 _SPELLED = r"(?:\s*[\[(]?\s*([A-Z][A-Z.]*))?"
