@@ -493,10 +493,18 @@ def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
         short = value if isinstance(node, Bare) else f"{key}.{value}"
         called = found.free(key if value.lower() in _VALUES else short, f"{key}.{value}")
     _note_unit(found, called, unit)
-    if timed is not None and _rises(vectors[timed]) and len(vectors[timed]) == len(array):
-        found.clocks.append((found.free(f"{key}.{timed}"), vectors[timed], {called: array}))
-    else:
-        found.loose[called] = array
+    time = vectors.get(timed or "")
+    if time is not None and len(time) == len(array):
+        there = np.isfinite(time)
+        if _rises(time[there]):
+            clock = found.free(f"{key}.{timed}")
+            found.clocks.append((clock, time[there], {called: array[there]}))
+            return
+        found.remarks.append(
+            f"{key}.{timed} does not increase from sample to sample: {called} is taken at the times"
+            " of the others"
+        )
+    found.loose[called] = array
 
 
 def _matrix(
@@ -508,6 +516,8 @@ def _matrix(
     that rises throughout is the time of the others.
     """
     if node.array.dtype.kind not in "fiub" or node.array.ndim > 2:
+        what = f"{node.array.ndim} dimensions" if node.array.ndim > 2 else f"{node.array.dtype}"
+        found.remarks.append(f"{key} is not read: it holds {what}, and no columns of numbers")
         return
     columns = list(_columns(node.array))
     first_rises = _rises(columns[0]) and not timed and not all(map(_rises, columns))

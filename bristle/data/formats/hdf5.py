@@ -82,7 +82,7 @@ def _node(item: Any, file: Any, h5py: Any) -> Node | None:
         rows = np.asarray(item[()])
         unit = _unit(item)
         return Bare({one: Leaf(np.asarray(rows[one]), unit) for one in item.dtype.names})
-    if item.dtype.kind in "fiub" and item.ndim <= 2 and "MATLAB_empty" not in item.attrs:
+    if item.dtype.kind in "fiubc" and "MATLAB_empty" not in item.attrs:
         return _with_names(Leaf(np.asarray(item[()]), _unit(item)), item)
     return None
 

@@ -171,10 +171,17 @@ def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
 def _assumed(channels: Channels) -> list[str]:
     """Return that a start is not known where others have one."""
     made = {key: one for key, one in channels.items() if one.step}
-    lacking = [key for key, one in made.items() if one.start is None]
-    if not lacking or len(lacking) == len(made):
+    if any(_is_time(key, one.array, one.unit) for key, one in channels.items()):
         return []
-    return [f"no wf_start_time is given for {listed(lacking)}: taken to begin as the others do"]
+    lacking = [key for key, one in made.items() if one.start is None]
+    sizes = {len(one.array) for one in made.values()}
+    bare = [k for k, one in channels.items() if not one.step and len(one.array) in sizes]
+    said = []
+    if lacking and len(lacking) < len(made):
+        said.append(f"no wf_start_time is given for {listed(lacking)}: taken to begin as others do")
+    if bare:
+        said.append(f"no wf_increment is given for {listed(bare)}: taken to be sampled as others")
+    return said
 
 
 def _since(zero: Any, instants: Any) -> Any:
