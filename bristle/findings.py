@@ -14,6 +14,10 @@ from .lines import KeyPath
 Level = Literal["error", "warning", "note"]
 LIST_AT_MOST = 12
 """Longer lists of names are cut down to the nearest few."""
+LINES, CHARACTERS = 10, 1000
+"""Size of a message at most."""
+LIST_LONGEST = 300
+"""Characters of a list of names at most."""
 
 
 class Finding(NamedTuple):
@@ -68,6 +72,43 @@ def nearest(name: str, names: Iterable[str], count: int = 1) -> list[str]:
         folded.setdefault(candidate.casefold(), candidate)
     matches = get_close_matches(name.casefold(), folded, n=count, cutoff=0.6)
     return [folded[match] for match in matches]
+
+
+def listed(names: Iterable[str], most: int = LIST_AT_MOST) -> str:
+    """Return names parted by commas, the first ones and a count of the rest where they are many.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Names, in quotes where they need them.
+    most : int
+        How many are named at most.
+    """
+    names = list(names)
+    shown = names[:most]
+    # Titles may be as long as a line each.
+    while len(shown) > 1 and len(", ".join(shown)) > LIST_LONGEST:
+        shown = shown[:-1]
+    rest = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {rest} more" if rest else "")
+
+
+def cut_short(text: str) -> str:
+    """Return a message of `LINES` lines and `CHARACTERS` at most, with a count of what is left out.
+
+    The last guard: who lists what a file holds uses `listed`.
+    """
+    lines = text.split("\n")
+    kept = lines if len(lines) <= LINES else lines[: LINES - 1]
+    room = CHARACTERS - 60  # what is said of the rest takes the others
+    if len("\n".join(kept)) > (CHARACTERS if kept is lines else room):
+        while len(kept) > 1 and len("\n".join(kept)) > room:
+            kept = kept[:-1]
+        if len(kept[0]) > room:
+            rest = len(text) - room
+            return f"{kept[0][:room]} ... and {rest:,} more characters."
+    rest = len(lines) - len(kept)
+    return "\n".join([*kept, *([f"  ... and {rest:,} more line{'s' * (rest > 1)}."] * bool(rest))])
 
 
 def unknown(what: str, name: str, names: Iterable[str], more: str = "") -> str:

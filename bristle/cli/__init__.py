@@ -98,7 +98,9 @@ def _run(arguments: argparse.Namespace) -> int:
     except BristleError as error:
         if arguments.debug:
             raise
-        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        from ..findings import cut_short
+
+        print(cut_short(f"{type(error).__name__}: {error}"), file=sys.stderr)
         return error.exit_code
     except BrokenPipeError:  # the reader of a pipe, such as head, has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

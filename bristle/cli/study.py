@@ -205,7 +205,7 @@ def _print_json(created: Created) -> None:
 
 
 def _print_new(created: Created) -> None:
-    from ..findings import capital, command
+    from ..findings import capital, command, listed
 
     folder, settings = created.study.folder, created.study.settings
     print(f"{folder}: a study of {len(settings.runs)} run(s). The columns are read as:")
@@ -222,7 +222,7 @@ def _print_new(created: Created) -> None:
         head = "Extra channels, on which an error may depend ([extra] in study.toml):"
         print(head, *extra, sep="\n")
     if created.unused:
-        print(f"Not used: {', '.join(created.unused)}.")
+        print(f"Not used: {listed(created.unused)}.")
     files = [run.file for run in (*settings.runs, *settings.excluded)]
     for note in created.notes:
         print(f"{capital(note, files)}.")

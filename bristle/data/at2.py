@@ -7,20 +7,28 @@ The layout is that of the PEER strong-motion database, in both of its ages:
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from ..errors import PhysicsError, UnitError
 from ..physics.record import number, shortened
 from ..units import Unit
 from ..units import parse as parse_unit
+from .titles import unit_or_none
 
 _TITLE_LINES = 10  # at most; four in the files of the database
 _SHORTEST = 1e-6  # s; times are rounded to a thousandth of it
 _LONGEST = 60.0  # s; what takes longer between two samples is no shaking
-_NUMBER = r"([-+]?[0-9]*\.?[0-9]+(?:[ED][-+]?[0-9]+)?)"
-_COUNT = re.compile(rf"NPTS\s*=?\s*{_NUMBER}", re.IGNORECASE)
-_STEP = re.compile(rf"\bDT\s*=?\s*{_NUMBER}(?![0-9.]*\s*/\s*[0-9])", re.IGNORECASE)
-"""Not the first number of a fraction such as 1/200."""
-_BOTH_BEFORE = re.compile(rf"^\s*{_NUMBER}\s+{_NUMBER}\s+NPTS\b.*\bDT\b", re.IGNORECASE)
+_NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[ED][-+]?[0-9]+)?)"
+_WHOLE = rf"([1-9][0-9]{{0,2}}(?:[,' ][0-9]{{3}})+(?![0-9.])|{_NUMBER[1:-1]})"
+"""A count, which may have its thousands in groups: 1,200."""
+_SPELLED = r"(?:\s*[\[(]?\s*([A-Z][A-Z.]*))?"
+_COUNT = re.compile(rf"NPTS\s*[=:]?\s*{_WHOLE}", re.IGNORECASE)
+_STEP = re.compile(rf"\bDT\s*[=:]?\s*{_NUMBER}(?![0-9.]*\s*/\s*[0-9]){_SPELLED}", re.IGNORECASE)
+"""With its unit; not the first number of a fraction such as 1/200."""
+_BOTH_BEFORE = re.compile(rf"^\s*{_WHOLE}\s+{_NUMBER}\s+NPTS\b.*\bDT\b{_SPELLED}", re.IGNORECASE)
+_SIGN_INSIDE = re.compile(r"(?<=[0-9.])(?=[-+])")
+"""Where a column ends and the next begins, in rows of a fixed width that leaves no blank."""
+_VALUE = re.compile(r"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:E[-+]?[0-9]+)?")
 _UNITS = re.compile(r"UNITS?\s*(?:OF|[:=])\s*([A-Z/0-9^*.]+)", re.IGNORECASE)
 
 
@@ -61,14 +69,17 @@ def parse(text: str, name: str) -> tuple[list[float], list[float]]:
     count, step = _count_and_step(lines[last], name, last + 1)
     unit = _unit(lines[: last + 1], name)
     values = [
-        number(field.upper().replace("D", "E"), name, line, unit.factor)
+        number(field, name, line, unit.factor)
         for line, row in enumerate(lines[last + 1 :], last + 2)
-        for field in row.split()
+        for field in _fields(row)
     ]
     if len(values) != count:
+        why = "The file is cut or has been edited; fetch it again."
+        if len(values) == 2 * count:
+            why = "AT2 holds values alone: remove the column of times."
         raise PhysicsError(
             f"{name}, line {last + 1}: NPTS announces {count} values, and {len(values)} follow. "
-            "The file is cut or has been edited; fetch it again."
+            f"{why}"
         )
     if count < 2:
         raise PhysicsError(f"{name}: {count} sample. A record has two at least.")
@@ -80,10 +91,19 @@ def _lines(text: str) -> list[str]:
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
+def _fields(row: str) -> Iterator[str]:
+    """Yield the numbers of a row; a minus sign may be all that parts two of them."""
+    for field in row.upper().replace("D", "E").split():
+        parts = _SIGN_INSIDE.split(field)
+        # Of 1.5-101 no one can say whether it is two numbers, or one without its E.
+        yield from parts if all(map(_VALUE.fullmatch, parts)) else (field,)
+
+
 def _count_and_step(row: str, name: str, line: int) -> tuple[int, float]:
+    """Return NPTS and DT [s], which is in the unit behind it, in s where there is none."""
     before = _BOTH_BEFORE.search(row)
     if before:
-        fields = before.groups()
+        whole, fraction, spelled = before.groups()
     else:
         count, step = _COUNT.search(row), _STEP.search(row)
         if count is None or step is None:
@@ -91,14 +111,27 @@ def _count_and_step(row: str, name: str, line: int) -> tuple[int, float]:
                 f'{name}, line {line}: "{shortened(row.strip())}" does not give both NPTS and DT, '
                 'as in "NPTS=   5372, DT=   .0100 SEC".'
             )
-        fields = (count[1], step[1])
-    points, spacing = (number(field.upper().replace("D", "E"), name, line) for field in fields)
+        whole, (fraction, spelled) = count[1], step.groups()
+    points = number(re.sub("[,' ]", "", whole.upper()).replace("D", "E"), name, line)
+    spacing = number(fraction.upper().replace("D", "E"), name, line)
+    spacing *= _seconds(spelled, f"{name}, line {line}")
     if points != int(points) or points < 1 or not _SHORTEST <= spacing <= _LONGEST:
         raise PhysicsError(
-            f"{name}, line {line}: NPTS = {fields[0]} and DT = {fields[1]} s. NPTS is a count, "
+            f"{name}, line {line}: NPTS = {whole} and DT = {spacing:g} s. NPTS is a count, "
             f"and DT is from {_SHORTEST:g} to {_LONGEST:g} s."
         )
     return int(points), spacing
+
+
+def _seconds(spelled: str | None, where: str) -> float:
+    """Return how many seconds one in the unit of DT is."""
+    unit = unit_or_none((spelled or "s").rstrip("."))
+    if unit is None or unit.dimension != parse_unit("s").dimension:
+        raise PhysicsError(
+            f'{where}: DT is in "{spelled}", which is no unit of time that is known. '
+            "SEC or MSEC is right."
+        )
+    return unit.factor
 
 
 def _unit(titles: list[str], name: str) -> Unit:

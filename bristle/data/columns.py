@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 
 from ..errors import PhysicsError, UnitError
+from ..findings import listed
 from ..physics.record import check_times, number, rows, shortened
 from ..units import Unit
 from ..units import parse as parse_unit
@@ -126,7 +127,7 @@ def _time_column(columns: list[Column], where: str) -> Column:
     named = [found for found in timed if found.is_a(_TIME, "time", "t")]
     if len(named or timed) == 1:
         return (named or timed)[0]
-    raise _no_column(columns, timed, where, "time", ("time", "t"), "time [s]")
+    raise _no_column(columns, timed, where, "time", ("time", "t"), "time")
 
 
 def _acceleration_column(columns: list[Column], where: str) -> Column:
@@ -137,8 +138,7 @@ def _acceleration_column(columns: list[Column], where: str) -> Column:
     if len(fitting) == 1:
         return fitting[0]
     names = ("acceleration", "ground_acceleration", "accel", "acc", "ag", "a_g", "a")
-    right = "ground_acceleration [m/s2]"
-    raise _no_column(columns, fitting, where, "acceleration", names, right)
+    raise _no_column(columns, fitting, where, "acceleration", names, "ground_acceleration")
 
 
 def _no_column(
@@ -149,11 +149,16 @@ def _no_column(
     names: tuple[str, ...],
     right: str,
 ) -> PhysicsError:
-    """Say why no column, or more than one, can be meant."""
+    """Say why no column, or more than one, can be meant; `right` is the name without the unit."""
     if fitting:
-        several = ", ".join(f'"{found.text}"' for found in fitting)
+        several = listed([f'"{found.text}"' for found in fitting])
+        # Who takes the advice keeps the numbers: the unit is that of the column.
+        units = dict.fromkeys(found.unit.name for found in fitting if found.unit)
+        called = " or ".join(f'"{right} [{unit}]"' for unit in units)
+        if len(units) > 1:
+            called += ", in its own unit"
         return PhysicsError(
-            f'{where}: {several} could all be the {quantity}. Call the one that is meant "{right}".'
+            f"{where}: {several} could all be the {quantity}. Call the one that is meant {called}."
         )
     for found in columns:
         if found.problem and found.name.lower() in names:

@@ -276,7 +276,7 @@ def measurements_of(
     known : what is known of the run besides
     """
     known = known or Known()
-    notes = list(table.notes)
+    notes = [*table.notes, *table.remarks]
     if channels is None:
         guesses = guess_channels(table)
         notes += [f"guessed: {guess}" for guess in guesses]

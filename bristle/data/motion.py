@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PhysicsError, RecordError
+from ..findings import listed
 from ..physics.record import HEADER, LARGEST, is_two_column, parse_two_column, read_text
 from . import at2, columns, fema, synthetic
 from .listing import Listing
@@ -146,13 +147,12 @@ def _existing(record: str, folder: Path) -> Path:
 
 
 def _what_there_is() -> str:
-    names = "".join(
-        f"\n    {row.name}" + (f"  (needs: {row.needs})" if row.needs else "")
-        for row in list_ground_motions()
-    )
+    rows = list_ground_motions()
+    needs = "; ".join(dict.fromkeys(row.needs for row in rows if row.needs))
+    more = f"; some need: {needs}" if needs else ""
     return (
-        f"There are:{names}\n  or the path of a PEER AT2 file, or of a CSV with units in its "
-        f'header, as in "{HEADER}".'
+        f"There are {listed(row.name for row in rows)} (all: bristle list records{more}), or the "
+        f'path of a PEER AT2 file, or of a CSV with units in its header, as in "{HEADER}".'
     )
 
 

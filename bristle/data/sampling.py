@@ -253,15 +253,19 @@ def _on_grid(
         own = float(np.median(np.diff(x)))
         if own > GAP * step:
             sparse.append(channel)
-        known &= _covered(even, x, max(own, step))
-        out[channel] = (
-            y if len(x) == len(even) and np.array_equal(x, even) else _between(even, x, y)
-        )
+        known &= covered(even, x, max(own, step))
+        out[channel] = y if len(x) == len(even) and np.array_equal(x, even) else between(even, x, y)
     return out, known, tuple(sparse)
 
 
-def _between(even: Array, x: Array, y: Array) -> Array:
-    """Return samples between others: switched channels keep their last value, others are curved."""
+def between(even: Array, x: Array, y: Array) -> Array:
+    """Return samples between others: switched channels keep their last value, others are curved.
+
+    Parameters
+    ----------
+    even : (m,) s, the times wanted, evenly spaced
+    x, y : (n,) s, increasing, and the samples, finite
+    """
     if is_switched(y):
         nearly = even + 1e-6 * (even[1] - even[0])
         last = np.searchsorted(x, nearly, side="right") - 1
@@ -271,8 +275,15 @@ def _between(even: Array, x: Array, y: Array) -> Array:
     return np.asarray(PchipInterpolator(x, y)(np.clip(even, x[0], x[-1])), dtype=float)
 
 
-def _covered(even: Array, x: Array, step: float) -> NDArray[np.bool_]:
-    """Return which times of a grid are samples, or lie between samples that are no gap apart."""
+def covered(even: Array, x: Array, step: float) -> NDArray[np.bool_]:
+    """Return which times of a grid are samples, or lie between samples that are no gap apart.
+
+    Parameters
+    ----------
+    even : (m,) s, the times of the grid
+    x : (n,) s, those of the samples
+    step : s, their usual spacing
+    """
     after = np.searchsorted(x, even - 1e-6 * step)
     before = np.searchsorted(x, even + 1e-6 * step, side="right") - 1
     inside = (before >= 0) & (after < len(x))

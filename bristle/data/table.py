@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
+from ..findings import listed
 from .columns import Column
 from .titles import titles
 
@@ -25,7 +26,8 @@ class Table:
 
     `values` maps a column's text, its title in the file, to (n,) floats, NaN where a value is
     missing. `not_numeric` says of a column that holds text where it is. `lines` (n,) is the line
-    of the file, or the row, that each sample is from, called `place`.
+    of the file, or the row, that each sample is from, called `place`. `remarks` are the notes that
+    who makes a study reads at once: what of the file is not read, or moved in time.
     """
 
     source: str
@@ -35,6 +37,7 @@ class Table:
     place: str = "line"
     not_numeric: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -55,7 +58,7 @@ class Table:
         named = [column for column in self.columns if column.name == called]
         if len(named) == 1:
             return named[0]
-        there = ", ".join(f'"{column.text}"' for column in self.columns)
+        there = listed(f'"{column.text}"' for column in self.columns)
         what = "several columns are" if named else "no column is"
         raise RecordError(f'{self.source}: {what} called "{called}"; there are {there}.')
 
@@ -102,6 +105,7 @@ def from_arrays(
     source: str,
     units: Mapping[str, str | None] | None = None,
     notes: tuple[str, ...] = (),
+    remarks: tuple[str, ...] = (),
 ) -> Table:
     """Return the table of named arrays (n,); what holds no numbers is named in `not_numeric`.
 
@@ -110,7 +114,7 @@ def from_arrays(
     data : title to (n,) of any type, in the column's own unit
     source : where the arrays are from, for messages
     units : title to unit; without one the unit in the title counts, if it has one
-    notes : what to know of the table, in sentences
+    notes, remarks : what to know of the table, in sentences, and what to know at once
     """
     units = units or {}
     size = len(next(iter(data.values()))) if data else 0
@@ -122,7 +126,9 @@ def from_arrays(
         values[column.text] = np.full(size, np.nan) if numbers is None else numbers
         if numbers is None:
             not_numeric[column.text] = f"it holds {array.dtype} and no numbers"
-    return Table(source, columns, values, np.arange(1, size + 1), "row", not_numeric, notes)
+    return Table(
+        source, columns, values, np.arange(1, size + 1), "row", not_numeric, notes, remarks
+    )
 
 
 def _numbers(array: NDArray[Any]) -> Array | None:

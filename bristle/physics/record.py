@@ -171,6 +171,7 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8-sig") -> str:
         raise PhysicsError(f"{name}: the file cannot be read ({reason}).") from None
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise PhysicsError(f"{name}: this is UTF-16. Save the file as UTF-8 text.")
+    content = without_end_mark(content)
     if b"\0" in content:
         raise PhysicsError(f"{name}: this is binary data. A record is a text file, CSV or AT2.")
     try:
@@ -181,6 +182,12 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8-sig") -> str:
             f"{name}, line {line}: byte 0x{content[error.start]:02x} is not UTF-8. "
             "Save the file as UTF-8 text."
         ) from None
+
+
+def without_end_mark(content: bytes) -> bytes:
+    """Return a file's bytes without the byte 0x1A by which DOS ended a text, and what fills it."""
+    text, mark, after = content.rpartition(b"\x1a")
+    return text.rstrip(b"\x1a") if mark and not after.strip(b"\0 \t\r\n") else content
 
 
 def rows(text: str) -> Iterator[tuple[int, str]]:
@@ -272,8 +279,9 @@ def median(values: Sequence[float]) -> float:
 
 
 def shortened(text: str) -> str:
-    """Return at most 40 characters of a text, for a message."""
-    return text if len(text) <= 40 else text[:37] + "..."
+    """Return at most 40 characters of a text, for a message; what cannot be seen as its code."""
+    seen = text if len(text) <= 40 else text[:37] + "..."
+    return "".join(c if c.isprintable() or c == "\t" else f"\\x{ord(c):02x}" for c in seen)
 
 
 def is_two_column(text: str) -> bool:

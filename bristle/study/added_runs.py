@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..data.files import other_schema, read_json, write_json
 from ..data.run_names import names_of_files
 from ..errors import StudyError
-from ..findings import command
+from ..findings import command, listed
 from .data_digest import other_than
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def other_data(study: Study) -> str:
         every = list(dict.fromkeys(run.file for run in study.settings.runs))
         names = dict(zip(every, names_of_files(every), strict=True))
         what = "run was" if len(files) == 1 else "runs were"
-        new = ", ".join(names[file] for file in files)
+        new = listed(names[file] for file in files)
         return f"{len(files)} {what} added after the present model was identified: {new}."
     numbers = study.history.numbers()
     known = study.history.data_of(numbers[-1]) if len(numbers) > 1 else ""

@@ -16,10 +16,11 @@ from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import StudyError
+from ..findings import listed
 from ..progress import counted
 from .added_runs import FILE as ADDED
 from .added_runs import note_addition
-from .new import refuse_other_columns
+from .new import refuse_other_columns, remarks_on
 from .reading import read_runs
 from .roles import roles_added
 from .run_facts import RunChoices, facts_of
@@ -80,11 +81,12 @@ def extend_study(
         paths, choices, bool({*DRIVE} & {*study.settings.channels}), _tones(study, tables),
         [Path(run.file) for run in (*study.settings.runs, *study.settings.excluded)],
     )  # fmt: skip
-    listed, said = _roles(paths, roles or {}, holdout)
+    notes += remarks_on([path.name for path in paths], tables)
+    assigned, said = _roles(paths, roles or {}, holdout)
     split = study.settings.split
     runs = tuple(
         RunFile(f"data/{path.name}", one.role or role, one.levels, one.labels, number)
-        for path, table, one, role in zip(paths, tables, about, listed, strict=True)
+        for path, table, one, role in zip(paths, tables, about, assigned, strict=True)
         for number in _numbers(table, split, study)
     )
     if not any(one.role for one in about):
@@ -113,7 +115,7 @@ def _refuse_names(study: Study, paths: Sequence[Path]) -> None:
     there = [path.name for path in paths if path.name.lower() in taken]
     if there:
         raise StudyError(
-            f"{study.folder / 'data'}: {', '.join(there)} {'is' if len(there) == 1 else 'are'} "
+            f"{study.folder / 'data'}: {listed(there)} {'is' if len(there) == 1 else 'are'} "
             "there already. Rename the new runs, if these are others."
         )
 
@@ -136,7 +138,7 @@ def _roles(
     """Return the role of each file's runs, and why, in sentences."""
     for pattern in holdout:
         if not any(fnmatchcase(path.name, pattern) for path in paths):
-            names = ", ".join(path.name for path in paths)
+            names = listed(path.name for path in paths)
             raise StudyError(f'--holdout "{pattern}": none of the new files is it: {names}.')
     known = dict(roles)
     if holdout:

@@ -21,7 +21,7 @@ from ..data.read import files_in, read_table
 from ..data.run_names import is_part, names_of_files
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
-from ..findings import unknown, written
+from ..findings import listed, unknown, written
 from ..physics.building import Building, read_building, with_damper
 from ..physics.effect import EFFECTS
 from ..physics.laws import law_names
@@ -152,7 +152,7 @@ def runs_of(train: list[Measurement], holdout: list[Measurement]) -> Runs:
         judged = set(sources[1::_FITTED_TO])
         holdout = [one for one in train if one.source in judged]
         train = [one for one in train if one.source not in judged]
-        names = ", ".join(one.name for one in holdout)
+        names = listed(one.name for one in holdout)
         notes = (f"Every third run is held out: {names}. holdout=... names others.", *notes)
     refuse_twins(train, holdout)
     return Runs(train, holdout, (*notes, *twins_within(train), *twins_within(holdout)))

@@ -31,7 +31,7 @@ from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import BristleError, StudyError, UnitError
-from ..findings import command
+from ..findings import capital, command, listed
 from ..physics.building import Building, read_building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
@@ -45,6 +45,8 @@ from .run_facts import Facts, RunChoices, facts_of
 from .run_file import EXCLUDE, ROLES, TEST, RunFile
 from .settings import ALL, Settings, write_settings
 
+_REMARKS = 6
+"""Remarks on files that are printed at most."""
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
 
 
@@ -117,11 +119,12 @@ def make_folder(
         [Path(file) for file in files], choices, _commanded(specs, studied),
         _tones(names, found, is_test),
     )  # fmt: skip
+    notes += remarks_on(names, tables)
     of_file = dict(zip(names, about, strict=True))
     copies = _copies(found, is_test)
     kept = [one for one in found if one not in copies]
-    listed, said = roles_of([one.name for one in kept], [is_test[one.file] for one in kept])
-    of_part = dict(zip(kept, [run.role for run in listed], strict=True))
+    assigned, said = roles_of([one.name for one in kept], [is_test[one.file] for one in kept])
+    of_part = dict(zip(kept, [run.role for run in assigned], strict=True))
     every = [_with_facts(one, of_part.get(one, EXCLUDE), of_file) for one in found]
     settings = Settings(
         title or folder.name, rig, tuple(run for run in every if run.role != EXCLUDE),
@@ -163,6 +166,28 @@ class _Part:
     @property
     def name(self) -> str:
         return f"{self.file}, run {self.piece}" if self.piece else self.file
+
+
+def remarks_on(names: Sequence[str], tables: Sequence[Table]) -> list[str]:
+    """Return what is to be known at once of files: each remark once, with the file it is of.
+
+    Parameters
+    ----------
+    names : of the files
+    tables : what is read of each
+    """
+    of: dict[str, list[str]] = {}
+    for name, table in zip(names, tables, strict=True):
+        for remark in table.remarks:
+            of.setdefault(remark, []).append(name)
+    said = [
+        f"{files[0]}{f' and {len(files) - 1} more' if len(files) > 1 else ''}: {remark}"
+        for remark, files in of.items()
+    ]
+    rest = len(said) - _REMARKS
+    if rest > 0:
+        said[_REMARKS:] = [f"{rest} more remarks of this kind on the files; study check has all"]
+    return said
 
 
 def _parts(
@@ -340,12 +365,13 @@ def _refuse_incomplete(
             f"{text} ({table.not_numeric[text]})" if text in table.not_numeric else text
             for text in left_out(table, guesses)
         ]
-        rest = f"\n  Not used: {', '.join(unused)}." if unused else ""
+        rest = f"\n  Not used: {listed(unused)}." if unused else ""
         raise StudyError(
             f"{table.source}: some channels cannot be guessed."
             + "".join(f"\n  {line}" for line in wrong)
             + (f"\n  The guess so far:{seen}" if seen else "")
             + rest
+            + "".join(f"\n  {capital(remark, [])}." for remark in table.remarks)
         )
 
 
@@ -375,7 +401,7 @@ def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -
         if guess.column not in there:
             raise StudyError(
                 f'{table.source}: there is no column "{guess.column}" ({guess.channel}), as in '
-                f"{first.source}; there are {', '.join(there)}. All runs of a study have the same "
+                f"{first.source}; there are {listed(there)}. All runs of a study have the same "
                 "columns."
             )
         doubt, of_first = there[guess.column].doubt, first.find(guess.column).doubt

@@ -11,6 +11,7 @@ from ..data.read import read_table
 from ..data.run_names import is_part, names_of_files
 from ..data.table import Table
 from ..errors import StudyError
+from ..findings import listed
 from ..progress import Count
 from .run_file import RunFile
 from .settings import Settings
@@ -72,7 +73,7 @@ def place_of_run(folder: Path, settings: Settings, name: str) -> tuple[str, int]
     own = [one for one in places if is_part(name, one)]
     if not own:
         raise StudyError(
-            f'{folder / "study.toml"}: no run is called "{name}"; there are {", ".join(places)}.'
+            f'{folder / "study.toml"}: no run is called "{name}"; there are {listed(places)}.'
         )
     return places[max(own, key=len)]
 

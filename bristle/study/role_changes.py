@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from ..errors import StudyError
-from ..findings import command
+from ..findings import command, listed
 from .reading import names_of_runs
 from .run_file import EXCLUDE, ROLES, RunFile
 from .settings import Settings
@@ -38,7 +38,7 @@ def roles_by_place(
         if role not in (*ROLES, EXCLUDE):
             raise StudyError(f'role "{role}" of {name}; there are {", ".join((*ROLES, EXCLUDE))}.')
         if name not in known:
-            there = ", ".join(names.values())
+            there = listed(names.values())
             raise StudyError(f'{path}: no run is called "{name}"; there are {there}.')
         found[known[name].file, known[name].piece] = role
     refuse_too_few(path, settings, found)
@@ -67,7 +67,7 @@ def refuse_too_few(path: Path, settings: Settings, found: Mapping[tuple[str, int
     if fitted + judged > 1 and 0 in (fitted, judged):
         lacking, other = ("held out", ROLES[1]) if fitted else ("for training", ROLES[0])
         names = names_of_runs(settings)
-        there = ", ".join(
+        there = listed(
             names[run.file, run.piece]
             for run, role in zip(every, roles, strict=True)
             if role in ROLES[:2]

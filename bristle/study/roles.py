@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import StudyError
+from ..findings import listed
 from .run_facts import RunChoices, rows_of_table
 from .run_file import TEST, RunFile
 
@@ -65,7 +66,7 @@ def roles_of(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[
     roles, notes = _seen_roles([n for n, is_test in zip(names, closed, strict=True) if not is_test])
     rest = iter(roles)
     every = [TEST if is_test else next(rest) for is_test in closed]
-    test = ", ".join(name for name, role in zip(names, every, strict=True) if role == TEST)
+    test = listed(name for name, role in zip(names, every, strict=True) if role == TEST)
     if test:
         notes.append(f"test runs, which no fit and no verdict sees: {test}")
     return [RunFile(f"data/{n}", role) for n, role in zip(names, every, strict=True)], notes
@@ -124,4 +125,4 @@ def _every_third(names: list[str]) -> tuple[list[str], str]:
 def _held_out(names: list[str], roles: list[str]) -> str:
     """Return the words that tell which runs are held out."""
     held_out = [name for name, role in zip(names, roles, strict=True) if role == "holdout"]
-    return f"Held out: {', '.join(held_out) or 'none'}"
+    return f"Held out: {listed(held_out) or 'none'}"

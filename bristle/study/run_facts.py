@@ -15,6 +15,7 @@ from ..data.labels import UNITS, Label, label_text
 from ..data.titles import title, unit_or_none
 from ..data.tone import Tone, label_doubt
 from ..errors import RecordError, StudyError, UnitError
+from ..findings import listed
 from ..units import convert
 from .file_names import (
     DOUBTFUL,
@@ -277,9 +278,7 @@ def rows_of_table(path: Path, files: Sequence[Path], commanded: bool = False) ->
     header, *rows = csv.reader(lines, delimiter=delimiter)
     at = [k for k, name in enumerate(header) if name.strip().lower() in _FILE]
     if not at:
-        raise StudyError(
-            f'--runs {path}: no column is called "file"; there are {", ".join(header)}.'
-        )
+        raise StudyError(f'--runs {path}: no column is called "file"; there are {listed(header)}.')
     named = [name.strip() for name in header if name.strip()]
     twice = next((name for name in named if named.count(name) > 1), "")
     if twice:

@@ -14,7 +14,7 @@ from ..data.files import Toml, write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
 from ..errors import PhysicsError, StudyError
-from ..findings import written
+from ..findings import listed, written
 from ..physics.building import read_building
 from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
 from .run_file import (
@@ -81,7 +81,7 @@ class Settings:
     @property
     def excluded_text(self) -> str:
         """The sentence that tells which runs are left out, "" where none is."""
-        names = ", ".join(run.name for run in self.excluded)
+        names = listed(run.name for run in self.excluded)
         return f'Left out by role = "{EXCLUDE}" in study.toml: {names}.' if names else ""
 
     @property
@@ -251,14 +251,14 @@ def write_settings(path: Path, settings: Settings) -> None:
     for run in (*settings.runs, *settings.excluded):
         runs.append(run_as_toml(run))
     document.add("runs", runs)
-    for key, listed in (("channels", settings.channels), ("extra", settings.extra)):
+    for key, specs in (("channels", settings.channels), ("extra", settings.extra)):
         channels = tomlkit.table(is_super_table=True)
-        for name, spec in listed.items():
+        for name, spec in specs.items():
             table = tomlkit.table()
             for line in settings.comments.get(name, "").splitlines():
                 table.add(tomlkit.comment(line))
             table.update(channel_as_toml(spec))
             channels.add(name, table)
-        if listed:
+        if specs:
             document.add(key, channels)
     write_whole(path, tomlkit.dumps(document))

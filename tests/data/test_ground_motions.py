@@ -157,7 +157,7 @@ def test_without_the_package_the_command_that_installs_it_is_told(
     needs = {row.name: row.needs for row in data.list_ground_motions()}
     assert {needs.pop(name) for name in ("el_centro_1940_ns", *synthetic.NAMES)} == {""}
     assert set(needs.values()) == {fema.COMMAND}
-    with pytest.raises(RecordError, match=r"kobe_1995_nishi_akashi_000  \(needs: pip install"):
+    with pytest.raises(RecordError, match="some need: pip install"):
         data.read_ground_motion("tokyo", tmp_path)
 
 
@@ -344,7 +344,7 @@ GOOD = "time_s,acc_g\n0.00,0.1\n0.01,0.2\n0.02,0.3\n0.03,0.4\n"
         (GOOD.replace("time_s", "x_mm"), "no column is a time with a unit"),
         ("time_s,t_s,acc_g\n0,0,1\n1,1,1\n", '"time_s", "t_s" could all be the time'),
         ("time_s,x_g,b [g]\n0,0,1\n1,1,1\n", None),
-        ("time_s,top [g],b [g]\n0,0,1\n1,1,1\n", r'Call the one .* "ground_acceleration \[m/s2\]"'),
+        ("time_s,top [g],b [g]\n0,0,1\n1,1,1\n", r'Call the one .* "ground_acceleration \[g\]"'),
         (b"\x89PNG\r\n\x00\x00" * 20, "binary data"),
         ("time_s,acc [m/s²]\n0,1\n1,1\n".encode("latin-1"), "line 1: byte 0xb2 is not UTF-8"),
         (GOOD.encode("utf-16"), "UTF-16"),

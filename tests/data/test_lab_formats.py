@@ -75,7 +75,7 @@ def test_a_log_of_the_test_before_the_measurement_is_not_read(tmp_path: Path) ->
 
     table = read_table(workbook(tmp_path / "a.xlsx", more))
     assert table.rows > 10
-    assert any('sheet "Data" is read, and not Log' in note for note in table.notes)
+    assert table.remarks == ('sheet "Data" is read; "Log" (3 rows: column 1, column 2) is not',)
 
     def uncomputed(sheet, book) -> None:
         for row in range(5, 17):
@@ -91,7 +91,7 @@ def test_the_sheet_with_numbers_is_read(tmp_path: Path) -> None:
         book.create_sheet("Spare")
 
     table = read_table(workbook(tmp_path / "run.xlsx", more))
-    assert any('sheet "Data" is read, and not About, Spare' in note for note in table.notes)
+    assert table.remarks == ('sheet "Data" is read; "About", "Spare" are not',)
     same(table)
 
 
@@ -357,7 +357,7 @@ def lvm(time: str, segments: int = 1, comma: bool = False) -> str:
     for part in range(segments):
         lines += [
             "Channels\t3\t\t", f"Samples\t{size}\t{size}\t{size}", "Y_Unit_Label\tmm\tkN\tA",
-            "X_Dimension\tTime\tTime\tTime", f"X0\t{T[part * size]}\t0\t0",
+            "X_Dimension\tTime\tTime\tTime", "\t".join(["X0", *3 * [str(T[part * size])]]),
             "Delta_X\t0.005\t0.005\t0.005", "***End_of_Header***\t\t\t",
             "X_Value\tDisplacement\tLoad\tCurrent\tComment",
         ]  # fmt: skip

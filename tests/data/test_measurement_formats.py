@@ -196,7 +196,7 @@ def test_mat_vectors_structures_and_sampling_rate(tmp_path: Path) -> None:
     table = read_table(path)
     assert [column.text for column in table.columns] == ["data_1", "data_2", "time_s"]
     np.testing.assert_allclose(table.values["time_s"], TIME)
-    assert any("few" in note for note in table.notes)
+    assert any("few" in remark for remark in table.remarks)
 
 
 def test_frame_with_units_in_attrs() -> None:

@@ -14,7 +14,8 @@ from itertools import islice
 import numpy as np
 
 from ...errors import RecordError
-from ...physics.record import shortened
+from ...findings import listed
+from ...physics.record import shortened, without_end_mark
 from ...units import parse as parse_unit
 from ..columns import Column
 from ..table import Table
@@ -29,6 +30,8 @@ HEADER = 4
 
 _TOKEN = re.compile(r'"[^"]*"|\S+(?: ?[\[(][^\])]*[\])])?')  # a title and its unit in brackets
 _GROUP = re.compile(r"\d{3}(?:\.\d*)?")
+_WIDE = 60
+"""Values in a row of a table that is wider than long, from which on its channels are rows."""
 _RIGHT = 'Titles with units are, for example, "time [s];force [kN]".'
 
 
@@ -51,6 +54,7 @@ def read(content: bytes, name: str) -> Table:
     """
     text, notes = decoded(content, name)
     lines = lines_of(text)
+    _refuse_channels_as_rows(lines, name)
     layout = _find_layout(lines, name)
     first = _first_row(lines, layout)
     columns = _header(lines[:first], layout, name, first, notes)
@@ -68,6 +72,25 @@ def read(content: bytes, name: str) -> Table:
     return Table(name, columns, values, body.lines, "line", not_numeric, (*notes, *body.notes))
 
 
+def _refuse_channels_as_rows(lines: list[str], name: str) -> None:
+    """Refuse a table that lies on its side, before anybody takes its samples for columns."""
+    if max(map(len, lines)) < 2 * _WIDE:
+        return
+    full = [line for line in lines if line.strip() and not is_comment(line)]
+    for delimiter in (";", "\t", ",", None):
+        wide = max((len(line.split(delimiter)) for line in full), default=0)
+        if wide < max(_WIDE, 4 * len(full)):
+            continue
+        rows = [line for line in full if len(line.split(delimiter)) > wide / 2]
+        begin = [row.split(delimiter, 1)[0].strip().strip('"') for row in rows]
+        named = listed([f'"{shortened(one)}"' for one in begin], 4)
+        first = f"{'they begin' if len(rows) > 1 else 'it begins'} with {named}"
+        raise RecordError(
+            f"{name}: {len(rows)} row{'s' * (len(rows) != 1)} of about {wide} values; {first}. "
+            "Here its channels are rows, and a column a channel is right: transpose the table."
+        )
+
+
 def decoded(content: bytes, name: str) -> tuple[str, list[str]]:
     """Return a file's text, and what is to be known of how it was read.
 
@@ -81,6 +104,7 @@ def decoded(content: bytes, name: str) -> tuple[str, list[str]]:
             return content.decode("utf-16"), []
         except UnicodeDecodeError as error:
             raise RecordError(f"{name}: this is no whole UTF-16 text ({error.reason}).") from None
+    content = without_end_mark(content)
     if b"\0" in content[:65536]:
         raise RecordError(
             f"{name}: this is binary data of a kind that is not read. "

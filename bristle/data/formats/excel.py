@@ -16,7 +16,10 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from ...errors import RecordError
+from ...findings import listed
 from ...units import parse as parse_unit
+from ..channels import meaning, quantity_of_unit
+from ..noise import SHORTEST
 from ..table import Table
 from ..titles import title_rows
 from . import delimited
@@ -28,6 +31,8 @@ LARGEST = 512 * 1024**2
 
 ROWS = 10
 """Rows of numbers that tell a measurement's sheet from a log of the test."""
+
+_OF_A_RUN = {"time", "displacement", "velocity", "acceleration", "force", "voltage", "current"}
 
 _MERGED = re.compile(rb'<mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
 _CELL = re.compile(rb"<c [^>]*[^>/]>.*?</c>", re.DOTALL)
@@ -52,7 +57,7 @@ def recognises(content: bytes, suffix: str) -> bool:
 
 
 def read(content: bytes, name: str) -> Table:
-    """Return the table in a workbook: the values of its first sheet of ten rows of numbers or more.
+    """Return the table in a workbook: the values of the sheet that holds a measurement.
 
     Of formulas the values count that were stored with them. Macros are not run.
 
@@ -81,12 +86,14 @@ def read(content: bytes, name: str) -> Table:
         _Sheet(one.title, parts.get(one.title, b""), text, f'{name}, sheet "{one.title}"')
         for one, text in texts
     ]
-    sheet, table = _chosen(read, name)
+    sheet, table, others = _chosen(read, name)
     _refuse_without_values(sheet.part, sheet.where)
     lines = ["", *delimited.lines_of(sheet.text)]
     _refuse_merged(sheet.part, table, lines[1 : int(table.lines[0])], sheet.where)
     table = _in_percent(table, _percent_columns(sheet.part, int(table.lines[0]), shares))
-    return _with_notes(table, sheet.part, notes, [one.title for one in read], sheet.title)
+    hidden = [one.title for one in book.worksheets if one.sheet_state != "visible"]
+    others += [f'"{title}" (hidden)' for title in hidden]
+    return _with_notes(table, sheet.part, notes, others, sheet.title)
 
 
 class _Sheet(NamedTuple):
@@ -98,13 +105,16 @@ class _Sheet(NamedTuple):
     where: str
 
 
-def _chosen(sheets: Sequence[_Sheet], name: str) -> tuple[_Sheet, Table]:
-    """Return the first sheet with as many rows of numbers as a measurement has, and its table.
+def _chosen(sheets: Sequence[_Sheet], name: str) -> tuple[_Sheet, Table, list[str]]:
+    """Return the sheet that holds a measurement, its table, and what the other sheets hold.
 
-    Where none has, the first with any. A log of the test, with a number here and there, often
-    stands before the measurement. A sheet whose formulas were never computed may be the one.
+    That with most of what a run consists of, as its titles say, among those long enough for one;
+    the first where several are alike. A log, a calibration or a summary often stands before the
+    measurement. A sheet whose formulas were never computed may be the one.
     """
-    reasons, few = [], []
+    reasons: list[str] = []
+    read: list[tuple[_Sheet, Table]] = []
+    others: dict[str, str] = {}
     for sheet in sheets:
         if len(_without_values(sheet.part)) >= ROWS:
             _refuse_without_values(sheet.part, sheet.where)
@@ -112,20 +122,34 @@ def _chosen(sheets: Sequence[_Sheet], name: str) -> tuple[_Sheet, Table]:
             table = delimited.read(sheet.text.encode(), sheet.where)
         except RecordError as error:
             reasons.append(str(error))
+            others[sheet.title] = f'"{sheet.title}"'
             continue
-        if table.rows >= ROWS:
-            return sheet, table
-        few.append((sheet, table))
-    if few:
-        return few[0]
-    for sheet in sheets:
-        _refuse_without_values(sheet.part, sheet.where)
-    raise RecordError(
-        reasons[0] if len(reasons) == 1 else f"{name}: no sheet holds rows of numbers."
-    )
+        read.append((sheet, table))
+        titles = listed([column.text for column in table.columns], 4)
+        rows = f"{table.rows} row{'s' * (table.rows != 1)}"
+        others[sheet.title] = f'"{sheet.title}" ({rows}: {titles})'
+    if not read:
+        for sheet in sheets:
+            _refuse_without_values(sheet.part, sheet.where)
+        raise RecordError(
+            reasons[0] if len(reasons) == 1 else f"{name}: no sheet holds rows of numbers."
+        )
+    best = max(read, key=lambda one: _worth(one[1]))
+    return *best, [text for title, text in others.items() if title != best[0].title]
 
 
-def _with_notes(table: Table, part: bytes, notes: list[str], titles: list[str], own: str) -> Table:
+def _worth(table: Table) -> tuple[bool, int, bool]:
+    """Return whether a table is long enough for a run, how many of its quantities it holds, and
+    whether it has more than a few rows."""
+    found = set()
+    for column in table.columns:
+        unit = column.unit.name if column.unit else None
+        meant = meaning(column.name, unit)
+        found.add(meant.quantity if meant is not None else quantity_of_unit(unit))
+    return table.rows >= SHORTEST, len(found & _OF_A_RUN), table.rows >= ROWS
+
+
+def _with_notes(table: Table, part: bytes, notes: list[str], others: list[str], own: str) -> Table:
     """Return a sheet's table with what is to be known of it.
 
     Parameters
@@ -133,15 +157,18 @@ def _with_notes(table: Table, part: bytes, notes: list[str], titles: list[str], 
     table : as read from the sheet's text
     part : the sheet's XML
     notes : of the workbook
-    titles, own : of all sheets, and of this one
+    others, own : what the other sheets are and hold; the title of this one
     """
     formulas = len(_formulas(part))
     if formulas:
         notes = [*notes, f"{formulas} cells hold formulas: their stored values are taken"]
-    others = [title for title in titles if title != own]
+    remarks = []
     if others:
-        notes = [*notes, f'sheet "{own}" is read, and not {", ".join(others)}']
-    return replace(table, notes=(*notes, *table.notes), place="row")
+        verb = "is" if len(others) == 1 else "are"
+        remarks = [f'sheet "{own}" is read; {listed(others, 6)} {verb} not']
+    return replace(
+        table, notes=(*notes, *table.notes), remarks=(*remarks, *table.remarks), place="row"
+    )
 
 
 def _refuse_large(content: bytes, name: str) -> None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ...errors import RecordError
 from ..table import Table
-from ..titles import unit_or_none
 from ._extra import library
-from ._vectors import AnyArray, columns_of, table_of
+from ._tree import Bare, Leaf, Node, Unread, table_of
 
 _MARK = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT")
@@ -36,48 +34,82 @@ def read(content: bytes, name: str) -> Table:
         If h5py is not installed, the file is damaged, or it holds no vector.
     """
     h5py = library("h5py", name, "HDF5 (as MAT of version 7.3 is)")
-    found: list[tuple[str, AnyArray]] = []
-    units: dict[str, str | None] = {}
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
-            for key, dataset in _datasets(file, h5py):
-                for called, array in _arrays(key, dataset):
-                    column = f"{key}.{called}" if called in units else called
-                    found.append((column, array))
-                    units[column] = _unit(dataset)
+            tree = _group(file, h5py)
     # A damaged file surfaces as any of these from the library's own parsing.
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, MemoryError) as error:
         raise RecordError(f"{name}: no HDF5 file, or damaged ({error}).") from None
-    return table_of(found, name, units)
+    return table_of(tree, name)
 
 
-def _datasets(group: Any, h5py: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the datasets below a group with their names; what MATLAB keeps for itself is left."""
-    for key, item in group.items():
-        if key.startswith("#") or item is None:
-            continue
-        called = f"{path}.{key}" if path else key
-        if isinstance(item, h5py.Group):
-            yield from _datasets(item, h5py, called)
-        elif isinstance(item, h5py.Dataset) and item.attrs.get("MATLAB_class") != b"char":
-            yield called, item
+def _group(group: Any, h5py: Any) -> dict[str, Node]:
+    """Return what is below a group; what MATLAB keeps for itself is left."""
+    return {
+        key: node
+        for key, item in group.items()
+        if not key.startswith("#") and item is not None
+        for node in [_node(item, group.file, h5py)]
+        if node is not None
+    }
 
 
-def _arrays(key: str, dataset: Any) -> Iterator[tuple[str, AnyArray]]:
-    if dataset.dtype.names:
-        rows = np.asarray(dataset[()])
-        for field in dataset.dtype.names:
-            yield from columns_of(field, np.asarray(rows[field]))
-    elif dataset.dtype.kind in "fiub" and dataset.ndim <= 2:
-        yield from columns_of(key, np.asarray(dataset[()]))
-
-
-def _unit(dataset: Any) -> str | None:
-    for key in _UNITS:
-        stated = dataset.attrs.get(key)
-        if stated is not None and np.size(stated) == 1:
-            first = np.ravel(stated)[0]  # some programs write an array of one text
-            text = first.decode(errors="replace") if isinstance(first, bytes) else str(first)
-            unit = unit_or_none(text)
-            return None if unit is None else unit.name
+def _node(item: Any, file: Any, h5py: Any) -> Node | None:
+    """Return a group, a dataset or an array of references of MATLAB; None for what is no data."""
+    kind = item.attrs.get("MATLAB_class", b"")
+    if isinstance(item, h5py.Group):
+        fields = _group(item, h5py)
+        sizes = {len(one) for one in fields.values() if isinstance(one, list)}
+        referred = all(
+            getattr(one, "dtype", None) is not None and h5py.check_ref_dtype(one.dtype)
+            for one in item.values()
+        )
+        if referred and fields and len(sizes) == 1:  # an array of structures, field by field
+            (size,) = sizes
+            lists = {key: one for key, one in fields.items() if isinstance(one, list)}
+            return [{key: one[k] for key, one in lists.items()} for k in range(size)]
+        return fields
+    if "MATLAB_object_decode" in item.attrs:
+        return Unread(kind.decode(errors="replace"))
+    if h5py.check_ref_dtype(item.dtype):
+        return [_node(file[one], file, h5py) if one else "" for one in np.ravel(item[()])]
+    if kind == b"char":
+        return "" if "MATLAB_empty" in item.attrs else _word(item[()])
+    if h5py.check_string_dtype(item.dtype) or item.dtype.kind in "SU":
+        words = [_decoded(one) for one in np.ravel(item[()])]
+        return words if item.shape else words[0]
+    if item.dtype.names:
+        rows = np.asarray(item[()])
+        unit = _unit(item)
+        return Bare({one: Leaf(np.asarray(rows[one]), unit) for one in item.dtype.names})
+    if item.dtype.kind in "fiubc" and "MATLAB_empty" not in item.attrs:
+        return _with_names(Leaf(np.asarray(item[()]), _unit(item)), item)
     return None
+
+
+def _with_names(leaf: Leaf, item: Any) -> Node:
+    """Return numbers with the lists of texts that stand in their attributes, of names and units."""
+    lists = {
+        key: [_decoded(one) for one in np.ravel(value)]
+        for key, value in item.attrs.items()
+        if isinstance(value, np.ndarray) and value.size > 1 and value.dtype.kind in "OSU"
+    }
+    own = item.name.rpartition("/")[2]
+    return Bare({own: leaf, **lists}) if lists and leaf.array.ndim == 2 else leaf
+
+
+def _word(codes: Any) -> str:
+    """Return a text of MATLAB from its codes, which it stores column by column."""
+    return "".join(map(chr, np.ravel(np.asarray(codes).T, order="F").tolist())).strip()
+
+
+def _decoded(text: Any) -> str:
+    return text.decode(errors="replace") if isinstance(text, bytes) else str(text)
+
+
+def _unit(item: Any) -> str:
+    for key in _UNITS:
+        stated = item.attrs.get(key)
+        if stated is not None and np.size(stated) == 1:
+            return _decoded(np.ravel(stated)[0])  # some programs write an array of one text
+    return ""

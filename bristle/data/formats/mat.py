@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ...errors import RecordError
 from ..table import Table
-from ._vectors import columns_of, table_of
+from ._tree import Leaf, Node, Unread, table_of
 
 
 def recognises(content: bytes, suffix: str) -> bool:
@@ -21,14 +20,15 @@ def recognises(content: bytes, suffix: str) -> bool:
 def read(content: bytes, name: str) -> Table:
     """Return the table in a MAT file.
 
-    Vectors of the commonest length are the columns; a matrix of that many rows gives `name_1`,
-    `name_2`. Fields of structures are called `structure.field`. Where no vector is a time, one is
-    made from a scalar called dt, Ts or fs.
+    Vectors are columns; a matrix gives `name_1`, `name_2`, or what a list of names beside it says.
+    Fields of structures are called `structure.field`, signals of Simulink by their labels. An array
+    of structures holds runs. Where no vector is a time, one is made from a scalar called dt, Ts or
+    fs.
 
     Raises
     ------
     RecordError
-        If the file is damaged, or holds no vector.
+        If the file is damaged, holds no vector, or channels do not overlap in time.
     """
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
@@ -41,29 +41,26 @@ def read(content: bytes, name: str) -> Table:
         NotImplementedError,
     ) as error:  # fmt: skip
         raise RecordError(f"{name}: no MAT file, or damaged ({error}).") from None
-    found = [
-        pair
-        for key, value in loaded.items()
-        if not key.startswith("__")
-        for pair in _arrays(key, value)
-    ]
-    return table_of(found, name)
+    tree = {key: _node(value) for key, value in loaded.items() if not key.startswith("__")}
+    return table_of(tree, name)
 
 
-def _arrays(key: str, value: Any) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[Any]]]]:
-    """Yield (name, array) of what one variable holds, structures followed."""
+def _node(value: Any) -> Node:
+    """Return what one variable holds, structures followed."""
     fields = getattr(value, "_fieldnames", None)
     if fields is not None:
-        if {"Name", "Data"} <= set(fields):  # recorders write lists of named signals
-            yield from _arrays(f"{key}.{value.Name}", value.Data)
-            return
-        for one in fields:
-            yield from _arrays(f"{key}.{one}", getattr(value, one))
-        return
+        return {one: _node(getattr(value, one)) for one in fields}
+    if isinstance(value, str):
+        return value
     array = np.asarray(value)
+    if array.dtype.names or type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
+        words = [one for one in array.ravel()[:1].tolist()[0] if isinstance(one, str | bytes)]
+        last = words[-1] if words else "unknown"
+        return Unread(last.decode(errors="replace") if isinstance(last, bytes) else last)
     if array.dtype == object:
-        for index, item in enumerate(array.ravel(), 1):
-            if hasattr(item, "_fieldnames"):
-                yield from _arrays(f"{key}({index})", item)
-        return
-    yield from columns_of(key, array)
+        if array.ndim == 0:  # a sparse matrix, or what scipy has no array for
+            return Unread(type(value).__name__)
+        return [_node(one) for one in array.ravel()]
+    if array.dtype.kind in "US":
+        return [str(one).rstrip() for one in array.ravel()]
+    return Leaf(array)

@@ -1,20 +1,32 @@
-"""TDMS of National Instruments: the channels of one group; no index file is needed."""
+"""TDMS of National Instruments: the channels of a group and of those that were recorded with it.
+
+No index file is needed.
+"""
 
 from __future__ import annotations
 
 import io
 from collections import Counter
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...errors import RecordError
+from ...findings import listed
+from ...quantity import plain
+from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
-from ..table import Table, from_arrays
+from ..table import Array, Table, from_arrays
 from ..titles import unit_or_none
 from ._extra import library
+from ._one_time import AnyArray, Series, by_length, on_one_time, overlap
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
+_UNSET = np.datetime64("1904-01-02")
+"""LabVIEW's zero of time, and a day more for time zones: a start that nobody set."""
+_SHARED = 0.5
+"""Share of a group's time that another group has, at the least, to be read with it."""
 _RISING = 0.98  # share of the steps of a time that are positive, at least
 
 
@@ -26,13 +38,15 @@ def recognises(content: bytes, suffix: str) -> bool:
 def read(content: bytes, name: str) -> Table:
     """Return the table in a TDMS file.
 
-    The group with most channels of one length is read; its waveforms' step gives the time where no
-    channel is one.
+    The group with most channels is read, and those beside it that hold other channels of the same
+    time. A channel's time is that of a channel beside it that is one, else its waveform's start,
+    offset and step; channels of several times are put on one.
 
     Raises
     ------
     RecordError
-        If npTDMS is not installed, the file is an index or damaged, or it holds no samples.
+        If npTDMS is not installed, the file is an index or damaged, or it holds no samples; if the
+        channels of a group do not overlap in time.
     """
     if content.startswith(b"TDSh"):
         raise RecordError(
@@ -47,29 +61,38 @@ def read(content: bytes, name: str) -> Table:
     except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError,
             MemoryError, RuntimeError, ArithmeticError) as error:  # fmt: skip
         raise RecordError(f"{name}: no TDMS file, or damaged ({error}).") from None
-    if not any(groups.values()):
+    groups = {key: channels for key, channels in groups.items() if channels}
+    if not groups:
         raise RecordError(f"{name}: the TDMS file holds no samples.")
     chosen = max(groups, key=lambda key: _size(groups[key]))
-    channels = groups[chosen]
-    size = _length(channels)
-    notes = [] if len(groups) == 1 else [f'of {len(groups)} groups "{chosen}" is read']
-    others = [key for key, (array, _, _) in channels.items() if len(array) != size]
-    if others:
-        notes.append(f"left out, for they have another length than {size}: {', '.join(others)}")
-    kept = {key: one for key, one in channels.items() if len(one[0]) == size}
-    data = {key: array for key, (array, _, _) in kept.items()}
-    units: dict[str, str | None] = {key: unit for key, (_, unit, _) in kept.items()}
-    steps = {step for _, _, step in kept.values() if step}
-    timed = any(_is_time(key, array, units[key]) for key, array in data.items())
-    if not timed and len(steps) == 1:
-        step = steps.pop()
-        data, units["time"] = {"time": np.arange(size) * step, **data}, "s"
-        notes.append(f"the time is made from wf_increment = {step:g} s")
-    return from_arrays(data, name, units, tuple(notes))
+    zero = min(_instants(groups), default=None)
+    clocks = {key: _series(channels, zero) for key, channels in groups.items()}
+    beside, remarks = _beside(groups, clocks, chosen)
+    remarks += _assumed({k: one for key in (chosen, *beside) for k, one in groups[key].items()})
+    return _table([chosen, *beside], groups, clocks, name, remarks)
 
 
-Channels = dict[str, tuple[Any, str | None, float]]
-"""Name to samples (n,), unit and step [s], 0 where none is given."""
+class _Channel(NamedTuple):
+    """Samples (n,), unit, and of the waveform its start, offset and step [s], 0 if not given."""
+
+    array: AnyArray
+    unit: str | None
+    start: np.datetime64 | None
+    offset: float
+    step: float
+
+
+Channels = dict[str, _Channel]
+
+
+class _Clocks(NamedTuple):
+    """A group's channels by their times; `untimed` has none; `made` from waveforms; `times` are
+    channels themselves."""
+
+    series: list[Series]
+    untimed: dict[str, AnyArray]
+    made: bool
+    times: list[str]
 
 
 def _channels(group: Any) -> Channels:
@@ -78,11 +101,189 @@ def _channels(group: Any) -> Channels:
         array = np.asarray(channel[:])
         if array.ndim != 1 or not len(array):
             continue
-        stated = next((channel.properties[key] for key in _UNITS if key in channel.properties), "")
+        given = channel.properties
+        stated = next((given[key] for key in _UNITS if key in given), "")
         unit = unit_or_none(str(stated))
-        step = float(channel.properties.get("wf_increment", 0.0) or 0.0)
-        out[channel.name] = array, None if unit is None else unit.name, step
+        start = given.get("wf_start_time")
+        known = isinstance(start, np.datetime64) and not np.isnat(start) and start > _UNSET
+        step, offset = (_seconds(given, key) for key in ("wf_increment", "wf_start_offset"))
+        out[channel.name] = _Channel(
+            array, None if unit is None else unit.name, start if known else None, offset,
+            step if step > 0.0 else 0.0,
+        )  # fmt: skip
     return out
+
+
+def _seconds(given: Any, key: str) -> float:
+    """Return a number of a waveform's axis in s, 0 where there is none or the axis is no time."""
+    unit = unit_or_none(str(given.get("wf_xunit_string") or "s"))
+    value = float(given.get(key, 0.0) or 0.0)
+    if unit is None or quantity_of_unit(unit.name) != "time" or not np.isfinite(value):
+        return 0.0
+    return value * unit.factor
+
+
+def _instants(groups: dict[str, Channels]) -> Iterator[np.datetime64]:
+    """Yield the instants at which the channels begin, as far as they are told."""
+    for one in (one for channels in groups.values() for one in channels.values()):
+        if one.array.dtype.kind == "M":
+            yield one.array[0]
+        elif one.start is not None:
+            yield one.start
+
+
+def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
+    """Return a group's channels by their times, in s since `zero` where they tell an instant.
+
+    A channel that is a time counts for all of its length; `wf_increment` is then often a 1 that
+    nobody set.
+    """
+    times = [key for key, one in channels.items() if _is_time(key, one.array, one.unit)]
+    found: dict[Any, Series] = {}
+    untimed: dict[str, AnyArray] = {}
+    made = False
+    starts = [one.start for one in channels.values() if one.start is not None]
+    for key, one in channels.items():
+        size = len(one.array)
+        own = next((other for other in times if len(channels[other].array) == size), None)
+        if own is not None:
+            clock: Any = own
+            if clock not in found and (time := _time_in(channels[own], zero)) is not None:
+                found[clock] = Series(time, {})
+        elif one.step and size > 1:
+            start = one.start if one.start is not None else min(starts, default=zero)
+            since = 0.0 if start is None else _since(zero, start)
+            clock = (since + one.offset, one.step, size)
+            if clock not in found:
+                even = since + one.offset + np.arange(size) * one.step
+                found[clock] = Series(np.asarray(even, dtype=float), {})
+            made = True
+        else:
+            clock = None
+        if clock in found:
+            found[clock].data[key] = one.array
+        else:
+            untimed[key] = one.array
+    series, untimed = by_length(untimed, list(found.values()))
+    return _Clocks(series, untimed, made, times)
+
+
+def _assumed(channels: Channels) -> list[str]:
+    """Return that a start is not known where others have one."""
+    made = {key: one for key, one in channels.items() if one.step}
+    if any(_is_time(key, one.array, one.unit) for key, one in channels.items()):
+        return []
+    lacking = [key for key, one in made.items() if one.start is None]
+    sizes = {len(one.array) for one in made.values()}
+    bare = [k for k, one in channels.items() if not one.step and len(one.array) in sizes]
+    said = []
+    if lacking and len(lacking) < len(made):
+        said.append(f"no wf_start_time is given for {listed(lacking)}: taken to begin as others do")
+    if bare:
+        said.append(f"no wf_increment is given for {listed(bare)}: taken to be sampled as others")
+    return said
+
+
+def _since(zero: Any, instants: Any) -> Any:
+    """Return instants as s since one."""
+    return np.float64(1e-9) * ((instants - zero) / np.timedelta64(1, "ns"))
+
+
+def _time_in(channel: _Channel, zero: np.datetime64 | None) -> Array | None:
+    """Return a channel's times (n,) s, None where they do not increase throughout."""
+    array = channel.array
+    if array.dtype.kind == "M":
+        first = array[0] if zero is None else zero
+        time = _since(first, array)
+    elif array.dtype.kind in "fiu":
+        unit = parse_unit(channel.unit or "s")
+        time = np.asarray(array, dtype=float) * unit.factor
+    else:
+        return None
+    return time if len(time) > 1 and (np.diff(time) > 0.0).all() else None
+
+
+def _beside(
+    groups: dict[str, Channels], clocks: dict[str, _Clocks], chosen: str
+) -> tuple[list[str], list[str]]:
+    """Return the groups that are read beside the chosen one, and what is said of the others."""
+    known, own = set(groups[chosen]) - set(clocks[chosen].times), clocks[chosen].series
+    beside, remarks = [], []
+    for key, clock in clocks.items():
+        if key == chosen:
+            continue
+        names = set(groups[key]) - set(clock.times)
+        what = f'group "{key}" ({listed(sorted(names) or groups[key], 4)}) is not read: '
+        if names & known:
+            remarks.append(what + "its channels are called as others are; is it a run of its own?")
+        elif not own or not clock.series:
+            sizes = {len(one.array) for one in groups[chosen].values()}
+            if own or clock.series or not {len(one) for one in clock.untimed.values()} <= sizes:
+                remarks.append(what + "nothing tells its time")
+                continue
+            known |= names
+            beside.append(key)
+        else:
+            begin, end = overlap([*own, *clock.series])
+            whole = overlap(own)
+            if end - begin < _SHARED * (whole[1] - whole[0]):
+                first, last = overlap(clock.series)
+                remarks.append(
+                    f"{what}it was recorded from {plain(first, 5)} s to {plain(last, 5)} s, and "
+                    f'"{chosen}" from {plain(whole[0], 5)} s to {plain(whole[1], 5)} s'
+                )
+                continue
+            known |= names
+            beside.append(key)
+    return beside, remarks
+
+
+def _table(
+    read: list[str], groups: dict[str, Channels], clocks: dict[str, _Clocks], name: str,
+    remarks: list[str],
+) -> Table:  # fmt: skip
+    """Return the table of the channels in some groups of a file."""
+    every = {key: one for group in read for key, one in groups[group].items()}
+    units: dict[str, str | None] = {key: one.unit for key, one in every.items()}
+    series = [one for group in read for one in clocks[group].series]
+    untimed = {key: array for group in read for key, array in clocks[group].untimed.items()}
+    series, untimed = by_length(untimed, series)
+    notes = [] if len(groups) == 1 else [f"of {len(groups)} groups {_named(read)} read"]
+    if not series:
+        size = Counter(map(len, untimed.values())).most_common(1)[0][0]
+        data = {key: array for key, array in untimed.items() if len(array) == size}
+        remarks = [*_another_length(untimed, size), *remarks]
+        return from_arrays(data, name, units, tuple(notes), tuple(remarks))
+    made = any(clocks[group].made for group in read)
+    times = {key for group in read for key in clocks[group].times}
+    series = [one for one in series if set(one.data) - times] or series[:1]
+    if len(series) == 1:
+        size, step = len(series[0].time), series[0].step
+        time, found = np.arange(size) * step, series[0].data
+        made = made and not set(found) & times
+    else:
+        bare = [({k: v for k, v in one.data.items() if k not in times}, one) for one in series]
+        joined = on_one_time([Series(one.time, data) for data, one in bare], name)
+        time, found = joined.time, joined.data
+        made, remarks = True, [*joined.remarks, *remarks]
+    data = {key: found[key] for key in every if key in found}
+    if made:
+        data, units["time"] = {"time": time, **data}, "s"
+        if len(series) == 1:
+            notes.append(f"the time is made from wf_increment = {step:g} s")
+    remarks = [*_another_length(untimed, len(time)), *remarks]
+    return from_arrays(data, name, units, tuple(notes), tuple(remarks))
+
+
+def _named(read: list[str]) -> str:
+    """Return groups by name with the verb that follows."""
+    names = listed(f'"{one}"' for one in read)
+    return f"{names} {'is' if len(read) == 1 else 'are'}"
+
+
+def _another_length(channels: dict[str, AnyArray], size: int) -> list[str]:
+    others = [key for key, array in channels.items() if len(array) != size]
+    return [f"left out, for nothing tells their time: {listed(others)}"] if others else []
 
 
 def _is_time(name: str, array: Any, unit: str | None) -> bool:
@@ -95,14 +296,7 @@ def _is_time(name: str, array: Any, unit: str | None) -> bool:
     return float(np.mean(np.diff(array) > 0.0)) > _RISING
 
 
-def _length(channels: Channels) -> int:
-    lengths = Counter(len(array) for array, _, _ in channels.values())
-    return max(lengths, key=lambda length: (lengths[length], length))
-
-
 def _size(channels: Channels) -> tuple[int, int]:
-    """Return how many channels have the commonest length, and that length."""
-    if not channels:
-        return 0, 0
-    size = _length(channels)
-    return sum(len(array) == size for array, _, _ in channels.values()), size
+    """Return how many channels a group has, and how long most of them are."""
+    lengths = Counter(len(one.array) for one in channels.values())
+    return len(channels), max(lengths, key=lambda length: (lengths[length], length))

@@ -1,0 +1,158 @@
+"""Channels that begin at other times, or are sampled at other rates, are put on one time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+
+from bristle.cli import main
+from bristle.data.measurement import Measurement, measurements_of
+from bristle.data.read import read_table
+
+BEGAN = np.datetime64("2024-05-06T09:10:11")
+
+
+def path(t):
+    return 10.0 * np.sin(2.0 * np.pi * 1.3 * t)
+
+
+def force(t):
+    return 400.0 * np.tanh(4.0 * np.cos(2.0 * np.pi * 1.3 * t))
+
+
+def voltage(t):
+    return np.where(t % 2.0 < 1.0, 1.0, 3.0)
+
+
+def channel(
+    name: str, f, unit: str, start=0.0, step=0.002, size=3000, offset=0.0, group="log", **more
+) -> ChannelObject:
+    """Return a channel of a function of the time since all began."""
+    began = BEGAN + np.timedelta64(round(1e6 * start), "us")
+    waveform = {"wf_start_time": began, "wf_start_offset": offset, "wf_increment": step}
+    values = f(start + offset + step * np.arange(size))
+    return ChannelObject(group, name, values, properties={"unit_string": unit} | waveform | more)
+
+
+def tdms(file: Path, *channels: ChannelObject) -> Path:
+    with TdmsWriter(str(file)) as writer:
+        writer.write_segment(list(channels))
+    return file
+
+
+def measured(file: Path, tolerance: float = 1e-6) -> Measurement:
+    """Return the run in a file, whose channels are those of the functions at its times."""
+    (run,) = measurements_of(read_table(file), estimate=False)
+    np.testing.assert_allclose(1e3 * run["displacement"], path(run.time), atol=tolerance)
+    np.testing.assert_allclose(run["force"], force(run.time), atol=400.0 * tolerance)
+    return run
+
+
+MOTION = channel("displacement", path, "mm")
+
+
+@pytest.mark.parametrize(
+    "late", [{"start": 0.084}, {"offset": 0.084}, {"start": 0.05, "offset": 0.034}]
+)
+def test_a_force_that_begins_later_is_put_on_the_time_of_the_motion(tmp_path, capsys, late) -> None:
+    file = tdms(tmp_path / "run.tdms", MOTION, channel("force", force, "N", **late))
+    run = measured(file)
+    assert run.time[0] == pytest.approx(0.084)
+    assert len(run.time) == 3000 - 42
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert '"force" begins 84 ms later than "displacement"' in said
+    assert "only the part that all channels have is read: 0.084 s to 5.998 s" in said
+
+
+def test_between_samples_it_is_interpolated_and_said(tmp_path: Path) -> None:
+    file = tdms(tmp_path / "run.tdms", MOTION, channel("force", force, "N", start=0.0837))
+    measured(file, 1e-3)
+    assert any("put on one time, interpolated" in one for one in read_table(file).remarks)
+
+
+def test_another_rate_and_another_group(tmp_path: Path) -> None:
+    slow = channel("voltage", voltage, "V", step=0.01, size=600)
+    file = tdms(tmp_path / "run.tdms", MOTION, slow, channel("force", force, "N", group="load"))
+    run = measured(file)
+    assert run.step == pytest.approx(0.002)
+    np.testing.assert_array_equal(run["voltage"], voltage(np.floor(run.time / 0.01 + 1e-6) * 0.01))
+    half = channel("force", force, "N", step=0.004, size=1500)
+    measured(tdms(tmp_path / "half.tdms", MOTION, half), 5e-2)
+
+
+def test_increments_in_ms(tmp_path: Path) -> None:
+    ms = {"wf_xunit_string": "ms", "wf_increment": 2.0}
+    channels = [
+        channel(n, f, u) for n, f, u in (("displacement", path, "mm"), ("force", force, "N"))
+    ]
+    for one in channels:
+        one.properties.update(ms)
+    assert measured(tdms(tmp_path / "run.tdms", *channels)).step == pytest.approx(0.002)
+
+
+def test_a_group_of_another_run_is_named_and_not_read(tmp_path: Path) -> None:
+    both = [channel("force", force, "N"), channel("force", force, "N", start=60.0, group="second")]
+    table = read_table(tdms(tmp_path / "run.tdms", MOTION, *both))
+    assert any('group "second" (force) is not read' in remark for remark in table.remarks)
+
+
+def test_channels_that_do_not_overlap_give_one_message(tmp_path: Path, capsys) -> None:
+    file = tdms(tmp_path / "run.tdms", MOTION, channel("force", force, "N", start=600.0))
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert "do not overlap in time" in said
+    assert '"displacement" from 0 s to 5.998 s; "force" from 600 s to 606 s' in said
+    assert "--step" not in said
+    assert not (tmp_path / "s").exists()
+    other = channel("force", force, "N", start=600.0, group="load")
+    file = tdms(tmp_path / "groups.tdms", MOTION, channel("voltage", voltage, "V"), other)
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file), "--quiet"]) == 2
+    assert 'Group "load" (force) is not read: it was recorded from 600 s' in capsys.readouterr().err
+
+
+HEADER = """LabVIEW Measurement\t
+Separator\tTab
+Decimal_Separator\t.
+X_Columns\t{columns}
+Time_Pref\tRelative
+***End_of_Header***\t
+
+Channels\t2\t\t
+Samples\t1000\t1000\t
+Date\t2024/05/06\t2024/05/06
+Time\t09:10:11.0\t{clock}
+Y_Unit_Label\tmm\tN
+X0\t0\t{start}
+Delta_X\t0.002\t{step}
+***End_of_Header***\t\t
+X_Value\tdisplacement\tforce\tComment
+"""
+
+
+@pytest.mark.parametrize(
+    ("columns", "clock", "start", "step"),
+    [
+        ("No", "09:10:11.0", 0.084, 0.002),
+        ("One", "09:10:11.0", 0.084, 0.002),
+        ("No", "09:10:11.0839999999999996", 0, 0.002),
+        ("No", "09:10:11.0", 0, 0.004),
+    ],
+)
+def test_labview_by_x0_by_the_clock_and_by_delta_x(
+    tmp_path: Path, columns: str, clock: str, start: float, step: float
+) -> None:
+    rows = np.arange(1000)
+    late = 0.084 if start or "0839" in clock else 0.0
+    size = 1000 if step == 0.002 else 500
+    text = HEADER.format(columns=columns, clock=clock, start=start, step=step)
+    for k in rows:
+        time = f"{0.002 * k:.6f}" if columns == "One" else ""
+        value = f"{force(late + step * k):.5f}" if k < size else ""
+        text += f"{time}\t{path(0.002 * k):.6f}\t{value}\n"
+    (tmp_path / "run.lvm").write_text(text)
+    measured(tmp_path / "run.lvm", 1e-5 if step == 0.002 else 5e-2)
+    assert read_table(tmp_path / "run.lvm").remarks
