@@ -52,29 +52,38 @@ class MissingFunctionError(Exception):
 
 
 class BlackBox:
-    """Remembers the call under way, and what the FMU said in it, where it outlives a crash."""
+    """Remembers the call under way, and what the FMU says in it, where it outlives a crash.
 
-    SIZE, SAID = 256, 1024
-    """Bytes of the call's name; of the message behind it."""
+    Behind its text the file has the number of calls, by which the parent sees that they go on, and
+    behind that the FMU's last message.
+    """
+
+    SIZE, COUNT, SAID = 256, 8, 1024
+    """Bytes of each."""
 
     def __init__(self, file: Path) -> None:
-        file.write_bytes(bytes(self.SIZE + self.SAID))
-        with file.open("r+b") as stream:
-            self._map = mmap.mmap(stream.fileno(), self.SIZE + self.SAID)
+        size = self.SIZE + self.COUNT + self.SAID
+        file.write_bytes(bytes(size))
+        self._calls = 0
         self._heard = False
+        with file.open("r+b") as stream:
+            self._map = mmap.mmap(stream.fileno(), size)
 
     def note(self, text: str) -> None:
         """Write what happens next."""
-        self._map[: self.SIZE] = text.encode("ascii", "replace")[: self.SIZE].ljust(
-            self.SIZE, b"\0"
-        )
+        size, end = self.SIZE, self.SIZE + self.COUNT
+        self._map[:size] = text.encode("ascii", "replace")[:size].ljust(size, b"\0")
+        if text not in ("", "fmi2GetStatus"):  # to ask whether a step is over is no progress
+            self._calls += 1
+            self._map[size:end] = self._calls.to_bytes(self.COUNT, "little")
         if self._heard:
-            self._map[self.SIZE :] = bytes(self.SAID)
+            self._map[end:] = bytes(self.SAID)
             self._heard = False
 
     def hear(self, text: str) -> None:
         """Write what the FMU says meanwhile."""
-        self._map[self.SIZE :] = text.encode()[: self.SAID].ljust(self.SAID, b"\0")
+        said = text.encode()[: self.SAID].ljust(self.SAID, b"\0")
+        self._map[self.SIZE + self.COUNT :] = said
         self._heard = True
 
     def text(self) -> str:
@@ -85,8 +94,16 @@ class BlackBox:
     def read(cls, file: Path) -> tuple[str, str]:
         """Return what was noted last and what was said then, "" for nothing."""
         data = file.read_bytes() if file.exists() else b""
-        noted, heard = (part.rstrip(b"\0") for part in (data[: cls.SIZE], data[cls.SIZE :]))
-        return noted.decode("ascii"), heard.decode("utf-8", "ignore")
+        noted, said = (
+            part.rstrip(b"\0") for part in (data[: cls.SIZE], data[cls.SIZE + cls.COUNT :])
+        )
+        return noted.decode("ascii"), said.decode("utf-8", "ignore")
+
+    @classmethod
+    def calls(cls, file: Path) -> int:
+        """Return how many calls were noted."""
+        data = file.read_bytes() if file.exists() else b""
+        return int.from_bytes(data[cls.SIZE : cls.SIZE + cls.COUNT], "little")
 
 
 class Library:
@@ -247,7 +264,7 @@ class Instance:
     def step(self, time_: float, step: float) -> int:
         """Call fmi2DoStep (s), and wait where the FMU computes asynchronously."""
         status = self._do("fmi2DoStep", time_, step, 1)
-        while status == PENDING:  # the time limit of the probe ends an endless wait
+        while status == PENDING:  # the time limit of the call ends an endless wait
             answer = c_int(PENDING)
             asked = self._do("fmi2GetStatus", _DO_STEP_STATUS, byref(answer))
             status = answer.value if asked in (OK, WARNING) else asked
