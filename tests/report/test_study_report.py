@@ -257,7 +257,7 @@ def test_values_have_the_digits_that_their_intervals_leave(value, std, told):
 )
 def test_a_value_is_at_the_edge_only_where_it_stands_at_a_bound(value, low, told):
     known = Value(value, "N/m", low, 1e9, std=0.9)
-    _, _, notes = parameter_table(StudyModel("lugre", parameters={"sigma_a": known}))
+    _, _, notes = parameter_table(StudyModel("lugre", parameters={"sigma_a": known}), "voltage")
     assert any("at a bound" in note for note in notes) is told
 
 
