@@ -23,6 +23,7 @@ from .channels import DRIVE, ChannelSpec, at_device, channel_unit
 from .corrections import Correction, gain_of, set_right
 from .decimate import decimated
 from .extra import Extra, found_in, read_extra
+from .finer import Finer
 from .guess import guess_channels, specs, too_few_rows
 from .labels import TEMPERATURE, Labels, mean_temperature
 from .noise import Noise, estimate_noise
@@ -72,9 +73,9 @@ class Measurement:
         False where a sample was missing and is interpolated.
     lost : mapping of (n,) arrays of bool
         By channel: True where that one alone says nothing, such as beyond the end of its range.
-    jumps : mapping of (n,) arrays of bool
-        By channel: True where it jumps between samples that were joined. Its value there is no
-        model's, but equilibrium holds: the filter was the same for all forces.
+    parts, since : int, mapping of (n,) arrays
+        Where samples were left out, at how many moments per sample a model is evaluated, and by
+        command how it went from one sample to the next; see `finer`.
     noise : dict of float
         Standard deviation of each channel in SI; `noise_facts` how it was found, None where given.
     notes : tuple of str
@@ -110,7 +111,8 @@ class Measurement:
     source: str
     notes: tuple[str, ...] = field(default=())
     lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
-    jumps: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    parts: int = 1
+    since: Mapping[str, Array] = field(default_factory=dict)
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
     extra: Mapping[str, Extra] = field(default_factory=dict)
@@ -133,20 +135,20 @@ class Measurement:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def valid(self, *channels: str, jumps: bool = True) -> NDArray[np.bool_]:
-        """Return at which samples (n,) all of these channels say something.
-
-        Parameters
-        ----------
-        channels : their names
-        jumps : whether a channel says nothing where it jumps, as is right for a model's force
-        """
+    def valid(self, *channels: str) -> NDArray[np.bool_]:
+        """Return at which samples (n,) all of these channels say something."""
         valid = self.measured
         for channel in channels:
-            for flags in (self.lost, self.jumps) if jumps else (self.lost,):
-                if channel in flags:
-                    valid = valid & ~flags[channel]
+            if channel in self.lost:
+                valid = valid & ~self.lost[channel]
         return valid
+
+    @property
+    def finer(self) -> Finer | None:
+        """How a model is evaluated between samples and filtered; None where none were left out."""
+        if self.parts == 1:
+            return None
+        return Finer(self.parts, self.since.get(self.drive, np.ones(len(self.time))))
 
     @property
     def drive(self) -> str:
@@ -174,7 +176,7 @@ class Measurement:
             channels={key: values[start:stop] for key, values in self.channels.items()},
             measured=self.measured[start:stop],
             lost={key: flags[start:stop] for key, flags in self.lost.items()},
-            jumps={key: flags[start:stop] for key, flags in self.jumps.items()},
+            since={key: counts[start:stop] for key, counts in self.since.items()},
             extra={key: one.of(slice(start, stop)) for key, one in self.extra.items()},
         )
 
@@ -205,8 +207,7 @@ class Measurement:
 
         return replace(
             self, channels=named(self.channels), units=named(self.units), lost=named(self.lost),
-            jumps=named(self.jumps),
-            noise=named(self.noise), noise_facts=named(self.noise_facts),
+            since=named(self.since), noise=named(self.noise), noise_facts=named(self.noise_facts),
             spikes=tuple(one._replace(channel=names.get(one.channel, one.channel))
                          for one in self.spikes),
         )  # fmt: skip
@@ -325,7 +326,8 @@ def measurements_of(
             Measurement(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
                 tuple(notes), labels=labels, spikes=() if known.mask else spikes,
-                lost=fewer.lost[number - 1], jumps=fewer.jumps[number - 1], extra=extra.at(piece),
+                lost=fewer.lost[number - 1], parts=fewer.parts, since=fewer.since[number - 1],
+                extra=extra.at(piece),
             )
         )  # fmt: skip
     return out
