@@ -45,8 +45,7 @@ class Decimated:
     `parts` and, by command, `since` of each piece are those of `data.finer.Finer`; 1 and nothing
     where no sample was left out. `lost` of each piece says where the record of a channel that was
     moved in time holds nothing. `gain` is by channel what filter and interpolation leave of white
-    noise, where there was one; `noise` of each piece that before them, of channels whose noise is
-    not white behind them.
+    noise, where there was one; `noise` of each piece that before them.
     `notes` says what was done, none where nothing was.
     """
 
@@ -93,9 +92,9 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
         taps = {name: _taps(name, y, every) for name, y in channels.items()}
         kept = {name: _filtered(y, taps[name])[::every].copy() for name, y in channels.items()}
         pieces.append((time[::every], kept, _all_within(measured, every)[::every]))
-        short = {name: channels[name] for name, own in taps.items() if own is hann(every)}
-        noise.append({n: shift.noise.get(n) or estimate_noise(y) for n, y in short.items()})
         commands = {name: y for name, y in channels.items() if name.endswith(DRIVE)}
+        rest = {name: y for name, y in channels.items() if name not in commands}
+        noise.append({n: shift.noise.get(n) or estimate_noise(y) for n, y in rest.items()})
         since.append({name: _since(y, every, parts) for name, y in commands.items()})
         ended.append(
             {name: ~_all_within(~flags, every)[::every] for name, flags in shift.lost.items()}

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from ..errors import RecordError, UnitError
 from ..shown import shown
 from ..units import conversion
-from .channels import DRIVE, ChannelSpec, at_device, channel_unit
+from .channels import DRIVE, ChannelSpec, at_device, channel_unit, is_smooth
 from .corrections import Correction, gain_of, set_right
 from .decimate import decimated
 from .extra import Extra, found_in, read_extra
 from .finer import Finer
 from .guess import guess_channels, specs, too_few_rows
 from .labels import TEMPERATURE, Labels, mean_temperature
-from .noise import Noise, estimate_noise
+from .noise import KNOWN, Noise, estimate_noise, quietest
 from .read import read_table
 from .sampling import Even, Sampling, evenly
 from .spikes import Spike, spikes_of, spikes_text
@@ -318,7 +318,7 @@ def measurements_of(
         name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
         noise, facts = _noise(table, channels, parts, estimate, known.corrections)
         if fewer.gain:
-            _behind_filter(fewer.gain, fewer.noise[number - 1], noise, facts)
+            _behind_filter(fewer.gain, fewer.noise[number - 1], parts, noise, facts)
         for channel, level in known.levels.items():
             units[channel], noise[channel], facts[channel] = channel_unit(channel), 0.0, None
             parts[channel] = np.full(len(piece), level)
@@ -430,24 +430,33 @@ def _noise(
 
 
 def _behind_filter(
-    gains: Mapping[str, float], before: Mapping[str, Noise],
+    gains: Mapping[str, float], before: Mapping[str, Noise], parts: Mapping[str, Array],
     noise: dict[str, float], facts: dict[str, Noise | None],
 ) -> None:  # fmt: skip
     """Change the noise of channels into that behind an anti-alias filter or an interpolation.
+
+    That of a force is not white there: it is told from before, and is no better known. A motion
+    shows its noise behind its filter too, or what was known before.
 
     Parameters
     ----------
     gains : by channel, what filter and interpolation leave of white noise
     before : by channel, the noise before them, where it was estimated
+    parts : the channels as they are now
     noise, facts : of the channels as they are now, changed in place
     """
     for channel, gain in gains.items():
-        found = before.get(channel) if facts.get(channel) else None
-        if found is not None:  # behind the filter it is not white, and is told from before
-            facts[channel] = replace(found, std=gain * found.std)
-            noise[channel] = gain * found.std
-        elif channel in facts and facts[channel] is None:
+        now, found = facts.get(channel), before.get(channel)
+        if channel in facts and now is None:
             noise[channel] *= gain
+        if now is None or found is None:
+            continue
+        long = is_smooth(channel) and gain < 1.0
+        if not long or (now.colour not in KNOWN and found.colour in KNOWN):
+            std = gain * found.std
+            if found.colour == "resting":  # low-passed before: the filter may leave all of it
+                std = max(std, min(found.std, quietest(parts[channel])))
+            noise[channel], facts[channel] = std, replace(found, std=std)
 
 
 def _what_is_missing(values: Sequence[str]) -> list[str]:
