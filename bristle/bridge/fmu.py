@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from ..compare.comparison import Comparison, compare_predictions
 from ..compare.coordinates import coordinates_of
-from ..compare.prediction import RunPrediction, between
+from ..compare.prediction import RunPrediction
 from ..compare.scale import rms
 from ..data.channels import DRIVE, MOTION, ChannelSpec, is_channel
+from ..data.finer import between
 from ..data.read import read_table
 from ..errors import FmuError
 from ..fmu.description import Description, Value, read_description

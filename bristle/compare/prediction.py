@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.finer import between
 from ..data.labels import Labels
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import LOST
@@ -110,7 +111,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
         problem.runs, problem.expectation(model, draws), strict=True
     ):
         predicted = problem.predict(model, run)
-        finer = problem.predict(model, halved(run))[::2]
+        finer = at_half_the_step(problem, model, run)
         if run.measured is not None:
             sigma = np.where(run.measured, sigma, sigma / LOST)  # `known` says it instead
         out.append(
@@ -133,6 +134,16 @@ def coordinates_of_run(run: Run) -> dict[str, Array]:
     numbers = {name: y for name, y in run.labels.items() if not isinstance(y, str)}
     measured = {name: one.values for name, one in run.extra.items()}
     return {**{name: np.full(len(run.x), y) for name, y in numbers.items()}, **measured, **found}
+
+
+def at_half_the_step(problem: Problem, model: Model, run: Run) -> Array:
+    """Return a model's force (n,) [N] at the samples of a run, evaluated twice as often."""
+    whole = run.whole if isinstance(run, StructureRun) else run
+    if whole is None or whole.finer is None:
+        return problem.predict(model, halved(run))[::2]
+    often = replace(whole, finer=whole.finer.halved())
+    again = replace(run, whole=often) if isinstance(run, StructureRun) else often
+    return problem.predict(model, again)
 
 
 def halved(run: Run) -> Run:
@@ -159,13 +170,3 @@ def halved(run: Run) -> Run:
         },
         measured=None,
     )
-
-
-def between(y: Array, rate: Array | None, dt: float) -> Array:
-    """Return samples (2 n - 1,) of which every second one is of y (n,)."""
-    out = np.empty(2 * len(y) - 1)
-    out[::2] = y
-    out[1::2] = 0.5 * (y[:-1] + y[1:])
-    if rate is not None:
-        out[1::2] += 0.125 * dt * (rate[:-1] - rate[1:])
-    return out

@@ -2,8 +2,8 @@
 
 A motion is smooth: a long filter takes what would be folded back, and leaves the motion. A force
 jumps where the motion turns or the command switches, and so do accelerations; a long filter would
-ring there, and a model that jumps as it should would be wrong. They get a filter as short as the
-new step, and a sample whose neighbours jump is not judged.
+ring there. They get a filter as short as the new step, and a model's force gets the same: see
+`data.finer`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import RecordError
 from ..quantity import plain
 from .channels import DRIVE, is_smooth
+from .finer import MOST, hann
 from .noise import SHORTEST, Noise, estimate_noise, is_switched
 from .sampling import Even
 from .table import Array
@@ -35,24 +36,25 @@ _TAPS = 20  # of the long filter per sample that is kept
 _BETA = 5.0  # of its Kaiser window: 50 dB of what would be folded back
 _HALF_POWER = 1.05  # its corner over half the new rate: white noise stays white when it folds
 _NONE = np.ones(1)
-_JUMPS = 4.0  # standard deviations by which samples about one leave a line where they jump
 
 
 @dataclass(frozen=True, eq=False)
 class Decimated:
-    """Pieces with fewer samples; `jumps` of each says by channel where a force jumps (n,).
+    """Pieces with fewer samples.
 
-    `lost` of each piece says where the record of a channel that was moved in time holds nothing.
-    `gain` is by channel what filter and interpolation leave of white noise, where there was one;
-    `noise` of each piece that before them, of channels whose noise is not white behind them.
+    `parts` and, by command, `since` of each piece are those of `data.finer.Finer`; 1 and nothing
+    where no sample was left out. `lost` of each piece says where the record of a channel that was
+    moved in time holds nothing. `gain` is by channel what filter and interpolation leave of white
+    noise, where there was one; `noise` of each piece that before them.
     `notes` says what was done, none where nothing was.
     """
 
     even: Even
-    jumps: list[Mapping[str, Flags]]
-    lost: list[Mapping[str, Flags]]
+    lost: Sequence[Mapping[str, Flags]]
     gain: Mapping[str, float] = field(default_factory=dict)
-    noise: list[Mapping[str, Noise]] = field(default_factory=list)
+    noise: Sequence[Mapping[str, Noise]] = ()
+    parts: int = 1
+    since: Sequence[Mapping[str, Array]] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -78,12 +80,11 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
     moved = moved or [InTime(channels) for _, channels, _ in even.pieces]
     if rate <= 0.0 or recorded < FAST * rate * (1.0 - 1e-6):
         left = {name: one.noise_left(name) for one in moved for name in one.between}
-        none: list[Mapping[str, Flags]] = [{} for _ in moved]
-        lost: list[Mapping[str, Flags]] = [one.lost for one in moved]
-        return Decimated(even, none, lost, left, [one.noise for one in moved])
-    every = int(recorded / rate + 1e-6)
-    pieces, jumps, noise = [], [], []
-    ended: list[Mapping[str, Flags]] = []
+        lost, noise_before = [one.lost for one in moved], [one.noise for one in moved]
+        return Decimated(even, lost, left, noise_before, since=[{} for _ in moved])
+    every, parts = _thinning(recorded / rate)
+    pieces, since, noise = [], [], []
+    ended: list[dict[str, Flags]] = []
     gain: dict[str, float] = {}
     for (time, channels, measured), shift in zip(even.pieces, moved, strict=True):
         if len(time) // every < SHORTEST:
@@ -91,11 +92,10 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
         taps = {name: _taps(name, y, every) for name, y in channels.items()}
         kept = {name: _filtered(y, taps[name])[::every].copy() for name, y in channels.items()}
         pieces.append((time[::every], kept, _all_within(measured, every)[::every]))
-        short = {name: channels[name] for name, own in taps.items() if own is _short(every)}
-        noise.append({n: shift.noise.get(n) or estimate_noise(y) for n, y in short.items()})
-        forces = [name for name in short if name.endswith("force")]  # what models are held against
-        found = {n: _jumps(short[n], every, noise[-1][n].std) for n in forces}
-        jumps.append({name: flags for name, flags in found.items() if flags.any()})
+        commands = {name: y for name, y in channels.items() if name.endswith(DRIVE)}
+        rest = {name: y for name, y in channels.items() if name not in commands}
+        noise.append({n: shift.noise.get(n) or estimate_noise(y) for n, y in rest.items()})
+        since.append({name: _since(y, every, parts) for name, y in commands.items()})
         ended.append(
             {name: ~_all_within(~flags, every)[::every] for name, flags in shift.lost.items()}
         )
@@ -110,17 +110,37 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
         f"decimated from {plain(recorded, 4)} Hz to {plain(1.0 / step, 4)} Hz behind an anti-alias "
         "filter (linear phase)"
     )
-    count = sum(int(flags.sum()) for one in jumps for flags in one.values())
-    if count:
-        note += f"; {count} samples beside jumps of {_named(jumps)} are not judged"
     return Decimated(
-        Even(pieces, replace(even.sampling, step=step), even.notes), list(jumps), ended, gain,
-        list(noise), (note,),
+        Even(pieces, replace(even.sampling, step=step), even.notes), ended, gain, noise, parts,
+        since, (note,),
     )  # fmt: skip
 
 
-def _named(jumps: list[dict[str, Flags]]) -> str:
-    return ", ".join(dict.fromkeys(name for one in jumps for name in one))
+def _thinning(most: float) -> tuple[int, int]:
+    """Return of how many samples one is kept, no more than `most`, and the parts of the new step.
+
+    The parts are those in which a model is evaluated: whole numbers of samples as recorded.
+    """
+    every = int(most + 1e-6)
+    recorded = -(-every // MOST)
+    return every // recorded * recorded, every // recorded
+
+
+def _since(V: Array, every: int, parts: int) -> Array:
+    """Return at how many moments up to each kept sample (n,) a command is nearer to it than before.
+
+    Parameters
+    ----------
+    V : the command as recorded
+    every : one sample of so many is kept
+    parts : moments per kept sample
+    """
+    kept = V[::every]
+    rows = V[1 : every * (len(kept) - 1) + 1].reshape(-1, every)
+    nearer = np.abs(rows - kept[1:, None]) < np.abs(rows - kept[:-1, None])
+    count = np.append(1, np.maximum(nearer.sum(axis=1), 1))
+    # A moment stands for the samples about it.
+    return np.asarray((count - 0.5) * parts / every + 0.5)
 
 
 def _taps(name: str, y: Array, every: int) -> Array:
@@ -131,9 +151,11 @@ def _taps(name: str, y: Array, every: int) -> Array:
     name, y : the channel and its samples (n,)
     every : one sample of so many is kept
     """
-    if name in DRIVE or is_switched(y):
+    if name.endswith(DRIVE):
         return _NONE
-    return _long(every) if is_smooth(name) else _short(every)
+    if is_smooth(name):
+        return _NONE if is_switched(y) else _long(every)
+    return hann(every)
 
 
 def _filtered(y: Array, taps: Array) -> Array:
@@ -154,30 +176,6 @@ def _long(every: int) -> Array:
 
     taps = firwin(_TAPS * every + 1, _HALF_POWER / every, window=("kaiser", _BETA))
     return np.asarray(taps, dtype=float)
-
-
-@cache
-def _short(every: int) -> Array:
-    return np.asarray(np.hanning(2 * every + 1)[1:-1], dtype=float)
-
-
-def _jumps(y: Array, every: int, noise: float) -> Flags:
-    """Return at which kept samples the samples about it leave a straight line by more than noise.
-
-    Parameters
-    ----------
-    y : (n,) as recorded
-    every : one sample of so many is kept
-    noise : standard deviation of the channel, in its unit
-    """
-    window = np.arange(-every, every + 1)
-    padded = np.concatenate([np.repeat(y[0], every), y, np.repeat(y[-1], every)])
-    rows = np.lib.stride_tricks.sliding_window_view(padded, len(window))[::every]
-    rows = rows - rows.mean(axis=1, keepdims=True)
-    rows = rows - (rows @ window / (window @ window))[:, None] * window
-    freedom = len(window) - 2
-    power = np.sum(rows**2, axis=1) / freedom
-    return np.asarray(power > noise**2 * (1.0 + _JUMPS * np.sqrt(2.0 / freedom)), dtype=bool)
 
 
 def _all_within(measured: Flags, every: int) -> Flags:

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from ..errors import RecordError, UnitError
 from ..shown import shown
 from ..units import conversion
-from .channels import DRIVE, ChannelSpec, at_device, channel_unit
+from .channels import DRIVE, ChannelSpec, at_device, channel_unit, is_smooth
 from .corrections import Correction, gain_of, set_right
 from .decimate import decimated
 from .extra import Extra, found_in, read_extra
+from .finer import Finer
 from .guess import guess_channels, specs, too_few_rows
 from .labels import TEMPERATURE, Labels, mean_temperature
-from .noise import Noise, estimate_noise
+from .noise import KNOWN, Noise, estimate_noise, quietest
 from .read import read_table
 from .sampling import Even, Sampling, evenly
 from .spikes import Spike, spikes_of, spikes_text
@@ -72,9 +73,9 @@ class Measurement:
         False where a sample was missing and is interpolated.
     lost : mapping of (n,) arrays of bool
         By channel: True where that one alone says nothing, such as beyond the end of its range.
-    jumps : mapping of (n,) arrays of bool
-        By channel: True where it jumps between samples that were joined. Its value there is no
-        model's, but equilibrium holds: the filter was the same for all forces.
+    parts, since : int, mapping of (n,) arrays
+        Where samples were left out, at how many moments per sample a model is evaluated, and by
+        command how it went from one sample to the next; see `finer`.
     noise : dict of float
         Standard deviation of each channel in SI; `noise_facts` how it was found, None where given.
     notes : tuple of str
@@ -110,7 +111,8 @@ class Measurement:
     source: str
     notes: tuple[str, ...] = field(default=())
     lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
-    jumps: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    parts: int = 1
+    since: Mapping[str, Array] = field(default_factory=dict)
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
     extra: Mapping[str, Extra] = field(default_factory=dict)
@@ -133,20 +135,20 @@ class Measurement:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def valid(self, *channels: str, jumps: bool = True) -> NDArray[np.bool_]:
-        """Return at which samples (n,) all of these channels say something.
-
-        Parameters
-        ----------
-        channels : their names
-        jumps : whether a channel says nothing where it jumps, as is right for a model's force
-        """
+    def valid(self, *channels: str) -> NDArray[np.bool_]:
+        """Return at which samples (n,) all of these channels say something."""
         valid = self.measured
         for channel in channels:
-            for flags in (self.lost, self.jumps) if jumps else (self.lost,):
-                if channel in flags:
-                    valid = valid & ~flags[channel]
+            if channel in self.lost:
+                valid = valid & ~self.lost[channel]
         return valid
+
+    @property
+    def finer(self) -> Finer | None:
+        """How a model is evaluated between samples and filtered; None where none were left out."""
+        if self.parts == 1:
+            return None
+        return Finer(self.parts, self.since.get(self.drive, np.ones(len(self.time))))
 
     @property
     def drive(self) -> str:
@@ -174,7 +176,7 @@ class Measurement:
             channels={key: values[start:stop] for key, values in self.channels.items()},
             measured=self.measured[start:stop],
             lost={key: flags[start:stop] for key, flags in self.lost.items()},
-            jumps={key: flags[start:stop] for key, flags in self.jumps.items()},
+            since={key: counts[start:stop] for key, counts in self.since.items()},
             extra={key: one.of(slice(start, stop)) for key, one in self.extra.items()},
         )
 
@@ -205,8 +207,7 @@ class Measurement:
 
         return replace(
             self, channels=named(self.channels), units=named(self.units), lost=named(self.lost),
-            jumps=named(self.jumps),
-            noise=named(self.noise), noise_facts=named(self.noise_facts),
+            since=named(self.since), noise=named(self.noise), noise_facts=named(self.noise_facts),
             spikes=tuple(one._replace(channel=names.get(one.channel, one.channel))
                          for one in self.spikes),
         )  # fmt: skip
@@ -317,7 +318,7 @@ def measurements_of(
         name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
         noise, facts = _noise(table, channels, parts, estimate, known.corrections)
         if fewer.gain:
-            _behind_filter(fewer.gain, fewer.noise[number - 1], noise, facts)
+            _behind_filter(fewer.gain, fewer.noise[number - 1], parts, noise, facts)
         for channel, level in known.levels.items():
             units[channel], noise[channel], facts[channel] = channel_unit(channel), 0.0, None
             parts[channel] = np.full(len(piece), level)
@@ -325,7 +326,8 @@ def measurements_of(
             Measurement(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
                 tuple(notes), labels=labels, spikes=() if known.mask else spikes,
-                lost=fewer.lost[number - 1], jumps=fewer.jumps[number - 1], extra=extra.at(piece),
+                lost=fewer.lost[number - 1], parts=fewer.parts, since=fewer.since[number - 1],
+                extra=extra.at(piece),
             )
         )  # fmt: skip
     return out
@@ -428,24 +430,33 @@ def _noise(
 
 
 def _behind_filter(
-    gains: Mapping[str, float], before: Mapping[str, Noise],
+    gains: Mapping[str, float], before: Mapping[str, Noise], parts: Mapping[str, Array],
     noise: dict[str, float], facts: dict[str, Noise | None],
 ) -> None:  # fmt: skip
     """Change the noise of channels into that behind an anti-alias filter or an interpolation.
+
+    That of a force is not white there: it is told from before, and is no better known. A motion
+    shows its noise behind its filter too, or what was known before.
 
     Parameters
     ----------
     gains : by channel, what filter and interpolation leave of white noise
     before : by channel, the noise before them, where it was estimated
+    parts : the channels as they are now
     noise, facts : of the channels as they are now, changed in place
     """
     for channel, gain in gains.items():
-        found = before.get(channel) if facts.get(channel) else None
-        if found is not None:  # behind the filter it is not white, and is told from before
-            facts[channel] = replace(found, std=gain * found.std)
-            noise[channel] = gain * found.std
-        elif channel in facts and facts[channel] is None:
+        now, found = facts.get(channel), before.get(channel)
+        if channel in facts and now is None:
             noise[channel] *= gain
+        if now is None or found is None:
+            continue
+        long = is_smooth(channel) and gain < 1.0
+        if not long or (now.colour not in KNOWN and found.colour in KNOWN):
+            std = gain * found.std
+            if found.colour == "resting":  # low-passed before: the filter may leave all of it
+                std = max(std, min(found.std, quietest(parts[channel])))
+            noise[channel], facts[channel] = std, replace(found, std=std)
 
 
 def _what_is_missing(values: Sequence[str]) -> list[str]:

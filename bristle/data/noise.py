@@ -23,6 +23,8 @@ Kernel = tuple[int, int]
 
 SHORTEST = 60
 """Fewest samples that a noise is estimated from."""
+KNOWN = ("white", "low-passed")
+"""Colours of a noise whose level is told from the channel, whatever its signal."""
 _DIFFERENCES: tuple[Kernel, ...] = tuple((a, 0) for a in range(2, 10))
 # From half the sampling rate downwards.
 _BANDS: tuple[Kernel, ...] = ((9, 0), (8, 1), (8, 2), (6, 3), (5, 5), (4, 8), (4, 16))
@@ -100,13 +102,13 @@ def estimate_noise(y: Array) -> Noise:
     std, colour = (std, "rough") if rough else _in_bands(y, std)
     if colour == "hidden" or std < _PERFECT * float(np.std(y)):
         colour = "hidden"  # what is flat so far down is the rounding of numbers after a filter
-        quiet = _quietest(y)
+        quiet = quietest(y)
         if quiet < _RESTING * float(np.std(y)):
             std, colour = max(std, quiet), "resting"
     return Noise(max(std, rounding), step, colour)
 
 
-def _quietest(y: Array) -> float:
+def quietest(y: Array) -> float:
     """Return the RMS about a straight line in the quietest stretches of 2 % of a channel."""
     size = max(100, len(y) // 50)
     if len(y) < 2 * size:

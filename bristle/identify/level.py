@@ -34,15 +34,11 @@ def smoothed_level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
     for i, what in enumerate(("displacement", "velocity")):
         channel = f"{name}_{what}"
         if m.has(channel):
-            y[:, i], have[i], seen[:, i] = m[channel], True, m.valid(channel, jumps=False)
+            y[:, i], have[i], seen[:, i] = m[channel], True, m.valid(channel)
             r[i] = m.noise.get(channel, 0.0) ** 2
     channel, ground = f"{name}_acceleration_absolute", "ground_acceleration"
     if m.has(channel):
-        y[:, 2], have[2], seen[:, 2] = (
-            m[channel] - m[ground],
-            True,
-            m.valid(channel, ground, jumps=False),
-        )
+        y[:, 2], have[2], seen[:, 2] = m[channel] - m[ground], True, m.valid(channel, ground)
         r[2] = m.noise.get(channel, 0.0) ** 2 + m.noise.get(ground, 0.0) ** 2
     # A channel without any noise still is no better than its last digits.
     r = np.maximum(r, (1e-7 * np.std(y, axis=0)) ** 2 + 1e-30)

@@ -12,7 +12,7 @@ from ..physics.inputs import Inputs
 from ..physics.laws import LAWS, Law
 from .fit import Fit
 from .model import Model, Run
-from .structure import StructureProblem
+from .structure import StructureProblem, StructureRun
 
 Array = NDArray[np.float64]
 
@@ -95,8 +95,9 @@ def _line_covariance(problem: StructureProblem, model: Model, columns: list[Arra
 
 def line_columns(run: Run, law: type[Law]) -> Array:
     """Return the force (n, p) of each parameter of a linear law at 1, the others at zero."""
-    zero = np.zeros_like(run.x)
-    q = Inputs(run.x, run.v, run.a, run.V, run.dt, 0.0, 0.0, False)
-    none = dict.fromkeys(law.parameters, 0.0)
+    whole, keep = (run.whole, run.keep) if isinstance(run, StructureRun) else (run, slice(None))
+    assert whole is not None
+    q = Inputs(*whole.smoothed, 0.0, 0.0, False)
+    zero, none = np.zeros_like(q.x), dict.fromkeys(law.parameters, 0.0)
     own = [law.hooks()["force"](q, (), law.at({**none, name: 1.0})) for name in law.parameters]
-    return np.column_stack([zero + force for force in own])
+    return np.column_stack([whole.seen(zero + force)[keep] for force in own])

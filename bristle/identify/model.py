@@ -6,12 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Self
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data.extra import Extra
+from ..data.finer import Finer, between
 from ..data.labels import Label
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
@@ -38,6 +40,16 @@ REFERENCE = {
 """Typical sizes on the rig of 10 N for which the effects' defaults are written."""
 
 
+class Moments(NamedTuple):
+    """Motion and command x, v, a, V (m,) in SI at moments that are `dt` [s] apart."""
+
+    x: Array
+    v: Array
+    a: Array
+    V: Array
+    dt: float
+
+
 @dataclass(frozen=True)
 class Run:
     """A measured run, its motion smoothed.
@@ -48,7 +60,8 @@ class Run:
     its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
     samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
     besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
-    was not measured and follows from the motion, beside `noise` and each with its draw of `draws`.
+    was not measured and follows from the motion, beside `noise` and each with its draw of `draws`;
+    `finer` how models are evaluated between the samples of a decimated run, None for others.
     """
 
     name: str
@@ -67,6 +80,27 @@ class Run:
     rest: int = 0
     extra: Mapping[str, Extra] = field(default_factory=dict)
     force_draws: Array | None = None
+    finer: Finer | None = None
+
+    @cached_property
+    def smoothed(self) -> Moments:
+        """The smoothed motion and command at the moments of which a model gives the force."""
+        return self._moments(self.x, self.v, self.a, self.V)
+
+    def drawn(self, draw: int) -> Moments:
+        """Return the motion and command of one draw at these moments."""
+        e = self.draws[draw]
+        return self._moments(self.x + e[:, 0], self.v + e[:, 1], self.a + e[:, 2], self.V + e[:, 3])
+
+    def _moments(self, x: Array, v: Array, a: Array, V: Array) -> Moments:
+        if self.finer is None:
+            return Moments(x, v, a, V, self.dt)
+        motion = self.finer.motion(x, v, a, self.dt)
+        return Moments(*motion, self.finer.command(V), self.dt / self.finer.parts)
+
+    def seen(self, force: Array) -> Array:
+        """Return a force at these moments as the measured one is: behind its filter (n,) [N]."""
+        return force if self.finer is None else self.finer.filtered(force)
 
     @property
     def judged(self) -> NDArray[np.bool_]:
@@ -76,7 +110,11 @@ class Run:
         return self.measured[self.skip :]
 
     def of(self, part: slice) -> Self:
-        """Return the run with these of its samples; `dt` and `skip` stay what they were."""
+        """Return the run with these of its samples; `dt` and `skip` stay what they were.
+
+        Where some between are left out, nothing is known between samples.
+        """
+        dense = part.step in (None, 1)
         rest = 0 if part.start else len(range(self.rest)[part])
         return replace(
             self, rest=rest, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
@@ -84,6 +122,7 @@ class Run:
             measured=None if self.measured is None else self.measured[part],
             force_draws=None if self.force_draws is None else self.force_draws[:, part],
             extra={name: one.of(part) for name, one in self.extra.items()},
+            finer=self.finer.of(part) if self.finer and dense else None,
         )  # fmt: skip
 
 
@@ -267,18 +306,17 @@ class Problem:
 
     def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, its states beginning as the model says."""
-        x, v, a, V = run.x, run.v, run.a, run.V
-        if draw is not None:
-            e = run.draws[draw]
-            x, v, a, V = x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
-        v, a = true_motion(model.effects, model.values, v, a, run.dt)
+        x, v, a, V, dt = run.smoothed if draw is None else run.drawn(draw)
+        v, a = true_motion(model.effects, model.values, v, a, dt)
         own = values_of_labels(model.effects, run.labels)
         late, values = pure_delay(model.effects, {**model.values, **own} if own else model.values)
         if late > 0.0:
-            x, v, a, V = earlier((x, v, a, V), late, run.dt)
+            x, v, a, V = earlier((x, v, a, V), late, dt)
         tracks = tracks_of(model.effects, run.extra, run.name)
-        force = self.bench(model).force(x, v, a, V, run.dt, values, tracks)
-        return shown_force(model.effects, values, force, run.dt)
+        if run.finer is not None:
+            tracks = {name: between(y, None, dt, run.finer.parts) for name, y in tracks.items()}
+        force = self.bench(model).force(x, v, a, V, dt, values, tracks)
+        return run.seen(shown_force(model.effects, values, force, dt))
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].

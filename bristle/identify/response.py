@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..data.channels import device_channel, no_device
 from ..data.extra import Extra
+from ..data.finer import Finer
 from ..data.labels import Labels
 from ..data.measurement import Measurement
 from ..errors import RecordError
@@ -41,15 +42,13 @@ class KnownSamples(NamedTuple):
     """Which samples of a run were measured.
 
     `motion`, `acceleration` (levels, n) of each level's displacement or velocity, and of its
-    accelerometer and the ground's; `force` (n,) of the damper; `others` (n,) of all other devices;
-    `smooth` (n,) where the damper's force does not jump either, between samples that were joined.
+    accelerometer and the ground's; `force` (n,) of the damper; `others` (n,) of all other devices.
     """
 
     motion: Flags
     acceleration: Flags
     force: Flags
     others: Flags
-    smooth: Flags
 
     def equilibrium(self, level: int = 0) -> Flags:
         """Return where the equilibrium of a level and all above it is known (n,)."""
@@ -70,7 +69,8 @@ class Response:
     the smoother leaves uncertain of x, v and relative acceleration; `draws` (levels, d, n, 3) draws
     of that error; `V_left` the noise left on V; `drive` the channel that V holds, in its own unit,
     "" where none was measured; `labels` what is known of the whole run; `extra` its channels
-    besides those that bristle knows. `known` says where all that was measured, and not filled in.
+    besides those that bristle knows. `known` says where all that was measured, and not filled in;
+    `finer` is that of `Run`.
     """
 
     name: str
@@ -95,6 +95,7 @@ class Response:
     others: tuple[Load, ...] = ()
     across: DeviceMotion | None = None
     known: KnownSamples | None = None
+    finer: Finer | None = None
 
     @property
     def damped(self) -> bool:
@@ -249,19 +250,18 @@ def responses(
 
 def _known(m: Measurement, building: Building, device: Device) -> KnownSamples | None:
     """Return which samples were measured, None where all were."""
-    if m.measured.all() and not m.lost and not m.jumps:
+    if m.measured.all() and not m.lost:
         return None
     motion, acceleration = [], []
     for name in building.levels():
         either = [f"{name}_displacement", f"{name}_velocity"]
         motion.append(np.any([m.valid(one) for one in either if m.has(one)], axis=0))
         shown = ["ground_acceleration", f"{name}_acceleration_absolute"]
-        acceleration.append(m.valid(*shown, jumps=False))
+        acceleration.append(m.valid(*shown))
     others = [f"{one.name}_force" for one in building.devices if one is not device]
     return KnownSamples(
-        np.array(motion), np.array(acceleration), m.valid("force", jumps=False),
-        m.valid(*others, jumps=False), m.valid("force"),
-    )  # fmt: skip
+        np.array(motion), np.array(acceleration), m.valid("force"), m.valid(*others)
+    )
 
 
 def _loads(m: Measurement, building: Building, device: Device) -> tuple[Load, ...]:
@@ -360,6 +360,7 @@ def _response(
         m.noise.get("force", 0.0), m.noise.get("ground_acceleration", 0.0), np.array(own),
         np.array([level["std"] for level in levels]),
         np.array([error[:, :n] for error in errors]), left, drive, m.labels, m.extra,
+        finer=m.finer,
     )  # fmt: skip
 
 

@@ -131,27 +131,25 @@ class StructureProblem(Problem):
         structure = tuple(e for e in model.effects if EFFECTS[e].site == "structure")
         damper = tuple(e for e in model.effects if EFFECTS[e].site != "structure")
         law = model.law_class
-        # A law without states is a function of the motion at each sample, others of its history.
+        # A law without states is a function of the motion at each sample, others of its history,
+        # as all are behind a filter.
         memory = bool(law.states) or any(
             EFFECTS[e].states or EFFECTS[e].site == "sensor" for e in model.effects
         )
         assert run.whole is not None
-        seen = run.whole if memory else run
-        x, v, a = seen.x, seen.v, seen.a
-        if draw is not None:
-            e = seen.draws[draw]
-            x, v, a = x + e[:, 0], v + e[:, 1], a + e[:, 2]
+        seen = run.whole if memory or run.whole.finer is not None else run
+        x, v, a, V, dt = seen.smoothed if draw is None else seen.drawn(draw)
         stiffness = 0.0
         if law.site == "structure":
             stiffness = model.value(law.stiffness)
-            q = Inputs(x, v, a, seen.V, seen.dt, 0.0, 0.0, False)
-            force: Array = law.hooks()["force"](q, (), law.at(model.values))
+            q = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
+            force = seen.seen(law.hooks()["force"](q, (), law.at(model.values)))
         else:
             force = super().predict(of_one_site(model, damper), seen, draw)
         if structure:
             own = of_one_site(model, structure)
             along = self.along(own.effects)
-            force = force + along.force(x, v, seen.dt, stiffness, own.values)
+            force = force + seen.seen(along.force(x, v, dt, stiffness, own.values))
         return force if seen is run else force[run.keep]
 
 
@@ -188,7 +186,9 @@ def structure_run(
 def _of(response: Response, run: StructureRun) -> StructureRun:
     """Return a run with what is known of its measurement: command, labels, extra channels."""
     known: dict[str, Any] = {"drive": response.drive or VOLTAGE.name, "labels": response.labels}
-    whole = None if run.whole is None else replace(run.whole, extra=response.extra, **known)
+    whole = None
+    if run.whole is not None:
+        whole = replace(run.whole, extra=response.extra, finer=response.finer, **known)
     extra = {
         name: replace(one, values=one.values[run.keep]) for name, one in response.extra.items()
     }
@@ -323,7 +323,7 @@ def _known_across(response: Response) -> NDArray[np.bool_] | None:
     if known is None:
         return None
     ends = [level for level in response.device.levels if level != GROUND]
-    shown = known.equilibrium() if response.force is None else known.smooth
+    shown = known.equilibrium() if response.force is None else known.force
     return np.asarray(known.motion[ends].all(axis=0) & shown, dtype=np.bool_)
 
 

@@ -69,7 +69,23 @@ def test_each_run_has_the_errors_of_its_own_step(monkeypatch):
             np.testing.assert_allclose(spread[:, :2], found.std[:, :2], rtol=0.1)
 
 
-def test_accelerations_that_jump_are_in_equilibrium_still(whole):
-    """All forces go through the same filter: only the damper's own is held against a law."""
+def test_a_decimated_building_is_in_equilibrium_and_its_damper_behind_the_same_filter(monkeypatch):
+    monkeypatch.setattr(shaken, "DT", 1.0 / 3000.0)
+    whole = measured(shake(HOUSE, 11, friction, samples=24000), 11, noise=1e-3)
     even = Even([(whole.time, whole.channels, whole.measured)], whole.sampling, [])
-    assert set(decimated(even, 100.0).jumps[0]) <= {"force"}
+    found = decimated(even, 500.0)
+    time, channels, known = found.even.pieces[0]
+    noise = {name: found.gain[name] * whole.noise[name] for name in channels}
+    run = replace(
+        whole, time=time, channels=channels, measured=known, noise=noise, lost=found.lost[0],
+        parts=found.parts, since=found.since[0], sampling=found.even.sampling,
+    )  # fmt: skip
+    assert run.measured.all()
+    np.testing.assert_allclose(equilibrium([run], HOUSE).z, 1.0, atol=0.15)
+    (response,) = responses([run], HOUSE)
+    seen = damper_run(response, HOUSE, "lugre").whole
+    moments = seen.smoothed
+    error = (seen.force - seen.seen(friction(moments.x, moments.v)))[seen.skip :]
+    plain = (seen.force - friction(seen.x, seen.v))[seen.skip :]
+    assert np.std(error) < 0.5 * np.std(plain)
+    assert damper_run(response, HOUSE, "lugre").judged.all()

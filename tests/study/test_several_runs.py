@@ -11,6 +11,7 @@ from made import RATE, bench_run, write
 
 from bristle.cli import main
 from bristle.data.decimate import decimated
+from bristle.data.finer import Finer
 from bristle.data.sampling import Even, Sampling
 from bristle.data.spikes import find_spikes
 from bristle.errors import RecordError, StudyError
@@ -91,7 +92,8 @@ def test_fast_runs_are_decimated_and_that_is_said(tmp_path, capsys) -> None:
     np.testing.assert_allclose(run["displacement"], 1e-3 * slow["x [mm]"], atol=2e-5)
     # What the short filter leaves of white noise of 0.1 N.
     assert run.noise["force"] == pytest.approx(0.1 * 6.0**0.5 / 4.0 / 2.0**0.5, rel=0.2)
-    assert run.jumps["force"].any()
+    assert run.measured.all()
+    assert run.parts == 4
     main(["study", "new", str(tmp_path / "all"), "--rate", "0", "--data", *map(str, files)])
     assert Study(tmp_path / "all").read()[0].step == pytest.approx(0.0005)
 
@@ -129,20 +131,40 @@ def test_a_motion_keeps_white_noise_and_loses_what_would_fold() -> None:
     assert not same.notes
 
 
-def test_a_force_does_not_ring_where_it_jumps() -> None:
+def test_a_force_does_not_ring_where_it_jumps_and_a_model_passes_its_filter() -> None:
     rng, t = np.random.default_rng(4), np.arange(80_000) / 2000.0
     clean = 5.0 * np.sign(np.sin(2.0 * np.pi * 1.3 * t)) + np.sin(2.0 * np.pi * 2.0 * t)
     given = even_run(force=clean + rng.normal(0.0, 0.05, t.size), voltage=np.floor(t % 3.0))
     found = decimated(given, 500.0)
     _, y, _ = found.even.pieces[0]
-    lost = found.jumps[0]["force"]
-    error = (y["force"] - clean[::4])[~lost]
-    assert np.max(np.abs(error)) < 6.0 * found.gain["force"] * 0.05
+    assert np.max(np.abs(y["force"])) < 6.2
+    finer = Finer(found.parts, found.since[0]["voltage"])
+    error = y["force"] - finer.filtered(clean[: 4 * len(y["force"]) - 3])
     assert np.std(error) == pytest.approx(found.gain["force"] * 0.05, rel=0.05)
+    assert np.max(np.abs(error)) < 6.0 * found.gain["force"] * 0.05
     assert found.noise[0]["force"].std == pytest.approx(0.05, rel=0.1)
-    assert np.mean(lost) < 0.03
-    assert "beside jumps of force are not judged" in found.notes[0]
     np.testing.assert_array_equal(y["voltage"], np.floor(t % 3.0)[::4])
+
+
+@pytest.mark.parametrize(("rate", "parts"), [(1000.0, 2), (3500.0, 7), (5500.0, 5), (12000.0, 8)])
+def test_a_command_jumps_between_the_samples_where_it_did(rate: float, parts: int) -> None:
+    t = np.arange(round(20.0 * rate)) / rate
+    levels = np.random.default_rng(5).choice([0.0, 1.0, 4.0], 60)[(t / 0.3511).astype(int)]
+    slow = np.sin(2.0 * np.pi * 0.5 * t)
+    given = Even(
+        [(t, {"voltage": levels, "current": slow}, np.ones(len(t), dtype=bool))],
+        Sampling(1.0 / rate, len(t)), [],
+    )  # fmt: skip
+    found = decimated(given, 500.0)
+    _, y, _ = found.even.pieces[0]
+    stride = round(found.even.sampling.step * rate / found.parts)
+    for name, whole in (("voltage", levels), ("current", slow)):
+        made = Finer(found.parts, found.since[0][name]).command(y[name])
+        off = np.abs(made - whole[::stride][: len(made)])
+        assert np.max(off[: -found.parts]) < (1e-4 if name == "current" else 2.0 + 1e-9)
+        if stride == 1 and name == "voltage":
+            np.testing.assert_array_equal(made, whole[: len(made)])
+    assert found.parts == parts
 
 
 def test_too_few_samples_are_not_decimated() -> None:

@@ -1,0 +1,111 @@
+"""Whether what is printed is what the data and the model say: one section per kind.
+
+`left_out`: 50 smooth records without a fault, of 200 Hz to 5 kHz, as loggers filter them or not,
+with and without white noise: how many samples no error counts, besides those in which a run
+settles.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import bristle
+from bristle.identify.prepare import prepare
+
+from ._rows import Row
+
+Array = NDArray[np.float64]
+
+RATES = (200.0, 500.0, 1000.0, 2000.0, 5000.0)
+"""Samples per second [Hz] of the records."""
+
+NOISES = (0.0, 0.001, 0.005, 0.01, 0.02)
+"""White noise, as a share of each channel's standard deviation."""
+
+SHARE = 0.005
+"""Of the samples may be left out."""
+
+
+class Record(NamedTuple):
+    """A smooth record: `rate` [Hz], share of `noise`, whether a logger `filtered` it, a `seed`."""
+
+    rate: float
+    noise: float
+    filtered: bool
+    seed: int
+
+
+def run() -> list[Row]:
+    """Return the figures of all sections."""
+    return left_out()
+
+
+def left_out() -> list[Row]:
+    """Return the share of samples that no error counts: of all records, and of the worst."""
+    kinds = product(RATES, NOISES, (False, True))
+    records = [Record(*kind, seed) for seed, kind in enumerate(kinds)]
+    found = {one: share_left_out(one) for one in records}
+    worst = max(found, key=lambda one: found[one])
+    mean = float(np.mean([*found.values()]))
+    return [
+        Row(
+            f"samples left out of {len(found)} smooth records",
+            f"{100.0 * mean:.2g} %; worst {100.0 * found[worst]:.2g} %",
+            f"<= {100.0 * SHARE:g} %", found[worst] / SHARE, f"worst: {worst}",
+        )
+    ]  # fmt: skip
+
+
+def share_left_out(record: Record) -> float:
+    """Return which share of a record's samples no error counts, after those in which it settles."""
+    with tempfile.TemporaryDirectory(prefix="bristle_honest_") as name:
+        folder = Path(name)
+        both = (record, record._replace(seed=record.seed + 1000))
+        files = [write(one, folder / f"run_{one.seed}.csv") for one in both]
+        study = bristle.Study.create(folder / "rig", files)
+        judged = np.concatenate([prepare(one).judged for one in study.read()])
+    return 1.0 - float(np.mean(judged))
+
+
+def write(record: Record, path: Path) -> Path:
+    """Write a record of a damper whose force is smooth, by turns linear and of a Bouc-Wen kind."""
+    random = np.random.default_rng(record.seed)
+    fine = max(1, round(10_000.0 / record.rate))
+    t = np.arange(round(8.0 * record.rate) * fine) / (record.rate * fine)
+    tones = [(f, random.normal(), random.uniform(0.0, 6.3)) for f in (0.7, 1.9, 4.3, 9.1, 17.3)]
+    x = sum(a / f * np.sin(2.0 * np.pi * f * t + p) for f, a, p in tones)
+    v = sum(2.0 * np.pi * a * np.cos(2.0 * np.pi * f * t + p) for f, a, p in tones)
+    force = 0.8 * v + 2.0 * x
+    if record.seed % 2:
+        force = force + 6.0 * _hysteresis(v, 1.0 / (record.rate * fine))
+    columns = {"x [mm]": x, "F [N]": force}
+    for name, y in columns.items():
+        shown = y[::fine] if not record.filtered else _as_logged(y, record, fine)
+        columns[name] = shown + record.noise * np.std(shown) * random.standard_normal(len(shown))
+    rows = np.column_stack([t[::fine], *columns.values()])
+    np.savetxt(path, rows, "%.7g", ",", header="time [s],x [mm],F [N]", comments="")
+    return path
+
+
+def _hysteresis(v: Array, dt: float) -> Array:
+    """Return z of z' = (v - |v| z) / 0.4 (n,), which never jumps."""
+    z, out = 0.0, np.empty(len(v))
+    for k, speed in enumerate(v.tolist()):
+        z += dt * (speed - abs(speed) * z) / 0.4
+        out[k] = z
+    return out
+
+
+def _as_logged(y: Array, record: Record, fine: int) -> Array:
+    """Return a signal behind a logger's Butterworth of fourth order, at its rate."""
+    from scipy.signal import butter, sosfilt
+
+    corner = (0.1, 0.2, 0.4)[record.seed // 2 % 3] * record.rate
+    sos = butter(4, max(corner, 40.0), fs=record.rate * fine, output="sos")
+    return np.asarray(sosfilt(sos, y)[::fine], dtype=float)
