@@ -157,7 +157,7 @@ def halved(run: Run) -> Run:
             name: replace(one, values=between(one.values, None, run.dt))
             for name, one in run.extra.items()
         },
-        measured=None,
+        left_out={},
     )
 
 

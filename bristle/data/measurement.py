@@ -25,6 +25,7 @@ from .decimate import decimated
 from .extra import Extra, found_in, read_extra
 from .guess import guess_channels, specs, too_few_rows
 from .labels import TEMPERATURE, Labels, mean_temperature
+from .left_out import JUMPS, MASKED, MISSING, SATURATED, any_of, occurring
 from .noise import Noise, estimate_noise
 from .read import read_table
 from .sampling import Even, Sampling, evenly
@@ -70,8 +71,12 @@ class Measurement:
         By name, in SI; `units` holds the units.
     measured : (n,) array of bool
         False where a sample was missing and is interpolated.
+    masked : (n,) array of bool or None
+        True where a sample is not measured because a spike there was masked; None for nowhere.
     lost : mapping of (n,) arrays of bool
-        By channel: True where that one alone says nothing, such as beyond the end of its range.
+        By channel: True where that one alone holds nothing, such as beyond the end of its record.
+    saturated : mapping of (n,) arrays of bool
+        By channel: True where that one may stand at the end of its range.
     jumps : mapping of (n,) arrays of bool
         By channel: True where it jumps between samples that were joined. Its value there is no
         model's, but equilibrium holds: the filter was the same for all forces.
@@ -114,6 +119,8 @@ class Measurement:
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
     extra: Mapping[str, Extra] = field(default_factory=dict)
+    saturated: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    masked: NDArray[np.bool_] | None = None
 
     def __repr__(self) -> str:
         rows = (
@@ -133,20 +140,40 @@ class Measurement:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def valid(self, *channels: str, jumps: bool = True) -> NDArray[np.bool_]:
+    def valid(self, *channels: str, jumps: bool = True, but_for: str = "") -> NDArray[np.bool_]:
         """Return at which samples (n,) all of these channels say something.
 
         Parameters
         ----------
         channels : their names
         jumps : whether a channel says nothing where it jumps, as is right for a model's force
+        but_for : the one reason that counts, such as "saturated"; "" for every one
         """
-        valid = self.measured
-        for channel in channels:
-            for flags in (self.lost, self.jumps) if jumps else (self.lost,):
-                if channel in flags:
-                    valid = valid & ~flags[channel]
-        return valid
+        found = self.left_out(*channels, jumps=jumps)
+        if but_for:
+            found = {reason: where for reason, where in found.items() if reason == but_for}
+        out = any_of(found)
+        return np.ones(len(self.time), dtype=np.bool_) if out is None else ~out
+
+    def left_out(self, *channels: str, jumps: bool = True) -> dict[str, NDArray[np.bool_]]:
+        """Return why samples (n,) of these channels say nothing: True by reason, where one holds.
+
+        Parameters
+        ----------
+        channels, jumps : as of `valid`
+        """
+        nowhere = np.zeros(len(self.time), dtype=np.bool_)
+
+        def of(flags: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+            own = [flags[channel] for channel in channels if channel in flags]
+            return np.asarray(np.any([nowhere, *own], axis=0), dtype=np.bool_)
+
+        masked = nowhere if self.masked is None else self.masked & ~self.measured
+        found = {
+            MASKED: masked, MISSING: (~self.measured & ~masked) | of(self.lost),
+            SATURATED: of(self.saturated), JUMPS: of(self.jumps) if jumps else nowhere,
+        }  # fmt: skip
+        return occurring(found)
 
     @property
     def drive(self) -> str:
@@ -174,6 +201,8 @@ class Measurement:
             channels={key: values[start:stop] for key, values in self.channels.items()},
             measured=self.measured[start:stop],
             lost={key: flags[start:stop] for key, flags in self.lost.items()},
+            saturated={key: flags[start:stop] for key, flags in self.saturated.items()},
+            masked=None if self.masked is None else self.masked[start:stop],
             jumps={key: flags[start:stop] for key, flags in self.jumps.items()},
             extra={key: one.of(slice(start, stop)) for key, one in self.extra.items()},
         )
@@ -205,7 +234,7 @@ class Measurement:
 
         return replace(
             self, channels=named(self.channels), units=named(self.units), lost=named(self.lost),
-            jumps=named(self.jumps),
+            saturated=named(self.saturated), jumps=named(self.jumps),
             noise=named(self.noise), noise_facts=named(self.noise_facts),
             spikes=tuple(one._replace(channel=names.get(one.channel, one.channel))
                          for one in self.spikes),
@@ -299,7 +328,9 @@ def measurements_of(
             labels.setdefault(TEMPERATURE, mean)
     if not values:
         raise RecordError(f"{table.source}: no channel besides time is named. There is nothing.")
+    there = {name: np.isfinite(y) for name, y in values.items()}
     spikes = spikes_of(time, values, mask=known.mask)
+    masked = time[np.any([own & ~np.isfinite(values[n]) for n, own in there.items()], axis=0)]
     notes += _masked(spikes) if known.mask else []
     extra = read_extra(table, time, known.extra)
     if warm is not None:
@@ -326,6 +357,7 @@ def measurements_of(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
                 tuple(notes), labels=labels, spikes=() if known.mask else spikes,
                 lost=fewer.lost[number - 1], jumps=fewer.jumps[number - 1], extra=extra.at(piece),
+                masked=_beside(piece, masked, even.sampling.step) if len(masked) else None,
             )
         )  # fmt: skip
     return out
@@ -346,6 +378,14 @@ def _set_right(even: Even, corrections: tuple[Correction, ...]) -> tuple[Even, l
         for (time, _, measured), one in zip(even.pieces, moved, strict=True)
     ]
     return replace(even, pieces=pieces), moved
+
+
+def _beside(time: Array, masked: Array, step: float) -> NDArray[np.bool_]:
+    """Return which times (n,) [s] lie within a step of one of those that were masked (m,)."""
+    ordered = np.sort(masked)
+    after = np.searchsorted(ordered, time)
+    behind, ahead = ordered[np.maximum(after - 1, 0)], ordered[np.minimum(after, len(ordered) - 1)]
+    return np.minimum(np.abs(time - behind), np.abs(ahead - time)) <= step * (1.0 + 1e-6)
 
 
 def _masked(spikes: tuple[Spike, ...]) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from known_runs import bench_run, truth_of
 
+from bristle.data.left_out import MISSING
 from bristle.identify import table, watch
 from bristle.identify.fit import Fit, Model, Problem, fit, identify
 from bristle.identify.search import z_of
@@ -156,7 +157,8 @@ def test_samples_that_were_not_measured_are_neither_drawn_nor_counted(problem: P
     lost = np.ones(1200, dtype=bool)
     lost[400:] = False
     runs = [
-        replace(run, measured=lost, force=np.where(lost, run.force, 1e6)) for run in problem.runs
+        replace(run, left_out={MISSING: ~lost}, force=np.where(lost, run.force, 1e6))
+        for run in problem.runs
     ]
     holed = Problem(runs)
     seen: Seen = []
