@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.left_out import LOADED, SETTLING, WAYS_OUT
-from ..quantity import quantity
+from ..quantity import percent, quantity
 from .model import Model, Problem, Run
 from .residuals import has_offset, zero_of
 
@@ -84,7 +84,7 @@ class ForceError:
         """
         rms, share = self.headline
         size = size if size is not None else self.signal_all
-        told = f" ({100.0 * share:.1f} %)" if isfinite(share) else ""
+        told = f" ({percent(share)})" if isfinite(share) else ""
         return f"{quantity(rms, unit, 4, size)}{told}"
 
     def counted(self) -> str:
@@ -109,13 +109,13 @@ class ForceError:
             return [f"{told}."] if told else []
         size = size if size is not None else self.signal_all
         if not self.over_all:
-            over = f"{quantity(self.rms_all, unit, 4, size)} ({100.0 * self.share_all:.1f} %)"
+            over = f"{quantity(self.rms_all, unit, 4, size)} ({percent(self.share_all)})"
             return [f"{told}. Over all samples the error is {over}."]
         most = max(self.left_out, key=lambda reason: self.left_out[reason])
         few = (
             "nothing"
             if not self.samples
-            else (f"{quantity(self.rms, unit, 4, size)} ({100.0 * self.share:.1f} %)")
+            else (f"{quantity(self.rms, unit, 4, size)} ({percent(self.share)})")
         )
         return [
             f"Warning: {told}. So the error is that over all samples; over the {self.samples:,} "

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from ..compare.names import site_name
 from ..compare.picture import headline
 from ..draw import html
-from ..draw.style import percent
 from ..physics.forms import shown_law
-from ..quantity import quantity, short_z
+from ..quantity import percent, quantity, short_z
 from ..study.run_file import TEST
 from ..version import __version__
 from .reproduce import commands

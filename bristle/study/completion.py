@@ -14,7 +14,7 @@ from .added_runs import other_data
 from .curves import learn_effect
 from .history import Step
 from .identification import identify_study
-from .identified import Identified
+from .identified import Identified, is_identified
 from .laws import law_or_all
 from .learned_effect import LearnedEffect
 from .learning import (
@@ -22,7 +22,6 @@ from .learning import (
     add_effects,
     diagnose_study,
     identify_with,
-    is_identified,
     take_law,
     verdict_of,
 )

@@ -8,9 +8,10 @@ from ..compare.loops import chosen_cycles
 from ..compare.panels import draw_error, draw_history, worst_window
 from ..compare.picture import LOOPS, loop_panels
 from ..compare.prediction import run_predictions
-from ..draw.style import Page, look, percent, png, short_z
+from ..draw.style import Page, look, png, short_z
 from ..identify.rig import DAMPER
 from ..physics.forms import shown_law
+from ..quantity import percent
 
 if TYPE_CHECKING:
     from .identified import Identified

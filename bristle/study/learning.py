@@ -7,7 +7,6 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose_rig
 from ..diagnose.faults import SensorFault
 from ..diagnose.law_free import diagnose_laws
@@ -19,7 +18,7 @@ from ..physics.laws import law_names
 from ..progress import tell, telling
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
-from .identified import Identified
+from .identified import Identified, is_identified
 from .joining import as_named_here, refuse_effect, refuse_left_out
 from .laws import law_command, law_or_all, with_law
 from .rig import building_of
@@ -80,11 +79,6 @@ def diagnose_study(
     if write:
         study.write_verdict(verdict_of(study, found))
     return found
-
-
-def is_identified(model: StudyModel) -> bool:
-    """Return whether a value of a model comes from an identification."""
-    return any(value.origin == "identified" for value in model.flat().values())
 
 
 def take_law(study: Study, found: Diagnosis) -> Identified | None:

@@ -8,9 +8,10 @@ from ..data.checks.finding import grouped, sentence
 from ..data.equation import equations, symbols
 from ..draw import html
 from ..draw.figure import DPI
-from ..draw.style import Page, percent, png, short_z
+from ..draw.style import Page, png, short_z
 from ..errors import RecordError
 from ..physics.forms import shown_law
+from ..quantity import percent
 from .fit_picture import draw_identified
 from .run_file import TEST
 from .staircase import history_steps
