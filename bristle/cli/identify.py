@@ -145,7 +145,7 @@ def text(found: Identified, folder: Path) -> str:
         lines += ["", *(f"  {one.numbers}" for one in told), f"  {symbols(found.model, told)}"]
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
-    lines += ["", *_errors(found)]
+    lines += ["", *error_lines(found)]
     if found.laws:
         lines += ["", *_every_law(found, folder)]
     if found.forms:
@@ -173,7 +173,7 @@ def _parameters(found: Identified) -> list[str]:
     return [f"  {'parameter':24} {'value':>12} {'unit':11} 95 % interval", *rows]
 
 
-def _errors(found: Identified) -> list[str]:
+def error_lines(found: Identified) -> list[str]:
     """Return the table of errors, before where that was a fitted model, and what stands beside."""
     from ..identify.rig import ROLES
 

@@ -66,7 +66,8 @@ def _how_wrong(comparison: Comparison) -> str:
         text = f"{where} the {what} by {size}, {times} times the noise{step}"
     else:
         text = f"{where} the {what} by {size}, which the noise explains (z = {total.z:.2f}){step}"
-    return f"{text}{_elsewhere(comparison)}."
+    beside = total.error.beside(comparison.unit)
+    return " ".join([f"{text}{_elsewhere(comparison)}.", *beside])
 
 
 def _elsewhere(comparison: Comparison) -> str:

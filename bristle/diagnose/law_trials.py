@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
+from ..identify.error import ForceError, force_error
 from ..identify.fit import Model, Problem
 from ..identify.model import steady, without
-from ..identify.residuals import plain_rms
 from ..identify.search import z_scale
 from ..identify.search_context import Search, refine
 from ..identify.starts import start_models
@@ -40,13 +40,13 @@ WITHIN = 0.95
 class LawTrial:
     """A law tried: fitted on the training runs, judged on the held-out ones.
 
-    `law` is its name with variant and form, such as "lugre_standard[quadratic]"; `rms_train` the
-    plain error [N] on the training runs; `z_runs` (r,) z of each held-out run.
+    `law` is its name with variant and form, such as "lugre_standard[quadratic]"; `error_train` the
+    error on the training runs; `z_runs` (r,) z of each held-out run.
     """
 
     law: str
     trial: Trial
-    rms_train: float
+    error_train: ForceError
     z_runs: tuple[float, ...]
 
     @property
@@ -77,7 +77,8 @@ class LawTrial:
         return {
             "law": plain, "command": form or LINEAR_FORM, "fitted": self.fitted,
             "z_train": round(self.trial.train, 4), "z_holdout": round(self.trial.z, 4),
-            "rms_train": self.rms_train, "rms_holdout": self.trial.rms,
+            "error_train": self.error_train.as_dict(),
+            "error_holdout": self.trial.error.as_dict() if self.trial.error else None,
             "z_above_best": round(above, 4),
             "interval95": round(half, 4) if np.isfinite(half) else None,
         }  # fmt: skip
@@ -239,4 +240,4 @@ def _row(law: str, model: Model, train: Problem, held_out: Problem) -> LawTrial:
     trial = replace(judge(model, train, held_out, expected), refined=True)
     edges = np.cumsum([len(run.force) - run.skip for run in held_out.runs])[:-1]
     z_runs = tuple(z_scale(part) for part in np.split(trial.residual, edges))
-    return LawTrial(law, trial, plain_rms(train, model, expected[0]), z_runs)
+    return LawTrial(law, trial, force_error([(train, model)]), z_runs)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan, sqrt
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,14 +126,20 @@ class ForceError:
         """Return what JSON holds: `rms` and `share` are the error that is told."""
         rms, share = self.headline
         numbers = {
-            "rms": rms, "share": share, "rms_counted": self.rms, "share_counted": self.share,
-            "rms_all": self.rms_all, "share_all": self.share_all,
+            "rms": rms, "share": share, "rms_counted": self.rms, "signal_counted": self.signal,
+            "rms_all": self.rms_all, "signal_all": self.signal_all,
         }  # fmt: skip
         return {
             **{key: one if isfinite(one) else None for key, one in numbers.items()},
             "samples": self.samples, "total": self.total, "left_out": dict(self.left_out),
-            "filter": "none",
         }  # fmt: skip
+
+    @classmethod
+    def of(cls, told: Mapping[str, Any]) -> Self:
+        """Return the error that `as_dict` has told."""
+        keys = ("rms_counted", "signal_counted", "rms_all", "signal_all")
+        a, b, c, d = (nan if told[key] is None else float(told[key]) for key in keys)
+        return cls(int(told["samples"]), int(told["total"]), a, b, c, d, dict(told["left_out"]))
 
 
 def force_error(pairs: Iterable[tuple[Problem, Model]]) -> ForceError:

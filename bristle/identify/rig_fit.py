@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -222,25 +222,42 @@ def errors_of(models: SiteModels, cutoff: float) -> RigErrors:
         If the force of a model is not finite on a run.
     """
     out: dict[str, float] = {}
-    force: dict[str, ForceError] = {}
-    at: dict[str, dict[str, ForceError]] = {}
-    for role in ROLES:
-        each = {name: (site.problem_of(role), model) for name, (site, model) in models.items()}
-        pairs = {n: (problem, model) for n, (problem, model) in each.items() if problem is not None}
-        if not pairs:
-            continue
-        runs = {name: errors_by_run(*pair) for name, pair in pairs.items()}
-        for name, (problem, model) in pairs.items():
-            _refuse_not_finite(problem, model, runs[name])
-        at[role] = {name: pooled(found) for name, found in runs.items()}
-        force[role] = error = pooled(one for found in runs.values() for one in found)
-        out[f"z_{role}"] = max(robust_z(*pair) for pair in pairs.values())
+    at = force_errors(models)
+    force = {role: pooled(found.values()) for role, found in at.items()}
+    for role, error in force.items():
+        pairs = [pair for _, pair in _pairs(models, role)]
+        out[f"z_{role}"] = max(robust_z(*pair) for pair in pairs)
         out[f"error_{role}"], out[f"error_share_{role}"] = error.headline
-        squares = [error_rms(*pair, cutoff) ** 2 for pair in pairs.values()]
-        forces = [force_rms(problem.runs, cutoff) ** 2 for problem, _ in pairs.values()]
+        squares = [error_rms(*pair, cutoff) ** 2 for pair in pairs]
+        forces = [force_rms(problem.runs, cutoff) ** 2 for problem, _ in pairs]
         out[f"rms_{role}"] = float(np.sqrt(sum(squares)))
         out[f"share_{role}"] = out[f"rms_{role}"] / float(np.sqrt(sum(forces)))
     return RigErrors(out, force, at)
+
+
+def force_errors(models: SiteModels) -> dict[str, dict[str, ForceError]]:
+    """Return the error by role and site of what predicts a rig's runs.
+
+    Raises
+    ------
+    RecordError
+        If the force of a model is not finite on a run.
+    """
+    out: dict[str, dict[str, ForceError]] = {}
+    for role in ROLES:
+        for name, (problem, model) in _pairs(models, role):
+            runs = errors_by_run(problem, model)
+            _refuse_not_finite(problem, model, runs)
+            out.setdefault(role, {})[name] = pooled(runs)
+    return out
+
+
+def _pairs(models: SiteModels, role: str) -> Iterator[tuple[str, tuple[Problem, Model]]]:
+    """Yield the runs of a role and what predicts them, by site."""
+    for name, (site, model) in models.items():
+        problem = site.problem_of(role)
+        if problem is not None:
+            yield name, (problem, model)
 
 
 def _refuse_not_finite(problem: Problem, model: Model, errors: Sequence[ForceError]) -> None:

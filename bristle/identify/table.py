@@ -274,7 +274,7 @@ def _fit_filtered(
         return _QUADRATIC * _rms([r])
 
     whole = shown is None
-    with watched(shown or problem, scaled.at, share, over_noise=False, last=whole) as accepted:
+    with watched(shown or problem, scaled.at, share, last=whole) as accepted:
         found = descend(
             residuals, scaled.start, scaled.low, scaled.high, 12,
             tolerance=_LAST if whole else _FIRST, accepted=accepted,

@@ -13,6 +13,7 @@ from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
 from ..findings import command, unknown
 from ..identify.bench import compile_ahead
+from ..identify.rig_fit import force_errors, site_models
 from ..physics.forms import joined_form
 from ..physics.laws import law_names
 from ..progress import tell, telling
@@ -21,7 +22,7 @@ from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified, is_identified
 from .joining import as_named_here, refuse_effect, refuse_left_out
 from .laws import law_command, law_or_all, with_law
-from .rig import building_of
+from .rig import building_of, rig_of
 from .settings import ALL
 from .study import Study
 
@@ -76,6 +77,9 @@ def diagnose_study(
             fitted = is_identified(model)
             found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
+    if is_identified(model):
+        rig = rig_of(study, model, runs)
+        found = replace(found, error=force_errors(site_models(rig, as_model(model))))
     if write:
         study.write_verdict(verdict_of(study, found))
     return found

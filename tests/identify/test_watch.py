@@ -15,7 +15,7 @@ from bristle.data.left_out import MISSING
 from bristle.identify import table, watch
 from bristle.identify.fit import Fit, Model, Problem, fit, identify
 from bristle.identify.search import z_of
-from bristle.identify.table import error_table, force_rms
+from bristle.identify.table import error_table
 from bristle.identify.watch import LAW, MODEL, series, share_of, watched
 from bristle.snapshots import watched_by
 
@@ -116,12 +116,11 @@ def test_laws_side_by_side_are_each_told_of_and_end_with_their_best(
     assert [row.as_dict() | {"holdout": 0} for row in found] == [
         row.as_dict() | {"holdout": 0} for row in alone
     ]
-    size = force_rms(problem.runs)
     for row in found:
         own = [one for one in seen if one["name"] == row.law]
         assert {one["kind"] for one in own} == {LAW}
         assert own[-1]["z"] is None
-        assert own[-1]["share"] == pytest.approx(row.train / size, rel=1e-9)
+        assert own[-1]["share"] == row.error_train.share
         for errors in own[-1]["errors"]:
             assert all(after < before for before, after in pairwise(errors))
 
