@@ -20,7 +20,7 @@ from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
 from .model import Model, Problem, Run
 from .prepare import prepare
 from .response import Response, responses
-from .structure import StructureProblem, blind_at_rest, problems_of
+from .structure import StructureProblem, blind_at_rest, device_moves, problems_of
 from .threads import in_threads
 
 ROLES = ("train", "holdout")
@@ -28,6 +28,11 @@ DAMPER = "damper"
 _NOT_TOLD = (
     "Springs and damping of the storeys beside it are those of the building's file: equilibrium "
     "does not tell them from the damper's own."
+)
+
+_STILL = (
+    "{}: the damper's ends do not move beyond the noise of their velocity, so that the damper is "
+    "not judged there."
 )
 
 
@@ -226,6 +231,9 @@ def building_rig(
         notes = (f"The damper's force{place} was not measured: it is computed from equilibrium.",)
         if not device.on_first:
             notes = (*notes, _NOT_TOLD)
+    still = [one.name for one in found if one.damped and not device_moves(one)]
+    if 0 < len(still) < len(found):
+        notes = (*notes, _STILL.format(", ".join(still)))
     return Rig(_BuildingSites(found, len(train), building), building, notes)
 
 

@@ -293,6 +293,12 @@ def moving(v: Array, std: float) -> NDArray[np.bool_]:
     return ~at_rest
 
 
+def device_moves(response: Response) -> bool:
+    """Return whether the ends of the damper surely move against each other anywhere in a run."""
+    across = motion_across(response)
+    return bool(moving(across.v, across.std).any())
+
+
 def damper_run(
     response: Response, building: Building, law: str, linear_storeys: bool = True
 ) -> StructureRun:
@@ -448,7 +454,8 @@ def problems_of(
         if all(moving or not part for moving, part in zip(parts, both, strict=True)):
             problems["layer"] = tuple(layer_problem(p, building) for p in parts)
     if damped:
-        made = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
+        able = [[r for r in part if device_moves(r)] or part for part in both]  # for every law
+        made = [[damper_run(r, building, law, linear_storeys) for r in part] for part in able]
         end = "base" if device.on_first else "damper"
         parts = [_moving(part, needed=end) for part in made]
         beside = device.on_first

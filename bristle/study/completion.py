@@ -130,15 +130,11 @@ def complete(
 
 
 def _kept(steps: Sequence[Step]) -> str:
-    """Return what there is where this ends now, behind a verdict."""
+    """Return what is kept where this ends now, behind a step or a verdict."""
     if not steps:
         return "The verdict is kept in verdict.json: the same command goes on there."
-    made = "; ".join(f"{step.number} {step.what}" for step in steps)
-    one = len(steps) == 1
-    return (
-        f"{'A step was' if one else f'{len(steps)} steps were'} made and {'is' if one else 'are'} "
-        f"kept in the study's history ({made}): the same command goes on there."
-    )
+    made = "1 step was made and is" if len(steps) == 1 else f"{len(steps)} steps were made and are"
+    return f"{made} kept in the study's history: the same command goes on there."
 
 
 def _begun_free(
