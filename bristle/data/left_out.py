@@ -21,13 +21,16 @@ JUMPS = "beside jumps of the force"
 
 WAYS_OUT = {
     MISSING: "record without gaps, or leave the run out",
-    SATURATED: "measure with a wider range, or leave the run out",
     MASKED: "take mask out of study.toml",
+    SATURATED: "measure with a wider range, or leave the run out",
     SETTLING: "use longer runs",
     LOADED: "use longer runs",
     JUMPS: "record at a lower rate, or give rate = 0 in study.toml",
 }
 """What a user can do about each, in the order in which a sample with several is counted."""
+
+NO_VALUE = (MISSING, MASKED)
+"""Reasons for which nothing was measured: what stands there is interpolated."""
 
 
 def any_of(flags: Mapping[str, Flags]) -> Flags | None:

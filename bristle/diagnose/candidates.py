@@ -90,7 +90,7 @@ def judge(
     own = residuals(train, model, fitted)
     lost, error = losses(z), force_error([(held_out, model)])
     return Trial(
-        model, z_scale(own), z_of(mean_loss(lost)), error.headline[0], lost, z, noise is None,
+        model, z_scale(own), z_of(mean_loss(lost)), error.rms, lost, z, noise is None,
         error,
     )  # fmt: skip
 

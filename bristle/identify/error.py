@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.left_out import LOADED, SETTLING, WAYS_OUT
+from ..data.left_out import LOADED, NO_VALUE, SETTLING, WAYS_OUT, any_of
 from ..quantity import percent, quantity
 from .model import Model, Problem, Run
 from .residuals import has_offset, zero_of
@@ -36,9 +36,9 @@ class ForceError:
     """How far a prediction is from what was measured, over the samples that count.
 
     `samples` of `total` count; `left_out` says how many do not, by reason. `rms`, `signal` the RMS
-    of the error and of what was measured over those that count, `rms_all`, `signal_all` over all,
-    [N] or the unit of an output; filled in where a sample is missing. An RMS is infinite where a
-    prediction is not finite, and not a number over no sample.
+    of the error and of what was measured over those that count, `rms_all`, `signal_all` over all
+    that hold a measured value, [N] or the unit of an output. An RMS is infinite where a prediction
+    is not finite, and not a number over no sample.
     """
 
     samples: int
@@ -60,14 +60,19 @@ class ForceError:
         return self.rms_all / self.signal_all if self.signal_all > 0.0 else nan
 
     @property
+    def valued(self) -> int:
+        """How many samples hold a measured value."""
+        return self.total - sum(self.left_out.get(reason, 0) for reason in NO_VALUE)
+
+    @property
     def share_left_out(self) -> float:
         """The share of the samples that is left out [1]."""
         return 1.0 - self.samples / self.total if self.total else nan
 
     @property
     def over_all(self) -> bool:
-        """Whether so many samples are left out that the error is that over all of them."""
-        return self.share_left_out > TOO_MANY
+        """Whether so many measured values are left out that the error is that over all of them."""
+        return self.valued - self.samples > TOO_MANY * self.valued
 
     @property
     def headline(self) -> tuple[float, float]:
@@ -105,22 +110,21 @@ class ForceError:
         unit, size : as of `text`
         """
         told = self.counted()
+        every = "all samples" if self.valued == self.total else "all that hold a value"
         if not told or self.share_left_out <= MENTIONED:
             return [f"{told}."] if told else []
-        size = size if size is not None else self.signal_all
-        if not self.over_all:
-            over = f"{quantity(self.rms_all, unit, 4, size)} ({percent(self.share_all)})"
-            return [f"{told}. Over all samples the error is {over}."]
         most = max(self.left_out, key=lambda reason: self.left_out[reason])
-        few = (
-            "nothing"
-            if not self.samples
-            else (f"{quantity(self.rms, unit, 4, size)} ({percent(self.share)})")
-        )
-        return [
-            f"Warning: {told}. So the error is that over all samples; over the {self.samples:,} "
-            f"that are left it is {few}. To change it: {WAYS_OUT[most]}."
-        ]
+        size = size if size is not None else self.signal_all
+        if self.over_all:
+            few = f"{quantity(self.rms, unit, 4, size)} ({percent(self.share)})"
+            told += f". So the error is that over {every}; over the {self.samples:,} that are left "
+            told += f"it is {few if self.samples else 'unknown'}"
+        elif self.valued > self.samples:
+            over = f"{quantity(self.rms_all, unit, 4, size)} ({percent(self.share_all)})"
+            told += f". Over {every} the error is {over}"
+        if self.share_left_out > TOO_MANY:
+            return [f"Warning: {told}. To change it: {WAYS_OUT[most]}."]
+        return [f"{told}."]
 
     def as_dict(self) -> dict[str, Any]:
         """Return what JSON holds: `rms` and `share` are the error that is told."""
@@ -184,6 +188,8 @@ def error_of(measured: Array, predicted: Array, left_out: Mapping[str, Flags]) -
         counted under the first of `data.left_out.WAYS_OUT`
     """
     error = measured - predicted
+    nothing = any_of({reason: left_out[reason] for reason in NO_VALUE if reason in left_out})
+    valued = slice(None) if nothing is None else ~nothing
     counts, out = {}, np.zeros(len(measured), dtype=np.bool_)
     for reason in sorted(left_out, key=list(WAYS_OUT).index):
         new = left_out[reason] & ~out
@@ -193,7 +199,7 @@ def error_of(measured: Array, predicted: Array, left_out: Mapping[str, Flags]) -
     kept = ~out
     return ForceError(
         int(np.count_nonzero(kept)), len(measured), _rms(error[kept]), _rms(measured[kept]),
-        _rms(error), _rms(measured), counts,
+        _rms(error[valued]), _rms(measured[valued]), counts,
     )  # fmt: skip
 
 
@@ -204,11 +210,11 @@ def pooled(errors: Iterable[ForceError]) -> ForceError:
     for one in errors:
         for reason, count in one.left_out.items():
             counts[reason] = counts.get(reason, 0) + count
-    samples, total = [one.samples for one in errors], [one.total for one in errors]
+    samples, valued = [one.samples for one in errors], [one.valued for one in errors]
     return ForceError(
-        sum(samples), sum(total),
+        sum(samples), sum(one.total for one in errors),
         _mean(samples, [e.rms for e in errors]), _mean(samples, [e.signal for e in errors]),
-        _mean(total, [e.rms_all for e in errors]), _mean(total, [e.signal_all for e in errors]),
+        _mean(valued, [e.rms_all for e in errors]), _mean(valued, [e.signal_all for e in errors]),
         counts,
     )  # fmt: skip
 

@@ -243,8 +243,8 @@ def write_settings(path: Path, settings: Settings) -> None:
         document.add("rate", tomlkit.item(settings.rate))
         document["rate"].comment("Hz, faster runs are decimated to it; 0 for none")
     if settings.mask:
-        document.add("mask", tomlkit.item(True))
-        document["mask"].comment("isolated spikes count as not measured")
+        mask = tomlkit.item(True)  # read from the document it would be a bool, without comments
+        document.add("mask", mask.comment("isolated spikes count as not measured"))
     if settings.split:
         document.add("split", tomlkit.item(settings.split))
     runs = tomlkit.aot()
