@@ -210,8 +210,9 @@ def _at(errors: RigErrors, role: str, site: str) -> str:
 
 
 def _low_passed(errors: RigErrors, role: str, size: float) -> str:
-    rms, share = errors.numbers[f"rms_{role}"], errors.numbers[f"share_{role}"]
-    return f"{quantity(rms, 'N', 4, size)} ({percent(share)})"
+    """Return the low-passed error; of several sites its share alone, for its RMS is their sum."""
+    rms, share = errors.numbers[f"rms_{role}"], percent(errors.numbers[f"share_{role}"])
+    return share if len(errors.at[role]) > 1 else f"{quantity(rms, 'N', 4, size)} ({share})"
 
 
 def _forms(found: Identified, folder: Path) -> list[str]:
