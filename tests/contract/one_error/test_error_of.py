@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 from bristle.data.left_out import LOADED, MASKED, MISSING, SATURATED, SETTLING
+from bristle.errors import RecordError
 from bristle.identify.error import ForceError, error_of, pooled
+from bristle.identify.model import Model, Problem, Run
+from bristle.identify.rig import Site
+from bristle.identify.rig_fit import SiteModel, force_errors
 
 N = 10_000
+LAW = Model("bingham")
 RANDOM = np.random.default_rng(3)
 FORCE = 50.0 * np.sin(0.01 * np.arange(N))
 WRONG = FORCE + RANDOM.normal(0.0, 2.0, N)
@@ -105,3 +110,18 @@ def test_a_prediction_that_is_not_finite_has_an_infinite_error_and_plain_json():
 def test_what_json_tells_is_the_error_again():
     error = error_of(FORCE, WRONG, {SETTLING: first(25), SATURATED: first(4000, 100)})
     assert ForceError.of(json.loads(json.dumps(error.as_dict()))) == error
+
+
+class Broken(Problem):
+    """A run whose model ends in what is no number."""
+
+    def predict(self, model, run, draw=None):
+        return np.where(np.arange(len(run.force)) > 500, np.nan, run.force)
+
+
+def test_an_error_that_is_not_finite_on_a_run_is_one_clear_message():
+    still = np.zeros(N)
+    run = Run("drive_7", 0.002, still, still, still, still, FORCE, 1.0, np.zeros((0, N, 4)))
+    at = SiteModel(Site("damper", lambda role: Broken([run]) if role == "train" else None), LAW)
+    with pytest.raises(RecordError, match="drive_7: the force of the model bingham is not finite"):
+        force_errors({"damper": at})
