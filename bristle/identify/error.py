@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.left_out import LOADED, NO_VALUE, SETTLING, WAYS_OUT, any_of
+from ..errors import RecordError
 from ..quantity import percent, quantity
 from .model import Model, Problem, Run
 from .residuals import has_offset, zero_of
@@ -29,6 +30,9 @@ MENTIONED = 0.02
 
 TOO_MANY = 0.2
 """The same above which that one is the error."""
+
+FEWEST = 100
+"""Samples of all runs together that a fit, or a judgement, needs at the least."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +148,28 @@ class ForceError:
         keys = ("rms_counted", "signal_counted", "rms_all", "signal_all")
         a, b, c, d = (nan if told[key] is None else float(told[key]) for key in keys)
         return cls(int(told["samples"]), int(told["total"]), a, b, c, d, dict(told["left_out"]))
+
+
+def refuse_empty(runs: Sequence[Run]) -> None:
+    """Refuse runs of which too few samples count for a fit, or to judge one.
+
+    Raises
+    ------
+    RecordError
+        Saying how many are left out of which runs, why, and what to do.
+    """
+    every = [run.entire() for run in runs]
+    counts = [error_of(run.force, run.force, reasons_of(run)) for run in every]
+    whole = pooled(counts)
+    if whole.samples >= FEWEST:
+        return
+    told = [f"{run.name}: {one.counted()}" for run, one in zip(runs, counts, strict=True)]
+    more = [f"and {len(told) - 3} more runs"] if len(told) > 3 else []
+    ways = "; ".join(dict.fromkeys(WAYS_OUT[why] for one in counts for why in one.left_out))
+    raise RecordError(
+        f"{'; '.join([*told[:3], *more])}. {whole.samples:,} samples are left, and {FEWEST} are "
+        f"needed. To change it: {ways}."
+    )
 
 
 def force_error(pairs: Iterable[tuple[Problem, Model]]) -> ForceError:

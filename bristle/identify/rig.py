@@ -17,6 +17,7 @@ from ..errors import StudyError
 from ..physics.building import Building, with_damper
 from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
+from .error import refuse_empty
 from .model import Model, Problem, Run
 from .prepare import prepare
 from .response import Response, responses
@@ -147,10 +148,15 @@ class Rig:
         return [one.name for one in effects if "force" in one.hooks()]
 
     def prepare(self, model: Model) -> None:
-        """Prepare all runs now, in place of where they are first asked for; raises as `sites`."""
+        """Prepare all runs now, in place of where they are first asked for.
+
+        Raises as `sites`, and a RecordError where too few samples of a role count.
+        """
         for site in self.sites(model).values():
             for role in ROLES:
-                site.problem_of(role)
+                problem = site.problem_of(role)
+                if problem is not None:
+                    refuse_empty(problem.runs)
 
 
 def _refuse_on_bench(model: Model) -> None:

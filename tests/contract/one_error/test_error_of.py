@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bristle.data.left_out import LOADED, MASKED, MISSING, SATURATED, SETTLING
 from bristle.errors import RecordError
-from bristle.identify.error import ForceError, error_of, pooled
+from bristle.identify.error import ForceError, error_of, pooled, refuse_empty
 from bristle.identify.model import Model, Problem, Run
 from bristle.identify.rig import Site
 from bristle.identify.rig_fit import SiteModel, force_errors
@@ -125,3 +126,20 @@ def test_an_error_that_is_not_finite_on_a_run_is_one_clear_message():
     at = SiteModel(Site("damper", lambda role: Broken([run]) if role == "train" else None), LAW)
     with pytest.raises(RecordError, match="drive_7: the force of the model bingham is not finite"):
         force_errors({"damper": at})
+
+
+def test_runs_of_which_nothing_is_left_are_refused_with_run_count_reason_and_way_out():
+    still = np.zeros(N)
+    parts = (0.002, still, still, still, still, FORCE, 1.0, np.zeros((0, N, 4)))
+    runs = [
+        Run(name, *parts, left_out={SATURATED: first(N - 10 * k)})
+        for k, name in enumerate(("a", "b"))
+    ]
+    with pytest.raises(RecordError) as told:
+        refuse_empty(runs)
+    assert str(told.value) == (
+        "a: 10,000 of 10,000 samples (100.0 %) left out: saturated; b: 9,990 of 10,000 samples "
+        "(99.9 %) left out: saturated. 10 samples are left, and 100 are needed. To change it: "
+        "measure with a wider range, or leave the run out."
+    )
+    refuse_empty([replace(runs[0], left_out={SATURATED: first(N - 100)})])
