@@ -206,9 +206,10 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
     fitted = _with_fit(model, fit)
     models = site_models(rig, as_model(fitted))
     present = task.present or model
-    before = None  # nobody fitted it: its error is no step on the way
-    if is_identified(present):
-        before = errors_of(site_models(rig, as_model(present)), task.cutoff)
+    old = site_models(rig, as_model(present))
+    # The start of a first fit is nobody's model: its error is no step on the way.
+    fitted_before = is_identified(present) or _lines_alone(old)
+    before = errors_of(old, task.cutoff) if fitted_before else None
     after = errors_of(models, task.cutoff)
     task.show(3)
     at = models.get(DAMPER) or _worst(models)
@@ -222,6 +223,11 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
     ]
     notes += [*rig.notes, *under_load(at)]
     return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+
+
+def _lines_alone(models: SiteModels) -> bool:
+    """Return whether a model is lines, which are fitted wherever it is judged, and nothing else."""
+    return all(site.is_line and not model.effects for site, model in models.values())
 
 
 def _worst(models: SiteModels) -> SiteModel:
