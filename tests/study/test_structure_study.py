@@ -56,7 +56,6 @@ def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):
     model = study.model().with_effect("duffing")
     found = identify_study(study, model=model, table=False, starts=1, write=False)
     assert found.before == {}  # of the law at its defaults nobody asks
-    assert found.after["z_holdout"] < 1.15
     layer = next(note for note in found.notes if note.startswith("layer"))
     k = float(layer.split("k = ")[1].split()[0])
     assert k == pytest.approx(building(1, True, 6).stiffnesses[0], rel=0.03)
