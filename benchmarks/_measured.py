@@ -90,15 +90,15 @@ def bench_row(
     assert after is not None
     noise = [run.noise["force"] for run in [*train, *held]]
     row.noise = f"{min(noise):.2g} to {max(noise):.2g} N" if len(noise) > 2 else f"{noise[0]:.2g} N"
-    force = np.concatenate([run["force"] for run in held])
-    size = float(np.sqrt(np.mean(force**2)))
-    row.before, row.z_before = found.before.rms / size, found.before.z
-    row.after, row.z_after = after.rms / size, after.z
+    assert found.before.error is not None
+    assert after.error is not None
+    row.before, row.z_before = found.before.error.headline[1], found.before.z
+    row.after, row.z_after = after.error.headline[1], after.z
     row.after_with = " + ".join(after.effects) + ("" if named else ", the best single one")
     problems = [
         Problem([prepare(m) for m in corrected(part, found.sensors)]) for part in (train, held)
     ]
-    row.least_squares = error_table(*problems, 0.0, laws=(row.law,), starts=2)[0].share
+    row.least_squares = error_table(*problems, 0.0, laws=(row.law,), starts=2)[0].error.share
     row.reference = told(after)
     if row.after > BEYOND:
         row.worth = (

@@ -128,6 +128,11 @@ def quantity(
     return f"{plain(factor * value, digits)} {'' if shown == '1' else shown}".rstrip()
 
 
+def percent(share: float, digits: int = 1) -> str:
+    """Return a share as text: "8.6 %"."""
+    return f"{round(100.0 * share, digits) + 0.0:.{digits}f} %"  # + 0.0: no minus before a zero
+
+
 def short_z(z: float) -> str:
     """Return z as text, with the digits that tell it from 1."""
     return f"{z:.2f}" if z < 10.0 else plain(z)

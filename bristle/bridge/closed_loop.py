@@ -15,12 +15,11 @@ from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
 from ..data.model_draws import has_covariance
 from ..data.open_effects import OpenEffect, left_open
-from ..draw.style import percent
 from ..errors import StudyError
 from ..findings import command
 from ..identify.run_labels import following
 from ..progress import tell
-from ..quantity import short_z
+from ..quantity import percent, short_z
 from ..study.added_runs import behind_data
 from ..study.openings import count_opening, opened_text, openings, runs_for_test
 from ..study.rig import building_of

@@ -11,9 +11,8 @@ import numpy as np
 from ..compare.names import name_of
 from ..data.channels import channel_unit
 from ..data.open_effects import widest
-from ..draw.style import percent
 from ..findings import command
-from ..quantity import plain, scale
+from ..quantity import percent, plain, scale
 
 Band = tuple[float, float]
 KINDS = {"peak": "Peak", "rms": "RMS"}

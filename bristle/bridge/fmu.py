@@ -16,9 +16,12 @@ from ..compare.prediction import RunPrediction
 from ..compare.scale import rms
 from ..data.channels import DRIVE, MOTION, ChannelSpec, is_channel
 from ..data.finer import between
+from ..data.left_out import MISSING, SETTLING
 from ..data.read import read_table
 from ..errors import FmuError
 from ..fmu.description import Description, Value, read_description
+from ..identify.begin import SETTLING as SETTLED
+from ..identify.error import error_of
 from ..units import conversion
 from .doubts import doubts
 from .ports import PortMap, map_ports
@@ -187,9 +190,12 @@ def _one(
     spread = draws - middle
     bias = spread.mean(axis=0)
     sigma = np.sqrt(noise**2 + spread.var(axis=0, ddof=1))
+    early = np.arange(len(measured)) < SETTLED
     return RunPrediction(
         piece.name, piece.dt, measured, predicted + bias, sigma, noise, spread - bias,
-        _coordinates(piece, signal, ports), predicted - coarser, name, unit,
+        _coordinates(piece, signal, ports), predicted - coarser, name, unit, skip=SETTLED,
+        known=None if piece.measured.all() else piece.measured,
+        held=error_of(measured, predicted, {MISSING: ~piece.measured, SETTLING: early}),
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +31,8 @@ class Signals:
     """One piece of a measurement as an FMU is fed: values (n,) in SI, smoothed where they can be.
 
     `errors` name to (d, n): draws of what is left uncertain; `raw` the channels as measured, with
-    their noise; `rates` name to that of the signal whose derivative is known.
+    their noise; `rates` name to that of the signal whose derivative is known; `measured` (n,) where
+    nothing was filled in.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Signals:
     noise: dict[str, float]
     rates: dict[str, str] = field(default_factory=dict)
     derived: tuple[str, ...] = ()
+    measured: NDArray[np.bool_] = field(default_factory=lambda: np.ones(0, dtype=np.bool_))
 
 
 def signals_of(
@@ -94,11 +96,15 @@ def signals_of(
     stem = Path(table.source).stem
     many = len(even.pieces) > 1
     found = [
-        _signals(
-            f"{stem} ({k})" if many else stem, even.sampling.step, piece, units, channels, seed + k
+        replace(
+            _signals(
+                f"{stem} ({k})" if many else stem, even.sampling.step, piece, units, channels,
+                seed + k,
+            ),
+            measured=measured,
         )
-        for k, (_, piece, _) in enumerate(even.pieces, 1)
-    ]
+        for k, (_, piece, measured) in enumerate(even.pieces, 1)
+    ]  # fmt: skip
     return found, notes + even.notes
 
 

@@ -34,13 +34,15 @@ KEPT = {
     "optimise": _NO_FILE,
     "plan": f"No plan was written. {_ANEW}",
     "report": f"No report was written; an older one is as it was. {_ANEW}",
-    "study auto": "Steps that were made are kept in the study's history: the same command goes on "
-    "there.",
+    "study auto": _AS_IT_WAS,
     "study check": f"No picture was written. {_ANEW}",
     "study extend": _AS_IT_WAS,
     "study new": f"No study was made. {_ANEW}",
 }
-"""What is told by command, or by command and action. `run` and `ensemble` tell what they kept."""
+"""What is told by command, or by command and action, before anything is made.
+
+What is made on the way is told by who makes it, as by `study auto`, `run` and `ensemble`.
+"""
 
 
 def kept_by(arguments: argparse.Namespace) -> str:

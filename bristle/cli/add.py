@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..findings import command
-from ..quantity import plain, scale
+from ..quantity import plain
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -47,22 +47,12 @@ def main(arguments: argparse.Namespace) -> int:
 def text(added: Added, folder: Path) -> str:
     """Return what adding did, as text."""
     from ..study.laws import law_command
+    from .identify import error_lines
 
     found = added.identified
-    before, after = found.before, found.after
+    after = found.after
     lines = [f"Step {added.step.number}: {added.step.what} ({added.step.why})", ""]
-    lines.append(f"  {'':32} {'before':>10} {'after':>10}")
-    factor, unit = scale("N", before.get("rms_train", 0.0))
-    low = f"RMS below {found.cutoff:g} Hz" if found.cutoff else "RMS"
-    for key, name, times in (
-        ("z_train", "z, training runs", 1.0),
-        ("z_holdout", "z, held-out runs", 1.0),
-        ("rms_train", f"{low} [{unit}], training", factor),
-        ("rms_holdout", f"{low} [{unit}], held out", factor),
-    ):
-        if key in after:
-            cells = [plain(times * errors[key], 4) for errors in (before, after)]
-            lines.append(f"  {name:32} {cells[0]:>10} {cells[1]:>10}")
+    lines += error_lines(found)
     lines.append("")
     for row in found.parameters():
         if row["name"].partition(".")[0] in added.effects:
@@ -75,6 +65,7 @@ def text(added: Added, folder: Path) -> str:
             "", f"The verdict is about the law {added.other_law}; this model has "
             f"{found.model.law}. To take that law:  {law_command(folder, added.other_law)}",
         ]  # fmt: skip
-    if "z_holdout" in after and after["z_holdout"] >= before["z_holdout"]:
+    before = found.before.get("z_holdout")
+    if before is not None and after["z_holdout"] >= before:
         lines += ["", "The error on runs not seen did not fall:  " + command("undo", folder)]
     return "\n".join([*lines, "", f"Next:  {command('diagnose', folder)}"])

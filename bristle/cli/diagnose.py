@@ -91,6 +91,7 @@ def text(verdict: Verdict, folder: Path) -> str:
         lines += ["", f"Note: {note.rstrip('.')}."]
     if verdict.get("laws"):
         lines += ["", *law_lines(verdict["laws"])]
+    lines += _error(verdict)
     lines += _trials(verdict)
     lines += _limits(verdict)
     if hidden := untestable(verdict):
@@ -106,6 +107,23 @@ def law_lines(rows: Sequence[Verdict]) -> list[str]:
 
     lines = aligned([list(HEADER), *law_table(rows)])
     return [*lines, *wrap(TABLE_NOTE, 98, initial_indent="  ", subsequent_indent="  ")]
+
+
+def _error(verdict: Verdict) -> list[str]:
+    """Return the error of the model as the study has it, which every command prints alike."""
+    from ..identify.error import ForceError
+
+    told = verdict.get("error") or {}
+    names = {"train": "training runs", "holdout": "held-out runs"}
+    role = "holdout" if "holdout" in told else "train"
+    if role not in told:
+        return []
+    error = ForceError.of(told[role])
+    sites = (verdict.get("error_by_site") or {}).get(role, {})
+    by_site = [f"{site} {ForceError.of(one).text()}" for site, one in sites.items()]
+    more = f"; {', '.join(by_site)}" if len(by_site) > 1 else ""
+    first = f"The study's model errs by {error.text()} on the {names[role]}{more}."
+    return ["", " ".join([first, *error.beside()])]
 
 
 def _trials(verdict: Verdict) -> list[str]:

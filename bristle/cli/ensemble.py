@@ -164,8 +164,8 @@ def _limits(found: Ensemble) -> list[str]:
     """Return what of each output's variance is from effects that are left open; none without."""
     from ..batch.quantiles import VARIES
     from ..data.open_effects import widest
-    from ..draw.style import percent
     from ..findings import command
+    from ..quantity import percent
 
     plan, parts = found.plan, found.parts
     if plan.identified is None or not parts:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..findings import command
 from ..physics.drive import DRIVES
-from ..quantity import plain, quantity, short_z
+from ..quantity import percent, plain, quantity, short_z
 from ._consent import add_trust
 
 if TYPE_CHECKING:
+    from ..identify.rig_fit import RigErrors
     from ..study.identified import Identified
 
 HELP = (
@@ -41,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--cutoff",
         type=float,
         metavar="HZ",
-        help="low-pass on measured and predicted force for the errors; 0 for none; else "
-        "study.toml's cut_off (18 Hz)",
+        help="low-pass for the table of laws and for the low-passed errors beside the error; 0 for "
+        "none; else study.toml's cut_off (18 Hz)",
     )
     parser.add_argument(
         "--starts",
@@ -143,7 +145,7 @@ def text(found: Identified, folder: Path) -> str:
         lines += ["", *(f"  {one.numbers}" for one in told), f"  {symbols(found.model, told)}"]
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
-    lines += ["", *_errors(found)]
+    lines += ["", *error_lines(found)]
     if found.laws:
         lines += ["", *_every_law(found, folder)]
     if found.forms:
@@ -171,36 +173,59 @@ def _parameters(found: Identified) -> list[str]:
     return [f"  {'parameter':24} {'value':>12} {'unit':11} 95 % interval", *rows]
 
 
-def _errors(found: Identified) -> list[str]:
-    low = f"below {found.cutoff:g} Hz" if found.cutoff else "without a filter"
-    lines = [f"  {'error of the force ' + low:34} {'before':>22} {'after':>22}"]
-    size = found.before["rms_train"]
-    for role, name in (("train", "training runs"), ("holdout", "held-out runs")):
-        if f"rms_{role}" not in found.after:
-            continue
-        cells = [
-            f"{quantity(errors[f'rms_{role}'], 'N', 4, size)} ({errors[f'share_{role}']:.1%})"
-            for errors in (found.before, found.after)
-        ]
-        lines.append(f"  {name:34} {cells[0]:>22} {cells[1]:>22}")
-    for role, name in (("train", "z, training runs"), ("holdout", "z, held-out runs")):
-        if f"z_{role}" in found.after:
-            before, after = found.before[f"z_{role}"], found.after[f"z_{role}"]
-            lines.append(f"  {name:34} {short_z(before):>22} {short_z(after):>22}")
-    return [*lines, "  z: error / noise; a true model has 1."]
+def error_lines(found: Identified) -> list[str]:
+    """Return the table of errors, before where that was a fitted model, and what stands beside."""
+    from ..identify.rig import ROLES
+
+    columns = [("before", found.errors_before)] if found.errors_before is not None else []
+    shown = [*columns, ("after" if columns else "", found.errors)]
+    title = "error of the force: RMS, share"
+    lines = [f"  {title:34} " + " ".join(f"{name:>22}" for name, _ in shown)]
+    names = dict(zip(ROLES, ("training runs", "held-out runs"), strict=True))
+    roles = [role for role in ROLES if role in found.errors.force]
+
+    def add(name: str, cells: Iterable[str]) -> None:
+        lines.append(f"  {name:34} " + " ".join(f"{cell:>22}" for cell in cells))
+
+    for role in roles:
+        add(names[role], (errors.force[role].text() for _, errors in shown))
+        sites = found.errors.at[role]
+        for site in sites if len(sites) > 1 else ():
+            add(f"  {site}", (_at(errors, role, site) for _, errors in shown))
+    for role in roles if found.cutoff else ():
+        name = f"below {found.cutoff:g} Hz, {names[role]}"
+        size = found.errors.force[role].signal
+        add(name, (_low_passed(errors, role, size) for _, errors in shown))
+    for role in roles:
+        add(f"z, {names[role]}", (short_z(errors.numbers[f"z_{role}"]) for _, errors in shown))
+    lines.append("  z: error / noise; a true model has 1.")
+    for role in roles:
+        lines += [f"  {names[role].capitalize()}: {t}" for t in found.errors.force[role].beside()]
+    return lines
+
+
+def _at(errors: RigErrors, role: str, site: str) -> str:
+    one = errors.at[role].get(site)
+    return one.text() if one is not None else "-"
+
+
+def _low_passed(errors: RigErrors, role: str, size: float) -> str:
+    """Return the low-passed error; of several sites its share alone, for its RMS is their sum."""
+    rms, share = errors.numbers[f"rms_{role}"], percent(errors.numbers[f"share_{role}"])
+    return share if len(errors.at[role]) > 1 else f"{quantity(rms, 'N', 4, size)} ({share})"
 
 
 def _forms(found: Identified, folder: Path) -> list[str]:
     """Return the table of the forms of the command, and which one would do better."""
     lines = [f"  {'command':18} {'training':>11} {'held out':>11} {'of force':>9} {'z':>8} fitted"]
-    size = max(row.errors["rms_train"] for row in found.forms)
+    size = max(row.errors["error_train"] for row in found.forms)
     for row in found.forms:
         own = row.errors
-        held_out = quantity(own["rms_holdout"], "N", 4, size) if "rms_holdout" in own else "-"
+        held_out = quantity(own["error_holdout"], "N", 4, size) if "error_holdout" in own else "-"
         z = short_z(own.get("z_holdout", own["z_train"]))
         lines.append(
-            f"  {row.form:18} {quantity(own['rms_train'], 'N', 4, size):>11} {held_out:>11} "
-            f"{row.judged:>9.1%} {z:>8} {row.numbers:>6}"
+            f"  {row.form:18} {quantity(own['error_train'], 'N', 4, size):>11} {held_out:>11} "
+            f"{percent(row.judged):>9} {z:>8} {row.numbers:>6}"
         )
     mine = next(row for row in found.forms if row.model.law == found.model.law)
     best = min(found.forms, key=lambda row: row.judged)
@@ -223,23 +248,25 @@ def _every_law(found: Identified, folder: Path) -> list[str]:
 
 
 def _laws(found: Identified, folder: Path) -> list[str]:
-    """Return the table of laws, as a section of the paper has it, and which one would do better."""
+    """Return the table of laws, and which one would do better."""
     from ..physics.forms import shown_law
     from ..physics.laws import base_and_variant
 
+    low = f"below {found.cutoff:g} Hz" if found.cutoff else "no filter"
     lines = [
-        f"  {'law':18} {'training':>11} {'held out':>11} {'of force':>9} {'|v| > 1 mm/s':>13} "
-        f"{'starts':>8}"
+        f"  {'law':18} {'training':>11} {'held out':>11} {'of force':>9} {low:>13} {'starts':>8}"
     ]
-    size = max(row.train for row in found.table)
+    size = max(row.error.signal_all for row in found.table)
+    held_out = found.holdout is not None
     for row in found.table:
-        cells = [quantity(one, "N", 4, size) for one in (row.train, row.holdout, row.moving)]
-        held_out = cells[1] if row.holdout == row.holdout else "-"
+        both = (row.error_train.headline[0], row.error.headline[0])
+        cells = [quantity(one, "N", 4, size) for one in both]
+        below = quantity(row.holdout if held_out else row.train, "N", 4, size)
         lines.append(
-            f"  {shown_law(row.law):18} {cells[0]:>11} {held_out:>11} {row.share:>9.1%} "
-            f"{cells[2]:>13} {row.agreed:>3} of {row.starts}"
+            f"  {shown_law(row.law):18} {cells[0]:>11} {cells[1] if held_out else '-':>11} "
+            f"{percent(row.error.headline[1]):>9} {below:>13} {row.agreed:>3} of {row.starts}"
         )
-    own = {row.law: row.holdout if row.holdout == row.holdout else row.train for row in found.table}
+    own = {row.law: row.error.headline[0] for row in found.table}
     for name in own:
         base, variant = base_and_variant(name)
         if variant.lacks and own[name] and base.name in own:
@@ -249,7 +276,8 @@ def _laws(found: Identified, folder: Path) -> list[str]:
     mine, best = found.model.law, min(own, key=lambda law: own[law])
     if mine in own and own[best] < BETTER * own[mine]:
         lines.append(_better_law(mine, best, 1.0 - own[best] / own[mine], folder))
-    return [*lines, "  Each law fitted by least squares of the low-passed force, without effects."]
+    fitted = f"the force {low}" if found.cutoff else "the force"
+    return [*lines, f"  Each law fitted by least squares of {fitted}, without effects."]
 
 
 def _better_law(mine: str, best: str, gain: float, folder: Path) -> str:

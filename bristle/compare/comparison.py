@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.error import ForceError
 from ..identify.fit import Fit, Model, Problem
 from ..physics.drive import DRIVES, Drive
 from ..quantity import short_z
@@ -23,6 +24,7 @@ from .errors import (
     refuse,
     run_dict,
     run_error,
+    total_error,
     with_failures,
 )
 from .labels import LabelError, label_errors
@@ -112,6 +114,11 @@ class Comparison:
     def z(self) -> float:
         """RMS(residual)/noise expected of a true model, over all runs."""
         return self.total.z
+
+    @property
+    def error(self) -> ForceError:
+        """The error over all runs."""
+        return self.total.error
 
     @property
     def right(self) -> bool:
@@ -212,6 +219,7 @@ def compare_predictions(
     flips: int = FLIPS,
     others: Sequence[SiteError] = (),
     role: str = "",
+    every: Sequence[RunPrediction] = (),
 ) -> Comparison:
     """Compare one output, measured and predicted, whatever predicted it; see `compare`.
 
@@ -223,6 +231,7 @@ def compare_predictions(
     flips : how many random patterns of signs say what chance would give
     others : the errors at the other sites of a building
     role : the role of the runs in a study, if that is known
+    every : these and the runs that are too short for z: the error is over all of them
 
     Raises
     ------
@@ -243,8 +252,9 @@ def compare_predictions(
         rest = finder.ranked(left, raw, [found[0].coordinate])
         second = rest[0] if rest and rest[0].significant else None
     comparison = Comparison(
-        predictions[0].quantity, predictions[0].unit, runs, run_error("all runs", predictions),
-        interval_of_z(normalised, finder), tuple(found), second, spectrum(predictions),
+        predictions[0].quantity, predictions[0].unit, runs,
+        total_error(predictions, every or predictions), interval_of_z(normalised, finder),
+        tuple(found), second, spectrum(predictions),
         tuple(regimes(normalised, along, DRIVES[predictions[0].drive])), tuple(predictions),
         seen=seen, labels=label_errors(predictions), role=role,
     )  # fmt: skip

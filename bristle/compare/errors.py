@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
+from ..identify.error import ForceError, pooled
 from ..identify.search import HUBER_AT_ONE, losses, mean_loss, z_scale
 from .patterns import LEVEL, Finder, ResidualPattern
 from .prediction import RunPrediction
@@ -28,29 +29,29 @@ FEWEST = 100
 class RunError:
     """The error on one run.
 
-    `z` RMS(residual)/noise expected of a true model, by a robust scale; `numerical_z` the same of
-    what half the step changes. `rms`, `noise`, `numerical`, `signal` [unit]: plain RMS of the
-    residual, of the noise expected, of what half the step changes, of the measured output;
-    `noise_own` that of the channel's own noise; `scatter`, `spread` the standard deviations of the
-    residual and of the measured output.
+    `error` is the one that every command tells. `z` RMS(residual)/noise expected of a true model,
+    by a robust scale; `numerical_z` the same of what half the step changes. `noise`, `numerical`
+    [unit]: RMS of the noise expected, of what half the step changes; `noise_own` that of the
+    channel's own noise; `residual`, `scatter`, `spread` the RMS of the residual that z judges, and
+    the standard deviations of it and of the measured output, over `samples`.
     """
 
     name: str
+    error: ForceError
     samples: int
     z: float
-    rms: float
+    residual: float
     noise: float
     noise_own: float
     numerical: float
     numerical_z: float
-    signal: float
     scatter: float
     spread: float
 
     @property
     def fit(self) -> float:
         """The normalised root mean square fit, 1 - RMS(residual)/std(measured) [1]."""
-        return 1.0 - self.rms / self.spread if self.spread > 0.0 else float("nan")
+        return 1.0 - self.residual / self.spread if self.spread > 0.0 else float("nan")
 
     @property
     def accounted(self) -> float:
@@ -58,9 +59,19 @@ class RunError:
         return 1.0 - (self.scatter / self.spread) ** 2 if self.spread > 0.0 else float("nan")
 
     @property
+    def rms(self) -> float:
+        """The RMS of the error [unit]."""
+        return self.error.headline[0]
+
+    @property
+    def signal(self) -> float:
+        """The RMS of the measured output [unit]."""
+        return self.error.signal_all if self.error.over_all else self.error.signal
+
+    @property
     def share(self) -> float:
-        """RMS of the residual over that of the measured output [1]."""
-        return self.rms / self.signal if self.signal > 0.0 else float("nan")
+        """The error over the RMS of the measured output [1]."""
+        return self.error.headline[1]
 
 
 @dataclass(frozen=True)
@@ -131,7 +142,12 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
 
 
 def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
-    """Return the error over some runs."""
+    """Return the error over some runs; over those without a sample for z as well."""
+    error = pooled(one.error for one in predictions)
+    predictions = [one for one in predictions if one.judged.any()]
+    if not predictions:
+        nothing = float("nan")
+        return RunError(name, error, 0, *[nothing] * 8)
     residual = np.concatenate([one.residual[one.judged] for one in predictions])
     sigma = np.concatenate([one.sigma[one.skip :][one.judged] for one in predictions])
     own = np.concatenate([np.full(one.judged.sum(), one.noise) for one in predictions])
@@ -141,10 +157,15 @@ def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
     moved = np.concatenate(tried) if len(tried) == len(predictions) else np.full(1, np.nan)
     measured = np.concatenate([one.measured[one.skip :][one.judged] for one in predictions])
     return RunError(
-        name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
+        name, error, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
         rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
-        rms(measured), float(np.std(residual)), float(np.std(measured)),
+        float(np.std(residual)), float(np.std(measured)),
     )  # fmt: skip
+
+
+def total_error(able: Sequence[RunPrediction], every: Sequence[RunPrediction]) -> RunError:
+    """Return the error over all runs: z of those that are long enough, the error of every one."""
+    return replace(run_error("all runs", able), error=pooled(one.error for one in every))
 
 
 def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
@@ -163,7 +184,9 @@ def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, f
 
 def run_dict(run: RunError) -> dict[str, Any]:
     """Return an error as JSON has it."""
-    return {**asdict(run), "share": run.share, "fit": run.fit, "accounted": run.accounted}
+    return {
+        **asdict(run), "error": run.error.as_dict(), "fit": run.fit, "accounted": run.accounted,
+    }  # fmt: skip
 
 
 def pattern_dict(pattern: ResidualPattern) -> dict[str, Any]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
-from ..quantity import log_ticks
+from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, short_z, zero_lines
+from ..quantity import log_ticks, percent
 from .coordinates import SHOWN, shown
 from .names import name_of
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ..data.finer import between
 from ..data.labels import Labels
+from ..data.left_out import MISSING, SETTLING
+from ..identify.error import ForceError, error_of, errors_by_run
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import LOST
 from ..identify.residuals import over_noise
@@ -33,7 +35,8 @@ class RunPrediction:
     they were not measured but filled in. `site` of a building is "damper", "layer", "storey1" ...,
     "" on a bench. `index` (n,) numbers the samples where some were left out, None where none were.
     `drive` is the channel that commands the damper, `labels` what is known of the whole run,
-    `units` those of the coordinates that are extra channels.
+    `units` those of the coordinates that are extra channels. `predicted` has the mean of the drawn
+    errors in it, as z needs; `held` is the error of the prediction itself, None where both are one.
     """
 
     name: str
@@ -54,6 +57,16 @@ class RunPrediction:
     drive: str = VOLTAGE.name
     labels: Labels = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    held: ForceError | None = None
+
+    @property
+    def error(self) -> ForceError:
+        """The error on the run, the same as everywhere: see `identify.error`."""
+        if self.held is not None:
+            return self.held
+        early = np.arange(len(self.measured)) < self.skip
+        known = np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
+        return error_of(self.measured, self.predicted, {SETTLING: early, MISSING: ~known})
 
     @property
     def time(self) -> Array:
@@ -107,8 +120,8 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
         How many draws of the measured inputs' error to carry through the model.
     """
     out = []
-    for run, (bias, sigma, spread) in zip(
-        problem.runs, problem.expectation(model, draws), strict=True
+    for run, (bias, sigma, spread), held in zip(
+        problem.runs, problem.expectation(model, draws), errors_by_run(problem, model), strict=True
     ):
         predicted = problem.predict(model, run)
         finer = at_half_the_step(problem, model, run)
@@ -120,7 +133,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
                 coordinates_of_run(run), finer - predicted, skip=run.skip, known=run.measured,
                 index=run.keep if isinstance(run, StructureRun) else None,
                 drive=run.drive, labels=run.labels,
-                units={name: one.unit for name, one in run.extra.items()},
+                units={name: one.unit for name, one in run.extra.items()}, held=held,
             )
         )  # fmt: skip
     return out
@@ -168,5 +181,5 @@ def halved(run: Run) -> Run:
             name: replace(one, values=between(one.values, None, run.dt))
             for name, one in run.extra.items()
         },
-        measured=None,
+        left_out={},
     )

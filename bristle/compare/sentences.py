@@ -54,21 +54,20 @@ def _how_wrong(comparison: Comparison) -> str:
     what = comparison.quantity.replace("_", " ") if known else f'output "{comparison.quantity}"'
     which = _OF_ROLE.get(comparison.role) or _WHICH[comparison.seen]
     where = f"{which} the model misses"
-    size = f"{quantity(total.rms, comparison.unit, 2, total.signal)} RMS"
-    if total.share == total.share:
-        size += f" ({_percent(total.share)} of {'the ' + what if known else 'its own'})"
+    size = total.error.text(comparison.unit)
     step = ""
     if total.numerical_z > _STEP:
         times = plain(total.numerical_z, 2)
         step = f"; the step of the calculation alone causes {times} times the noise"
-    if total.rms > _SPIKY * total.z * total.noise:
+    if total.residual > _SPIKY * total.z * total.noise:
         size += ", much of it in short spikes"
     if not comparison.right:
         times = plain(total.z)
         text = f"{where} the {what} by {size}, {times} times the noise{step}"
     else:
         text = f"{where} the {what} by {size}, which the noise explains (z = {total.z:.2f}){step}"
-    return f"{text}{_elsewhere(comparison)}."
+    beside = total.error.beside(comparison.unit)
+    return " ".join([f"{text}{_elsewhere(comparison)}.", *beside])
 
 
 def _elsewhere(comparison: Comparison) -> str:

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from .comparison import Comparison, compare_predictions
 from .errors import (
     FEWEST,
-    RunError,
     SiteError,
     interval_of_z,
     refuse,
     run_error,
+    total_error,
     with_failures,
 )
 from .patterns import Finder
@@ -48,8 +48,9 @@ def compare_sites(
     errors = site_errors(predictions, seed)
     site = site or errors[0].site
     others = [one for one in errors if one.site != site]
+    able = usable(predictions[site])
     return compare_predictions(
-        usable(predictions[site]), seen=seen, seed=seed, others=others, role=role
+        able, seen=seen, seed=seed, others=others, role=role, every=predictions[site]
     )
 
 
@@ -67,9 +68,9 @@ def usable(predictions: Sequence[RunPrediction]) -> list[RunPrediction]:
 
 def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteError:
     """Return how wrong a model is at a site, and along what, without the rest of a comparison."""
-    first, predictions, nothing = predictions[0], usable(predictions), float("nan")
+    first, every, predictions = predictions[0], predictions, usable(predictions)
+    total, nothing = total_error(predictions, every), float("nan")
     if not predictions:
-        total = RunError("all runs", 0, *[nothing] * 9)
         return SiteError(first.site, first.quantity, first.unit, (), total, (nothing,) * 2, None)
     refuse(predictions)
     runs = tuple(run_error(one.name, [one]) for one in predictions)
@@ -80,5 +81,4 @@ def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteError
     found = finder.ranked(finder.normalised)
     pattern = found[0] if found and found[0].significant else None
     interval = interval_of_z(normalised, finder)
-    total = run_error("all runs", predictions)
     return SiteError(first.site, first.quantity, first.unit, runs, total, interval, pattern)

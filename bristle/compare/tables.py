@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..data.labels import Label, label_text, varying
-from ..draw.style import percent
 from ..physics.drive import DRIVES
-from ..quantity import plain, scale, short_z
+from ..quantity import percent, plain, scale, short_z
 from .labels import known_of
 from .names import name_of, site_name
 from .sentences import FAINT, begin
@@ -50,7 +49,7 @@ def _site(one: SiteError, factor: float) -> list[str]:
     (low, high), total, pattern = one.z_interval, one.total, one.pattern
     worth = pattern is not None and pattern.share >= FAINT
     return [
-        name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", plain(factor * total.rms),
+        name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", plain(factor * total.rms, 4),
         percent(total.share), plain(factor * total.noise),
         name_of(pattern.coordinate, one.site) if pattern is not None and worth else "-",
     ]  # fmt: skip
@@ -88,7 +87,7 @@ def label_table(comparison: Comparison) -> Table:
 def _run(run: RunError, factor: float) -> list[str]:
     numerical = plain(run.numerical_z, 2) if run.numerical_z == run.numerical_z else "not tried"
     return [
-        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share), percent(run.fit),
+        run.name, short_z(run.z), plain(factor * run.rms, 4), percent(run.share), percent(run.fit),
         percent(run.accounted), plain(factor * run.noise), numerical,
     ]  # fmt: skip
 

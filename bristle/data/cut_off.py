@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..quantity import quantity
 from .channels import DRIVE, channel_unit
 from .checks.clipping import stands_at_top
+from .left_out import merged
 from .measurement import Measurement
 
 Array = NDArray[np.float64]
@@ -90,8 +91,7 @@ def without_cut_off(runs: Sequence[Measurement]) -> tuple[list[Measurement], tup
                 continue
             cut = beyond_range(run[channel], run.noise.get(channel, 0.0), level)
             if cut.any():
-                flags = cut | run.lost.get(channel, np.zeros_like(cut))
-                out[k] = replace(run, lost={**run.lost, channel: flags})
+                out[k] = replace(run, saturated=merged(run.saturated, channel, cut))
                 unit = channel_unit(channel)
                 at = " and ".join(quantity(end, unit, 4) for end in outermost(ends))
                 notes.append(

@@ -26,6 +26,7 @@ from .extra import Extra, found_in, read_extra
 from .finer import Finer
 from .guess import guess_channels, specs, too_few_rows
 from .labels import TEMPERATURE, Labels, mean_temperature
+from .left_out import MASKED, MISSING, SATURATED, any_of, occurring
 from .noise import KNOWN, Noise, estimate_noise, quietest
 from .read import read_table
 from .sampling import Even, Sampling, evenly
@@ -71,8 +72,12 @@ class Measurement:
         By name, in SI; `units` holds the units.
     measured : (n,) array of bool
         False where a sample was missing and is interpolated.
+    masked : (n,) array of bool or None
+        True where a sample is not measured because a spike there was masked; None for nowhere.
     lost : mapping of (n,) arrays of bool
-        By channel: True where that one alone says nothing, such as beyond the end of its range.
+        By channel: True where that one alone holds nothing, such as beyond the end of its record.
+    saturated : mapping of (n,) arrays of bool
+        By channel: True where that one may stand at the end of its range.
     parts, since : int, mapping of (n,) arrays
         Where samples were left out, at how many moments per sample a model is evaluated, and by
         command how it went from one sample to the next; see `finer`.
@@ -116,6 +121,8 @@ class Measurement:
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
     extra: Mapping[str, Extra] = field(default_factory=dict)
+    saturated: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    masked: NDArray[np.bool_] | None = None
 
     def __repr__(self) -> str:
         rows = (
@@ -135,13 +142,34 @@ class Measurement:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def valid(self, *channels: str) -> NDArray[np.bool_]:
-        """Return at which samples (n,) all of these channels say something."""
-        valid = self.measured
-        for channel in channels:
-            if channel in self.lost:
-                valid = valid & ~self.lost[channel]
-        return valid
+    def valid(self, *channels: str, but_for: str = "") -> NDArray[np.bool_]:
+        """Return at which samples (n,) all of these channels say something.
+
+        Parameters
+        ----------
+        channels : their names
+        but_for : the one reason that counts, such as "saturated"; "" for every one
+        """
+        found = self.left_out(*channels)
+        if but_for:
+            found = {reason: where for reason, where in found.items() if reason == but_for}
+        out = any_of(found)
+        return np.ones(len(self.time), dtype=np.bool_) if out is None else ~out
+
+    def left_out(self, *channels: str) -> dict[str, NDArray[np.bool_]]:
+        """Return why these channels say nothing at samples (n,): True by reason, if one holds."""
+        nowhere = np.zeros(len(self.time), dtype=np.bool_)
+
+        def of(flags: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+            own = [flags[channel] for channel in channels if channel in flags]
+            return np.asarray(np.any([nowhere, *own], axis=0), dtype=np.bool_)
+
+        masked = nowhere if self.masked is None else self.masked & ~self.measured
+        found = {
+            MASKED: masked, MISSING: (~self.measured & ~masked) | of(self.lost),
+            SATURATED: of(self.saturated),
+        }  # fmt: skip
+        return occurring(found)
 
     @property
     def finer(self) -> Finer | None:
@@ -176,6 +204,8 @@ class Measurement:
             channels={key: values[start:stop] for key, values in self.channels.items()},
             measured=self.measured[start:stop],
             lost={key: flags[start:stop] for key, flags in self.lost.items()},
+            saturated={key: flags[start:stop] for key, flags in self.saturated.items()},
+            masked=None if self.masked is None else self.masked[start:stop],
             since={key: counts[start:stop] for key, counts in self.since.items()},
             extra={key: one.of(slice(start, stop)) for key, one in self.extra.items()},
         )
@@ -207,7 +237,8 @@ class Measurement:
 
         return replace(
             self, channels=named(self.channels), units=named(self.units), lost=named(self.lost),
-            since=named(self.since), noise=named(self.noise), noise_facts=named(self.noise_facts),
+            saturated=named(self.saturated), since=named(self.since),
+            noise=named(self.noise), noise_facts=named(self.noise_facts),
             spikes=tuple(one._replace(channel=names.get(one.channel, one.channel))
                          for one in self.spikes),
         )  # fmt: skip
@@ -300,7 +331,9 @@ def measurements_of(
             labels.setdefault(TEMPERATURE, mean)
     if not values:
         raise RecordError(f"{table.source}: no channel besides time is named. There is nothing.")
+    there = {name: np.isfinite(y) for name, y in values.items()}
     spikes = spikes_of(time, values, mask=known.mask)
+    masked = time[np.any([own & ~np.isfinite(values[n]) for n, own in there.items()], axis=0)]
     notes += _masked(spikes) if known.mask else []
     extra = read_extra(table, time, known.extra)
     if warm is not None:
@@ -328,6 +361,7 @@ def measurements_of(
                 tuple(notes), labels=labels, spikes=() if known.mask else spikes,
                 lost=fewer.lost[number - 1], parts=fewer.parts, since=fewer.since[number - 1],
                 extra=extra.at(piece),
+                masked=_beside(piece, masked, even.sampling.step) if len(masked) else None,
             )
         )  # fmt: skip
     return out
@@ -348,6 +382,14 @@ def _set_right(even: Even, corrections: tuple[Correction, ...]) -> tuple[Even, l
         for (time, _, measured), one in zip(even.pieces, moved, strict=True)
     ]
     return replace(even, pieces=pieces), moved
+
+
+def _beside(time: Array, masked: Array, step: float) -> NDArray[np.bool_]:
+    """Return which times (n,) [s] lie within a step of one of those that were masked (m,)."""
+    ordered = np.sort(masked)
+    after = np.searchsorted(ordered, time)
+    behind, ahead = ordered[np.maximum(after - 1, 0)], ordered[np.minimum(after, len(ordered) - 1)]
+    return np.minimum(np.abs(time - behind), np.abs(ahead - time)) <= step * (1.0 + 1e-6)
 
 
 def _masked(spikes: tuple[Spike, ...]) -> list[str]:

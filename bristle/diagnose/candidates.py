@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.error import ForceError, force_error
 from ..identify.fit import Model, Problem
-from ..identify.residuals import Expected, plain_rms, residuals
+from ..identify.residuals import Expected, residuals
 from ..identify.search import loss, losses, mean_loss, z_of, z_scale
 from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
@@ -52,8 +53,9 @@ class Trial:
     """A model tried: fitted on the training runs, judged on the held-out ones.
 
     `train`, `z` the robust RMS of residual over expected noise there; `losses` (n,) the robust loss
-    per held-out sample, `residual` (n,) the normalised residuals, `rms` [N] their plain size.
-    `refined` is False where the first, short search already showed that it gains too little.
+    per held-out sample, `residual` (n,) the normalised residuals; `rms` [N] the error there, that
+    of `error`, which is None where nobody asked. `refined` is False where the first, short search
+    already showed that it gains too little.
     """
 
     model: Model
@@ -63,6 +65,7 @@ class Trial:
     losses: Array
     residual: Array
     refined: bool = True
+    error: ForceError | None = None
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -85,10 +88,10 @@ def judge(
     fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
     z = residuals(held_out, model, expected)
     own = residuals(train, model, fitted)
-    lost = losses(z)
+    lost, error = losses(z), force_error([(held_out, model)])
     return Trial(
-        model, z_scale(own), z_of(mean_loss(lost)),
-        plain_rms(held_out, model, expected), lost, z, noise is None,
+        model, z_scale(own), z_of(mean_loss(lost)), error.rms, lost, z, noise is None,
+        error,
     )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.corrections import LEFT_OUT
+from ..data.left_out import MISSING, merged
 from ..identify.model import Model, Problem, Run
 from ..identify.residuals import residuals
 from ..identify.search import z_scale
@@ -200,7 +201,6 @@ def _set_right(run: Run, clocks: Clocks, k: int) -> Run:
     at = np.arange(len(run.force), dtype=float)
     when = (at - clocks.late[k] / run.dt) / (1.0 + clocks.rate)
     known = (when >= 0.0) & (when <= at[-1])
-    measured = known if run.measured is None else known & run.measured
 
     def then(values: Array) -> Array:
         return np.asarray(np.interp(when, at, values))
@@ -210,7 +210,7 @@ def _set_right(run: Run, clocks: Clocks, k: int) -> Run:
         draws = np.apply_along_axis(then, 1, draws)
     return replace(
         run, x=then(run.x), v=then(run.v), a=then(run.a), V=then(run.V), draws=draws,
-        measured=measured,
+        left_out=merged(run.left_out, MISSING, ~known),
     )  # fmt: skip
 
 

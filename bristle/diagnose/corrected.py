@@ -26,7 +26,7 @@ def corrected(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> lis
 
 
 def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
-    channels, lost, noise = dict(run.channels), dict(run.lost), dict(run.noise)
+    channels, cut, noise = dict(run.channels), dict(run.saturated), dict(run.noise)
     timing: list[Correction] = []
     for fault in sorted(faults, key=lambda one: ORDER.get(one.fault, 0)):
         if fault.channel not in channels or fault.run not in ("", run.name):
@@ -47,9 +47,11 @@ def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
         elif fault.fault in ("lag", "high-pass", "derived"):
             del channels[fault.channel]  # displacement says the same, without it
         elif fault.fault == "clipping":
-            lost[fault.channel] = beyond_range(values, noise.get(fault.channel, 0.0), fault.value)
-    known = {name: replace(run, lost=lost).valid(name) for name in channels}
+            cut[fault.channel] = beyond_range(values, noise.get(fault.channel, 0.0), fault.value)
+    known = {name: replace(run, saturated=cut).valid(name) for name in channels}
     moved = in_time(channels, known, run.step, timing)
     for name in moved.between:
         noise[name] = noise.get(name, 0.0) * moved.noise_left(name)
-    return replace(run, channels=moved.channels, lost={**lost, **moved.lost}, noise=noise)
+    return replace(
+        run, channels=moved.channels, lost={**run.lost, **moved.lost}, saturated=cut, noise=noise
+    )

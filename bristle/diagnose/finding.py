@@ -74,7 +74,8 @@ class Finding:
         if self.before is not None and self.after is not None:
             for when, trial in (("before", self.before), ("after", self.after)):
                 out[f"z_train_{when}"] = round(trial.train, 4)
-                out[f"rms_holdout_{when}"] = trial.rms
+                if trial.error is not None:
+                    out[f"error_holdout_{when}"] = trial.error.as_dict()
         if np.isfinite(self.detectable):
             out["detectable"] = round(self.detectable, 5)
         if self.kind == "unknown" and self.coordinate:

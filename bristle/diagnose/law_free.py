@@ -20,7 +20,7 @@ from .diagnosis import look_at_lines
 from .equilibrium import BuildingRuns
 from .inconsistent_runs import contradicted
 from .law_choice import Pair, choose, equivalents, search, simplest
-from .law_trials import LawTrial, not_finite, try_laws
+from .law_trials import KeptFits, LawTrial, not_finite, try_laws
 from .law_verdict import LawVerdict
 from .opening import Insufficient, Opening, Progress, bench_data, opened_with, silent
 from .rule import BENCH, DecisionRule
@@ -36,6 +36,7 @@ def diagnose_laws(
     *,
     named: str = "",
     profile: bool = False,
+    kept: KeptFits | None = None,
     say: Progress = silent,
     rule: DecisionRule = BENCH,
 ) -> Diagnosis:
@@ -48,6 +49,7 @@ def diagnose_laws(
     building : the building that the damper is in, None for a test bench
     named : the present law with its variant, "" where nobody chose one
     profile : whether the model is fitted again at every limit of an effect
+    kept : fits of laws to a bench's runs that are known already, and where those that are made go
     say : called with a few words at each stage
     rule : the numbers that decide
 
@@ -63,7 +65,8 @@ def diagnose_laws(
     if isinstance(data, Insufficient):
         return Diagnosis("insufficient", (), data.reasons, sensors=data.faults, noise=data.noise)
     say("trying every law")
-    rows = try_laws(data.problem, data.held_out, present, bends=tells_a_bend(train))
+    bends = tells_a_bend(train)
+    rows = try_laws(data.problem, data.held_out, present, bends=bends, kept=kept)
     looks = Looks(lambda trial: opened_with(trial, data), say)
     sought = _sought(rows, looks, say, rule)
     finding = contradicted(sought.chosen.finding, sought.opened)

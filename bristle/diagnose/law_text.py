@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..compare.names import joined
+from ..identify.error import ForceError
 from ..physics.forms import LINEAR_FORM
-from ..quantity import quantity, short_z
+from ..quantity import short_z
 from .decision import Z
 
 Row = Mapping[str, Any]
@@ -19,7 +20,10 @@ HEADER = (
     "law", "command", "fitted", "z, training", "z, held out", "above the best",
     "error, training", "error, held out",
 )  # fmt: skip
-"""Columns of the table of laws; the last two are the RMS errors of the force."""
+"""Columns of the table of laws; the last two are those of `ERRORS`."""
+
+ERRORS = ("error_train", "error_holdout")
+"""Where a row has the error of the force; one of an earlier version has another error, and none."""
 
 TABLE_NOTE = (
     "z: error / noise; a true model has 1. Above the best: z less that of the best law, the mean "
@@ -84,7 +88,8 @@ def _pair_name(row: Row) -> str:
 
 def law_table(rows: Sequence[Row]) -> list[list[str]]:
     """Return the cells of the table of laws, one row per law as in verdict.json; see `HEADER`."""
-    size = max((row["rms_holdout"] for row in rows), default=0.0)
+    known = [row[key] for row in rows for key in ERRORS if row.get(key)]
+    size = max((one["signal_all"] for one in known), default=0.0)
     return [_cells(row, size) for row in rows]
 
 
@@ -95,5 +100,5 @@ def _cells(row: Row, size: float) -> list[str]:
         str(row["law"]), str(row["command"]), str(row["fitted"]),
         short_z(row["z_train"]), short_z(row["z_holdout"]),
         f"{above:.2f}{spread}" if above else "-",
-        quantity(row["rms_train"], "N", 3, size), quantity(row["rms_holdout"], "N", 3, size),
+        *(ForceError.of(row[key]).text("N", size) if row.get(key) else "-" for key in ERRORS),
     ]  # fmt: skip

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.stats import t as student
 
+from ..identify.error import ForceError, force_error
 from ..identify.fit import Model, Problem
 from ..identify.model import steady, without
-from ..identify.residuals import plain_rms
 from ..identify.search import z_scale
 from ..identify.search_context import Search, refine
 from ..identify.starts import start_models
@@ -40,13 +40,13 @@ WITHIN = 0.95
 class LawTrial:
     """A law tried: fitted on the training runs, judged on the held-out ones.
 
-    `law` is its name with variant and form, such as "lugre_standard[quadratic]"; `rms_train` the
-    plain error [N] on the training runs; `z_runs` (r,) z of each held-out run.
+    `law` is its name with variant and form, such as "lugre_standard[quadratic]"; `error_train` the
+    error on the training runs; `z_runs` (r,) z of each held-out run.
     """
 
     law: str
     trial: Trial
-    rms_train: float
+    error_train: ForceError
     z_runs: tuple[float, ...]
 
     @property
@@ -77,14 +77,25 @@ class LawTrial:
         return {
             "law": plain, "command": form or LINEAR_FORM, "fitted": self.fitted,
             "z_train": round(self.trial.train, 4), "z_holdout": round(self.trial.z, 4),
-            "rms_train": self.rms_train, "rms_holdout": self.trial.rms,
+            "error_train": self.error_train.as_dict(),
+            "error_holdout": self.trial.error.as_dict() if self.trial.error else None,
             "z_above_best": round(above, 4),
             "interval95": round(half, 4) if np.isfinite(half) else None,
         }  # fmt: skip
 
 
+class KeptFits(Protocol):
+    """Where a search for the law keeps its fits, and takes up those of one that was interrupted."""
+
+    known: dict[str, dict[str, float]]
+    """Values [SI] by law, then by name."""
+
+    def keep(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
+        """Keep the values of more laws."""
+
+
 def try_laws(
-    train: Problem, held_out: Problem, present: Model, *, bends: bool
+    train: Problem, held_out: Problem, present: Model, *, bends: bool, kept: KeptFits | None = None
 ) -> tuple[LawTrial, ...]:
     """Return the trials of all laws and of their variants, the best on held-out runs first.
 
@@ -96,6 +107,7 @@ def try_laws(
     present : the model as it is; each law has those of its effects that can join it
     bends : whether the command has levels enough for a parabola: laws whose form may be chosen
         are then tried with that, too
+    kept : fits that are known already, and where those that are made go
     """
     unfit = not_finite(train, present)  # which compiles all before threads ask for it
     names = [name for name in law_names() if name not in unfit]
@@ -103,7 +115,8 @@ def try_laws(
 
     def tried(name: str) -> list[LawTrial]:
         with series(LAW, name):
-            found = _tried(name, train, held_out, present, bends)
+            fitted = _fitted(name, train, present, bends, kept)
+            found = [_row(law, one, train, held_out) for law, one in fitted]
         count.done(name)
         return found
 
@@ -189,23 +202,31 @@ def _is_finite(model: Model, problem: Problem) -> bool:
     )
 
 
-def _tried(
-    name: str, train: Problem, held_out: Problem, present: Model, bends: bool
-) -> list[LawTrial]:
+def _fitted(
+    name: str, train: Problem, present: Model, bends: bool, kept: KeptFits | None
+) -> list[tuple[str, Model]]:
+    """Return a law fitted to the training runs, and the same with a bent command where it may."""
     model = _model(name, train, present)
+    bent = joined_form(name, QUADRATIC_FORM) if bends and choosable(model.law_class) else ""
+    known = kept.known if kept is not None else {}
+    if name in known and (not bent or bent in known):
+        of_both = [(name, model)] + ([(bent, _model(bent, train, present))] if bent else [])
+        return [(law, replace(one, values=known[law])) for law, one in of_both if known[law]]
     starts = start_models(train, model, STARTS)
     expected = train.expectation(starts[0])
     ends = [Search(train, one, expected, one.free()).run(JACOBIANS) for one in starts]
     best, _ = min(ends, key=lambda end: end[1].cost)
     fitted = [(name, refine(best, train, JACOBIANS))]
-    if bends and choosable(model.law_class):
-        bent = joined_form(name, QUADRATIC_FORM)
+    if bent:
         begin = replace(
             _model(bent, train, present), values=fitted[0][1].values, fixed=fitted[0][1].fixed
         )
         if set(begin.effects) == set(model.effects):
             fitted.append((bent, refine(begin, train, JACOBIANS)))
-    return [_row(law, one, train, held_out) for law, one in fitted]
+    if kept is not None:
+        none: dict[str, dict[str, float]] = {bent: {}} if bent else {}  # it may not join
+        kept.keep({**none, **{law: one.values for law, one in fitted}})
+    return fitted
 
 
 def _model(name: str, problem: Problem, present: Model) -> Model:
@@ -239,4 +260,4 @@ def _row(law: str, model: Model, train: Problem, held_out: Problem) -> LawTrial:
     trial = replace(judge(model, train, held_out, expected), refined=True)
     edges = np.cumsum([len(run.force) - run.skip for run in held_out.runs])[:-1]
     z_runs = tuple(z_scale(part) for part in np.split(trial.residual, edges))
-    return LawTrial(law, trial, plain_rms(train, model, expected[0]), z_runs)
+    return LawTrial(law, trial, force_error([(train, model)]), z_runs)

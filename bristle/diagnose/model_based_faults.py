@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.left_out import MISSING, merged
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import steady
 from ..identify.search import HUBER_AT_ONE, losses, mean_loss
@@ -247,8 +248,8 @@ def _advanced(run: Run, late: float, draws: bool = True) -> Run:
         for one in moved:
             one[:, 3] = _ahead(one[:, 3], samples)
     known = np.arange(len(run.V)) < len(run.V) - samples
-    measured = known if run.measured is None else known & run.measured
-    return replace(run, V=_ahead(run.V, samples), draws=moved, measured=measured)
+    left_out = merged(run.left_out, MISSING, ~known)
+    return replace(run, V=_ahead(run.V, samples), draws=moved, left_out=left_out)
 
 
 def _ahead(values: Array, samples: float) -> Array:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from ..draw import html
 from ..draw.figure import DPI
-from ..draw.style import percent, png, short_z
+from ..draw.style import png, short_z
+from ..quantity import percent
 from .picture import MOST, draw_diagnosis, headline
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..data.derived import derived_velocity
+from ..data.left_out import WAYS_OUT
 from ..data.measurement import Measurement
 from ..identify.fit import Model, Problem, Run, identify
 from ..identify.prepare import SHORTEST
@@ -34,6 +35,9 @@ MANY = 150_000
 
 ENOUGH, FEWEST = 75_000, 8
 """Samples, about, of that part, for a search takes as long as they are; and its runs."""
+
+TOLD = 3
+"""Runs that a sentence names one by one."""
 
 Progress = Callable[[str], None]
 
@@ -138,10 +142,12 @@ def bench_data(
     if lacking:
         return Insufficient(tuple(lacking), tuple(faults), noise)
     say("smoothing the motion")
-    left = [_left(corrected(runs, faults)) for runs in (train, holdout)]
+    whole = [corrected(runs, faults) for runs in (train, holdout)]
+    left = [_left(runs) for runs in whole]
     if not all(left):
-        reasons = ("No run has enough samples that are not clipped.", *words_of(faults))
-        return Insufficient(reasons, tuple(faults), noise)
+        empty = zip(("for training", "held out"), whole, left, strict=True)
+        reasons = [_too_few(role, runs) for role, runs, kept in empty if not kept]
+        return Insufficient((*reasons, *words_of(faults)), tuple(faults), noise)
     problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
     redundant = any(
         run.has("displacement", "velocity") and not derived_velocity(run) for run in train
@@ -249,6 +255,37 @@ def _left(runs: Sequence[Measurement]) -> list[Measurement]:
     ]
 
 
+def _too_few(role: str, runs: Sequence[Measurement]) -> str:
+    """Return the sentence that no run of a role has samples enough: where, why, what to do."""
+    told, ways = [], dict[str, None]()
+    for run in runs:
+        worst = min(run.channels, key=lambda name: np.count_nonzero(run.valid(name)))
+        here = [worst] if np.count_nonzero(run.valid(worst)) < SHORTEST else list(run.channels)
+        counts = {why: int(flags.sum()) for why, flags in run.left_out(*here).items()}
+        left = np.count_nonzero(run.valid(*here))
+        why = ", ".join(f"{count:,} {why}" for why, count in counts.items())
+        told.append(
+            f"{run.name}: of {', '.join(here)} {left:,} of {len(run.time):,} samples can be used "
+            f"({why})"
+        )
+        ways |= dict.fromkeys(WAYS_OUT[why] for why in counts)
+    more = [f"and {len(told) - TOLD} more runs"] if len(told) > TOLD else []
+    where = "; ".join([*told[:TOLD], *more])
+    return (
+        f"No run {role} has the {SHORTEST} samples that a fit needs. {where}. To change it: "
+        f"{'; '.join(ways)}."
+    )
+
+
+def _where(runs: Sequence[Measurement], names: Sequence[str] = ()) -> str:
+    """Return which runs something is in, by name or all, and how many samples they have."""
+    own = [run for run in runs if run.name in names] or list(runs)
+    listed = ", ".join(run.name for run in own[:TOLD])
+    more = f" and {len(own) - TOLD} more" if len(own) > TOLD else ""
+    count = sum(len(run.time) for run in own)
+    return f"in {listed}{more} ({count:,} samples)"
+
+
 def median_noise(runs: Sequence[Measurement]) -> dict[str, float]:
     """Return the median noise of each channel over the runs, in SI."""
     names = dict.fromkeys(name for run in runs for name in run.noise)
@@ -266,22 +303,35 @@ def _lacking(
     force = np.concatenate([run["force"] for run in runs if run.has("force")] or [np.zeros(1)])
     spread = float(np.std(force))
     noise = float(np.median([run.noise.get("force", 0.0) for run in runs]))
+    where = _where(runs)
     if spread <= 0.0:
-        out.append("The force is constant: there is nothing to explain.")
+        out.append(
+            f"The force is constant ({plain(float(force[0]))} N) {where}: there is nothing to "
+            "explain. Look at its column and unit:  bristle study channels ; or measure it."
+        )
     elif spread < rule.quietest * noise:
         out.append(
-            f"The force's noise, {plain(noise)} N, is nearly the force itself, {plain(spread)} "
-            f"N RMS: "
-            f"at least {rule.quietest:g} times are needed."
+            f"The force's noise, {plain(noise)} N, is nearly the force itself, {plain(spread)} N "
+            f"RMS, {where}: the force must be at least {rule.quietest:g} times its noise. Measure "
+            "with larger motions or a quieter load cell, or give the noise in study.toml if it is "
+            "less."
         )
     for channel in ("displacement", "velocity"):
         able = [run[channel] for run in runs if run.has(channel)]
         if able and float(np.ptp(np.concatenate(able))) == 0.0:
-            out.append(f"The {channel} does not change: without motion no damper shows anything.")
+            out.append(
+                f"The {channel} does not change {where}: without motion no damper shows anything. "
+                "Look at its column:  bristle study channels ; or measure with motion."
+            )
     out += [fault.words for fault in faults if fault.fault == "unrelated"]
     cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
     if cut:
         share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))
         if share > rule.cut:
-            out.append(f"The force is saturated in {share:.0%} of the samples.")
+            count, there = round(share * len(force)), _where(runs, cut[0].runs)
+            out.append(
+                f"The force is saturated in {count:,} of {len(force):,} samples ({share:.0%}) "
+                f"{there}; {rule.cut:.0%} is the most. Measure with a wider range, or leave these "
+                "runs out."
+            )
     return out

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..compare.patterns import ResidualPattern
 from ..identify.assigned import late_effects
+from ..identify.error import ForceError, pooled
 from ..identify.rig import DAMPER
 from ..physics.effect import EFFECTS
 from ..shown import shown
@@ -24,8 +25,8 @@ from .law_verdict import LawVerdict
 from .verdict_file import SCHEMA
 
 OF_WORST = (
-    "z_holdout_before", "z_holdout_after", "z_train_before", "z_train_after", "rms_holdout_before",
-    "rms_holdout_after", "explained", "organised",
+    "z_holdout_before", "z_holdout_after", "z_train_before", "z_train_after",
+    "error_holdout_before", "error_holdout_after", "explained", "organised",
 )  # fmt: skip
 """What verdict.json tells of the worst site beside the list of all."""
 
@@ -63,6 +64,9 @@ class Diagnosis:
         Noise of each channel, as far as it was asked for, in SI.
     laws : LawVerdict or None
         How all laws do, where laws and effects were sought together.
+    error : mapping of mapping of ForceError
+        By role, "train" or "holdout", and site: the error of the model as it was given, on the runs
+        as they are; none where nobody fitted that model.
 
     Examples
     --------
@@ -84,6 +88,7 @@ class Diagnosis:
     force: str = "measured"
     noise: Mapping[str, float] = field(default_factory=dict)
     laws: LawVerdict | None = None
+    error: Mapping[str, Mapping[str, ForceError]] = field(default_factory=dict)
 
     @property
     def law(self) -> str:
@@ -229,6 +234,14 @@ class Diagnosis:
             "findings": [found.as_dict() for found in self.findings.values()],
             "reasons": list(self.reasons),
         }  # fmt: skip
+        if self.error:
+            out["error"] = {
+                role: pooled(one.values()).as_dict() for role, one in self.error.items()
+            }
+            out["error_by_site"] = {
+                role: {site: error.as_dict() for site, error in one.items()}
+                for role, one in self.error.items()
+            }
         if self.worst is not None:
             shown = self.worst.as_dict()
             out |= {key: shown[key] for key in OF_WORST if key in shown}

@@ -160,11 +160,6 @@ def _broken(text: str, width: float, per_inch: float) -> str:
     return "\n".join(textwrap.fill(line, fits) for line in lines).replace(_TOGETHER, " ")
 
 
-def percent(share: float, digits: int = 1) -> str:
-    """Return a share as text: "8.6 %"."""
-    return f"{round(100.0 * share, digits) + 0.0:.{digits}f} %"  # + 0.0: no minus before a zero
-
-
 def zero_lines(axes: Axes) -> None:
     """Draw the axes through the origin."""
     axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)

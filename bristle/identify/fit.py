@@ -33,7 +33,7 @@ from .scaled import Scaled
 from .search import descend, loss, mean_loss
 from .starts import start_model, start_models
 from .threads import in_threads
-from .watch import share_of, watched
+from .watch import watched
 
 __all__ = [
     "Expected",
@@ -111,7 +111,7 @@ def fit(
     if not scaled.names:
         cost = mean_loss(loss(scaled.residuals(np.zeros(0))))
         return Fit(model, {}, cost)
-    with watched(problem, scaled.at, partial(share_of, problem, expected)) as accepted:
+    with watched(problem, scaled.at) as accepted:
         found = descend(
             scaled.residuals,
             scaled.start,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..data.extra import Extra
 from ..data.finer import Finer, between
 from ..data.labels import Label
+from ..data.left_out import any_of
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
@@ -55,9 +56,9 @@ class Run:
     """A measured run, its motion smoothed.
 
     `x`, `v`, `a`, `V`, `force` (n,) in SI, evenly spaced by `dt` [s]; `noise` the force channel's
-    standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `measured` (n,)
-    False where a sample was filled in, None if none was. `drive` is the channel that V holds, in
-    its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
+    standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `left_out` why
+    samples say nothing, by reason (n,) True where that holds. `drive` is the channel that V holds,
+    in its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
     samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
     besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
     was not measured and follows from the motion, beside `noise` and each with its draw of `draws`;
@@ -74,7 +75,7 @@ class Run:
     noise: float
     draws: Array
     skip: int = 25
-    measured: NDArray[np.bool_] | None = None
+    left_out: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
     rest: int = 0
@@ -102,6 +103,12 @@ class Run:
         """Return a force at these moments as the measured one is: behind its filter (n,) [N]."""
         return force if self.finer is None else self.finer.filtered(force)
 
+    @cached_property
+    def measured(self) -> NDArray[np.bool_] | None:
+        """Which samples (n,) say something, None where all do."""
+        out = any_of(self.left_out)
+        return None if out is None else ~out
+
     @property
     def judged(self) -> NDArray[np.bool_]:
         """Which of the samples after `skip` were measured (n - skip,)."""
@@ -119,11 +126,15 @@ class Run:
         return replace(
             self, rest=rest, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
             force=self.force[part], draws=self.draws[:, part],
-            measured=None if self.measured is None else self.measured[part],
+            left_out={reason: where[part] for reason, where in self.left_out.items()},
             force_draws=None if self.force_draws is None else self.force_draws[:, part],
             extra={name: one.of(part) for name, one in self.extra.items()},
             finer=self.finer.of(part) if self.finer and dense else None,
         )  # fmt: skip
+
+    def entire(self) -> Run:
+        """Return the run with all its samples, whatever a fit takes of them."""
+        return self
 
 
 @dataclass(frozen=True)

@@ -61,12 +61,11 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     # Where one of two channels of the motion is lost, the other one tells it.
     alone = tuple(c for c in ("displacement", "velocity") if measurement.has(c))
     needed = ("force", drive, *(alone if len(alone) == 1 else ()))
-    known = measurement.valid(*needed)
     force = measurement["force"]
     begin = begin_of(motion.x, force, dt)
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
-        _noise_of_force(measurement), error, begin.first, None if known.all() else known,
+        _noise_of_force(measurement), error, begin.first, measurement.left_out(*needed),
         drive or VOLTAGE.name, measurement.labels, begin.rest, measurement.extra,
         finer=measurement.finer,
     )  # fmt: skip

@@ -111,18 +111,6 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
     return np.concatenate(parts)
 
 
-def plain_rms(problem: Problem, model: Model, expected: Expected) -> float:
-    """Return the RMS of the error over all samples that were measured, each with the same say [N].
-
-    Parameters
-    ----------
-    problem, model, expected : as of `errors`
-    """
-    pairs = zip(errors(problem, model, expected), problem.runs, strict=True)
-    judged = np.concatenate([error[run.judged] for error, run in pairs])
-    return float(np.sqrt(np.mean(judged**2))) if len(judged) else 0.0
-
-
 def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:
     """Return z, the robust RMS of residual over expected noise: 1 for a true model."""
     return z_scale(residuals(problem, model, problem.expectation(model, draws)))

@@ -70,7 +70,7 @@ class Response:
     of that error; `V_left` the noise left on V; `drive` the channel that V holds, in its own unit,
     "" where none was measured; `labels` what is known of the whole run; `extra` its channels
     besides those that bristle knows. `known` says where all that was measured, and not filled in;
-    `finer` is that of `Run`.
+    `known_but` by reason where it would be, but for that one; `finer` is that of `Run`.
     """
 
     name: str
@@ -96,6 +96,7 @@ class Response:
     across: DeviceMotion | None = None
     known: KnownSamples | None = None
     finer: Finer | None = None
+    known_but: Mapping[str, KnownSamples] = field(default_factory=dict)
 
     @property
     def damped(self) -> bool:
@@ -240,28 +241,31 @@ def responses(
             else:
                 errors.append(made[i, _instruments(one), m.step])
         found = _response(m, levels, errors, _accelerations(m, building, levels))
+        reasons = m.left_out(*m.channels)
         found = replace(
             found, device=device, others=_loads(m, building, device), across=own,
-            known=_known(m, building, device),
+            known=_known(m, building, device) if reasons else None,
+            known_but={why: _known(m, building, device, why) for why in reasons},
         )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
     return out
 
 
-def _known(m: Measurement, building: Building, device: Device) -> KnownSamples | None:
-    """Return which samples were measured, None where all were."""
-    if m.measured.all() and not m.lost:
-        return None
+def _known(m: Measurement, building: Building, device: Device, but_for: str = "") -> KnownSamples:
+    """Return which samples say something; with `but_for` that reason alone hides any."""
     motion, acceleration = [], []
     for name in building.levels():
         either = [f"{name}_displacement", f"{name}_velocity"]
-        motion.append(np.any([m.valid(one) for one in either if m.has(one)], axis=0))
+        motion.append(
+            np.any([m.valid(one, but_for=but_for) for one in either if m.has(one)], axis=0)
+        )
         shown = ["ground_acceleration", f"{name}_acceleration_absolute"]
-        acceleration.append(m.valid(*shown))
+        acceleration.append(m.valid(*shown, but_for=but_for))
     others = [f"{one.name}_force" for one in building.devices if one is not device]
     return KnownSamples(
-        np.array(motion), np.array(acceleration), m.valid("force"), m.valid(*others)
-    )
+        np.array(motion), np.array(acceleration), m.valid("force", but_for=but_for),
+        m.valid(*others, but_for=but_for),
+    )  # fmt: skip
 
 
 def _loads(m: Measurement, building: Building, device: Device) -> tuple[Load, ...]:

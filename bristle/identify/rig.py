@@ -17,10 +17,11 @@ from ..errors import StudyError
 from ..physics.building import Building, with_damper
 from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
+from .error import refuse_empty
 from .model import Model, Problem, Run
 from .prepare import prepare
 from .response import Response, responses
-from .structure import StructureProblem, blind_at_rest, problems_of
+from .structure import StructureProblem, blind_at_rest, device_moves, problems_of
 from .threads import in_threads
 
 ROLES = ("train", "holdout")
@@ -28,6 +29,11 @@ DAMPER = "damper"
 _NOT_TOLD = (
     "Springs and damping of the storeys beside it are those of the building's file: equilibrium "
     "does not tell them from the damper's own."
+)
+
+_STILL = (
+    "{}: the damper's ends do not move beyond the noise of their velocity, so that the damper is "
+    "not judged there."
 )
 
 
@@ -142,10 +148,15 @@ class Rig:
         return [one.name for one in effects if "force" in one.hooks()]
 
     def prepare(self, model: Model) -> None:
-        """Prepare all runs now, in place of where they are first asked for; raises as `sites`."""
+        """Prepare all runs now, in place of where they are first asked for.
+
+        Raises as `sites`, and a RecordError where too few samples of a role count.
+        """
         for site in self.sites(model).values():
             for role in ROLES:
-                site.problem_of(role)
+                problem = site.problem_of(role)
+                if problem is not None:
+                    refuse_empty(problem.runs)
 
 
 def _refuse_on_bench(model: Model) -> None:
@@ -226,6 +237,9 @@ def building_rig(
         notes = (f"The damper's force{place} was not measured: it is computed from equilibrium.",)
         if not device.on_first:
             notes = (*notes, _NOT_TOLD)
+    still = [one.name for one in found if one.damped and not device_moves(one)]
+    if 0 < len(still) < len(found):
+        notes = (*notes, _STILL.format(", ".join(still)))
     return Rig(_BuildingSites(found, len(train), building), building, notes)
 
 

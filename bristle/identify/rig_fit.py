@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import RecordError
 from ..quantity import plain
 from .assigned import at_site
+from .error import ForceError, errors_by_run, pooled
 from .fit import Fit
 from .line import DAMPING, at_bound
-from .model import Model
+from .model import Model, Problem
 from .residuals import robust_z
 from .rig import DAMPER, ROLES, Rig, Site
 from .site_fit import fit_site, with_line
@@ -192,21 +194,77 @@ def site_models(rig: Rig, model: Model) -> SiteModels:
     return found
 
 
-def errors_of(models: SiteModels, cutoff: float) -> dict[str, float]:
-    """Return z of the worst site, and the RMS error [N] of the forces of all sites together.
+class RigErrors(NamedTuple):
+    """The errors of a model on a rig.
 
-    Both on training runs, and on held-out ones if there are any; the RMS after the low-pass at
-    `cutoff` [Hz]. `share` is that RMS over the RMS of all these forces.
+    `numbers` by name: "z_train" that of the worst site, "error_train" [N] and "error_share_train"
+    the error over all sites, "rms_train" [N] and "share_train" the same behind a low-pass on both
+    forces; "..._holdout" where runs are held out. `force` the error by role over all sites,
+    `at` by role and site.
+    """
+
+    numbers: dict[str, float]
+    force: dict[str, ForceError]
+    at: dict[str, dict[str, ForceError]]
+
+
+def errors_of(models: SiteModels, cutoff: float) -> RigErrors:
+    """Return the errors of what predicts a rig's runs, on training runs and on held-out ones.
+
+    Parameters
+    ----------
+    models : by site
+    cutoff : Hz, of the low-pass for the low-passed errors; 0 for none
+
+    Raises
+    ------
+    RecordError
+        If the force of a model is not finite on a run.
     """
     out: dict[str, float] = {}
-    for role in ROLES:
-        each = [(model, site.problem_of(role)) for site, model in models.values()]
-        pairs = [(model, problem) for model, problem in each if problem is not None]
-        if not pairs:
-            continue
-        out[f"z_{role}"] = max(robust_z(problem, model) for model, problem in pairs)
-        squares = [error_rms(problem, model, cutoff) ** 2 for model, problem in pairs]
-        forces = [force_rms(problem.runs, cutoff) ** 2 for _, problem in pairs]
+    at = force_errors(models)
+    force = {role: pooled(found.values()) for role, found in at.items()}
+    for role, error in force.items():
+        pairs = [pair for _, pair in _pairs(models, role)]
+        out[f"z_{role}"] = max(robust_z(*pair) for pair in pairs)
+        out[f"error_{role}"], out[f"error_share_{role}"] = error.headline
+        squares = [error_rms(*pair, cutoff) ** 2 for pair in pairs]
+        forces = [force_rms(problem.runs, cutoff) ** 2 for problem, _ in pairs]
         out[f"rms_{role}"] = float(np.sqrt(sum(squares)))
         out[f"share_{role}"] = out[f"rms_{role}"] / float(np.sqrt(sum(forces)))
+    return RigErrors(out, force, at)
+
+
+def force_errors(models: SiteModels) -> dict[str, dict[str, ForceError]]:
+    """Return the error by role and site of what predicts a rig's runs.
+
+    Raises
+    ------
+    RecordError
+        If the force of a model is not finite on a run.
+    """
+    out: dict[str, dict[str, ForceError]] = {}
+    for role in ROLES:
+        for name, (problem, model) in _pairs(models, role):
+            runs = errors_by_run(problem, model)
+            _refuse_not_finite(problem, model, runs)
+            out.setdefault(role, {})[name] = pooled(runs)
     return out
+
+
+def _pairs(models: SiteModels, role: str) -> Iterator[tuple[str, tuple[Problem, Model]]]:
+    """Yield the runs of a role and what predicts them, by site."""
+    for name, (site, model) in models.items():
+        problem = site.problem_of(role)
+        if problem is not None:
+            yield name, (problem, model)
+
+
+def _refuse_not_finite(problem: Problem, model: Model, errors: Sequence[ForceError]) -> None:
+    """Refuse a model whose force is not a number on a run."""
+    for run, error in zip(problem.runs, errors, strict=True):
+        if not np.isfinite(error.rms_all):
+            raise RecordError(
+                f"{run.name}: the force of the model {model.law} is not finite there, so there is "
+                "no error. Bounds or fixed values in model.toml, or another law, keep it finite."
+            )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from .fit import Model, Problem, parameter
 from .residuals import Expected as Expected
 from .residuals import residuals as residuals
 from .search import Descent, descend, jacobian
-from .watch import share_of, watched
+from .watch import watched
 
 Array = NDArray[np.float64]
 
@@ -69,8 +68,7 @@ class Search:
 
     def run(self, sweeps: int) -> tuple[Model, Descent]:
         """Search from the model's own values."""
-        share = partial(share_of, self.problem, self.expected)
-        with watched(self.problem, self.at, share) as accepted:
+        with watched(self.problem, self.at) as accepted:
             found = descend(
                 self.residuals, self.start, self.low, self.high, sweeps, rough=self.rough,
                 accepted=accepted,

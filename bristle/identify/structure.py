@@ -11,13 +11,14 @@ to it; so they are judged by the same searches as a damper's effects in a damper
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.left_out import occurring
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
@@ -32,6 +33,7 @@ from .reconstructed import reconstructed
 from .response import Response, responses, shear
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 SLIDING = 3.0
 """Where dry friction may act, slower samples than so many standard deviations are left out: the
@@ -58,6 +60,13 @@ class StructureRun(Run):
     def of(self, part: slice) -> Self:
         """Return the run with these of the samples that count; `whole` stays, for its history."""
         return replace(super().of(part), keep=self.keep[part])
+
+    def entire(self) -> StructureRun:
+        """Return the run with all samples of `whole`, those at rest too."""
+        whole = self.whole
+        assert whole is not None
+        own = {one.name: getattr(whole, one.name) for one in fields(Run)}
+        return StructureRun(**own, whole=whole, keep=np.arange(len(whole.force)))
 
 
 class StructureProblem(Problem):
@@ -156,7 +165,7 @@ class StructureProblem(Problem):
 def structure_run(
     name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
     draws: Array, keep: NDArray[np.bool_] | None = None, drawn: Array | None = None,
-    measured: NDArray[np.bool_] | None = None,
+    left_out: Mapping[str, Flags] | None = None,
 ) -> StructureRun:  # fmt: skip
     """Return a run of the samples that count; the first ones are the smoother's and skipped.
 
@@ -168,9 +177,10 @@ def structure_run(
     draws : (d, n, 4) draws of the error of x, v, a, V
     keep : (n,) which samples count; None for all
     drawn : (d, n) draws of the error of a force that follows from the motion [N]; None for none
-    measured : (n,) False where a sample was filled in; None if none was
+    left_out : by reason (n,) True where a sample says nothing; None for nowhere
     """
-    whole = Run(name, dt, *motion, force, noise, draws, measured=measured, force_draws=drawn)
+    left_out = left_out or {}
+    whole = Run(name, dt, *motion, force, noise, draws, left_out=left_out, force_draws=drawn)
     if keep is None:
         index, skip = np.arange(len(force)), whole.skip
     else:
@@ -178,7 +188,7 @@ def structure_run(
     x, v, a, V = (part[index] for part in motion)
     return StructureRun(
         name, dt, x, v, a, V, force[index], noise, draws[:, index], skip, whole=whole, keep=index,
-        measured=None if measured is None else measured[index],
+        left_out={reason: where[index] for reason, where in left_out.items()},
         force_draws=None if drawn is None else drawn[:, index],
     )  # fmt: skip
 
@@ -224,20 +234,22 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
     motion = (x, v, response.a[level], response.V)
     made = structure_run(
         response.name, response.dt, motion, force, noise, error,
-        measured=_known(response, level, response.device.crosses(level)),
+        left_out=_left_out(response, level, response.device.crosses(level)),
     )  # fmt: skip
     return _of(response, made)
 
 
-def _known(response: Response, level: int, loaded: bool) -> NDArray[np.bool_] | None:
-    """Return where a level's equilibrium is known (n,), with the damper's force if it is `loaded`.
+def _left_out(response: Response, level: int, loaded: bool) -> dict[str, Flags]:
+    """Return why a level's equilibrium is not known, by reason (n,) True where it is not.
 
-    None where all was measured.
+    With the damper's force if it is `loaded`.
     """
-    if response.known is None:
-        return None
-    there = response.known.equilibrium(level)
-    return there & response.known.force if loaded and response.force is not None else there
+    loaded = loaded and response.force is not None
+    found = {
+        reason: ~(known.equilibrium(level) & known.force if loaded else known.equilibrium(level))
+        for reason, known in response.known_but.items()
+    }
+    return occurring(found)
 
 
 def layer_run(response: Response, building: Building) -> StructureRun:
@@ -257,7 +269,7 @@ def layer_run(response: Response, building: Building) -> StructureRun:
     x, v, a = response.x[0], response.v[0], response.a[0]
     made = structure_run(
         response.name, response.dt, (x, v, a, response.V), force, noise, _error(response, 0),
-        sliding(response), measured=_known(response, 0, response.device.crosses(0)),
+        sliding(response), left_out=_left_out(response, 0, response.device.crosses(0)),
     )  # fmt: skip
     return _of(response, made)
 
@@ -279,6 +291,12 @@ def moving(v: Array, std: float) -> NDArray[np.bool_]:
     moves = np.abs(v) > SLIDING * std
     at_rest = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
     return ~at_rest
+
+
+def device_moves(response: Response) -> bool:
+    """Return whether the ends of the damper surely move against each other anywhere in a run."""
+    across = motion_across(response)
+    return bool(moving(across.v, across.std).any())
 
 
 def damper_run(
@@ -309,22 +327,19 @@ def damper_run(
     keep = moving(v, std) if blind_at_rest(law) else None
     made = structure_run(
         response.name, response.dt, motion, force, noise, error, keep, drawn,
-        _known_across(response),
+        _left_out_across(response),
     )  # fmt: skip
     return _of(response, made)
 
 
-def _known_across(response: Response) -> NDArray[np.bool_] | None:
-    """Return where the damper's force and the motion of its ends are known (n,).
-
-    None where all was measured.
-    """
-    known = response.known
-    if known is None:
-        return None
+def _left_out_across(response: Response) -> dict[str, Flags]:
+    """Return why the damper's force or the motion of its ends is not known, by reason (n,)."""
     ends = [level for level in response.device.levels if level != GROUND]
-    shown = known.equilibrium() if response.force is None else known.force
-    return np.asarray(known.motion[ends].all(axis=0) & shown, dtype=np.bool_)
+    found = {}
+    for reason, known in response.known_but.items():
+        shown = known.equilibrium() if response.force is None else known.force
+        found[reason] = np.asarray(~(known.motion[ends].all(axis=0) & shown), dtype=np.bool_)
+    return occurring(found)
 
 
 class AcrossDamper(NamedTuple):
@@ -439,7 +454,8 @@ def problems_of(
         if all(moving or not part for moving, part in zip(parts, both, strict=True)):
             problems["layer"] = tuple(layer_problem(p, building) for p in parts)
     if damped:
-        made = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
+        able = [[r for r in part if device_moves(r)] or part for part in both]  # for every law
+        made = [[damper_run(r, building, law, linear_storeys) for r in part] for part in able]
         end = "base" if device.on_first else "damper"
         parts = [_moving(part, needed=end) for part in made]
         beside = device.on_first

@@ -1,4 +1,4 @@
-"""Errors of the laws as Shirazi et al. (2012), section III-C, judge them.
+"""Laws fitted as Shirazi et al. (2012), section III-C, fit them, and their errors.
 
 The quadratic error of the force, measured and predicted force low-passed alike, is minimised from
 several starting points; standard laws lack the exponential. The low-pass leaves little above its
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..errors import RecordError
 from ..physics.laws import base_and_variant, law_names
 from ..progress import Count
+from .error import ForceError, force_error
 from .model import Model, Problem, Run, steady, without
 from .search import descend
 from .starts import start_models
@@ -52,28 +53,34 @@ _QUADRATIC = 1e3  # residuals divided by this stay where the search's loss is qu
 class LawError:
     """The error of one law, fitted to the training runs.
 
-    `train`, `holdout` the RMS error of the low-passed force [N], `nan` where there is no run;
-    `moving` that of held-out samples (else of training samples) faster than `REST`; `share` the
-    error on held-out (else training) runs over the RMS of the force; `starts`, `agreed` how many
+    `error_train`, `error` the error on the training runs, and on those that decide: held out, else
+    for training. Of the low-passed force: `train`, `holdout` the RMS error [N], `nan` where there
+    is no run; `moving` that of samples that decide faster than `REST`; `share` the error on them
+    over the RMS of the force. `starts`, `agreed` how many
     starts were tried and how many came to the same end, judged on the samples that the searches
     from the starts take.
     """
 
     law: str
     model: Model
+    error_train: ForceError
+    error: ForceError
     train: float
     holdout: float
     moving: float
     share: float
     starts: int
     agreed: int
+    cut_off: float
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         numbers = {key: getattr(self, key) for key in ("train", "holdout", "moving", "share")}
         finite = {key: value if np.isfinite(value) else None for key, value in numbers.items()}
         return {
-            "law": self.law, **finite, "starts": self.starts, "agreed": self.agreed,
+            "law": self.law, "error_train": self.error_train.as_dict(),
+            "error": self.error.as_dict(), "below": self.cut_off, **finite,
+            "starts": self.starts, "agreed": self.agreed,
             "parameters": {name: self.model.value(name) for name in self.model.free()},
         }  # fmt: skip
 
@@ -184,14 +191,14 @@ def _law_error(
     deciding = holdout if holdout is not None and holdout.runs else train
     errors = filtered_errors(deciding, best, cutoff)
     moving = [
-        e[np.abs(run.v[run.skip :]) >= REST] for e, run in zip(errors, deciding.runs, strict=True)
+        e[(np.abs(run.v[run.skip :]) >= REST) & run.judged]
+        for e, run in zip(errors, deciding.runs, strict=True)
     ]
-    force = [low_pass(run.force, run.dt, cutoff)[run.skip :] for run in deciding.runs]
-    held_out = _rms(errors)
+    held_out = error_rms(deciding, best, cutoff)
     return LawError(
-        law, best, _rms(filtered_errors(train, best, cutoff)),
-        held_out if deciding is not train else float("nan"), _rms(moving), held_out / _rms(force),
-        tried, agreed,
+        law, best, force_error([(train, best)]), force_error([(deciding, best)]),
+        error_rms(train, best, cutoff), held_out if deciding is not train else float("nan"),
+        _rms(moving), held_out / force_rms(deciding.runs, cutoff), tried, agreed, cutoff,
     )  # fmt: skip
 
 
@@ -223,13 +230,17 @@ def _judged(run: Run, error: Array) -> Array:
 
 
 def force_rms(runs: list[Run], cutoff: float = CUTOFF) -> float:
-    """Return the RMS of the low-passed force over runs [N]."""
-    return _rms([low_pass(run.force, run.dt, cutoff)[run.skip :] for run in runs])
+    """Return the RMS of the low-passed force over what was measured of runs [N]."""
+    return _rms([low_pass(run.force, run.dt, cutoff)[run.skip :][run.judged] for run in runs])
 
 
 def error_rms(problem: Problem, model: Model, cutoff: float = CUTOFF) -> float:
-    """Return the RMS of the low-passed error of the force over all runs [N]."""
-    return _rms(filtered_errors(problem, model, cutoff))
+    """Return the RMS of the low-passed error of the force over what was measured of all runs [N].
+
+    The error that is told is another one: `error.force_error`.
+    """
+    pairs = zip(filtered_errors(problem, model, cutoff), problem.runs, strict=True)
+    return _rms([error[run.judged] for error, run in pairs])
 
 
 def _rms(parts: list[Array]) -> float:
@@ -263,7 +274,7 @@ def _fit_filtered(
         return _QUADRATIC * _rms([r])
 
     whole = shown is None
-    with watched(shown or problem, scaled.at, share, over_noise=False, last=whole) as accepted:
+    with watched(shown or problem, scaled.at, share, last=whole) as accepted:
         found = descend(
             residuals, scaled.start, scaled.low, scaled.high, 12,
             tolerance=_LAST if whole else _FIRST, accepted=accepted,

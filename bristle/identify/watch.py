@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from ..draw.cycles import by_level, cycles
 from ..physics.drive import DRIVES
 from ..snapshots import Watcher, watcher
+from .error import force_error
 from .model import Model, Problem, Run, parameter
-from .residuals import Expected
 from .search import Accepted, z_of
 from .structure import StructureRun
 
@@ -45,7 +45,6 @@ MOST = 50_000
 SEARCHES = 12
 """Searches of a series whose errors are kept."""
 
-_NO_FORCE = 1e-12  # N, in place of zero where an error is divided by the force
 _series: ContextVar[_Series | None] = ContextVar("series", default=None)
 
 
@@ -73,8 +72,7 @@ def series(kind: str, name: str = "") -> Iterator[None]:
 def watched(
     problem: Problem,
     at: Callable[[Array], Model],
-    share: Callable[[Array], float],
-    over_noise: bool = True,
+    share: Callable[[Array], float] | None = None,
     last: bool = True,
 ) -> Iterator[Accepted | None]:
     """Give what `search.descend` tells its accepted steps to, None where nobody watches.
@@ -83,8 +81,8 @@ def watched(
     ----------
     problem : the runs of the fit
     at : theta (p,) of the search to the model there
-    share : its residuals (n,) to the RMS error over the RMS of the force
-    over_noise : whether its residuals are over the noise, so that its cost tells z
+    share : its residuals (n,) to what it minimises, over the RMS of the force; None where they
+        are over the noise, so that its cost tells z
     last : whether its end may be what comes of the series; not that of a search on a part of the
         samples, whose errors are not those of all
     """
@@ -92,33 +90,13 @@ def watched(
     if present is None:
         yield None
         return
-    search = _Search(present, problem, at, share, over_noise, last)
+    search = _Search(present, problem, at, share, last)
     yield search
     search.end()
 
 
-def share_of(problem: Problem, expected: Expected, r: Array) -> float:
-    """Return the RMS error of a model over the RMS of the force, on samples that were measured.
-
-    Parameters
-    ----------
-    problem : the runs
-    expected : what a true model would show on each run
-    r : normalised residuals (n,) of all runs, one after the other
-    """
-    runs = problem.runs
-    sigma = np.concatenate([e[1][run.skip :] for run, e in zip(runs, expected, strict=True)])
-    known = np.concatenate([_measured(run)[run.skip :] for run in runs])
-    force = np.concatenate([run.force[run.skip :] for run in runs])
-    return _rms((r * sigma)[known]) / max(_rms(force[known]), _NO_FORCE)
-
-
 def _measured(run: Run) -> NDArray[np.bool_]:
     return np.ones(len(run.force), dtype=bool) if run.measured is None else run.measured
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values * values))) if len(values) else 0.0
 
 
 class _Told(NamedTuple):
@@ -127,6 +105,7 @@ class _Told(NamedTuple):
     model: Model
     problem: Problem
     told: Mapping[str, Any]
+    cost: float
 
 
 class _Series:
@@ -152,8 +131,10 @@ class _Series:
         """Whether it is time for another snapshot."""
         return time.monotonic() - self._last >= EVERY
 
-    def give(self, model: Model, problem: Problem, told: Mapping[str, Any], last: bool) -> None:
-        """Give a snapshot of a model that a search came to; `last` as in `watched`."""
+    def give(
+        self, model: Model, problem: Problem, told: Mapping[str, Any], last: bool, cost: float
+    ) -> None:
+        """Give a snapshot of a model that a search came to at a cost; `last` as in `watched`."""
         shown = _cycles_of(problem)
         runs = {one.run for one in shown}
         forces = {run: problem.predict(model, problem.runs[run]) for run in runs}
@@ -170,15 +151,16 @@ class _Series:
             }
         )  # fmt: skip
         self._last = time.monotonic()
-        self._told = _Told(model, problem, told)
-        better = self._best is None or told["share"] < self._best.told["share"]
+        self._told = _Told(model, problem, told, cost)
+        better = self._best is None or cost < self._best.cost
         if last and told["z"] is None and better:
             self._best = self._told
 
     def end(self) -> None:
         """Give the best of searches for the least RMS error once more: it is what comes of them."""
         if self._best is not None and self._best is not self._told:
-            self.give(*self._best, last=True)
+            best = self._best
+            self.give(best.model, best.problem, best.told, last=True, cost=best.cost)
 
 
 class _Search:
@@ -186,17 +168,17 @@ class _Search:
 
     def __init__(
         self, series: _Series, problem: Problem, at: Callable[[Array], Model],
-        share: Callable[[Array], float], over_noise: bool, last: bool,
+        share: Callable[[Array], float] | None, last: bool,
     ) -> None:  # fmt: skip
         self._series, self._problem, self._at = series, problem, at
-        self._share, self._over_noise, self._is_last = share, over_noise, last
+        self._share, self._is_last = share, last
         self._number, self._errors = series.begin()
-        self._left: tuple[Array, Array, float | None] | None = None  # what was not told yet
+        self._left: tuple[Array, float | None] | None = None  # what was not told yet
 
     def __call__(self, theta: Array, r: Array, cost: float) -> None:
-        z = z_of(cost) if self._over_noise else None
-        self._errors.append(self._share(r) if z is None else z)
-        self._left = theta.copy(), r, z
+        told = z_of(cost) if self._share is None else self._share(r)
+        self._errors.append(told)
+        self._left = theta.copy(), told if self._share is None else None
         if self._series.due:
             self.end()
 
@@ -204,11 +186,13 @@ class _Search:
         """Tell the last step, unless it was told."""
         if self._left is None:
             return
-        (theta, r, z), self._left = self._left, None
+        (theta, z), self._left = self._left, None
+        model = self._at(theta)
         told = {
-            "search": self._number, "step": len(self._errors) - 1, "share": self._share(r), "z": z,
+            "search": self._number, "step": len(self._errors) - 1,
+            "share": force_error([(self._problem, model)]).headline[1], "z": z,
         }  # fmt: skip
-        self._series.give(self._at(theta), self._problem, told, self._is_last)
+        self._series.give(model, self._problem, told, self._is_last, self._errors[-1])
 
 
 class _Cycle:

@@ -34,12 +34,11 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     study = Study(folder)
     steps = study.steps()
     drawn = history_steps(steps)
-    low = {study.settings.cut_off if one.cut_off is None else one.cut_off for one in drawn}
     verdict = study.verdict() or {}
     named = verdict.get("effects", []) if verdict.get("kind") in ("effect", "ambiguous") else []
     return {
         "steps": [_step(study, step, one) for step, one in zip(steps, drawn, strict=True)],
-        "floor": 1.0, "close": CLOSE, "cut_off": low.pop() if len(low) == 1 else 0.0,
+        "floor": 1.0, "close": CLOSE,
         "named": list(named), "kind": verdict.get("kind", ""), "can_add": _can_join(study),
         "commands": _commands(study),
     }  # fmt: skip
@@ -53,6 +52,7 @@ def _step(study: Study, step: Step, one: HistoryStep) -> dict[str, Any]:
     return {
         "number": step.number, "what": step.what, "why": step.why, "z": one.z, "train": one.z_train,
         "rms": one.rms, "share": one.share, "parameters": parameters,
+        "below": study.settings.cut_off if one.cut_off is None else one.cut_off,
     }  # fmt: skip
 
 

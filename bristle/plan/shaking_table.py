@@ -166,7 +166,7 @@ class ShakingTable:
             units={name: channel_unit(name) for name in channels},
             measured=np.ones(count, dtype=np.bool_), noise=std,
             noise_facts=dict.fromkeys(std), sampling=Sampling(signals.dt, count), source="plan",
-            notes=(), lost={}, parts=1, since={}, spikes=(),
+            notes=(), lost={}, saturated={}, masked=None, parts=1, since={}, spikes=(),
         )  # fmt: skip
 
     def _shown(self) -> list[str]:

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from ..compare.names import site_name
 from ..compare.picture import headline
 from ..draw import html
-from ..draw.style import percent
 from ..physics.forms import shown_law
-from ..quantity import quantity, short_z
+from ..quantity import short_z
 from ..study.run_file import TEST
 from ..version import __version__
 from .reproduce import commands
@@ -86,15 +85,15 @@ def _tiles(content: Content) -> str:
             f"error / noise (z) on held-out runs; 95 %: {low:.2f} to {high:.2f}",
         ),
         (
-            quantity(now.total.rms, now.unit, 2, now.total.signal),
-            f"RMS error at all frequencies, {percent(now.total.share)} of the RMS of the "
-            f"{now.quantity}",
+            now.error.text(now.unit),
+            f"error of the {now.quantity} on held-out runs: RMS of measured less predicted, and "
+            "its share of the RMS of what was measured",
         ),
     ]
     first = next((one.z for one in content.history_steps if one.z is not None), None)
     if first is not None and first > 1.02 * now.z:
         pairs.append(
-            (f"{short_z(first)} → {short_z(now.z)}", "z of the first model, and of this one")
+            (f"{short_z(first)} → {short_z(now.z)}", "z of the first fitted model, and of this one")
         )
     runs = content.study.settings.runs
     count = sum(run.role == "holdout" for run in runs)

@@ -9,9 +9,8 @@ import numpy as np
 
 from ..compare.tables import run_table
 from ..data.labels import label_text
-from ..draw.style import percent
 from ..physics.laws import LAWS
-from ..quantity import plain, quantity
+from ..quantity import percent, plain, quantity
 from ..quantity import with_interval as with_interval
 from ..study.reading import names_of_runs, place_of_run
 from ..study.run_file import TEST

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..compare.loops import OneCycle, chosen_cycles
 from ..compare.prediction import run_predictions
-from ..draw.style import BLUE, GREEN, GREY, INK, PALE, PURPLE, VERMILION, Page, look, percent
+from ..draw.style import BLUE, GREEN, GREY, INK, PALE, PURPLE, VERMILION, Page, look
 from ..identify.budget import Share, force_budget
 from ..physics.forms import shown_law
 from ..physics.laws import LAWS
-from ..quantity import scale
+from ..quantity import percent, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,12 +9,13 @@ from typing import Any
 from ..diagnose import Diagnosis
 from ..diagnose.candidates import Trial
 from ..diagnose.decision import missing
+from ..interrupt import keeps
 from ..progress import tell
 from .added_runs import other_data
 from .curves import learn_effect
 from .history import Step
 from .identification import identify_study
-from .identified import Identified
+from .identified import Identified, is_identified
 from .laws import law_or_all
 from .learned_effect import LearnedEffect
 from .learning import (
@@ -22,7 +23,6 @@ from .learning import (
     add_effects,
     diagnose_study,
     identify_with,
-    is_identified,
     take_law,
     verdict_of,
 )
@@ -80,7 +80,8 @@ def complete(
 ) -> Completed:
     """Identify, diagnose and add until the verdict is none, ambiguous, unknown or insufficient.
 
-    What was done is in the history already when this is interrupted: calling it again goes on.
+    Each step is in the history when it is made, each law that was fitted in `law_fits`, and
+    `interrupt.keeps` says which: calling it again goes on there.
 
     Parameters
     ----------
@@ -99,12 +100,14 @@ def complete(
     def stepped(step: Step | None) -> None:
         if step is not None:
             steps.append(step)
+            keeps(_kept(steps))
             if on_step is not None:
                 on_step()
 
     free = _begun_free(study, law_or_all(study, law), say, stepped)
     while True:
         found = diagnose_study(study, law=ALL if free else study.model().law, say=say)
+        keeps(_kept(steps))
         if free:
             found, free = _with_law_taken(study, found, stepped), False
         names, abreast = _named(found), list[Trial]()
@@ -124,6 +127,14 @@ def complete(
         why = f"verdict: {found.kind}"
         added = add_effects(study, names, why=why, found=found, identified=identified)
         stepped(added.step)
+
+
+def _kept(steps: Sequence[Step]) -> str:
+    """Return what is kept where this ends now, behind a step or a verdict."""
+    if not steps:
+        return "The verdict is kept in verdict.json: the same command goes on there."
+    made = "1 step was made and is" if len(steps) == 1 else f"{len(steps)} steps were made and are"
+    return f"{made} kept in the study's history: the same command goes on there."
 
 
 def _begun_free(

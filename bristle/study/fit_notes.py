@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..data.checks.clipping import saturated_share
@@ -11,6 +9,7 @@ from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..errors import StudyError
 from ..identify.begin import under_load_text
+from ..identify.error import ForceError
 from ..identify.residuals import robust_z
 from ..identify.rig_fit import SiteModel, SiteModels
 from ..identify.table import LawError
@@ -83,30 +82,28 @@ def by_site(models: SiteModels) -> list[str]:
     return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
 
 
-def weighing(
-    rows: list[LawError], model: StudyModel, own: float, after: Mapping[str, float]
-) -> list[str]:
+def weighing(rows: list[LawError], model: StudyModel, own: ForceError, z: float) -> list[str]:
     """Return what a model that errs by more than noise does to intervals and to the fit.
 
     Parameters
     ----------
     rows : the table of laws at a site
     model : the study's model
-    own : its RMS error at that site [N], low-passed as in the table
-    after : errors of the whole rig
+    own : its error at that site on the training runs
+    z : of the whole rig there
     """
-    if after["z_train"] <= _MISFIT:
+    if z <= _MISFIT:
         return []
     notes = [
         "The error exceeds the noise. The intervals come from the error itself: they describe "
         "the best values of this model, not the constants of a damper."
     ]
     same = [row for row in rows if row.law == model.law and not model.effects]
-    if same and same[0].train < _LESS * own:
+    if same and same[0].error_train.rms < _LESS * own.rms:
         notes.append(
             f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
-            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N instead "
-            f"of {plain(own, 4)} N."
+            f"the force alone, as in the table, would leave {same[0].error_train.text()} on the "
+            f"training runs instead of {own.text()}."
         )
     return notes
 

@@ -8,7 +8,7 @@ from ..compare.loops import chosen_cycles
 from ..compare.panels import draw_error, draw_history, worst_window
 from ..compare.picture import LOOPS, loop_panels
 from ..compare.prediction import run_predictions
-from ..draw.style import Page, look, percent, png, short_z
+from ..draw.style import Page, look, png, short_z
 from ..identify.rig import DAMPER
 from ..physics.forms import shown_law
 
@@ -53,8 +53,6 @@ def draw_identified(found: Identified) -> Page:
 
 
 def _headings(found: Identified, role: str) -> tuple[str, str]:
-    share = found.after.get("share_holdout", found.after["share_train"])
-    low = f" below {found.cutoff:g} Hz" if found.cutoff else ""
     law = " + ".join([shown_law(found.model.law), *found.model.effects])
     site = found.at.site
     what = site.quantity[:1].upper() + site.quantity[1:]
@@ -62,6 +60,6 @@ def _headings(found: Identified, role: str) -> tuple[str, str]:
     worst = " at the worst site" if site.shown else ""
     runs = "runs held out" if role == "held out" else "training runs"
     return (
-        f"{law}: error {percent(share)} of the force{low}, z = {short_z(found.z)}{worst}",
+        f"{law}: error {found.error.text()}, z = {short_z(found.z)}{worst}",
         f"{what} in {runs}, measured and predicted. z is error / noise; a true model has 1.",
     )

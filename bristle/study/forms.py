@@ -44,7 +44,7 @@ class FormError:
     @property
     def judged(self) -> float:
         """Share of the force that is left on held-out runs; of training runs where none is."""
-        return self.errors.get("share_holdout", self.errors["share_train"])
+        return self.errors.get("error_share_holdout", self.errors["error_share_train"])
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""

@@ -18,7 +18,7 @@ from ..identify.fit import Fit, Model
 from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
-from ..identify.table import LawError, error_rms, error_table
+from ..identify.table import LawError, error_table
 from ..physics.effect import EFFECTS
 from ..physics.forms import shown_law
 from ..physics.laws import base_and_variant, law_names
@@ -27,7 +27,7 @@ from ..units import convert
 from .added_runs import behind_data
 from .fit_notes import by_site, doubts, under_load, weighing, why
 from .forms import FormError, form_of, forms_asked, in_form
-from .identified import Identified
+from .identified import Identified, is_identified
 from .joining import refuse_left_out
 from .laws import all_laws, left_out_notes, refuse_in_building
 from .rig import rig_of
@@ -205,16 +205,29 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
     fit = fits.whole(start)
     fitted = _with_fit(model, fit)
     models = site_models(rig, as_model(fitted))
-    before = errors_of(site_models(rig, as_model(task.present or model)), task.cutoff)
+    present = task.present or model
+    old = site_models(rig, as_model(present))
+    # The start of a first fit is nobody's model: its error is no step on the way.
+    fitted_before = is_identified(present) or _lines_alone(old)
+    before = errors_of(old, task.cutoff) if fitted_before else None
     after = errors_of(models, task.cutoff)
     task.show(3)
     at = models.get(DAMPER) or _worst(models)
     rows = _table(at, task) if task.table else []
     task.show(4)
-    own = error_rms(at.site.train, at.model, task.cutoff)
-    notes += [*fits.notes(), *by_site(models), *weighing(rows, model, own, after), *rig.notes]
-    notes += under_load(at)
+    own = after.at["train"][at.site.name]
+    notes += [
+        *fits.notes(),
+        *by_site(models),
+        *weighing(rows, model, own, after.numbers["z_train"]),
+    ]
+    notes += [*rig.notes, *under_load(at)]
     return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+
+
+def _lines_alone(models: SiteModels) -> bool:
+    """Return whether a model is lines, which are fitted wherever it is judged, and nothing else."""
+    return all(site.is_line and not model.effects for site, model in models.values())
 
 
 def _worst(models: SiteModels) -> SiteModel:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..data.model import StudyModel
 from ..errors import StudyError
+from ..identify.error import ForceError
 from ..identify.fit import Fit, Problem
-from ..identify.rig_fit import SiteModel
+from ..identify.rig_fit import RigErrors, SiteModel
 from ..identify.table import LawError
 from ..physics.forms import shown_law, split_form
 from ..shown import shown
@@ -21,6 +22,11 @@ if TYPE_CHECKING:
     from ..diagnose.law_trials import LawTrial
 
 
+def is_identified(model: StudyModel) -> bool:
+    """Return whether a value of a model comes from an identification."""
+    return any(value.origin == "identified" for value in model.flat().values())
+
+
 @dataclass(frozen=True)
 class Identified:
     """What an identification found; `bristle.identify` returns it, and a notebook shows it.
@@ -31,11 +37,11 @@ class Identified:
         The model with the values found; `model.values()` are those in SI.
     fit : Fit
         Values and standard deviations in SI.
-    before, after : dict of float
-        Errors of the two models: z, RMS [N] and its share of the force, on training and held-out
-        runs.
+    errors_before, errors : RigErrors
+        Errors of the model before and of this one; None before a first fit, whose start is no
+        model of anybody.
     cutoff : float
-        Low-pass [Hz] of these errors.
+        Low-pass [Hz] of those among them that are low-passed.
     table : list of LawError
         Errors of the laws, where they were compared.
     notes : tuple of str
@@ -65,13 +71,28 @@ class Identified:
     model: StudyModel
     table: list[LawError]
     cutoff: float
-    before: dict[str, float]
-    after: dict[str, float]
+    errors_before: RigErrors | None
+    errors: RigErrors
     notes: tuple[str, ...]
     step: Step | None
     at: SiteModel
     forms: tuple[FormError, ...] = ()
     laws: tuple[LawTrial, ...] = ()
+
+    @property
+    def before(self) -> dict[str, float]:
+        """The numbers of `errors_before`, such as "z_holdout"; none before a first fit."""
+        return self.errors_before.numbers if self.errors_before is not None else {}
+
+    @property
+    def after(self) -> dict[str, float]:
+        """The numbers of `errors`, such as "z_holdout" and "error_holdout" [N]."""
+        return self.errors.numbers
+
+    @property
+    def error(self) -> ForceError:
+        """The error on held-out runs; on training runs where none is held out."""
+        return self.errors.force.get("holdout", self.errors.force["train"])
 
     @property
     def train(self) -> Problem:
@@ -89,9 +110,12 @@ class Identified:
         return self.after.get("z_holdout", self.after["z_train"])
 
     def for_history(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Return the errors before and after with the low-pass of their RMS [Hz], for a step."""
+        """Return the errors before and after with the low-pass of the `rms_` ones [Hz], for a step.
+
+        None before where that model was not fitted.
+        """
         own = {"cut_off": self.cutoff}
-        return {**self.before, **own}, {**self.after, **own}
+        return {**self.before, **own} if self.before else {}, {**self.after, **own}
 
     @property
     def unidentified(self) -> tuple[str, ...]:
@@ -151,6 +175,11 @@ class Identified:
             "cut_off": self.cutoff,
             "before": self.before,
             "after": self.after,
+            "error": {role: one.as_dict() for role, one in self.errors.force.items()},
+            "error_by_site": {
+                role: {site: one.as_dict() for site, one in sites.items()}
+                for role, sites in self.errors.at.items()
+            },
             "table": [row.as_dict() for row in self.table],
             "forms": [row.as_dict() for row in self.forms],
             **laws,

@@ -34,9 +34,9 @@ def refuse_in_building(law: str | None, in_building: bool) -> None:
     """
     if law == ALL and in_building:
         raise StudyError(
-            "identify compares all laws on a test bench alone: in a building the law decides which "
-            "samples of the damper's force count. Name one law, or let diagnose seek it with its "
-            "effects (--law all)."
+            "identify compares all laws on a test bench alone: in a building the law decides "
+            "which samples its fit and z take. Name one law, or let diagnose seek it "
+            "with its effects (--law all)."
         )
 
 

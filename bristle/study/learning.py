@@ -7,21 +7,23 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose_rig
 from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
 from ..findings import command, unknown
 from ..identify.bench import compile_ahead
+from ..identify.rig_fit import force_errors, site_models
+from ..interrupt import keeps
 from ..physics.forms import joined_form
 from ..physics.laws import law_names
 from ..progress import tell, telling
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
-from .identified import Identified
+from .identified import Identified, is_identified
 from .joining import as_named_here, refuse_effect, refuse_left_out
+from .law_fits import LawFits
 from .laws import law_command, law_or_all, with_law
-from .rig import building_of
+from .rig import building_of, rig_of
 from .settings import ALL
 from .study import Study
 
@@ -71,18 +73,18 @@ def diagnose_study(
     known = runs.train, runs.holdout, as_model(model), building_of(study, model)
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
-            found = diagnose_laws(*known, named=model.law, profile=profile, say=say)
+            kept = LawFits(study, model) if write and not study.settings.has_building else None
+            found = diagnose_laws(*known, named=model.law, profile=profile, kept=kept, say=say)
         else:
             fitted = is_identified(model)
             found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
+    if is_identified(model):
+        rig = rig_of(study, model, runs)
+        found = replace(found, error=force_errors(site_models(rig, as_model(model))))
     if write:
         study.write_verdict(verdict_of(study, found))
+        keeps("The verdict is kept in verdict.json.")
     return found
-
-
-def is_identified(model: StudyModel) -> bool:
-    """Return whether a value of a model comes from an identification."""
-    return any(value.origin == "identified" for value in model.flat().values())
 
 
 def take_law(study: Study, found: Diagnosis) -> Identified | None:

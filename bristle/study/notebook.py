@@ -8,12 +8,13 @@ from ..data.checks.finding import grouped, sentence
 from ..data.equation import equations, symbols
 from ..draw import html
 from ..draw.figure import DPI
-from ..draw.style import Page, percent, png, short_z
+from ..draw.style import Page, png, short_z
 from ..errors import RecordError
 from ..physics.forms import shown_law
+from ..quantity import percent, plain
 from .fit_picture import draw_identified
 from .run_file import TEST
-from .staircase import history_steps
+from .staircase import HistoryStep, history_steps
 from .staircase_picture import staircase_page
 
 if TYPE_CHECKING:
@@ -48,23 +49,22 @@ def identified_html(found: Identified) -> str:
         for row in found.parameters()
         if not (row["how"] == "held" and row["name"].endswith(_HELD))
     ]  # fmt: skip
-    low = f", below {found.cutoff:g} Hz" if found.cutoff else ""
     errors = [
         [
-            words, short_z(found.after[f"z_{role}"]), f"{found.after[f'rms_{role}']:.3g}",
-            percent(found.after[f"share_{role}"]),
+            words, found.errors.force[role].text(), short_z(found.after[f"z_{role}"]),
+            " ".join(found.errors.force[role].beside()),
         ]
         for role, words in (("train", "training"), ("holdout", "held out"))
-        if f"z_{role}" in found.after
+        if role in found.errors.force
     ]  # fmt: skip
-    header = ["runs", "error / noise (z)", f"RMS error [N]{low}", "of the force"]
+    header = ["runs", "error of the force", "error / noise (z)", "samples"]
     told = equations(found.model)
     return html.fragment(
         title,
         *(html.formula(one.intervals) for one in told),
         *([html.paragraphs(symbols(found.model, told), kind="soft")] if told else []),
         html.table(["parameter", "value", "95 % interval", "unit"], rows, numbers=(1, 2)),
-        html.table(header, errors, numbers=(1, 2, 3)),
+        html.table(header, errors, numbers=(1, 2)),
         _forms(found),
         html.items(found.notes),
         html.figure(png(draw_identified(found), DPI), f"{title}: force measured and predicted"),
@@ -105,13 +105,19 @@ def study_page(study: Study) -> Page:
     return draw_run(runs[0])
 
 
+def _error_of(step: HistoryStep) -> str:
+    """Return the error of a step, which says below which frequency one of an old version is."""
+    low = f" below {step.cut_off:g} Hz" if step.cut_off else ""
+    return f"{plain(step.rms or 0.0, 4)}{low}"
+
+
 def study_html(study: Study) -> str:
     """Return a study as HTML: its history in a table, and its picture."""
     settings, steps = study.settings, study.steps()
     rows = [
         [
             str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train),
-            "-" if one.rms is None else f"{one.rms:.3g}",
+            "-" if one.rms is None else _error_of(one),
         ]
         for step, one in zip(steps, history_steps(steps), strict=True)
     ]  # fmt: skip

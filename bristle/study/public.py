@@ -20,11 +20,12 @@ from ..errors import StudyError
 from ..findings import written
 from ..identify.bench import compile_ahead
 from ..identify.rig import Rig, bench_rig, building_rig
+from ..identify.rig_fit import force_errors, site_models
 from ..physics.building import Building
 from ..physics.laws import DEFAULT
 from .comparison import compare_study
 from .identification import FitTask, as_model, identify_on_rig, identify_study
-from .identified import Identified
+from .identified import Identified, is_identified
 from .inputs import (
     Channels,
     Data,
@@ -315,10 +316,13 @@ def diagnose(
     runs = _runs(given, holdout, channels, house)
     if free:
         return diagnose_laws(runs.train, runs.holdout, as_model(chosen), house, profile=profile)
-    known = any(value.origin == "identified" for value in chosen.flat().values())
-    return diagnose_rig(
-        runs.train, runs.holdout, as_model(chosen), house, identified=known, profile=profile
+    known, present = is_identified(chosen), as_model(chosen)
+    found = diagnose_rig(
+        runs.train, runs.holdout, present, house, identified=known, profile=profile
     )
+    if not known:
+        return found
+    return replace(found, error=force_errors(site_models(_rig(runs, house), present)))
 
 
 def _is_all(model: Given | None) -> bool:

@@ -238,13 +238,13 @@ def write_settings(path: Path, settings: Settings) -> None:
         document.add("law", tomlkit.item(settings.law))
         document["law"].comment("sought with its effects; without this line the model's is kept")
     document.add("cut_off", tomlkit.item(settings.cut_off))
-    document["cut_off"].comment("Hz, low-pass on measured and predicted force; 0 for none")
+    document["cut_off"].comment("Hz, low-pass of the low-passed errors; 0 for none")
     if settings.rate:
         document.add("rate", tomlkit.item(settings.rate))
         document["rate"].comment("Hz, faster runs are decimated to it; 0 for none")
     if settings.mask:
-        document.add("mask", tomlkit.item(True))
-        document["mask"].comment("isolated spikes count as not measured")
+        mask = tomlkit.item(True)  # read from the document it would be a bool, without comments
+        document.add("mask", mask.comment("isolated spikes count as not measured"))
     if settings.split:
         document.add("split", tomlkit.item(settings.split))
     runs = tomlkit.aot()

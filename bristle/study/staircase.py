@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import log10, sqrt
 from typing import TYPE_CHECKING, Any
 
-from ..quantity import plain, quantity, short_z
+from ..quantity import percent, plain, quantity, short_z
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -26,8 +26,9 @@ CLOSE = 1.1
 class HistoryStep:
     """One step of the staircase: what was done, and z and error [N] of the model after it.
 
-    `share` is the error on held-out runs over the force's RMS [1]; `cut_off` [Hz] of the low-pass
-    on the forces of both, 0 for none, None where the step does not tell.
+    `share` is the error on held-out runs over the force's RMS [1]. A step of a version that knew
+    the low-passed error alone has that one: `cut_off` [Hz] of its low-pass is then not 0, or None
+    where the step does not tell it.
     """
 
     number: int
@@ -95,9 +96,9 @@ class Staircase:
         colour = "green" if done else "dark_orange"
         cut_off = self.cut_off if one.cut_off is None else one.cut_off
         low = f" below {cut_off:g} Hz" if cut_off else ""
-        about = (
-            [] if one.rms is None else [f"{quantity(one.rms, self.unit, 3, self._size())} RMS{low}"]
-        )
+        of_force = f" ({percent(one.share)})" if one.share is not None else ""
+        size = f"{quantity(one.rms or 0.0, self.unit, 4, self._size())}{of_force}{low}"
+        about = [] if one.rms is None else [f"error {size}"]
         about += [] if one.z_train is None else [f"training z = {short_z(one.z_train)}"]
         tail = f"   {', '.join(about)}" if about else ""
         return [(bar, colour), (f" {short_z(one.z)}", f"bold {colour}"), (tail, "dim")]
@@ -109,13 +110,14 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0, cut_off: float = 
     Parameters
     ----------
     steps : list of Step
-        Their `after` holds "z_holdout", "z_train", "rms_holdout" [N]; a step without is "not
-        judged", unless the next one's `before` holds them.
+        Their `after` holds "z_holdout", "z_train", "error_holdout" [N]; a step without is "not
+        judged", unless the next one's `before` holds them. Of steps with a low-passed error
+        alone, "rms_holdout", the staircase says so.
     noise_floor : float
         z that noise alone explains.
     cut_off : float
-        Hz, of the low-pass on the forces whose RMS errors the steps hold, where a step does not
-        tell its own; 0 for none.
+        Hz, of the low-pass behind a step's "rms_holdout" where the step does not tell it; 0 for
+        none.
 
     Examples
     --------
@@ -135,9 +137,14 @@ def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
         errors: dict[str, Any] = {**step.after}
         if not errors and k + 1 < len(steps):
             errors = {**steps[k + 1].before}
-        keys = ("z_holdout", "z_train", "rms_holdout", "share_holdout", "cut_off")
-        numbers = [_number(errors.get(key)) for key in keys]
-        out.append(HistoryStep(step.number, step.what, *numbers))
+        new = "error_holdout" in errors
+        names = (
+            ("error_holdout", "error_share_holdout") if new else ("rms_holdout", "share_holdout")
+        )
+        keys = ("z_holdout", "z_train", *names)
+        z, z_train, rms, share = (_number(errors.get(key)) for key in keys)
+        low = 0.0 if new else _number(errors.get("cut_off"))
+        out.append(HistoryStep(step.number, step.what, z, z_train, rms, share, low))
     return out
 
 

@@ -93,7 +93,8 @@ def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None, unit
     """Write z and error over a step, and at its riser by how much the error fell."""
     assert one.z is not None
     z = short_z(one.z)
-    rms = "" if one.rms is None else f"  {quantity(one.rms, unit, 2)}"
+    rms = "" if one.rms is None else f"  {quantity(one.rms, unit, 4)}"
+    rms += f" below {one.cut_off:g} Hz" if rms and one.cut_off else ""
     # Above the higher of both lines, so that neither strikes it through.
     height = max(one.z, one.z_train or 0.0)
     label(axes, f"z = {z}{rms}", i, height, BLUE, xytext=(0, 7), ha="center", va="bottom")

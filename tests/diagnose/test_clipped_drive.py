@@ -29,5 +29,8 @@ def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
     every = [replace(run, channels={**run.channels, "voltage": np.ones(3000)}) for run in runs]
     found = diagnose(every[:2], every[2:], law="bingham", values=LAW)
     assert found.kind == "insufficient"
-    assert "not clipped" in found.words
+    assert "No run for training has the 200 samples that a fit needs." in found.words
+    name = every[0].name
+    assert f"{name}: of voltage 0 of 3,000 samples can be used (3,000 saturated)" in found.words
+    assert "measure with a wider range" in found.words
     assert found.sensors == (cut,)

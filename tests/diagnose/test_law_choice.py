@@ -25,6 +25,7 @@ from bristle.diagnose.law_trials import LawTrial
 from bristle.diagnose.law_verdict import LawVerdict, rows_of
 from bristle.diagnose.rule import BENCH
 from bristle.diagnose.verdict_text import headline
+from bristle.identify.error import ForceError
 from bristle.identify.fit import Model
 from bristle.physics.laws import base_and_variant
 
@@ -41,8 +42,13 @@ def trial(z, law, effects=(), spread=0.0, seed=0):
     return Trial(model, z, z, z, losses, np.sqrt(NOISE))
 
 
+def erring(rms):
+    """Return an error of so many newtons in 10 N."""
+    return ForceError(SAMPLES, SAMPLES, rms, 10.0, rms, 10.0)
+
+
 def row(law, z, **choices):
-    return LawTrial(law, trial(z, law, **choices), z, (z, z, z))
+    return LawTrial(law, trial(z, law, **choices), erring(z), (z, z, z))
 
 
 def pair(law, z_alone, kind="none", effects=(), z=None, **choices):
@@ -251,13 +257,13 @@ def test_the_simplest_law_is_of_those_that_the_best_does_not_surpass():
 
 
 def test_an_interval_over_runs_needs_two_of_them():
-    best = LawTrial("dahl", trial(1.0, "dahl"), 1.0, (1.0, 1.0, 1.1))
-    other = LawTrial("bingham", trial(2.0, "bingham"), 2.0, (2.0, 2.2, 2.1))
+    best = LawTrial("dahl", trial(1.0, "dahl"), erring(1.0), (1.0, 1.0, 1.1))
+    other = LawTrial("bingham", trial(2.0, "bingham"), erring(2.0), (2.0, 2.2, 2.1))
     above, half = other.above(best)
     assert above == pytest.approx(1.0667, abs=1e-3)
     # t(0.975; 2) = 4.303 of Student's tables; standard deviation of 1.0, 1.2, 1.0 by sqrt(3)
     assert half == pytest.approx(4.303 * 0.11547 / 3**0.5, rel=1e-3)
-    alone = [LawTrial(one.law, one.trial, 1.0, one.z_runs[:1]) for one in (other, best)]
+    alone = [LawTrial(one.law, one.trial, erring(1.0), one.z_runs[:1]) for one in (other, best)]
     assert np.isnan(alone[0].above(alone[1])[1])
     assert rows_of((alone[1], alone[0]))[1]["interval95"] is None
 
@@ -276,6 +282,11 @@ def test_the_verdict_tells_law_table_and_what_does_as_well():
     table = law_table(told["laws"])
     assert [cells[:2] for cells in table][-1] == ["lugre", "quadratic"]
     assert table[0][5] == "-"
+    assert (table[0][6], table[0][7]) == ("1.003 N (10.0 %)", "-")  # nobody asked on held-out runs
+    old = [{"rms_train": 0.3, "rms_holdout": 0.4, **one} for one in told["laws"]]
+    for one in old:  # another error than the one that is told today
+        del one["error_train"], one["error_holdout"]
+    assert {cells[k] for cells in law_table(old) for k in (6, 7)} == {"-"}
 
 
 def test_a_verdict_on_a_law_given_says_nothing_of_laws():

@@ -10,6 +10,7 @@ from bristle.diagnose import law_trials
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.law_text import left_out
 from bristle.diagnose.law_trials import LawTrial, better_law, not_finite, try_laws
+from bristle.identify.error import ForceError
 from bristle.identify.fit import Model, Problem
 from bristle.identify.rig import bench_rig
 from bristle.study.inputs import measurements
@@ -61,7 +62,7 @@ def test_laws_have_those_of_the_present_effects_that_can_join_them(problems, few
 def test_how_much_of_an_error_is_the_form_of_the_law_is_told():
     def row(law, z, rms):
         trial = Trial(Model("tanh"), z, z, rms, np.ones(1), np.ones(1))
-        return LawTrial(law, trial, rms, (z,))
+        return LawTrial(law, trial, ForceError(1, 1, rms, 1.0, rms, 1.0), (z,))
 
     judged = row("lugre", 3.0, 1.0).trial
     # The z of dahl is lower still, but it serves the samples near rest at the cost of all others.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bristle.data.cut_off import beyond_range
+from bristle.data.left_out import MISSING
 from bristle.diagnose.candidates import judge
 from bristle.diagnose.decision import missing
 from bristle.diagnose.limits import detectable
@@ -35,7 +36,8 @@ class Given(Problem):
 
 def run_of(force, noise, measured) -> Run:
     draws = np.zeros((0, len(T), 4))
-    return Run("r", DT, X, V, 0.0 * X, 0.0 * X, force, noise, draws, measured=measured)
+    out = {} if measured is None else {MISSING: ~measured}
+    return Run("r", DT, X, V, 0.0 * X, 0.0 * X, force, noise, draws, left_out=out)
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.1, 0.25])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.compare.patterns import LEVEL, ResidualPattern
+from bristle.data.left_out import MISSING
 from bristle.diagnose import remaining_residual
 from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.finding import Finding
@@ -83,7 +84,9 @@ def test_samples_that_were_not_measured_make_no_pattern_smaller():
     lost = np.abs(x) > 0.8
     noise = np.random.default_rng(0).standard_normal(len(t))
     left = np.where(lost, 0.0, 3.0 * x + noise)
-    run = Run("r", 0.002, x, v, x, v, v, 1.0, np.zeros((0, len(t), 4)), skip=0, measured=~lost)
+    run = Run(
+        "r", 0.002, x, v, x, v, v, 1.0, np.zeros((0, len(t), 4)), skip=0, left_out={MISSING: lost}
+    )
     found = patterns_of(SimpleNamespace(residual=left), Problem([run]))
     along = next(one for one in found if one.coordinate == "displacement")
     assert np.abs(along.centre).max() < 0.8

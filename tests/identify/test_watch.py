@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from known_runs import bench_run, truth_of
 
+from bristle.data.left_out import MISSING
 from bristle.identify import table, watch
 from bristle.identify.fit import Fit, Model, Problem, fit, identify
 from bristle.identify.search import z_of
-from bristle.identify.table import error_table, force_rms
-from bristle.identify.watch import LAW, MODEL, series, share_of, watched
+from bristle.identify.table import error_table
+from bristle.identify.watch import LAW, MODEL, series, watched
 from bristle.snapshots import watched_by
 
 Seen = list[Mapping[str, Any]]
@@ -62,10 +63,7 @@ def test_errors_never_rise_and_the_last_is_that_of_the_result(problem: Problem) 
     assert {name: value for name, value, _ in last["parameters"]} == {
         name: found.model.value(name) for name in found.model.free()
     }
-    error = [
-        (run.force - problem.predict(found.model, run) - bias)[run.skip :]
-        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
-    ]
+    error = [(run.force - problem.predict(found.model, run))[run.skip :] for run in problem.runs]
     force = np.concatenate([run.force[run.skip :] for run in problem.runs])
     share = np.linalg.norm(np.concatenate(error)) / np.linalg.norm(force)
     assert last["share"] == pytest.approx(share, rel=1e-9)
@@ -115,12 +113,11 @@ def test_laws_side_by_side_are_each_told_of_and_end_with_their_best(
     assert [row.as_dict() | {"holdout": 0} for row in found] == [
         row.as_dict() | {"holdout": 0} for row in alone
     ]
-    size = force_rms(problem.runs)
     for row in found:
         own = [one for one in seen if one["name"] == row.law]
         assert {one["kind"] for one in own} == {LAW}
         assert own[-1]["z"] is None
-        assert own[-1]["share"] == pytest.approx(row.train / size, rel=1e-9)
+        assert own[-1]["share"] == row.error_train.share
         for errors in own[-1]["errors"]:
             assert all(after < before for before, after in pairwise(errors))
 
@@ -156,18 +153,20 @@ def test_samples_that_were_not_measured_are_neither_drawn_nor_counted(problem: P
     lost = np.ones(1200, dtype=bool)
     lost[400:] = False
     runs = [
-        replace(run, measured=lost, force=np.where(lost, run.force, 1e6)) for run in problem.runs
+        replace(run, left_out={MISSING: ~lost}, force=np.where(lost, run.force, 1e6))
+        for run in problem.runs
     ]
     holed = Problem(runs)
     seen: Seen = []
     with watched_by(seen.append), series(MODEL):
         fit(holed, start(), with_std=False)
     assert all(np.max(np.abs(loop["measured"])) < 1e6 for loop in seen[-1]["loops"])
-    expected = holed.expectation(start())
-    r = np.concatenate([np.where(lost, 0.5, 1e3)[run.skip :] for run in runs])
-    whole = share_of(holed, expected, r)
-    kept = np.concatenate(
-        [(0.5 * e[1])[run.skip : 400] for run, e in zip(runs, expected, strict=True)]
+    told = {name: value for name, value, _ in seen[-1]["parameters"]}
+    model = Model("bingham", (), {**start().values, **told})
+    part = [slice(run.skip, 400) for run in runs]
+    off = np.concatenate(
+        [(run.force - holed.predict(model, run))[one] for run, one in zip(runs, part, strict=True)]
     )
-    force = np.concatenate([run.force[run.skip : 400] for run in runs])
-    assert whole == pytest.approx(np.linalg.norm(kept) / np.linalg.norm(force), rel=1e-12)
+    force = np.concatenate([run.force[one] for run, one in zip(runs, part, strict=True)])
+    share = np.linalg.norm(off) / np.linalg.norm(force)
+    assert seen[-1]["share"] == pytest.approx(share, rel=1e-9)

@@ -14,6 +14,7 @@ from bristle.cli import identify as command
 from bristle.cli import main
 from bristle.errors import RecordError, StudyError
 from bristle.identify.bench import Bench
+from bristle.identify.error import ForceError
 from bristle.study.create import create_study
 from bristle.study.identification import identify_study
 from bristle.study.public import identify
@@ -147,9 +148,10 @@ def test_the_step_holds_the_errors_before_and_after_and_can_be_undone(tmp_path, 
     assert "bingham_standard" in out
     step = Study(study.folder).steps()[-1]
     assert step.what == "identify bingham"
-    assert {"z_train", "z_holdout", "rms_train", "rms_holdout"} <= set(step.before) & set(
-        step.after
-    )
+    told = {"z_train", "z_holdout", "error_train", "error_share_holdout", "rms_train", "cut_off"}
+    assert told <= set(step.after)
+    assert step.before == {}  # the start of a first fit is nobody's model
+    assert "before" not in out
     assert step.after["z_holdout"] == pytest.approx(1.0, abs=0.1)
     model = Study(study.folder).model()
     assert model.parameters["f_c"].origin == "identified"
@@ -233,9 +235,17 @@ def test_wrong_choices_are_refused(tmp_path):
 @pytest.mark.parametrize(("errors", "told"), [((3.0, 5.0), True), ((4.8, 5.0), False)])
 def test_a_law_that_errs_less_is_named(errors, told):
     rows = [
-        SimpleNamespace(law=law, train=e, holdout=e, share=0.1, moving=e, agreed=3, starts=3)
+        SimpleNamespace(
+            law=law,
+            error_train=ForceError(9, 9, e, 10.0, e, 10.0),
+            holdout=e,
+            agreed=3,
+            starts=3,
+            error=ForceError(9, 9, e, 10.0, e, 10.0),
+        )
         for law, e in zip(("bingham", "lugre"), errors, strict=True)
     ]
-    found = SimpleNamespace(model=SimpleNamespace(law="lugre"), table=rows)
+    model = SimpleNamespace(law="lugre")
+    found = SimpleNamespace(model=model, table=rows, cutoff=18.0, holdout=True)
     said = "\n".join(command._laws(found, Path("rig")))
     assert ("bristle identify rig --law bingham" in said) is told

@@ -24,7 +24,7 @@ def test_bars_fall_with_the_error_on_a_scale_of_ratios():
     assert bars[2] == 40
     assert bars[3] == round(40 * 0.582)  # log 3 / log 6.6, from what the next step began with
     assert bars[4] == 1
-    assert "0.88 N RMS, training z = 6.30" in lines[2]
+    assert "error 0.88 N, training z = 6.30" in lines[2]
     assert lines[-1].endswith("| 1")
 
 
@@ -55,4 +55,13 @@ def test_each_step_tells_the_low_pass_of_its_own_error():
     told.append({**told[0], "cut_off": 5.0})
     steps = [Step(k, f"identify {k}", "", {}, one) for k, one in enumerate(told)]
     lines = str(staircase(steps, cut_off=18.0)).splitlines()
-    assert [line.partition("RMS")[2] for line in lines[1:4]] == [" below 18 Hz", "", " below 5 Hz"]
+    assert [line.partition("2 N")[2] for line in lines[1:4]] == [" below 18 Hz", "", " below 5 Hz"]
+
+
+def test_a_step_with_the_low_passed_error_alone_says_so_beside_one_with_the_error():
+    low = {"z_holdout": 4.0, "rms_holdout": 2.0, "share_holdout": 0.2, "cut_off": 18.0}
+    new = {**low, "z_holdout": 2.0, "error_holdout": 2.5, "error_share_holdout": 0.24}
+    steps = [Step(1, "old", "", {}, low), Step(2, "new", "", {}, new)]
+    old, now = str(staircase(steps)).splitlines()[1:3]
+    assert old.endswith("error 2 N (20.0 %) below 18 Hz")
+    assert now.endswith("error 2.5 N (24.0 %)")

@@ -144,7 +144,7 @@ class Laws {
       if (own.fit === fit) continue;
       const same = own.fit && (own.fit.z === null) === (fit.z === null); // else fitted anew, to another error
       own.fit = fit;
-      own.least = Math.min(same ? own.least : Infinity, fit.share, ...(fit.z === null ? fit.errors.flat() : []));
+      own.least = Math.min(same ? own.least : Infinity, fit.share);
       own.tag.textContent = percent(fit.share);
       own.plot.canvas.setAttribute("aria-label", `force over velocity, measured and by the law ${fit.name}; RMS error ${percent(fit.share)}`);
       own.plot.later();

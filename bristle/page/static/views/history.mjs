@@ -52,6 +52,9 @@ function orders(page, found) {
     added ? h("a", { href: page.link("verdict") }, "The residual before and after") : null);
 }
 
+/** What the error of a step of an earlier version is of: its forces are low-passed. */
+const below = (step) => (step.rms !== null && step.below ? ` below ${number(step.below)} Hz` : "");
+
 /** The error of each model on held-out runs, on a logarithmic scale from the noise floor. */
 function staircase(found) {
   const known = found.steps.filter((step) => step.z !== null);
@@ -63,10 +66,9 @@ function staircase(found) {
     bars("error / noise (z) of each step on held-out runs", found.steps.map((step) => ({
       name: `${step.number} ${step.what}`, value: step.z === null ? null : log(step.z), strong: true,
       good: step.z !== null && step.z <= found.close,
-      text: step.z === null ? "not judged" : `${z(step.z)}${step.rms === null ? "" : ` · ${number(step.rms)} N`}`,
+      text: step.z === null ? "not judged" : `${z(step.z)}${step.rms === null ? "" : ` · ${number(step.rms, 4)} N${below(step)}`}`,
     })), { most: top, edge: log(1) }),
-    h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic; RMS error ",
-      found.cut_off ? `below ${number(found.cut_off)} Hz. ` : ". ", "Green line: the noise floor, z = 1. Green bar: a model that reaches it."));
+    h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic, and the RMS error. Green line: the noise floor, z = 1. Green bar: a model that reaches it."));
 }
 
 function compare(page, found) {
@@ -109,8 +111,8 @@ function compare(page, found) {
       table("Errors", ["error", a.what, b.what], [
         ["z, held-out runs", z(a.z), z(b.z)],
         ["z, training runs", z(a.train), z(b.train)],
-        ["RMS error, held-out runs [N]", number(a.rms), number(b.rms)],
-        ["RMS error over RMS force", a.share === null ? "–" : percent(a.share), b.share === null ? "–" : percent(b.share)],
+        ["error, held-out runs [N]", ...[a, b].map((step) => `${number(step.rms, 4)}${below(step)}`)],
+        ["error over the RMS of the force", ...[a, b].map((step) => (step.share === null ? "–" : `${percent(step.share)}${below(step)}`))],
       ], [1, 2]),
       table("Parameters", ["parameter", a.what, b.what, "unit"], names.map((name) => [
         h("code", {}, name), cell(of(a, name)), cell(of(b, name)), (of(a, name) ?? of(b, name)).unit.replace(/^1$/, ""),

@@ -1,0 +1,95 @@
+"""`study auto` keeps each law that it fitted and each step; Ctrl-C tells what is there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bristle.cli import main
+from bristle.diagnose import law_free, law_trials
+from bristle.study.law_fits import NAME
+from bristle.study.study import Study
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    """Return a study of two short runs whose law nobody chose."""
+    t = np.arange(800) / 200.0
+    for seed in (1, 2):
+        random = np.random.default_rng(seed)
+        x = 8e-3 * np.sin(2 * np.pi * (0.9 + 0.3 * seed) * t) + 2e-3 * np.sin(19.0 * t + seed)
+        v = np.gradient(x, t)
+        force = 6.0 * np.tanh(v / 5e-3) + 70.0 * v + 0.05 * random.standard_normal(len(t))
+        x = x + 2e-5 * random.standard_normal(len(t))
+        run = pd.DataFrame({"time [s]": t, "x [m]": x, "F [N]": force})
+        run.to_csv(tmp_path / f"run_{seed}.csv", index=False)
+    folder = tmp_path / "rig"
+    assert main(["study", "new", str(folder), "--data", str(tmp_path / "run_*.csv")]) == 0
+    return folder
+
+
+def interrupt(*_given: object, **_named: object) -> None:
+    raise KeyboardInterrupt
+
+
+def auto(rig: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """Return what an interrupted command tells."""
+    capsys.readouterr()
+    assert main(["study", "auto", str(rig)]) == 130
+    return capsys.readouterr().err.splitlines()[-1]
+
+
+def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, monkeypatch):
+    with monkeypatch.context() as stopped:
+        stopped.setattr(law_free, "bench_data", interrupt)
+        told = auto(rig, capsys)
+    assert told == "interrupted. The study is as it was. The same command begins anew."
+    assert not (rig / "reports" / NAME).exists()
+
+    fitted: list[str] = []
+    whole = law_trials.refine
+
+    def refine(model, *given, **named):
+        fitted.append(model.law)
+        return whole(model, *given, **named)
+
+    monkeypatch.setattr(law_trials, "refine", refine)
+    monkeypatch.setattr(law_free, "_sought", interrupt)  # the search for effects
+    told = auto(rig, capsys)
+    known = json.loads((rig / "reports" / NAME).read_text())["laws"]
+    assert len(known) == len(fitted) > 5
+    assert told == (
+        f"interrupted. The fits of {len(known)} laws are kept, the effects are not sought yet: the "
+        "same command goes on there."
+    )
+    assert len(Study(rig).steps()) == 1  # no step was made, and none is claimed
+
+    fitted.clear()
+    auto(rig, capsys)
+    assert fitted == []
+    path = rig / "reports" / NAME
+    content = json.loads(path.read_text())
+    del content["laws"]["bingham"]
+    path.write_text(json.dumps(content))
+    auto(rig, capsys)
+    assert fitted == ["bingham"]
+    path.write_text("{}")  # damaged: all are fitted anew
+    fitted.clear()
+    auto(rig, capsys)
+    assert len(fitted) == len(known)
+
+
+def test_a_step_is_there_when_it_is_told(rig, capsys, monkeypatch):
+    monkeypatch.setattr("bristle.study.completion.diagnose_study", interrupt)
+    capsys.readouterr()
+    assert main(["study", "auto", str(rig), "--law", "bingham"]) == 130
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert told == (
+        "interrupted. 1 step was made and is kept in the study's history: the same command goes on "
+        "there."
+    )
+    assert [step.what for step in Study(rig).steps()][1:] == ["identify bingham"]
