@@ -19,16 +19,19 @@ from ..data.model import StudyModel
 from ..errors import StudyError
 from ..fmu.build import Plan, build, plan
 from ..fmu.catalogue import component_of_law
+from ..identify.rig import DAMPER
 from ..identify.run_labels import following
 from ..physics.device import GROUND
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.user import own_effects
 from ..scenario.model_parts import Parameters, source_of, values_of
-from ..study.rig import building_of
+from ..study.identification import as_model
+from ..study.rig import building_of, rig_of
 from ..study.runs import Runs
 from ..study.study import Study
 from . import on_bench
+from .held_out import FOLDER, HeldOut, Proof, held_out, prove, step_for, write_inputs, write_proof
 from .in_building import House, Shaking, loads, shaking_of, write_scenario
 from .scenario_files import DamperText, part_text
 
@@ -37,13 +40,18 @@ Build = Callable[[Plan, Path], Path]
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written: the FMU, the scenario, the files it reads; what was left out, and why."""
+    """What was written: the FMU, the scenario, the files it reads; what was left out, and why.
+
+    `proof` is what the FMU gives on the held-out runs, whose inputs are among the files; None where
+    the study has no damper that a force is known of.
+    """
 
     fmu: Path
     scenario: Path
     files: tuple[Path, ...]
     run: str
     notes: tuple[str, ...] = ()
+    proof: Proof | None = None
 
 
 class Editable(NamedTuple):
@@ -81,15 +89,32 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     measurement = _one_run(study, runs)
     folder = study.folder / "export" if out is None else out
     notes: list[str] = []
+    held = _held_out(study, model, runs)
+    step = step_for(held) if held else None
     with _writing(folder):
-        fmu = build(_damper(study, model, runs, notes), folder)
+        fmu = build(_damper(study, model, runs, notes, step), folder)
 
         def damper(parameters: Parameters) -> str:
             return part_text("damper", {"fmu": fmu.name}, parameters)
 
         drive = drive_named(measurement.drive)
         scenario, files = _scenario(study, model, measurement, drive, folder, damper, notes)
-    return Exported(fmu, scenario, tuple(files), measurement.name, tuple(notes))
+        proof = None
+        if held and step:
+            files += write_inputs(held, step, folder / FOLDER)
+            proof = prove(held, fmu, step)
+            files += write_proof(proof, held, fmu, folder / FOLDER)
+    return Exported(fmu, scenario, tuple(files), measurement.name, tuple(notes), proof)
+
+
+def _held_out(study: Study, model: StudyModel, runs: Runs) -> HeldOut | None:
+    """Return what the damper is held against; None for a building whose damper is no site."""
+    rig = rig_of(study, model, runs)
+    if DAMPER not in rig.sites(as_model(model)):
+        return None
+    bare = model.at("damper", bench=not study.settings.has_building)
+    known = [_with_stroke(study, model, one) for one in runs.holdout or runs.train]
+    return held_out(bare, model, rig, known)
 
 
 def write_editable(study: Study, folder: Path) -> Editable:
@@ -180,7 +205,9 @@ def _signals(damper: StudyModel) -> Collection[str]:
     return following(damper.effects)
 
 
-def _damper(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> Plan:
+def _damper(
+    study: Study, model: StudyModel, runs: Runs, notes: list[str], step: float | None
+) -> Plan:
     """Plan the damper with the model's values as its defaults."""
     own = _bare(study, model, notes)
     starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
@@ -192,6 +219,7 @@ def _damper(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> Pl
         starts=starts,
         effects=[files[name] for name in own.effects if EFFECTS[name].own],
         drive=drive_named(runs.all[0].drive).name,
+        step=step,
     )
 
 

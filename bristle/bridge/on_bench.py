@@ -13,8 +13,8 @@ from ..data.files import write_whole
 from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..fmu.damper import input_of
-from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
+from ..identify.model import Fed, Problem, Run
 from ..identify.prepare import prepare
 from ..identify.run_labels import following, values_of_labels
 from ..physics.drive import Drive, drive_named, states_for
@@ -55,6 +55,7 @@ def write_scenario(
     """
     fitted = as_model(model)
     run = prepare(measurement)
+    fed = Problem([run]).fed(fitted, run)
     v, a = true_motion(fitted.effects, fitted.values, run.v, run.a, run.dt)
     run = replace(run, v=v, a=a)
     fine = max(1, ceil(run.dt / STEP - 1e-9))
@@ -84,7 +85,7 @@ def write_scenario(
         files.append(signal_file(time, values, quantity, unit, folder / f"{name}.csv"))
         signal = {"kind": "csv", "file": files[-1].name}
         parts.append(part_text(name, {"fmu": "SignalSource"}, signal))
-    starts = _start_values(own, run) | values_of_labels(own.effects, run.labels)
+    starts = start_values(own, fed, run)
     if not measurement.drive:
         starts[drive.name] = 0.0
     parts.append(damper(starts))
@@ -113,17 +114,19 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
     return signal_file(nodes, x, "displacement", "m", path)
 
 
-def _start_values(damper: StudyModel, run: Run) -> dict[str, float]:
-    """Return the start values of states that begin with a signal or the load of the run."""
+def start_values(damper: StudyModel, fed: Fed, run: Run) -> dict[str, float]:
+    """Return the parameters that a run sets: states that begin with a signal, labels, its load."""
     drive = drive_named(run.drive)
-    first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
+    moments = fed.moments
+    first = {name: float(getattr(moments, name)[0]) for name in ("x", "v", "a", "V")}
     states = dict(LAWS[damper.base_law].starts)
     for name in damper.effects:
         called = states_for(EFFECTS[name].states, drive)
         starts = EFFECTS[name].starts
         states |= {f"{name}.{called[state]}": signal for state, signal in starts.items()}
-    begun = {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
-    return begun | Problem([run]).carrying(as_model(damper), run)
+    begun = {f"{name}_0": first[signal] for name, signal in states.items() if signal in first}
+    begun |= Problem([run]).carrying(as_model(damper), run)
+    return begun | values_of_labels(damper.effects, run.labels)
 
 
 def prediction(model: StudyModel, run: Run, bench: bool = True) -> Array:

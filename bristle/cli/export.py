@@ -78,11 +78,14 @@ def main(arguments: argparse.Namespace) -> int:
             "files": [str(file.absolute()) for file in found.files],
             "run": found.run,
             "notes": list(found.notes),
+            "proof": found.proof and found.proof.as_dict(),
         }
         print(json.dumps(answer, indent=2))
         return 0
     print(f"{found.fmu}: the damper with the model's values.")
     print(f"{found.scenario}: applies the motion of {found.run} to it.")
+    for line in found.proof.lines(found.fmu.parent) if found.proof else ():
+        print(line)
     print(f"Run it:  {command('run', found.scenario)}")
     for note in found.notes:
         print(f"{note[:1].upper()}{note[1:]}")

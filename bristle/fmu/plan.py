@@ -98,6 +98,7 @@ def plan(
     effects: Iterable[Path] = (),
     controller: Path | None = None,
     drive: str = VOLTAGE.name,
+    step: float | None = None,
 ) -> Plan:
     """Return what to build.
 
@@ -121,6 +122,8 @@ def plan(
         Controller file of a design, for a component that takes one of its kind.
     drive : str
         What commands a damper: one of `physics.drive.DRIVES`.
+    step : float, optional
+        Step [s] that the FMU asks for; else 2 ms.
 
     Raises
     ------
@@ -157,6 +160,8 @@ def plan(
         catalogue.describe(component, building, effects=effects)  # refuses what is wrong with them
     if drive != VOLTAGE.name:
         baked["drive"] = drive
+    if step is not None:
+        baked["step"] = step
     if starts:
         known = catalogue.describe(component, building, effects=effects, drive=drive).variables
         baked["starts"] = _checked_starts(component, known, starts)

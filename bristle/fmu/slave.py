@@ -124,7 +124,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.baked = self._read_baked() if baked is None else baked
         self.modelName = self.baked.get("name", type(self).__name__)
         self.guid = self.baked.get("guid", self.guid)
-        self.default_experiment = DefaultExperiment(start_time=0.0, stop_time=10.0, step_size=0.002)
+        self.default_experiment = DefaultExperiment(
+            start_time=0.0, stop_time=10.0, step_size=self.baked.get("step", 0.002)
+        )
         self.description = (type(self).__doc__ or "").strip().split("\n")[0]
         self.declare()
         self.add_output(

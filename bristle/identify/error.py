@@ -185,10 +185,15 @@ def force_error(pairs: Iterable[tuple[Problem, Model]]) -> ForceError:
 def errors_by_run(problem: Problem, model: Model) -> list[ForceError]:
     """Return the error of a model on each run of a problem, whatever its fit left out."""
     runs = [run.entire() for run in problem.runs]
-    zero = 0.0  # of the load cell: a model that was fitted with it predicts what the cell shows
-    if problem.free_zero and not has_offset(model):
-        zero, _ = zero_of(problem, model)
+    zero = zero_on(problem, model)
     return [error_on(run, problem.predict(model, run) + zero) for run in runs]
+
+
+def zero_on(problem: Problem, model: Model) -> float:
+    """Return the zero of the load cell [N] with which a model was fitted: what it shows more."""
+    if problem.free_zero and not has_offset(model):
+        return zero_of(problem, model)[0]
+    return 0.0
 
 
 def error_on(run: Run, predicted: Array) -> ForceError:

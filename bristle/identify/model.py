@@ -51,6 +51,14 @@ class Moments(NamedTuple):
     dt: float
 
 
+class Fed(NamedTuple):
+    """What a damper's functions are given: motion and command, values, channels by parameter."""
+
+    moments: Moments
+    values: dict[str, float]
+    tracks: dict[str, Array]
+
+
 @dataclass(frozen=True)
 class Run:
     """A measured run, its motion smoothed.
@@ -317,6 +325,15 @@ class Problem:
 
     def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, its states beginning as the model says."""
+        fed = self.fed(model, run, draw)
+        force = self.bench(model).force(*fed.moments, fed.values, fed.tracks)
+        return self.shown(model, run, fed, force)
+
+    def fed(self, model: Model, run: Run, draw: int | None = None) -> Fed:
+        """Return what a damper's functions are given of a run, or of one draw of its motion.
+
+        Behind the instruments of the velocity, and as early as the force is merely late.
+        """
         x, v, a, V, dt = run.smoothed if draw is None else run.drawn(draw)
         v, a = true_motion(model.effects, model.values, v, a, dt)
         own = values_of_labels(model.effects, run.labels)
@@ -326,8 +343,11 @@ class Problem:
         tracks = tracks_of(model.effects, run.extra, run.name)
         if run.finer is not None:
             tracks = {name: between(y, None, dt, run.finer.parts) for name, y in tracks.items()}
-        force = self.bench(model).force(x, v, a, V, dt, values, tracks)
-        return run.seen(shown_force(model.effects, values, force, dt))
+        return Fed(Moments(x, v, a, V, dt), values, tracks)
+
+    def shown(self, model: Model, run: Run, fed: Fed, force: Array) -> Array:
+        """Return a damper's force (m,) [N] at these moments as the load cell shows it (n,) [N]."""
+        return run.seen(shown_force(model.effects, fed.values, force, fed.moments.dt))
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].

@@ -1,0 +1,64 @@
+"""Run the exported FMU on the held-out runs in plain FMPy: `python check.py`.
+
+Needs fmpy and numpy, not bristle. The force of the FMU goes through the filter of a decimated
+record and gets the zero of the load cell; the effects of instruments, if proof.json names any, are
+not applied here.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import simulate_fmu
+
+FOLDER = Path(__file__).resolve().parent
+
+
+def columns(path: Path) -> dict[str, Any]:
+    """Return the columns (n,) of a CSV by title without unit."""
+    with path.open(encoding="utf-8") as file:
+        names = [title.partition(" [")[0] for title in file.readline().strip().split(",")]
+        return dict(zip(names, np.loadtxt(file, delimiter=",", ndmin=2).T, strict=True))
+
+
+def force_of(proof: dict[str, Any], run: str, parts: int) -> Any:
+    """Return the force (n,) [N] that the FMU gives at the samples of a run."""
+    given = columns(FOLDER / f"{run}_inputs.csv")
+    rows = np.array(list(zip(*given.values(), strict=True)), dtype=[(n, float) for n in given])
+    step = proof["step"]
+    found = simulate_fmu(
+        str(FOLDER.parent / proof["fmu"]), stop_time=float(given["time"][-1]), step_size=step,
+        output_interval=step, input=rows, output=["force"],
+        start_values=proof["start_values"][run],
+    )  # fmt: skip
+    time = columns(FOLDER / f"{run}_force.csv")["time"]
+    moments = np.linspace(time[0], time[-1], (len(time) - 1) * parts + 1)
+    force = np.interp(moments, found["time"], found["force"])
+    half = parts - 1  # a Hann window as long as two samples; it goes on point-symmetrically
+    taps = np.hanning(2 * parts + 1)[1:-1]
+    begin, end = 2 * force[0] - force[half:0:-1], 2 * force[-1] - force[-2 : -half - 2 : -1]
+    around = np.concatenate([begin, force, end]) if half else force
+    return np.convolve(around, taps / taps.sum(), "valid")[::parts] + proof["load_cell_zero"]
+
+
+def main() -> None:
+    """Print the error of the FMU beside that of `bristle compare`, over the samples that count."""
+    proof = json.loads((FOLDER / "proof.json").read_text(encoding="utf-8"))
+    errors, forces = [], []
+    for run, parts in proof["moments_per_sample"].items():
+        held = columns(FOLDER / f"{run}_force.csv")
+        counts = held["counts"] > 0.5
+        errors.append((held["force"] - force_of(proof, run, parts))[counts])
+        forces.append(held["force"][counts])
+    error, force = (float(np.sqrt(np.mean(np.concatenate(y) ** 2))) for y in (errors, forces))
+    told = proof["error_told"]
+    print(f"FMU in FMPy: {error:.5g} N, {100.0 * error / force:.3g} % of the force")
+    rms, signal = told["rms_counted"], told["signal_counted"]
+    print(f"bristle compare: {rms:.5g} N, {100.0 * rms / signal:.3g} %")
+    if proof["instruments"]:
+        print(f"Not applied here: {', '.join(proof['instruments'])}")
+
+
+if __name__ == "__main__":
+    main()

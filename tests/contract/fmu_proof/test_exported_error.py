@@ -1,0 +1,69 @@
+"""The error that is printed is the one that the exported FMU has in plain FMPy."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+
+from bristle.cli import main
+
+
+def record(path: Path, rate: float, phase: float, switched: bool) -> None:
+    """Write a damper with Coulomb friction, a dashpot and a command that switches or sweeps."""
+    t = np.arange(0.0, 3.0, 1.0 / rate)
+    w = 2.0 * np.pi
+    x = 4e-3 * np.sin(1.3 * w * t + phase) + 1.5e-3 * np.sin(3.1 * w * t)
+    v = 4e-3 * 1.3 * w * np.cos(1.3 * w * t + phase) + 1.5e-3 * 3.1 * w * np.cos(3.1 * w * t)
+    V = np.where(t % 1.0 < 0.45, 3.0, 0.5) if switched else 2.0 + np.sin(2.0 * w * t / 3.0)
+    force = (1.3 + 0.8 * V) * np.tanh(v / 0.004) + (25.0 + 5.0 * V) * v + 90.0 * x
+    rng = np.random.default_rng(int(10 * phase))
+    noisy = [x + 2e-6 * rng.standard_normal(len(t)), force + 0.02 * rng.standard_normal(len(t))]
+    header = "time [s],displacement [m],force [N],voltage [V]"
+    np.savetxt(path, np.column_stack([t, *noisy, V]), delimiter=",", header=header, comments="")
+
+
+@pytest.mark.parametrize(
+    ("rate", "law", "switched"),
+    [(500.0, "bingham", False), (500.0, "dahl", True), (3000.0, "bingham", True)],
+)
+def test_the_fmu_has_the_error_that_compare_prints(
+    rate: float, law: str, switched: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    for k, phase in enumerate((0.3, 1.1, 2.0)):
+        record(tmp_path / f"run_{k}.csv", rate, phase, switched)
+    assert main(["study", "new", "rig", "--data", "run_*.csv", "--law", law]) == 0
+    assert main(["identify", "rig", "--no-table"]) == 0
+    capfd.readouterr()
+    assert main(["compare", "rig", "--json"]) == 0
+    compared = json.loads(capfd.readouterr().out)
+    assert main(["export", "rig", "--json"]) == 0
+    exported = json.loads(capfd.readouterr().out)
+    proof = exported["proof"]
+    assert proof["agrees"]
+    assert proof["error_told"]["rms"] == compared["total"]["error"]["rms"]
+    assert fmpy.read_model_description(exported["fmu"]).defaultExperiment.stepSize == proof["step"]
+    said = subprocess.run(
+        [sys.executable, "rig/export/held_out/check.py"], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    fmu, told = (float(line.split(": ")[1].split(" N")[0]) for line in said[-2:])
+    signal = proof["error_told"]["signal_counted"]
+    assert abs(fmu - told) <= max(0.01 * told, 0.002 * signal)
+    # With the columns as measured, whose velocity is a difference, it is another one: told as well.
+    assert proof["error_raw"]["rms"] > 0.0
+
+
+def test_without_a_proof_the_reason_is_told(tmp_path: Path) -> None:
+    from bristle.bridge.held_out import Proof
+    from bristle.identify.error import error_of
+
+    told = error_of(np.ones(50), np.zeros(50), {})
+    lines = Proof(told, 5e-4, why="no library for this platform.").lines(tmp_path)
+    assert lines[-1] == "The FMU was not run to confirm it: no library for this platform."
