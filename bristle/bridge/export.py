@@ -16,7 +16,7 @@ import numpy as np
 from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.measurement import Measurement
 from ..data.model import StudyModel
-from ..errors import StudyError
+from ..errors import RecordError, StudyError
 from ..fmu.build import Plan, build, plan
 from ..fmu.catalogue import component_of_law
 from ..identify.rig import DAMPER
@@ -89,7 +89,7 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     measurement = _one_run(study, runs)
     folder = study.folder / "export" if out is None else out
     notes: list[str] = []
-    held = _held_out(study, model, runs)
+    held = _held_out(study, model, runs, notes)
     step = step_for(held) if held else None
     with _writing(folder):
         fmu = build(_damper(study, model, runs, notes, step), folder)
@@ -107,10 +107,16 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     return Exported(fmu, scenario, tuple(files), measurement.name, tuple(notes), proof)
 
 
-def _held_out(study: Study, model: StudyModel, runs: Runs) -> HeldOut | None:
-    """Return what the damper is held against; None for a building whose damper is no site."""
-    rig = rig_of(study, model, runs)
-    if DAMPER not in rig.sites(as_model(model)):
+def _held_out(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> HeldOut | None:
+    """Return what the damper is held against; None, and a note, where the runs do not tell it."""
+    try:
+        rig = rig_of(study, model, runs)
+        there = DAMPER in rig.sites(as_model(model))
+    except RecordError as error:
+        notes.append(f"the FMU was not held against the runs: {error}")
+        return None
+    if not there:
+        notes.append("the FMU was not held against the runs: they do not tell the damper's force.")
         return None
     bare = model.at("damper", bench=not study.settings.has_building)
     known = [_with_stroke(study, model, one) for one in runs.holdout or runs.train]

@@ -49,7 +49,8 @@ def test_the_fmu_has_the_error_that_compare_prints(
     proof = exported["proof"]
     assert proof["agrees"]
     assert proof["error_told"]["rms"] == compared["total"]["error"]["rms"]
-    assert fmpy.read_model_description(exported["fmu"]).defaultExperiment.stepSize == proof["step"]
+    asked = fmpy.read_model_description(exported["fmu"]).defaultExperiment
+    assert float(asked.stepSize) == proof["step"]
     said = subprocess.run(
         [sys.executable, "rig/export/held_out/check.py"], capture_output=True, text=True, check=True
     ).stdout.splitlines()
