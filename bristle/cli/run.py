@@ -236,7 +236,7 @@ def _print_errors(frame: pd.DataFrame) -> None:
         return
     step = 1e3 * frame.attrs["made"]["step"]
     heading = f"Coupling error at {step:g} ms, by {frame.attrs['coupling_error_by']}, in %"
-    shown = [name for name in judged_by(frame) if found[name]["along"] > 0.0]
+    shown = [n for n in judged_by(frame) if found[n]["along"] > 0.0 or not found[n]["worth"]]
     if not shown:
         print(f"{heading}: none, for nothing here depends on the step.")
         return
@@ -246,7 +246,9 @@ def _print_errors(frame: pd.DataFrame) -> None:
         table.add_column(column, justify="right")
     for name in shown:
         error = found[name]
-        shares = (plain(100.0 * error[key], 2) for key in ("along", "peak", "rms"))
+        keys = ("along", "peak", "rms")
+        # Runs that agree on the wrong side of a switch show no error, and have one.
+        shares = [plain(100.0 * error[key], 2) if error["along"] > 0.0 else "?" for key in keys]
         order = f"{error['order']:.1f}" + ("" if error["worth"] else ", no use")
         table.add_row(name, *shares, order)
     _print_table(table)

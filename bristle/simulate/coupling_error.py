@@ -41,6 +41,8 @@ class CouplingError:
     `along` is the largest anywhere along the run, `peak` and `rms` those of peak and RMS, positive
     where the run's value is too large. `order` is by which power of the step the error along the
     run falls, nan where there is none. `worth` is whether that order lets the estimate be believed.
+    `least` is what the error along the run is even if it does not: the difference to the run
+    without error, or half of that to the run at half the step, which is the better of the two.
     """
 
     along: float
@@ -48,11 +50,17 @@ class CouplingError:
     rms: float
     order: float
     worth: bool
+    least: float
 
     @property
     def some(self) -> bool:
         """Whether there is an error beyond rounding."""
         return self.along > ROUNDING
+
+    @property
+    def known(self) -> float:
+        """What is known of the error along the run: all of it, or the least that it is."""
+        return self.along if self.worth else self.least
 
     def __str__(self) -> str:
         shares = (f"{100 * share:.2g} %" for share in (self.along, self.peak, self.rms))
@@ -158,7 +166,7 @@ def against(h: Array, half: Array, exact: Array) -> CouplingError:
     """
     scale = largest(exact) or 1.0
     wrong, better = largest(h - exact) / scale, largest(half - exact) / scale
-    found = _judged(wrong, better, 1.0, h, exact)
+    found = _judged(wrong, better, 1.0, h, exact, least=wrong)
     # Measured, not extrapolated: an error that falls faster than expected is as good as any.
     falls = found.worth or not found.order <= MOST_ORDER
     return replace(found, worth=falls and found.along <= MOST_ERROR)
@@ -177,10 +185,12 @@ def extrapolated(h: Array, half: Array, quarter: Array) -> CouplingError:
     first, second = largest(h - half) / scale, largest(half - quarter) / scale
     ratio = first / second if second > 0.0 else nan
     factor = ratio / (ratio - 1.0) if ratio > 1.0 else 1.0
-    return _judged(first, second, factor, h, half)
+    return _judged(first, second, factor, h, half, least=first / 2.0)
 
 
-def _judged(wrong: float, better: float, factor: float, h: Array, other: Array) -> CouplingError:
+def _judged(
+    wrong: float, better: float, factor: float, h: Array, other: Array, least: float
+) -> CouplingError:
     """Return an error from the differences of two runs; `factor` makes them the whole error.
 
     Parameters
@@ -188,9 +198,10 @@ def _judged(wrong: float, better: float, factor: float, h: Array, other: Array) 
     wrong, better : largest difference [1] at the step and at half of it, shares of the peak
     factor : 1 where the differences are those to the exact run
     h, other : (rows,) the run, and what it is held against
+    least : as in `CouplingError`
     """
     if wrong <= ROUNDING:
-        return CouplingError(0.0, 0.0, 0.0, nan, True)
+        return CouplingError(0.0, 0.0, 0.0, nan, True, 0.0)
     order = log2(wrong / better) if better > 0.0 else nan
     along = factor * wrong
     peak, rms = largest(other), _rms(other)
@@ -200,6 +211,7 @@ def _judged(wrong: float, better: float, factor: float, h: Array, other: Array) 
         rms=factor * (_rms(h) / rms - 1.0) if rms > 0.0 else nan,
         order=order,
         worth=along <= MOST_ERROR and LEAST_ORDER <= order <= MOST_ORDER,
+        least=least,
     )
 
 

@@ -11,6 +11,7 @@ from math import ceil, isfinite, log2
 from typing import TYPE_CHECKING
 
 from ..errors import RunError
+from ..quantity import plain
 from .coupling_error import CouplingError, coupled_run, estimate, finer, largest
 from .summary import judged_by
 from .tolerance import worst
@@ -39,8 +40,8 @@ class Expected:
 
     `output` is that output. `step` [s] is the scenario's divided by a power of two at which a run
     was within the tolerance. `tried` [s] is the shortest step that was run, and `tried_error` [1]
-    the largest error there: where `step` is None it is not within. All are None where nothing can
-    be told, and `why` says so.
+    the largest error there: where `step` is None it is not within. All are None where the error is
+    not known, and `why` says what is.
     """
 
     algorithm: str
@@ -53,11 +54,11 @@ class Expected:
 
     def __str__(self) -> str:
         if self.error is None or self.tried is None or self.tried_error is None:
-            return f"{self.algorithm}: the coupling error cannot be told: {self.why}"
-        told = f"{self.algorithm}: {100 * self.error:.2g} % along the run of {self.output}"
+            return f"{self.algorithm}: {self.why}"
+        told = f"{self.algorithm}: {plain(100 * self.error, 2)} % along the run of {self.output}"
         if self.error <= TOLERANCE:
             return told
-        there = f"{100 * self.tried_error:.2g} %"
+        there = f"{plain(100 * self.tried_error, 2)} %"
         if self.step is None:
             limit = (
                 f"no step down to {1e3 * self.tried:.4g} ms keeps it below {100 * TOLERANCE:g} %"
@@ -88,17 +89,19 @@ def expect(scenario: Scenario, again: Again) -> tuple[Expected, ...]:
         try:
             found.append(_expected(replace(scenario, algorithm=name), kept, again))
         except RunError as failure:
-            found.append(Expected(name, None, None, why=str(failure)))
+            found.append(Expected(name, None, None, why=f"cannot be told: {failure}"))
     return tuple(found)
 
 
 def _expected(scenario: Scenario, kept: Again, again: Again) -> Expected:
     frame = kept(scenario, "fmu")
     errors = estimate(scenario, frame, kept)[1]
-    output = worst(errors, frame)
+    output, doubt = worst(errors, frame)
+    if doubt:
+        return Expected(scenario.algorithm, None, None, why=doubt, output=output)
     error = errors[output].along
     found = Expected(scenario.algorithm, error, scenario.step, scenario.step, error, output=output)
-    judged = {n: errors[n] for n in judged_by(frame) if errors[n].worth and errors[n].some}
+    judged = {n: errors[n] for n in judged_by(frame) if errors[n].some}
     if error <= TOLERANCE:
         return found
     halvings = max(_halvings(one) for one in judged.values())

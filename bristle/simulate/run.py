@@ -36,6 +36,8 @@ FLUSH = 1.0
 """Seconds between two writes of a running results file."""
 BLOCK = 0.1
 """Seconds of steps between two looks at Ctrl-C, progress and clock."""
+MOST_WARNINGS = 9
+"""Outputs with a doubtful coupling error that are named on a terminal."""
 
 
 class IncompleteRunError(RunError):
@@ -198,8 +200,14 @@ def _add_error(
     for name, one in found.items():
         if one.some:
             output.log(f"coupling error of {name}, by {how}: {one}")
-        if not one.worth:
-            output.warn(f"{name}: {one.doubt()}: the estimate is worth nothing")
+    doubtful = [f"{name}: {one.doubt()}" for name, one in found.items() if not one.worth]
+    for line in doubtful[:MOST_WARNINGS]:
+        output.warn(f"{line}: the estimate is worth nothing")
+    for line in doubtful[MOST_WARNINGS:]:
+        output.log(f"warning: {line}: the estimate is worth nothing")
+    if len(doubtful) > MOST_WARNINGS:
+        more = len(doubtful) - MOST_WARNINGS
+        output.warn(f"and {more} more outputs: their estimates are worth nothing")
 
 
 def run_quietly(scenario: Scenario, engine: str, fmus: str = "python") -> Results:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from ..errors import RunError
+from ..quantity import plain
 from ..scenario.checks import STEP_TOLERANCE
 from .coupling_error import CouplingError, estimate, finer
 from .summary import judged_by
@@ -20,6 +21,9 @@ FEWEST_STEPS = 100
 
 MOST_TRIALS = 12
 """Steps that a search for a tolerance tries."""
+
+MOST_UNKNOWN = 3
+"""Steps in a row with an unknown error after which it goes no further down."""
 
 
 def find_step(
@@ -36,7 +40,7 @@ def find_step(
     Raises
     ------
     RunError
-        If no step does, or no output has an estimate that is worth something.
+        If no step does, or one of these outputs has no estimate that is worth something.
     """
     runs: dict[tuple[float, str], pd.DataFrame] = {}
 
@@ -46,16 +50,24 @@ def find_step(
         return runs[one.step, engine]
 
     good: Scenario | None = None
-    tried = scenario
+    tried, unknown = scenario, 0
     for _ in range(MOST_TRIALS):
         errors = estimate(tried, frame := kept(tried, "fmu"), kept)[1]
-        if errors[worst(errors, frame)].along <= tolerance:
+        output, doubt = worst(errors, frame)
+        unknown = unknown + 1 if doubt else 0
+        if not doubt and errors[output].along <= tolerance:
             good, coarser = tried, finer(tried, 0.5)
             if tried.step < scenario.step or not _fits(coarser):
                 return good
             tried = coarser
         elif good is not None:
             return good
+        elif unknown == MOST_UNKNOWN:
+            raise RunError(
+                f"the coupling error at {1e3 * tried.step:.3g} ms is {doubt}.\n"
+                "  So there is nothing to hold a tolerance against. Dry friction without "
+                "holding_force and switches behave so."
+            )
         else:
             tried = finer(tried, 2)
     raise RunError(
@@ -64,8 +76,11 @@ def find_step(
     )
 
 
-def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> str:
-    """Return which of the outputs that a run is judged by has the largest error along it.
+def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> tuple[str, str]:
+    """Return the output that is furthest off, of those that a run is judged by, and a doubt.
+
+    The doubt is "" where each of them has an estimate that is worth something. Else nobody knows
+    the error of the run, and the doubt says what is known, and why no more.
 
     Parameters
     ----------
@@ -75,15 +90,20 @@ def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> str:
     Raises
     ------
     RunError
-        If none of them has an estimate that is worth something.
+        If the run has no Real output.
     """
-    worth = {name: errors[name].along for name in judged_by(frame) if errors[name].worth}
-    if not worth:
-        raise RunError(
-            "no output's coupling error falls with the step: there is nothing to hold a tolerance "
-            "against. Dry friction without holding_force and switches behave so."
-        )
-    return max(worth, key=worth.__getitem__)
+    judged = {name: errors[name] for name in judged_by(frame)}
+    if not judged:
+        raise RunError("no output is Real: there is nothing that has a coupling error.")
+    output = max(judged, key=lambda name: judged[name].known)
+    doubtful = {name: error for name, error in judged.items() if not error.worth}
+    if not doubtful:
+        return output, ""
+    first = max(doubtful, key=lambda name: doubtful[name].known)
+    others = f" and {len(doubtful) - 1} more" if len(doubtful) > 1 else ""
+    known = judged[output].known
+    least = f", at least {plain(100 * known, 2)} % along the run of {output}" if known > 0.0 else ""
+    return output, f"unknown{least}; {first}{others}: {doubtful[first].doubt()}"
 
 
 def _fits(scenario: Scenario) -> bool:

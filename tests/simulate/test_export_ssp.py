@@ -341,8 +341,8 @@ def test_the_step_that_is_told_keeps_the_error_of_a_closed_loop(loop: Path) -> N
 
 
 def test_an_error_that_does_not_fall_is_told(scenario: Path) -> None:
-    for one in expect(load_scenario(scenario), sampled(0.0)):
-        assert "cannot be told" in str(one) or one.error == 0.0
+    for one in expect(load_scenario(scenario), sampled(0.0)):  # all runs agree
+        assert one.error == 0.0
 
 
 def test_a_name_that_is_no_package_is_refused(scenario: Path, tmp_path: Path) -> None:
