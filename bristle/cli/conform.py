@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=20.0,
         metavar="S",
-        help="time limit of one probe in s (default: %(default)g)",
+        help="time limit of one call in s (default: %(default)g)",
     )
     parser.add_argument(
         "--only", action="append", metavar="PROBE", help="try this probe only; may be repeated"

@@ -31,7 +31,7 @@ def conform(
     path : Path or str
         The .fmu file, anybody's.
     timeout : float
-        Time limit of one probe in s; an FMU that does not answer by then fails the probe.
+        Time limit of one call in s; an FMU that does not answer by then fails the probe.
     only : collection of str, optional
         Names of the probes to try; all of them otherwise.
     beside : Path or str, optional

@@ -155,15 +155,33 @@ class Bench:
         return rows
 
     def differs(self, rows: Iterable[Values], wanted: Sequence[Values], first: int = 0) -> str:
-        """Return where two runs differ first, in words; "" if they are equal bit by bit.
+        """Return where two runs differ first, in words; "" if they are `equal`.
 
         `first` is the communication point of the first row.
         """
+        allowed = self._allowed(wanted)
         for k, (row, want) in enumerate(zip(rows, wanted, strict=True), first):
-            for variable, a, b in zip(self.observed, row, want, strict=True):
-                if not _same(a, b):
+            for variable, a, b, less in zip(self.observed, row, want, allowed, strict=True):
+                if not _same(a, b, less):
                     return f"{variable.name} at {self._at(k)} is {a!r} instead of {b!r}"
         return ""
+
+    @property
+    def equal(self) -> str:
+        """How equal runs are that do not differ."""
+        tolerance = self.plan.tolerance
+        return f"within the tolerance of {tolerance:g}" if tolerance else "bit by bit"
+
+    def _allowed(self, wanted: Sequence[Values]) -> list[float]:
+        """Return by how much the observed variables may differ: a solver's tolerance of a peak."""
+        if not self.plan.tolerance:
+            return [0.0] * len(self.observed)
+        rows = [*wanted, *(self.reference() if self._file.exists() else ())]
+        return [
+            self.plan.tolerance
+            * max((abs(row[i]) for row in rows if isinstance(row[i], float)), default=0.0)
+            for i in range(len(self.observed))
+        ]
 
 
 def good(status: int, function: str) -> None:
@@ -189,7 +207,9 @@ def some(names: Sequence[Any], most: int = 3) -> str:
     return ", ".join(str(name) for name in names[:most]) + more
 
 
-def _same(a: Value, b: Value) -> bool:
+def _same(a: Value, b: Value, less: float) -> bool:
+    if isinstance(a, float) and isinstance(b, float) and abs(a - b) <= less:
+        return True
     return a == b or (a != a and b != b)  # NaN equals NaN here
 
 

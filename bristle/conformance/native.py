@@ -50,27 +50,44 @@ class MissingFunctionError(Exception):
 
 
 class BlackBox:
-    """Remembers the call under way in a file, where it outlives a crash of this process."""
+    """Remembers the call under way in a file, where it outlives a crash of this process.
 
-    SIZE = 256
+    Behind its text the file has the number of calls, by which the parent sees that they go on.
+    """
+
+    SIZE, COUNT = 256, 8
 
     def __init__(self, file: Path) -> None:
-        file.write_bytes(bytes(self.SIZE))
+        file.write_bytes(bytes(self.SIZE + self.COUNT))
+        self._calls = 0
         with file.open("r+b") as stream:
-            self._map = mmap.mmap(stream.fileno(), self.SIZE)
+            self._map = mmap.mmap(stream.fileno(), self.SIZE + self.COUNT)
 
     def note(self, text: str) -> None:
         """Write what happens next."""
-        self._map[:] = text.encode("ascii", "replace")[: self.SIZE].ljust(self.SIZE, b"\0")
+        size = self.SIZE
+        self._map[:size] = text.encode("ascii", "replace")[:size].ljust(size, b"\0")
+        if text not in ("", "fmi2GetStatus"):  # to ask whether a step is over is no progress
+            self._calls += 1
+            self._map[size:] = self._calls.to_bytes(self.COUNT, "little")
 
     def text(self) -> str:
         """Return what was noted last, "" if that is over."""
-        return bytes(self._map[:]).rstrip(b"\0").decode("ascii")
+        return bytes(self._map[: self.SIZE]).rstrip(b"\0").decode("ascii")
 
     @staticmethod
     def read(file: Path) -> str:
         """Return what was noted last, "" if nothing was."""
-        return file.read_bytes().rstrip(b"\0").decode("ascii") if file.exists() else ""
+        if not file.exists():
+            return ""
+        return file.read_bytes()[: BlackBox.SIZE].rstrip(b"\0").decode("ascii")
+
+    @staticmethod
+    def calls(file: Path) -> int:
+        """Return how many calls were noted."""
+        if not file.exists():
+            return 0
+        return int.from_bytes(file.read_bytes()[BlackBox.SIZE :], "little")
 
 
 class Library:
@@ -210,7 +227,7 @@ class Instance:
     def step(self, time_: float, step: float) -> int:
         """Call fmi2DoStep (s), and wait where the FMU computes asynchronously."""
         status = self._do("fmi2DoStep", time_, step, 1)
-        while status == PENDING:  # the time limit of the probe ends an endless wait
+        while status == PENDING:  # the time limit of the call ends an endless wait
             answer = c_int(PENDING)
             asked = self._do("fmi2GetStatus", _DO_STEP_STATUS, byref(answer))
             status = answer.value if asked in (OK, WARNING) else asked

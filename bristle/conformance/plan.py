@@ -17,8 +17,9 @@ class Plan:
 
     `steps` is how many communication steps the comparing probes take, `instances` how often
     the repeating ones instantiate; both shrink for an FMU that is slow. `driven` says whether
-    real inputs may be moved. `ours` says that bristle's rules for faults apply. `fmi3` is also
-    known where the variables cannot be read.
+    real inputs may be moved. `tolerance` [1] is that of the FMU's solver, 0 where it states none:
+    two runs are equal if they differ by less of a variable's largest value. `ours` says that
+    bristle's rules for faults apply. `fmi3` is also known where the variables cannot be read.
     """
 
     fmu: str
@@ -32,6 +33,7 @@ class Plan:
     steps: int = 60
     instances: int = 30
     driven: bool = True
+    tolerance: float = 0.0
     repeatable: bool = True
     ours: bool = False
     fmi3: bool = False

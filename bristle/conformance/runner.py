@@ -9,6 +9,7 @@ import signal
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def judge(
     path : Path
         The .fmu file.
     timeout : float
-        Time limit of one probe [s].
+        Time limit of one call [s].
     only : collection of str or None
         Names of the probes to try; None: all.
     beside : Path or None
@@ -94,7 +95,7 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     ----------
     path, root : the .fmu file and its parsed modelDescription.xml
     folder : where it is unpacked, into `fmu`; the probes work in `work` beside that
-    timeout : time limit of one probe [s]
+    timeout : time limit of one call [s]
 
     Raises
     ------
@@ -115,6 +116,8 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     times = {} if experiment is None else experiment.attrib
     plan.start = _time(times.get("startTime"), -math.inf) or 0.0
     plan.stop = _time(times.get("stopTime"), plan.start)
+    tolerance = _time(times.get("tolerance"), 0.0) or 0.0
+    plan.tolerance = tolerance if tolerance < 1.0 else 0.0
     step = _time(times.get("stepSize"), 0.0)
     plan.step = step or _usual_step(plan, root)
     return plan
@@ -271,7 +274,9 @@ class _Session:
             (work / name).unlink(missing_ok=True)
         # Forks share a hash seed and a memory layout; what depends on these is found anew.
         anew = probe.name == _REPEATABLE
-        code = self.subprocesses.run(probe.name, self.plan.timeout, anew=anew, bare=probe.bare)
+        calls = partial(BlackBox.calls, work / BOX)
+        timeout = self.plan.timeout
+        code = self.subprocesses.run(probe.name, timeout, calls, anew=anew, bare=probe.bare)
         return _finding(work, code, self.plan.timeout)
 
 

@@ -1,4 +1,4 @@
-"""Processes for probes: each in one of its own, ended when its time is over.
+"""Processes for probes: each in one of its own, ended when a call takes too long.
 
 On Linux a process that has imported the probes, and never an FMU, forks one child per probe:
 starting Python anew each time would take most of the time of a judgement. Elsewhere, and where
@@ -13,6 +13,8 @@ import signal
 import subprocess
 import sys
 import threading
+import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -54,7 +56,9 @@ class Subprocesses:
             _kill(self._mother.pid)
             self._mother.communicate()
 
-    def run(self, probe: str, timeout: float, *, anew: bool, bare: bool) -> int | None:
+    def run(
+        self, probe: str, timeout: float, calls: Callable[[], int], *, anew: bool, bare: bool
+    ) -> int | None:
         """Return how a probe's process ended: its exit code, None if it had to be killed.
 
         As in subprocess, an exit code is positive and a signal negative.
@@ -62,7 +66,8 @@ class Subprocesses:
         Parameters
         ----------
         probe : name of the probe
-        timeout : time limit [s]
+        timeout : time limit of one call [s]
+        calls : returns how many calls there were
         anew, bare : whether Python starts anew for it; whether without site-packages, anew as well
 
         Raises
@@ -74,14 +79,16 @@ class Subprocesses:
         folder = self._work / f"cwd{self._count}"
         folder.mkdir()
         if anew or bare or sys.platform != "linux":
-            return self._start(probe, folder, timeout, bare)
-        return self._fork(probe, folder, timeout)
+            return self._start(probe, folder, timeout, calls, bare)
+        return self._fork(probe, folder, timeout, calls)
 
     def _command(self, bare: bool, *arguments: str) -> list[str]:
         flags = ["-I", "-S"] if bare else ["-P"]
         return [sys.executable, *flags, "-c", _BOOT, _PACKAGES, str(self._work), *arguments]
 
-    def _start(self, probe: str, folder: Path, timeout: float, bare: bool) -> int | None:
+    def _start(
+        self, probe: str, folder: Path, timeout: float, calls: Callable[[], int], bare: bool
+    ) -> int | None:
         process = subprocess.Popen(
             self._command(bare, probe),
             cwd=folder,
@@ -94,14 +101,20 @@ class Subprocesses:
         waiter = threading.Thread(target=process.wait, daemon=True)
         try:
             waiter.start()
-            waiter.join(timeout)
-            ended = not waiter.is_alive()
+
+            def over(seconds: float) -> bool:
+                waiter.join(seconds)
+                return not waiter.is_alive()
+
+            ended = _ends(over, timeout, calls)
         finally:
             _kill(process.pid)
             code = process.wait()
         return code if ended else None
 
-    def _fork(self, probe: str, folder: Path, timeout: float) -> int | None:
+    def _fork(
+        self, probe: str, folder: Path, timeout: float, calls: Callable[[], int]
+    ) -> int | None:
         if self._mother is None:
             self._mother = subprocess.Popen(
                 self._command(False),
@@ -117,11 +130,24 @@ class Subprocesses:
         request.write(f"{probe}\t{folder}\n".encode())
         pid = _number(answer.readline())
         self._living.append(pid)
-        ended = bool(select.select([answer], [], [], timeout)[0])
+        ended = _ends(
+            lambda seconds: bool(select.select([answer], [], [], seconds)[0]), timeout, calls
+        )
         _kill(pid)
         code = _number(answer.readline())
         self._living.remove(pid)
         return code if ended else None
+
+
+def _ends(over: Callable[[float], bool], timeout: float, calls: Callable[[], int]) -> bool:
+    """Wait for the end of a process; return False if one call takes longer than its time [s]."""
+    last, since = calls(), time.monotonic()
+    while not over(timeout / 10):
+        if (now := calls()) != last:
+            last, since = now, time.monotonic()
+        elif time.monotonic() - since >= timeout:
+            return False
+    return True
 
 
 def _number(line: bytes) -> int:

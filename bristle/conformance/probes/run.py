@@ -159,4 +159,4 @@ def repeatable(bench: Bench) -> Finding:
     difference = bench.differs(bench.whole_run(), bench.reference())
     if difference:
         return noted(f"not repeatable: {difference}", repeatable=False)
-    return passed("equal bit by bit")
+    return passed(f"equal {bench.equal}")

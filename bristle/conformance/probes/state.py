@@ -54,7 +54,7 @@ def state_replay(bench: Bench) -> Finding:
     if difference:
         return failed(f"after fmi2GetFMUstate into the same copy {difference}")
     good(instance.forget(state), "FreeFMUstate")
-    return passed(f"{steps - half} steps replayed bit by bit, three times")
+    return passed(f"{steps - half} steps replayed {bench.equal}, three times")
 
 
 @probe(
@@ -78,7 +78,7 @@ def state_across_reset(bench: Bench) -> Finding:
     good(instance.forget(state), "FreeFMUstate")
     if difference:
         return failed(difference)
-    return passed("replayed bit by bit")
+    return passed(f"replayed {bench.equal}")
 
 
 @probe(
@@ -147,7 +147,7 @@ def serialised_state(bench: Bench) -> Finding:
     difference = _revived(bench, data, wanted)
     if difference:
         return failed(difference)
-    return passed(f"{len(data)} bytes; a fresh instance continues bit by bit")
+    return passed(f"{len(data)} bytes; a fresh instance continues {bench.equal}")
 
 
 @probe(
@@ -180,4 +180,4 @@ def state_across_processes(bench: Bench) -> Finding:
             if bench.plan.repeatable
             else noted(f"not judged, since no two runs are equal: {difference}")
         )
-    return passed("a fresh process continues bit by bit")
+    return passed(f"a fresh process continues {bench.equal}")
