@@ -26,7 +26,7 @@ def designed(folder: Path, kind: str, parameters: str) -> int:
 def test_a_voltage_without_effect_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, parameters: str
 ) -> None:
-    assert designed(tmp_path, kind, parameters) == 1
+    assert designed(tmp_path, kind, parameters) == 2
     said = capsys.readouterr().err
     assert "the voltage has no effect on the force" in said
     assert "unexpected" not in said
@@ -42,5 +42,5 @@ def test_one_part_that_follows_it_is_enough(tmp_path: Path, parameters: str) -> 
 def test_a_parameter_out_of_place_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], value: str
 ) -> None:
-    assert designed(tmp_path, "lqg", f"f_v = {value}") == 1
+    assert designed(tmp_path, "lqg", f"f_v = {value}") == 2
     assert "f_v" in capsys.readouterr().err
