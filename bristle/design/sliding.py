@@ -105,6 +105,12 @@ class Damper:
         }
         return {**values, **variant.values}
 
+    @property
+    def follows_command(self) -> bool:
+        """Whether the voltage changes the force at any of the law's usual speeds."""
+        speeds = [share * self.speed for share in (1e-3, 0.1, 1.0, 10.0)]
+        return any(self.sliding_force(v, 0.0) != self.sliding_force(v, self.v_max) for v in speeds)
+
     def sliding_force(self, v: float, V: float) -> tuple[float, float]:
         """Return the law's yield force [N] and its other force [N], the mean of both directions.
 

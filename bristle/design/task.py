@@ -164,6 +164,11 @@ class Task:
             for what, value in share._asdict().items():
                 if not (isfinite(value) and value >= 0.0):
                     raise DesignError(f"passive: {name}.{what} = {value!r} must not be negative.")
+        if not self.damper.follows_command:
+            raise DesignError(
+                f"damper: the voltage has no effect on the force of {self.damper.law!r} with these "
+                "parameters, so there is nothing to control. A parameter per volt above 0 is right."
+            )
         check_building(self.plant_building, self.place)
         check_sample_period(self.sample_period, self.plant_building)
         known = self.damper.known_to

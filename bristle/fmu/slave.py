@@ -465,46 +465,57 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.warn_once(f"no variable has one of the value references {list(vrs)}.")
         return [vr if 0 <= vr < len(self._values) else self._index["fault"] for vr in vrs]
 
-    def get_real(self, vrs: list[int]) -> list[float]:
-        """Return the values of Real variables by their references."""
+    def _converted(self, vrs: list[int], kind: type) -> list[Any]:
+        """Return values as another type than the variables have, with a warning.
+
+        Hosts read Integers as Reals, and the like. An exception would poison the binary: what is
+        no number is 0, and an unknown variable has the value of `fault`.
+        """
+        self._known(vrs)
+        found = []
+        for vr in vrs:
+            there = 0 <= vr < len(self._values)
+            value = self._values[vr if there else self._index["fault"]]
+            alike = isinstance(value, kind) and isinstance(value, bool) == (kind is bool)
+            if there and not alike:
+                self.warn_once(
+                    f"{self.vars[vr].name} is not of type {kind.__name__}: its value is converted."
+                )
+            try:
+                found.append(kind() if isinstance(value, str) and kind is not str else kind(value))
+            except (ValueError, OverflowError):
+                found.append(kind())
+        return found
+
+    def _get(self, vrs: list[int], kind: type) -> list[Any]:
         try:
             if self._stale:
                 self._follow()
             values = self._values
             try:
-                return [float(values[vr]) for vr in vrs]
-            except (IndexError, ValueError):
-                return [
-                    0.0 if isinstance(values[vr], str) else float(values[vr])
-                    for vr in self._known(vrs)
-                ]
+                found = [values[vr] for vr in vrs]
+            except IndexError:
+                return self._converted(vrs, kind)
+            return found if {*map(type, found)} <= {kind} else self._converted(vrs, kind)
         except BaseException:
             self._hold()
             raise
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """Return the values of Real variables by their references."""
+        return self._get(vrs, float)
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         """Return the values of Integer variables by their references."""
-        try:
-            if self._stale:
-                self._follow()
-            values = self._values
-            try:
-                return [int(values[vr]) for vr in vrs]
-            except (IndexError, ValueError, OverflowError):
-                return [int(self._values[self._index["fault"]]) for _ in self._known(vrs)]
-        except BaseException:
-            self._hold()
-            raise
+        return self._get(vrs, int)
 
-    @outermost
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         """Return the values of Boolean variables by their references."""
-        return [bool(self._values[vr]) for vr in self._known(vrs)]
+        return self._get(vrs, bool)
 
-    @outermost
     def get_string(self, vrs: list[int]) -> list[str]:
         """Return the values of String variables by their references."""
-        return [str(self._values[vr]) for vr in self._known(vrs)]
+        return self._get(vrs, str)
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set Real variables by their references."""

@@ -16,8 +16,10 @@ EXPORT fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], 
     for (size_t i = 0; i < count; i++) {
         if (vr[i] == (fmi3ValueReference)component.count)
             values[i] = slave_of(c)->time;
-        else if (host_get(slave_of(c), &vr[i], 1, REAL, DOUBLES, &values[i]) != DONE)
-            status = fmi3Error;
+        else {
+            fmi3Status one = (fmi3Status)host_get(slave_of(c), &vr[i], 1, REAL, DOUBLES, &values[i]);
+            if (one > status) status = one;
+        }
     }
     return status;
 }

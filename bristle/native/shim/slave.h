@@ -55,8 +55,8 @@ Status slave_leave(Slave *slave);
 Status slave_step(Slave *slave, double time, double dt);
 void slave_follow(Slave *slave, int final);
 
-/* values.c: values in and out. What was asked of a variable that is none, or of another type, is
-   answered with FAILED. */
+/* values.c: values in and out. What was asked of a variable that is none, or set of another type, is
+   answered with FAILED; a number that is got as one of another type with WARNED. */
 Status slave_get(Slave *slave, unsigned reference, int kind, double *value);
 Status slave_get_text(Slave *slave, unsigned reference, const char **value);
 Status slave_set(Slave *slave, unsigned reference, int kind, double value);

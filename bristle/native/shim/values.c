@@ -1,5 +1,6 @@
 /* Values of variables, in and out. */
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,8 +28,30 @@ static int known(Slave *slave, unsigned reference, int kind) {
     return 0;
 }
 
+/* Hosts read Integers as Reals, and the like: such a value is converted, and a warning says so. */
+static Status converted(Slave *slave, unsigned reference, int kind, double *value) {
+    const Variable *v = &component.variables[reference];
+    double found = slave->values[reference];
+    Text text;
+    if (v->kind == STRING || (kind == INTEGER && !(fabs(found) < 2147483648.0))) {
+        known(slave, reference, kind);
+        return FAILED;
+    }
+    *value = kind == BOOLEAN ? found != 0.0 : kind == INTEGER ? trunc(found) : found;
+    text_clear(&text);
+    text_add(&text, v->name);
+    text_add(&text, " is not of type ");
+    text_add(&text, TYPES[kind]);
+    text_add(&text, ": its value is converted.");
+    slave_warn(slave, text.at);
+    return WARNED;
+}
+
 Status slave_get(Slave *slave, unsigned reference, int kind, double *value) {
-    if (slave->stale && kind != BOOLEAN) slave_follow(slave, 0);
+    int there = reference < (unsigned)component.count;
+    int own = there ? component.variables[reference].kind : kind;
+    if (slave->stale && own != BOOLEAN) slave_follow(slave, 0);
+    if (there && own != kind) return converted(slave, reference, kind, value);
     if (!known(slave, reference, kind)) return FAILED;
     *value = slave->values[reference];
     return DONE;

@@ -1,0 +1,61 @@
+"""Numbers that are got as those of another type: both forms of an FMU answer, and warn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from both_forms import both, needs_zig
+from fmi3_form import Three
+
+from bristle.conformance.native import ERROR, WARNING
+
+pytestmark = needs_zig
+
+CASES: list[tuple[str, str, Any]] = [
+    ("fault", "Real", 0.0),
+    ("fault", "Boolean", False),
+    ("gas_spring.on", "Real", 1.0),
+    ("gas_spring.on", "Integer", 1),
+    ("voltage", "Integer", -2),  # rounded toward 0, as int() does
+    ("voltage", "Boolean", True),
+]
+NAMES = {"Real": "float", "Integer": "int", "Boolean": "bool"}
+OF_FMI3 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+
+
+@pytest.mark.parametrize(("name", "kind", "value"), CASES)
+def test_both_forms_answer_and_warn(name: str, kind: str, value: Any) -> None:
+    pair = both("LuGreDamper", gas_spring__on=True)
+    pair.set("voltage", -2.75)
+    pair.begin()
+    pair.said()
+    index = pair.slave._index[name]
+    mine = getattr(pair.slave, f"get_{kind.lower()}")([index])
+    assert pair.one.get(kind, [index]) == (WARNING, mine)
+    assert mine == [value]
+    warning = f"one: {name} is not of type {NAMES[kind]}: its value is converted."
+    for said in pair.said():
+        assert [text for text in said if "of type" in text] == [warning]
+    pair.one.free()
+
+
+@pytest.mark.parametrize(("name", "kind", "value"), CASES)
+def test_so_does_an_fmu_of_fmi_3(name: str, kind: str, value: Any) -> None:
+    one = Three("LuGreDamper")
+    one.set("gas_spring.on", True)
+    one.set("voltage", -2.75)
+    index = one.about.variables[name].reference
+    assert getattr(one.slave, f"get{OF_FMI3[kind]}")([index]) == [value]
+    warning = f"one: {name} is not of type {NAMES[kind]}: its value is converted."
+    assert [text for *_, text in one.said if "of type" in text] == [warning]
+
+
+def test_a_number_that_fits_no_integer_is_none() -> None:
+    pair = both("LuGreDamper")
+    pair.set("voltage", 1e12)
+    index = pair.slave._index["voltage"]
+    pair.said()
+    assert pair.one.get("Integer", [index])[0] == ERROR
+    assert any("voltage is not of type int." in text for text in pair.said()[1])
+    pair.one.free()
