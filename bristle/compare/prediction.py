@@ -119,6 +119,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
         How many draws of the measured inputs' error to carry through the model.
     """
     out = []
+    problem = problem.with_excess(0.0)
     for run, (bias, sigma, spread), held in zip(
         problem.runs, problem.expectation(model, draws), errors_by_run(problem, model), strict=True
     ):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..identify.fit import Model
+from ..identify.residuals import excess_of
 from ..identify.site_fit import fit_damper
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
@@ -21,7 +22,12 @@ from .zero import free_zero, renewed_zero, zero_fault
 
 
 def look_at_damper(
-    opened: Opening, say: Progress = silent, made: Trials | None = None, *, pairs: bool = True
+    opened: Opening,
+    say: Progress = silent,
+    made: Trials | None = None,
+    *,
+    pairs: bool = True,
+    excess: float | None = None,
 ) -> tuple[Finding, Opening]:
     """Return what a damper's law lacks, by `opened.rule`.
 
@@ -31,24 +37,37 @@ def look_at_damper(
     say : is told what is being done
     made : the trials of single effects, where they were made before
     pairs : whether two effects are tried where no single one suffices
+    excess : variance [N2] that counts beside the noise, see `residuals.excess_of`; None for what
+        the best of these models misses
 
     Returns
     -------
-    finding; and what the look began with: with the zero of the force free where that is off
+    finding; and what the look began with: with the zero of the force free where that is off, and
+    with the excess
     """
     before, rule = opened.before, opened.rule
     if noise_is_all(opened):
         return of_decision(as_noise(before, ()), before), opened
     made, decision = _decided(opened, say, made, pairs)
-    sensors = renewed_zero(opened, decision)
-    freed = free_zero(opened, decision)
+    zero, freed = None, free_zero(opened, decision)
     if freed is not None:
         say("the zero of the force is fitted along with every effect")
         again, other = _decided(freed, say, None, pairs)
         zero = zero_fault(freed.problem, other)
         if zero is not None:
-            opened, made, decision, sensors = freed, again, other, (zero,)
-            before = opened.before
+            opened, made, decision = freed, again, other
+    if excess is None:
+        excess = excess_of(opened.problem, made.best.model)
+    if excess:
+        say("what no effect explains counts beside the noise")
+        made = made.with_excess(excess)
+        opened = made.opened
+        made, decision = _decided(opened, say, made, pairs)
+    before = opened.before
+    if zero is not None:
+        sensors = tuple(filter(None, (zero_fault(opened.problem, decision),)))
+    else:
+        sensors = renewed_zero(opened, decision)
     if not decision.effects:
         decision = _rare(before, made.single, rule) or decision
     found = of_decision(decision, before, tuple(made.single))

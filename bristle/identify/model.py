@@ -160,6 +160,9 @@ class Problem:
     free_zero = False
     """Whether the force's zero is fitted along with every model; see `residuals.zero_of`."""
 
+    excess = 0.0
+    """Variance [N2] of what no model here explains, beside the noise; see `residuals.excess_of`."""
+
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
         self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
@@ -168,7 +171,7 @@ class Problem:
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""
         made = self._made_of(runs)
-        made.free_zero = self.free_zero
+        made.free_zero, made.excess = self.free_zero, self.excess
         return made
 
     def _made_of(self, runs: list[Run]) -> Problem:
@@ -189,6 +192,18 @@ class Problem:
         """Return the same runs with the force's zero fitted along with every model."""
         made = self.of(self.runs)
         made.free_zero = True
+        return made
+
+    def with_excess(self, excess: float) -> Problem:
+        """Return the same runs, what no model explains counted as variance [N2] beside the noise.
+
+        The same for all samples, so that fits and losses weigh them nearly alike where it is large.
+        """
+        if excess == self.excess:
+            return self
+        made = self.of(self.runs)
+        made.excess = excess
+        made._sizes, made._benches = self._sizes, self._benches
         return made
 
     def damper_effects(self, law: str) -> list[str]:
@@ -296,8 +311,9 @@ class Problem:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].
 
         What a true model would show: its prediction from the smoothed motion is off by `bias` in
-        the mean, and scatters about that by `noise`, the force's own and the motion's; `draws` are
-        the motion's part alone. Samples that were not measured get a noise of `LOST`.
+        the mean, and scatters about that by `noise`, the force's own and the motion's, with
+        `excess` if there is any; `draws` are the motion's part alone. Samples that were not
+        measured get a noise of `LOST`.
         """
         return [self._expected(model, run, draws) for run in self.runs]
 
@@ -314,7 +330,7 @@ class Problem:
         # A jump that no draw put at this sample may still be here if one put it at the next.
         variance = np.mean((spread - bias) ** 2, axis=0)
         around = np.convolve(variance, _AROUND, "same")
-        noise = np.sqrt(run.noise**2 + np.maximum(variance, around))
+        noise = np.sqrt(run.noise**2 + np.maximum(variance, around) + self.excess)
         if run.measured is not None:
             noise = np.where(run.measured, noise, LOST * noise)
         return bias, noise, spread - bias
