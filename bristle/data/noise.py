@@ -32,6 +32,8 @@ _CHANGES = 6  # of a channel that is switched rather than moved, at most per hun
 _KEPT = 0.97  # the share of blocks of white noise that the final threshold lets pass
 _FLAT = 1.12  # neighbouring bands whose levels differ by less are flat
 _RESTING = 0.03  # share of a channel's standard deviation below which it is at rest
+_PARTS, _SHORT = 8, 25  # of a stretch at rest: parts, and samples of one at the least
+_STILL = 0.5  # share of a stretch's RMS that its parts have about their own lines, at rest
 _PERFECT = 1e-4  # no instrument's noise is a smaller share
 _ROUGH = 0.15  # a noise above this share of a channel's standard deviation may be its signal
 
@@ -107,17 +109,31 @@ def estimate_noise(y: Array) -> Noise:
 
 
 def _quietest(y: Array) -> float:
-    """Return the RMS about a straight line in the quietest stretches of 2 % of a channel."""
+    """Return the RMS about a straight line in the quietest stretches of 2 % of a channel at rest.
+
+    Infinite where none is at rest: noise is as large about the lines of short parts of a stretch,
+    a slow motion is not.
+    """
     size = max(100, len(y) // 50)
     if len(y) < 2 * size:
         return float("inf")
-    line = np.linspace(-1.0, 1.0, size)
     rows = np.lib.stride_tricks.sliding_window_view(y, size)[:: size // 2]
+    squares = _about_lines(rows)
+    # The quietest of many is quiet by chance, too: those that are not much louder belong to it.
+    quiet = squares <= 6.0 * squares.min()
+    short = size // min(_PARTS, size // _SHORT)
+    parts = rows[quiet][:, : size // short * short].reshape(-1, short)
+    found = float(np.sqrt(np.mean(squares[quiet])))
+    still = float(np.sqrt(np.mean(_about_lines(parts)))) >= _STILL * found
+    return found if still else float("inf")
+
+
+def _about_lines(rows: Array) -> Array:
+    """Return the mean squares (m,) of rows (m, n) about a straight line of each."""
+    line = np.linspace(-1.0, 1.0, rows.shape[1])
     rows = rows - rows.mean(axis=1, keepdims=True)
     rows = rows - (rows @ line / (line @ line))[:, None] * line
-    squares = np.mean(rows**2, axis=1)
-    # The quietest of many is quiet by chance, too: those that are not much louder belong to it.
-    return float(np.sqrt(np.mean(squares[squares <= 6.0 * squares.min()])))
+    return np.asarray(np.mean(rows**2, axis=1))
 
 
 def quantum(y: Array) -> float:
