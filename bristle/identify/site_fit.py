@@ -23,6 +23,9 @@ from .watch import MODEL, series
 QUICK = 8
 """Sweeps of the first, short search from each start, on every fifth sample."""
 
+MORE = 2
+"""Times as many starts where a law does not explain the runs: its loss has several valleys then."""
+
 Values = Mapping[str, float]
 
 
@@ -39,7 +42,9 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
     own = at_site(model, site.name, sites)
 
     def searched(train: Problem) -> Fit:
-        return _fit_line(own, train, also) if site.is_line else _fit_law(own, train, count, also)
+        if site.is_line:
+            return _fit_line(own, train, also)
+        return _fit_law(own, train, MORE * count if train.excess else count, also)
 
     with series(MODEL, site.shown):
         if site.is_line and not own.effects:
