@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from bristle.data.measurement import read_measurements
 from bristle.identify.fit import Model, Problem, Scaled
 from bristle.identify.model import steady, without
-from bristle.identify.rig import DAMPER, bench_rig
+from bristle.identify.rig import DAMPER, ROLES, Site, bench_rig
 from bristle.identify.site_fit import fit_site
 from bristle.identify.starts import start_models
 from bristle.physics.laws import base_and_variant, law_names
@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 STARTS = 8
 TRAINING, HELD_OUT = 1.02, 1.05
 """Goals: times the error of least squares."""
+MOST = 100
+"""Evaluations of scipy's search, Jacobians not counted."""
+FAR = 1e9  # N, in place of a force that is not a number
 
 DYNO = ("speed6_100psi", "speed1_100psi", "speed5_150psi"), ("speed1_150psi", "speed5_50psi")
 
@@ -63,13 +66,10 @@ class Beside:
         return self.fitted[0] / self.least[0], self.fitted[1] / self.least[1]
 
 
-def beside(data: Path, sets: str = "", laws: tuple[str, ...] = ()) -> Iterator[Beside | str]:
-    """Yield every law on every set whose name holds `sets`; a name where a set is not there."""
+def beside(data: Path, sets: str = "", laws: tuple[str, ...] = ()) -> Iterator[Beside]:
+    """Yield every law on every set that is there and whose name holds `sets`."""
     for name, runs in SETS.items():
-        if sets not in name:
-            continue
-        if not (data / name).is_dir():
-            yield name
+        if sets not in name or not (data / name).is_dir():
             continue
         train, held_out = bench_rig(*runs(data / name)).sites(Model("bingham"))[DAMPER].pair
         for law in laws or law_names():
@@ -88,10 +88,8 @@ def _beside(data: str, law: str, train: Problem, held_out: Problem) -> Beside:
     )  # fmt: skip
 
 
-def bench_site(train: Problem, held_out: Problem):
+def bench_site(train: Problem, held_out: Problem) -> Site:
     """Return runs of a bench as a site."""
-    from bristle.identify.rig import ROLES, Site
-
     return Site(DAMPER, lambda role: (train, held_out)[ROLES.index(role)])
 
 
@@ -100,7 +98,7 @@ def errors_of(problem: Problem, model: Model) -> Array:
     parts = [
         (run.force - problem.predict(model, run))[run.skip :][run.judged] for run in problem.runs
     ]
-    return np.nan_to_num(np.concatenate(parts), nan=1e9, posinf=1e9, neginf=-1e9)
+    return np.nan_to_num(np.concatenate(parts), nan=FAR, posinf=FAR, neginf=-FAR)
 
 
 def share(problem: Problem, model: Model) -> float:
@@ -119,7 +117,7 @@ def least_squares_fit(problem: Problem, model: Model) -> Model:
         scaled = Scaled(problem, start, none)
         found = least_squares(
             lambda theta, s=scaled: errors_of(problem, s.at(theta)), scaled.start,
-            bounds=(scaled.low - 1e-12, scaled.high + 1e-12), x_scale="jac", max_nfev=100,
+            bounds=(scaled.low - 1e-12, scaled.high + 1e-12), x_scale="jac", max_nfev=MOST,
         )  # fmt: skip
         ends.append((found.cost, scaled.at(found.x)))
     return min(ends, key=lambda end: end[0])[1]
@@ -130,9 +128,9 @@ def rows(data: Path) -> list[Row]:
     out: list[Row] = []
     found = [*beside(data)]
     for name in SETS:
-        own = [one for one in found if isinstance(one, Beside) and one.data == name]
+        own = [one for one in found if one.data == name]
         if not own:
-            out.append(Row(f"fit / least squares, {name}", "not run: the data are not there"))
+            out.append(Row(f"fit / least squares, {name}", f"not run: there is no {name}"))
             continue
         for k, (role, goal) in enumerate((("training", TRAINING), ("held out", HELD_OUT))):
             worst = max(own, key=lambda one: one.ratios[k])
