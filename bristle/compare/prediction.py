@@ -36,6 +36,8 @@ class RunPrediction:
     `drive` is the channel that commands the damper, `labels` what is known of the whole run,
     `units` those of the coordinates that are extra channels. `predicted` has the mean of the drawn
     errors in it, as z needs; `held` is the error of the prediction itself, None where both are one.
+    `noise_known` is False where the output's noise cannot be told from its signal, so that no z
+    says anything.
     """
 
     name: str
@@ -57,6 +59,7 @@ class RunPrediction:
     labels: Labels = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     held: ForceError | None = None
+    noise_known: bool = True
 
     @property
     def error(self) -> ForceError:
@@ -134,6 +137,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
                 index=run.keep if isinstance(run, StructureRun) else None,
                 drive=run.drive, labels=run.labels,
                 units={name: one.unit for name, one in run.extra.items()}, held=held,
+                noise_known=problem.noise_known,
             )
         )  # fmt: skip
     return out

@@ -50,8 +50,9 @@ class Noise:
     - "blue": it grows towards there, as after a numerical derivative; `std` is an upper limit for
       what lies below.
     - "resting": nowhere flat, as after a filter; `std` is that of the quietest stretch, at rest.
-    - "hidden": nowhere flat and never at rest: it cannot be told from the signal; `std` is a lower
-      limit.
+    - "slow": nowhere flat and never at rest: it cannot be told from the signal; `std` is that of
+      the slowest stretch, with the signal's own part in it.
+    - "hidden": as "slow", and nowhere slow; `std` is a lower limit.
     - "rough": the signal itself changes that much from sample to sample; `std` is an upper limit.
     - "none": there is no noise.
     """
@@ -59,6 +60,11 @@ class Noise:
     std: float
     quantum: float = 0.0
     colour: str = "white"
+
+    @property
+    def known(self) -> bool:
+        """Whether it can be told from the signal, so that an error may be divided by it."""
+        return self.colour not in ("slow", "hidden")
 
 
 def white_noise(y: Array) -> float:
@@ -102,21 +108,21 @@ def estimate_noise(y: Array) -> Noise:
     std, colour = (std, "rough") if rough else _in_bands(y, std)
     if colour == "hidden" or std < _PERFECT * float(np.std(y)):
         colour = "hidden"  # what is flat so far down is the rounding of numbers after a filter
-        quiet = _quietest(y)
+        quiet, at_rest = _quietest(y)
         if quiet < _RESTING * float(np.std(y)):
-            std, colour = max(std, quiet), "resting"
+            std, colour = max(std, quiet), "resting" if at_rest else "slow"
     return Noise(max(std, rounding), step, colour)
 
 
-def _quietest(y: Array) -> float:
-    """Return the RMS about a straight line in the quietest stretches of 2 % of a channel at rest.
+def _quietest(y: Array) -> tuple[float, bool]:
+    """Return the RMS about a straight line in the quietest stretches, and whether they are at rest.
 
-    Infinite where none is at rest: noise is as large about the lines of short parts of a stretch,
-    a slow motion is not.
+    A stretch is 2 % of a channel. At rest noise is as large about the lines of its short parts; a
+    slow motion is not.
     """
     size = max(100, len(y) // 50)
     if len(y) < 2 * size:
-        return float("inf")
+        return float("inf"), False
     rows = np.lib.stride_tricks.sliding_window_view(y, size)[:: size // 2]
     squares = _about_lines(rows)
     # The quietest of many is quiet by chance, too: those that are not much louder belong to it.
@@ -124,8 +130,7 @@ def _quietest(y: Array) -> float:
     short = size // min(_PARTS, size // _SHORT)
     parts = rows[quiet][:, : size // short * short].reshape(-1, short)
     found = float(np.sqrt(np.mean(squares[quiet])))
-    still = float(np.sqrt(np.mean(_about_lines(parts)))) >= _STILL * found
-    return found if still else float("inf")
+    return found, float(np.sqrt(np.mean(_about_lines(parts)))) >= _STILL * found
 
 
 def _about_lines(rows: Array) -> Array:

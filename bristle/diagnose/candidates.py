@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..identify.error import ForceError, force_error
 from ..identify.fit import Model, Problem
-from ..identify.residuals import Expected, in_noises, residuals
+from ..identify.residuals import EXPLAINS, Expected, excess_of, in_noises, residuals
 from ..identify.search import loss, losses, mean_loss, z_of, z_scale
 from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
@@ -94,6 +94,11 @@ def judge(
         model, z_scale(own), z_of(mean_loss(losses(z))), error.rms, losses(r), z, noise is None,
         error,
     )  # fmt: skip
+
+
+def missed_by(trial: Trial, train: Problem) -> float:
+    """Return the variance [N2] beside the noise that a trial's model misses, 0 where little."""
+    return excess_of(train, trial.model) if trial.train > EXPLAINS else 0.0
 
 
 def joinable(

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..identify.fit import Model
-from ..identify.residuals import excess_of
 from ..identify.site_fit import fit_damper
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
-from .candidates import Trial, judge
+from .by_gains import decide_by_gains
+from .candidates import Trial, judge, missed_by
 from .decision import Decision, Z, as_noise, decide, gained
 from .finding import Finding, of_decision
 from .opening import Opening, Progress, silent
@@ -57,7 +57,7 @@ def look_at_damper(
         if zero is not None:
             opened, made, decision = freed, again, other
     if excess is None:
-        excess = excess_of(opened.problem, made.best.model)
+        excess = missed_by(made.best, opened.problem)
     if excess:
         say("what no effect explains counts beside the noise")
         made = made.with_excess(excess)
@@ -74,7 +74,7 @@ def look_at_damper(
     best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
     found = replace(found, sensors=sensors, together=best_pair)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
-    return replace(found, patterns=patterns), opened
+    return replace(found, patterns=patterns, noise_known=opened.held_out.noise_known), opened
 
 
 def noise_is_all(opened: Opening) -> bool:
@@ -88,6 +88,8 @@ def _decided(
 ) -> tuple[Trials, Decision]:
     """Return the trials of effects at a damper, and the decision that they lead to."""
     made, rule = made or Trials(opened, say), opened.rule
+    if not opened.held_out.noise_known:
+        return made, decide_by_gains(opened.before, made.single, opened.held_out, rule)
     organised = rule.organised < 1.0 and bool(made.patterns)
     if organised:
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)

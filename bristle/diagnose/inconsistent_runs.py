@@ -35,6 +35,8 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
     opened : the site's runs and its model
     """
     assert found.after is not None
+    if not found.noise_known:
+        return found  # of no run can be said what its error is over noise
     opened = opened.with_excess(0.0)  # whether noise is all that a model leaves of some of the runs
     for apart in (_but_for_a_run, _but_for_clocks):
         odd = apart(found, opened)

@@ -10,10 +10,9 @@ from ..data.checks.levels import tells_a_bend
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..identify.model import Model, Problem
-from ..identify.residuals import excess_of
 from ..identify.rig import DAMPER
 from ..physics.building import Building
-from .candidates import Trial
+from .candidates import Trial, missed_by
 from .conclusion import About, conclude
 from .damper import look_at_damper, noise_is_all
 from .detail import detailed
@@ -148,7 +147,7 @@ def _sought(
     pairs = search(rows, looks, rule)
     nearest = min(pairs, key=lambda pair: pair.reach(rule).z)
     assert nearest.opened is not None
-    looks.excess = excess_of(nearest.opened.problem, nearest.reach(rule).model)
+    looks.excess = missed_by(nearest.reach(rule), nearest.opened.problem)
     if looks.excess:
         say("what no law explains counts beside the noise")
         train, held_out = (one.with_excess(looks.excess) for one in runs)

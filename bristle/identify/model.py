@@ -51,6 +51,8 @@ class Run:
     samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
     besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
     was not measured and follows from the motion, beside `noise` and each with its draw of `draws`.
+    `noise_known` is False where the force's noise cannot be told from its signal: `noise` is then
+    a lower limit.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Run:
     rest: int = 0
     extra: Mapping[str, Extra] = field(default_factory=dict)
     force_draws: Array | None = None
+    noise_known: bool = True
 
     @cached_property
     def measured(self) -> NDArray[np.bool_] | None:
@@ -167,6 +170,11 @@ class Problem:
         self.runs = runs
         self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
         self._sizes: dict[str, float] = {}
+
+    @property
+    def noise_known(self) -> bool:
+        """Whether the force's noise is known in most runs, so that z says something."""
+        return 2 * sum(run.noise_known for run in self.runs) >= len(self.runs)
 
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""

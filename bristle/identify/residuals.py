@@ -123,6 +123,11 @@ def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:
     return z_scale(in_noises(problem, residuals(problem, model, expected), expected))
 
 
+def told_z(problem: Problem, model: Model) -> float:
+    """Return z of a model, NaN where the noise is not known and z says nothing."""
+    return robust_z(problem, model) if problem.noise_known else float("nan")
+
+
 def in_noises(problem: Problem, r: Array, expected: Expected) -> Array:
     """Return normalised residuals (n,) over the noise alone, without the problem's excess.
 
