@@ -3,6 +3,8 @@
 `left_out`: 50 smooth records without a fault, of 200 Hz to 5 kHz, as loggers filter them or not,
 with and without white noise: how many samples no error counts, besides those in which a run
 settles.
+
+`fit`: each law on each measured set, by bristle's fit and by plain least squares.
 """
 
 from __future__ import annotations
@@ -18,9 +20,14 @@ from numpy.typing import NDArray
 import bristle
 from bristle.identify.prepare import prepare
 
+from . import _honest_fit
+from ._motions import DATA as MOTIONS
 from ._rows import Row
 
 Array = NDArray[np.float64]
+
+DATA = MOTIONS.parent
+"""Measured sets, where they lie beside the checkout."""
 
 RATES = (200.0, 500.0, 1000.0, 2000.0, 5000.0)
 """Samples per second [Hz] of the records."""
@@ -43,7 +50,7 @@ class Record(NamedTuple):
 
 def run() -> list[Row]:
     """Return the figures of all sections."""
-    return left_out()
+    return [*left_out(), *_honest_fit.rows(DATA)]
 
 
 def left_out() -> list[Row]:

@@ -133,8 +133,10 @@ def percent(share: float, digits: int = 1) -> str:
     return f"{round(100.0 * share, digits) + 0.0:.{digits}f} %"  # + 0.0: no minus before a zero
 
 
-def short_z(z: float) -> str:
-    """Return z as text, with the digits that tell it from 1."""
+def short_z(z: float | None) -> str:
+    """Return z as text, with the digits that tell it from 1; "not known" where it is no number."""
+    if z is None or z != z:
+        return "not known"
     return f"{z:.2f}" if z < 10.0 else plain(z)
 
 

@@ -132,6 +132,8 @@ def _trials(verdict: Verdict) -> list[str]:
     rows = [row for row in verdict["ranking"] if at is not None and row["site"] == at["site"]]
     if at is None or not rows or "z_train_before" not in at:
         return []
+    if not verdict.get("noise_known", True):
+        return _gains(rows)
     lines = ["", f"  {'error / noise (z) of the model':34} {'training':>12} {'held out':>12}"]
     before = at["z_train_before"], at["z_holdout_before"]
     model = f"{verdict['law']} alone" if verdict.get("laws") else "present model"
@@ -147,6 +149,15 @@ def _trials(verdict: Verdict) -> list[str]:
         z = row["z_train"], row["z_holdout"]
         lines.append(f"  {'with ' + row['effect']:34} {z[0]:>12.3f} {z[1]:>12.3f}{note}")
     return [*lines, "  A true model has z = 1: its only error is the noise."]
+
+
+def _gains(rows: Sequence[Verdict]) -> list[str]:
+    """Return the table of the effects that lower the error, where no z is known."""
+    able = sorted((row for row in rows if row["gain"] > 0.0), key=lambda row: -row["gain"])[:5]
+    lines = ["", f"  {'error of the force, held out':34} {'lower by':>12}"] if able else []
+    for row in able:
+        lines.append(f"  {'with ' + row['effect']:34} {100.0 * row['gain']:>10.1f} %")
+    return lines
 
 
 def _limits(verdict: Verdict) -> list[str]:

@@ -198,7 +198,8 @@ def error_lines(found: Identified) -> list[str]:
         add(name, (_low_passed(errors, role, size) for _, errors in shown))
     for role in roles:
         add(f"z, {names[role]}", (short_z(errors.numbers[f"z_{role}"]) for _, errors in shown))
-    lines.append("  z: error / noise; a true model has 1.")
+    known = "; not known: the noise cannot be told from the force" * (not found.train.noise_known)
+    lines.append(f"  z: error / noise; a true model has 1{known}.")
     for role in roles:
         lines += [f"  {names[role].capitalize()}: {t}" for t in found.errors.force[role].beside()]
     return lines
@@ -298,6 +299,11 @@ def _better_law(mine: str, best: str, gain: float, folder: Path) -> str:
 
 def _next(found: Identified, folder: Path) -> list[str]:
     z = max(found.after.get("z_holdout", 0.0), found.after["z_train"])
+    if z != z:
+        return [
+            f"How much of the error is noise is not known. Next: what lowers it,  "
+            f"{command('diagnose', folder)}"
+        ]
     if z > 1.15:
         return [
             f"The error is {short_z(z)} times the noise floor. Next: where it occurs,  "

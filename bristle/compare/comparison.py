@@ -121,6 +121,11 @@ class Comparison:
         return self.total.error
 
     @property
+    def noise_known(self) -> bool:
+        """Whether z says something: else it is NaN."""
+        return self.z == self.z
+
+    @property
     def right(self) -> bool:
         """Whether noise explains the error; of a building's site, with all sites looked at."""
         if self.sites:
@@ -258,9 +263,27 @@ def compare_predictions(
         tuple(regimes(normalised, along, DRIVES[predictions[0].drive])), tuple(predictions),
         seen=seen, labels=label_errors(predictions), role=role,
     )  # fmt: skip
+    if not predictions[0].noise_known:
+        comparison = _without_z(comparison)
     if others:
         comparison = replace(comparison, sites=with_failures([site_of(comparison), *others]))
     return replace(comparison, sentences=sentences(comparison, finder))
+
+
+def _without_z(comparison: Comparison) -> Comparison:
+    """Return a comparison whose noise is not known: nothing says how much of an error it is."""
+    none = float("nan")
+
+    def blind(run: RunError) -> RunError:
+        return replace(run, z=none, numerical_z=none, noise=none, noise_own=none)
+
+    bands = tuple(replace(one, z=none) for one in comparison.spectrum.bands)
+    return replace(
+        comparison, total=blind(comparison.total), runs=tuple(map(blind, comparison.runs)),
+        z_interval=(none, none), spectrum=replace(comparison.spectrum, bands=bands),
+        regimes=tuple(replace(one, z=none) for one in comparison.regimes),
+        labels=tuple(replace(one, z=none) for one in comparison.labels),
+    )  # fmt: skip
 
 
 def site_of(comparison: Comparison) -> SiteError:

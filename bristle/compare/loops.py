@@ -96,6 +96,8 @@ def under(shown: Sequence[OneCycle], predictions: Sequence[RunPrediction]) -> li
 
 def z_of(of: RunPrediction, part: slice) -> float:
     """Return error / noise of a part of a run."""
+    if not of.noise_known:
+        return float("nan")
     return z_scale((of.measured - of.predicted)[part] / of.sigma[part])
 
 

@@ -139,6 +139,10 @@ def headline(comparison: Comparison) -> str:
         return f"The model's {what} is right within its noise (z = {z:.2f})"
     times = plain(z, 2 if z < 100.0 else 3)
     text = f"The model's {what} is wrong by {times} times what noise explains"
+    if not comparison.noise_known:
+        text = (
+            f"The model misses {100.0 * comparison.total.share:.1f} % of the {what}, noise included"
+        )
     if comparison.first:
         along = name_of(comparison.first.coordinate, comparison.site)
         text += f"; the error depends mainly on {along}"

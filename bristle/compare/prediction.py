@@ -37,6 +37,8 @@ class RunPrediction:
     `drive` is the channel that commands the damper, `labels` what is known of the whole run,
     `units` those of the coordinates that are extra channels. `predicted` has the mean of the drawn
     errors in it, as z needs; `held` is the error of the prediction itself, None where both are one.
+    `noise_known` is False where the output's noise cannot be told from its signal, so that no z
+    says anything.
     """
 
     name: str
@@ -58,6 +60,7 @@ class RunPrediction:
     labels: Labels = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     held: ForceError | None = None
+    noise_known: bool = True
 
     @property
     def error(self) -> ForceError:
@@ -120,6 +123,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
         How many draws of the measured inputs' error to carry through the model.
     """
     out = []
+    problem = problem.with_excess(0.0)
     for run, (bias, sigma, spread), held in zip(
         problem.runs, problem.expectation(model, draws), errors_by_run(problem, model), strict=True
     ):
@@ -134,6 +138,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
                 index=run.keep if isinstance(run, StructureRun) else None,
                 drive=run.drive, labels=run.labels,
                 units={name: one.unit for name, one in run.extra.items()}, held=held,
+                noise_known=problem.noise_known,
             )
         )  # fmt: skip
     return out

@@ -61,7 +61,9 @@ def _how_wrong(comparison: Comparison) -> str:
         step = f"; the step of the calculation alone causes {times} times the noise"
     if total.residual > _SPIKY * total.z * total.noise:
         size += ", much of it in short spikes"
-    if not comparison.right:
+    if not comparison.noise_known:
+        text = f"{where} the {what} by {size}, noise included, which is not known"
+    elif not comparison.right:
         times = plain(total.z)
         text = f"{where} the {what} by {size}, {times} times the noise{step}"
     else:
@@ -123,6 +125,8 @@ def _where(comparison: Comparison, finder: Finder) -> str:
 
 
 def _where_right(comparison: Comparison) -> str:
+    if not comparison.noise_known:
+        return "Give the noise of the force in study.toml, and the error is told in units of it."
     every = comparison.regimes
     whole = (
         f"between {min(r.z for r in every):.2f} and {max(r.z for r in every):.2f}" if every else ""

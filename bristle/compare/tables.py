@@ -86,6 +86,8 @@ def label_table(comparison: Comparison) -> Table:
 
 def _run(run: RunError, factor: float) -> list[str]:
     numerical = plain(run.numerical_z, 2) if run.numerical_z == run.numerical_z else "not tried"
+    if run.z != run.z:
+        numerical = short_z(None)
     return [
         run.name, short_z(run.z), plain(factor * run.rms, 4), percent(run.share), percent(run.fit),
         percent(run.accounted), plain(factor * run.noise), numerical,

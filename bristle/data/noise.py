@@ -34,6 +34,8 @@ _CHANGES = 6  # of a channel that is switched rather than moved, at most per hun
 _KEPT = 0.97  # the share of blocks of white noise that the final threshold lets pass
 _FLAT = 1.12  # neighbouring bands whose levels differ by less are flat
 _RESTING = 0.03  # share of a channel's standard deviation below which it is at rest
+_PARTS, _SHORT = 8, 25  # of a stretch at rest: parts, and samples of one at the least
+_STILL = 0.5  # share of a stretch's RMS that its parts have about their own lines, at rest
 _PERFECT = 1e-4  # no instrument's noise is a smaller share
 _ROUGH = 0.15  # a noise above this share of a channel's standard deviation may be its signal
 
@@ -50,8 +52,9 @@ class Noise:
     - "blue": it grows towards there, as after a numerical derivative; `std` is an upper limit for
       what lies below.
     - "resting": nowhere flat, as after a filter; `std` is that of the quietest stretch, at rest.
-    - "hidden": nowhere flat and never at rest: it cannot be told from the signal; `std` is a lower
-      limit.
+    - "slow": nowhere flat and never at rest: it cannot be told from the signal; `std` is that of
+      the slowest stretch, with the signal's own part in it.
+    - "hidden": as "slow", and nowhere slow; `std` is a lower limit.
     - "rough": the signal itself changes that much from sample to sample; `std` is an upper limit.
     - "none": there is no noise.
     """
@@ -59,6 +62,11 @@ class Noise:
     std: float
     quantum: float = 0.0
     colour: str = "white"
+
+    @property
+    def known(self) -> bool:
+        """Whether it can be told from the signal, so that an error may be divided by it."""
+        return self.colour not in ("slow", "hidden")
 
 
 def white_noise(y: Array) -> float:
@@ -102,24 +110,37 @@ def estimate_noise(y: Array) -> Noise:
     std, colour = (std, "rough") if rough else _in_bands(y, std)
     if colour == "hidden" or std < _PERFECT * float(np.std(y)):
         colour = "hidden"  # what is flat so far down is the rounding of numbers after a filter
-        quiet = quietest(y)
+        quiet, at_rest = quietest(y)
         if quiet < _RESTING * float(np.std(y)):
-            std, colour = max(std, quiet), "resting"
+            std, colour = max(std, quiet), "resting" if at_rest else "slow"
     return Noise(max(std, rounding), step, colour)
 
 
-def quietest(y: Array) -> float:
-    """Return the RMS about a straight line in the quietest stretches of 2 % of a channel."""
+def quietest(y: Array) -> tuple[float, bool]:
+    """Return the RMS about a straight line in the quietest stretches, and whether they are at rest.
+
+    A stretch is 2 % of a channel. At rest noise is as large about the lines of its short parts; a
+    slow motion is not.
+    """
     size = max(100, len(y) // 50)
     if len(y) < 2 * size:
-        return float("inf")
-    line = np.linspace(-1.0, 1.0, size)
+        return float("inf"), False
     rows = np.lib.stride_tricks.sliding_window_view(y, size)[:: size // 2]
+    squares = _about_lines(rows)
+    # The quietest of many is quiet by chance, too: those that are not much louder belong to it.
+    quiet = squares <= 6.0 * squares.min()
+    short = size // min(_PARTS, size // _SHORT)
+    parts = rows[quiet][:, : size // short * short].reshape(-1, short)
+    found = float(np.sqrt(np.mean(squares[quiet])))
+    return found, float(np.sqrt(np.mean(_about_lines(parts)))) >= _STILL * found
+
+
+def _about_lines(rows: Array) -> Array:
+    """Return the mean squares (m,) of rows (m, n) about a straight line of each."""
+    line = np.linspace(-1.0, 1.0, rows.shape[1])
     rows = rows - rows.mean(axis=1, keepdims=True)
     rows = rows - (rows @ line / (line @ line))[:, None] * line
-    squares = np.mean(rows**2, axis=1)
-    # The quietest of many is quiet by chance, too: those that are not much louder belong to it.
-    return float(np.sqrt(np.mean(squares[squares <= 6.0 * squares.min()])))
+    return np.asarray(np.mean(rows**2, axis=1))
 
 
 def quantum(y: Array) -> float:

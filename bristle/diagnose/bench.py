@@ -77,6 +77,8 @@ class BenchRuns:
         judged = finding.before if finding.kind == "unknown" else finding.after
         if finding.kind == "insufficient" or judged is None or judged.z <= opened.rule.clean:
             return finding
+        if not finding.noise_known:
+            return finding
         self._say("trying every law")
         bends = tells_a_bend(self._train)
         laws = try_laws(opened.searched, opened.held_out, judged.model, bends=bends)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..identify.error import ForceError, force_error
 from ..identify.fit import Model, Problem
-from ..identify.residuals import Expected, residuals
+from ..identify.residuals import EXPLAINS, Expected, excess_of, in_noises, residuals
 from ..identify.search import loss, losses, mean_loss, z_of, z_scale
 from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
@@ -53,9 +53,9 @@ class Trial:
     """A model tried: fitted on the training runs, judged on the held-out ones.
 
     `train`, `z` the robust RMS of residual over expected noise there; `losses` (n,) the robust loss
-    per held-out sample, `residual` (n,) the normalised residuals; `rms` [N] the error there, that
-    of `error`, which is None where nobody asked. `refined` is False where the first, short search
-    already showed that it gains too little.
+    per held-out sample, by the weights of the fit; `residual` (n,) the residuals over the noise;
+    `rms` [N] the error there, that of `error`, which is None where nobody asked. `refined` is
+    False where the first, short search already showed that it gains too little.
     """
 
     model: Model
@@ -86,13 +86,19 @@ def judge(
         for this model; None draws it
     """
     fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
-    z = residuals(held_out, model, expected)
-    own = residuals(train, model, fitted)
-    lost, error = losses(z), force_error([(held_out, model)])
+    r = residuals(held_out, model, expected)
+    z = in_noises(held_out, r, expected)
+    own = in_noises(train, residuals(train, model, fitted), fitted)
+    error = force_error([(held_out, model)])
     return Trial(
-        model, z_scale(own), z_of(mean_loss(lost)), error.rms, lost, z, noise is None,
+        model, z_scale(own), z_of(mean_loss(losses(z))), error.rms, losses(r), z, noise is None,
         error,
     )  # fmt: skip
+
+
+def missed_by(trial: Trial, train: Problem) -> float:
+    """Return the variance [N2] beside the noise that a trial's model misses, 0 where little."""
+    return excess_of(train, trial.model) if trial.train > EXPLAINS else 0.0
 
 
 def joinable(

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ..data.corrections import LEFT_OUT
 from ..data.left_out import MISSING, merged
 from ..identify.model import Model, Problem, Run
-from ..identify.residuals import residuals
-from ..identify.search import z_scale
+from ..identify.residuals import robust_z
 from ..identify.search_context import refine
 from ..quantity import plain
 from .candidates import Trial, judge
@@ -123,7 +122,7 @@ def _hopeless(
     if before.train < rule.clocks_large:
         return False
     problem = train.of(moved)
-    z = z_scale(residuals(problem, model, problem.expectation(model)))
+    z = robust_z(problem, model)
     excess = before.train**2 - 1.0
     return excess - max(z**2 - 1.0, 0.0) < rule.clocks_promise * excess
 

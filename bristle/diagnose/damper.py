@@ -10,7 +10,8 @@ from ..identify.fit import Model
 from ..identify.site_fit import fit_damper
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
-from .candidates import Trial, judge
+from .by_gains import decide_by_gains
+from .candidates import Trial, judge, missed_by
 from .decision import Decision, Z, as_noise, decide, gained
 from .finding import Finding, of_decision
 from .opening import Opening, Progress, silent
@@ -21,7 +22,12 @@ from .zero import free_zero, renewed_zero, zero_fault
 
 
 def look_at_damper(
-    opened: Opening, say: Progress = silent, made: Trials | None = None, *, pairs: bool = True
+    opened: Opening,
+    say: Progress = silent,
+    made: Trials | None = None,
+    *,
+    pairs: bool = True,
+    excess: float | None = None,
 ) -> tuple[Finding, Opening]:
     """Return what a damper's law lacks, by `opened.rule`.
 
@@ -31,31 +37,44 @@ def look_at_damper(
     say : is told what is being done
     made : the trials of single effects, where they were made before
     pairs : whether two effects are tried where no single one suffices
+    excess : variance [N2] that counts beside the noise, see `residuals.excess_of`; None for what
+        the best of these models misses
 
     Returns
     -------
-    finding; and what the look began with: with the zero of the force free where that is off
+    finding; and what the look began with: with the zero of the force free where that is off, and
+    with the excess
     """
     before, rule = opened.before, opened.rule
     if noise_is_all(opened):
         return of_decision(as_noise(before, ()), before), opened
     made, decision = _decided(opened, say, made, pairs)
-    sensors = renewed_zero(opened, decision)
-    freed = free_zero(opened, decision)
+    zero, freed = None, free_zero(opened, decision)
     if freed is not None:
         say("the zero of the force is fitted along with every effect")
         again, other = _decided(freed, say, None, pairs)
         zero = zero_fault(freed.problem, other)
         if zero is not None:
-            opened, made, decision, sensors = freed, again, other, (zero,)
-            before = opened.before
+            opened, made, decision = freed, again, other
+    if excess is None:
+        excess = missed_by(made.best, opened.problem)
+    if excess:
+        say("what no effect explains counts beside the noise")
+        made = made.with_excess(excess)
+        opened = made.opened
+        made, decision = _decided(opened, say, made, pairs)
+    before = opened.before
+    if zero is not None:
+        sensors = tuple(filter(None, (zero_fault(opened.problem, decision),)))
+    else:
+        sensors = renewed_zero(opened, decision)
     if not decision.effects:
         decision = _rare(before, made.single, rule) or decision
     found = of_decision(decision, before, tuple(made.single))
     best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
     found = replace(found, sensors=sensors, together=best_pair)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
-    return replace(found, patterns=patterns), opened
+    return replace(found, patterns=patterns, noise_known=opened.held_out.noise_known), opened
 
 
 def noise_is_all(opened: Opening) -> bool:
@@ -69,6 +88,8 @@ def _decided(
 ) -> tuple[Trials, Decision]:
     """Return the trials of effects at a damper, and the decision that they lead to."""
     made, rule = made or Trials(opened, say), opened.rule
+    if not opened.held_out.noise_known:
+        return made, decide_by_gains(opened.before, made.single, opened.held_out, rule)
     organised = rule.organised < 1.0 and bool(made.patterns)
     if organised:
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)

@@ -43,7 +43,7 @@ def detailed(found: Finding, opened: Opening, *, profile: bool = False) -> Findi
 def _with_labels(found: Finding, opened: Opening) -> Finding:
     """Return a finding that says on which runs the present model errs, where a label tells it."""
     runs = [*opened.problem.runs, *opened.held_out.runs]
-    if found.kind == "none" or not varying(_known(runs)):
+    if found.kind == "none" or not found.noise_known or not varying(_known(runs)):
         return found
     predictions = run_predictions(opened.problem.of(runs), opened.before.model)
     told = label_sentence(label_errors(predictions))

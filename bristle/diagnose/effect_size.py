@@ -190,7 +190,8 @@ class Known:
 
     def scatter(self, direction: Array) -> float:
         """Return the standard deviation of a direction's (n,) product with the residual."""
-        if mean_loss(np.minimum(self.plain**2, HUBER**2)) > self.rule.misfit**2:
+        size = mean_loss(np.minimum(self.plain**2, HUBER**2))
+        if self.problem.excess or size > self.rule.misfit**2:
             sums = np.add.reduceat(direction * self.left, np.arange(0, len(direction), BLOCK))
             return float(np.linalg.norm(sums))
         own, drawn = self.noise

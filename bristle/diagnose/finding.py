@@ -35,7 +35,8 @@ class Finding:
     distinguish alternatives, where the rig's motion can be chosen; `sensors` are faults that only
     the model with the named effects shows; `together` is the best pair of effects that was tried;
     `other_law` the law that would leave less than the model's, where that was asked; `limits` how
-    large each further effect may be beside `model`.
+    large each further effect may be beside `model`; `noise_known` whether z says something: else
+    verdict.json has no z.
     """
 
     site: str
@@ -60,6 +61,13 @@ class Finding:
     other_law: OtherLaw | None = None
     limits: tuple[EffectLimit, ...] = ()
     beside: tuple[str, ...] = ()
+    noise_known: bool = True
+
+    def gain(self, trial: Trial) -> float:
+        """Return by what share a trial lowers the held-out z; the RMS error if z is not known."""
+        if self.noise_known or self.before is None:
+            return 1.0 - trial.z / self.z_before
+        return 1.0 - trial.rms / self.before.rms
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds of the site."""

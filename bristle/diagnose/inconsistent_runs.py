@@ -9,13 +9,14 @@ from itertools import chain
 from ..data.corrections import LEFT_OUT
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
+from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
 from .candidates import Trial
 from .clocks import clock_faults
 from .decision import OTHER_FORM, Z
 from .finding import Finding
-from .odd_run import odd_run, other_gain, other_zero, z_with
+from .odd_run import odd_run, other_gain, other_zero
 from .opening import Opening
 from .rule import BENCH, DecisionRule
 
@@ -34,6 +35,9 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
     opened : the site's runs and its model
     """
     assert found.after is not None
+    if not found.noise_known:
+        return found  # of no run can be said what its error is over noise
+    opened = opened.with_excess(0.0)  # whether noise is all that a model leaves of some of the runs
     for apart in (_but_for_a_run, _but_for_clocks):
         odd = apart(found, opened)
         if odd is not found:
@@ -155,7 +159,7 @@ def inconsistent_runs(
         "" where the model explains all runs.
     """
     z = {
-        run.name: z_with(model, problem.of([run]))
+        run.name: robust_z(problem.of([run]), model)
         for problem in (train, held_out)
         for run in problem.runs
     }
@@ -224,7 +228,7 @@ def _explains(
 ) -> bool:
     """Return whether a model that is fitted to these runs alone leaves noise."""
     part = problem.of(runs)
-    if z_with(fit(part, model, with_std=False).model, part) <= rule.misfit:
+    if robust_z(part, fit(part, model, with_std=False).model) <= rule.misfit:
         return True
     if not restart:
         return False
@@ -232,7 +236,7 @@ def _explains(
         part, model.law, model.effects, 2, fixed=model.fixed,
         values={name: model.value(name) for name in model.fixed}, limits=model.limits,
     )  # fmt: skip
-    return z_with(own.model, part) <= rule.misfit
+    return robust_z(part, own.model) <= rule.misfit
 
 
 def _list(names: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ from ..errors import RecordError
 from ..identify.model import Model, Problem
 from ..identify.rig import DAMPER
 from ..physics.building import Building
-from .candidates import Trial
+from .candidates import Trial, missed_by
 from .conclusion import About, conclude
 from .damper import look_at_damper, noise_is_all
 from .detail import detailed
@@ -20,7 +20,7 @@ from .diagnosis import look_at_lines
 from .equilibrium import BuildingRuns
 from .inconsistent_runs import contradicted
 from .law_choice import Pair, choose, equivalents, search, simplest
-from .law_trials import KeptFits, LawTrial, not_finite, try_laws
+from .law_trials import KeptFits, LawTrial, not_finite, try_laws, weighed_anew
 from .law_verdict import LawVerdict
 from .opening import Insufficient, Opening, Progress, bench_data, opened_with, silent
 from .rule import BENCH, DecisionRule
@@ -68,7 +68,7 @@ def diagnose_laws(
     bends = tells_a_bend(train)
     rows = try_laws(data.problem, data.held_out, present, bends=bends, kept=kept)
     looks = Looks(lambda trial: opened_with(trial, data), say)
-    sought = _sought(rows, looks, say, rule)
+    sought = _sought(rows, looks, (data.problem, data.held_out), say, rule)
     finding = contradicted(sought.chosen.finding, sought.opened)
     finding = detailed(finding, sought.opened, profile=profile)
     driven = any(run.has(name) for run in (*train, *holdout) for name in DRIVE)
@@ -99,7 +99,8 @@ def _in_building(
     problem, held_out = runs.damper
     say("trying every law")
     rows = try_laws(problem, held_out, present, bends=bends)
-    sought = _sought(rows, Looks(runs.opened_with, say), say, rule)
+    looks = Looks(runs.opened_with, say)
+    sought = _sought(rows, looks, runs.damper, say, rule)
     runs.suppose(sought.chosen.row.trial.model)
     found = sought.chosen.finding
     excused = runs.excused(found, findings)
@@ -132,9 +133,26 @@ class _Sought:
         return LawVerdict(self.chosen.row, named, self.rows, self.pairs, tuple(equal), unfit)
 
 
-def _sought(rows: tuple[LawTrial, ...], looks: Looks, say: Progress, rule: DecisionRule) -> _Sought:
-    """Search the effects that laws lack; return the pair that the runs ask for, and the others."""
+def _sought(
+    rows: tuple[LawTrial, ...],
+    looks: Looks,
+    runs: tuple[Problem, Problem],
+    say: Progress,
+    rule: DecisionRule,
+) -> _Sought:
+    """Search the effects that laws lack; return the pair that the runs ask for, and the others.
+
+    Where no pair explains the runs, what the nearest one misses counts beside the noise for all.
+    """
     pairs = search(rows, looks, rule)
+    nearest = min(pairs, key=lambda pair: pair.reach(rule).z)
+    assert nearest.opened is not None
+    looks.excess = missed_by(nearest.reach(rule), nearest.opened.problem)
+    if looks.excess:
+        say("what no law explains counts beside the noise")
+        train, held_out = (one.with_excess(looks.excess) for one in runs)
+        rows = weighed_anew(rows, train, held_out)
+        pairs = search(rows, looks, rule)
     chosen = choose(pairs, rule)
     say(f"intervals of {chosen.row.law}")
     return _Sought(chosen, tuple(pairs), rows)
@@ -152,6 +170,7 @@ class Looks:
     def __init__(self, opened_with: Callable[[Trial], Opening], say: Progress = silent) -> None:
         self.opened_with, self.say = opened_with, say
         self.made: dict[str, Trials] = {}
+        self.excess = 0.0  # N2, see `look_at_damper`
 
     def __call__(self, row: LawTrial, pairs: bool) -> Pair:
         """Return what a law lacks: single effects alone, or pairs as well where none suffices."""
@@ -159,11 +178,13 @@ class Looks:
         if made is None:
             opened = self.opened_with(row.trial)
             if noise_is_all(opened):
-                return Pair(row, *look_at_damper(opened, self.say, pairs=pairs))
+                return Pair(row, *look_at_damper(opened, self.say, pairs=pairs, excess=0.0))
             self.say(f"effects that {row.law} lacks (error / noise {row.trial.z:.2f})")
             made = Trials(opened, self.say)
             self.made[row.law] = made
         elif pairs:
             self.say(f"two effects that {row.law} lacks")
-        finding, opened = look_at_damper(made.opened, self.say, made, pairs=pairs)
+        finding, opened = look_at_damper(
+            made.opened, self.say, made, pairs=pairs, excess=self.excess
+        )
         return Pair(row, finding, opened)

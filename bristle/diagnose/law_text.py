@@ -54,7 +54,9 @@ def law_sentences(verdict: Row) -> list[str]:
     z = short_z(mine.get("z_with_effects", mine["z_holdout"]))
     with_what = f" with {joined(mine['effects'])}" if mine.get("kind") == "effect" else ""
     count = len({row["law"] for row in rows})
-    if verdict.get("kind") == "unknown":
+    if not verdict.get("noise_known", True):
+        out = [f"Of {count} laws {law_name(mine)}{with_what} leaves the least on held-out runs."]
+    elif verdict.get("kind") == "unknown":
         out = [
             f"None of {count} laws explains the runs, with an effect or without; {law_name(mine)} "
             f"comes nearest, {Z} = {z} without."
@@ -94,7 +96,7 @@ def law_table(rows: Sequence[Row]) -> list[list[str]]:
 
 
 def _cells(row: Row, size: float) -> list[str]:
-    half, above = row.get("interval95"), float(row["z_above_best"])
+    half, above = row.get("interval95"), row["z_above_best"]  # None where no noise is known
     spread = f" +- {half:.2f}" if half is not None else ""
     return [
         str(row["law"]), str(row["command"]), str(row["fitted"]),

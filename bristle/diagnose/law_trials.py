@@ -124,6 +124,17 @@ def try_laws(
     return tuple(sorted(rows, key=lambda row: row.trial.z))
 
 
+def weighed_anew(
+    rows: Sequence[LawTrial], train: Problem, held_out: Problem
+) -> tuple[LawTrial, ...]:
+    """Return laws fitted anew by the weights of these runs, from where they ended before."""
+
+    def again(row: LawTrial) -> LawTrial:
+        return _row(row.law, refine(row.trial.model, train, JACOBIANS), train, held_out)
+
+    return tuple(sorted(in_threads(again, rows), key=lambda row: row.trial.z))
+
+
 @dataclass(frozen=True)
 class OtherLaw:
     """A law that leaves less than the model's, with the same effects: `share` of the excess."""

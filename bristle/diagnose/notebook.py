@@ -37,12 +37,18 @@ def _rows(found: Diagnosis) -> tuple[list[list[str]], list[int]]:
     before = found.before
     if before is None:
         return [], []
-    rows = [["present model", short_z(before.train), short_z(before.z), ""]]
+    worst = found.worst
+    assert worst is not None
+    known = found.noise_known
+
+    def z(value: float) -> str:
+        return short_z(value if known else None)
+
+    rows = [["present model", z(before.train), z(before.z), ""]]
     strong = []
     for trial in found.trials[:MOST]:
         if trial.effects[-1] in found.effects:
             strong.append(len(rows))
-        gain = percent(1.0 - trial.z / before.z) if before.z > 0.0 else ""
-        name = f"with {trial.effects[-1]}"
-        rows.append([name, short_z(trial.train), short_z(trial.z), gain])
+        gain = percent(worst.gain(trial)) if before.z > 0.0 else ""
+        rows.append([f"with {trial.effects[-1]}", z(trial.train), z(trial.z), gain])
     return rows, strong

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identify.fit import Model, Problem, fit
+from ..identify.residuals import in_noises, residuals, robust_z
 from ..identify.search import z_scale
-from ..identify.search_context import residuals
 from ..quantity import plain
 from .rule import BENCH, DecisionRule
 
@@ -57,10 +57,10 @@ def odd_run(
         if not is_covered([(one.v, one.V) for one in (run, *others)], 1):
             continue
         fitted = fit(train.of(others), model, with_std=False).model
-        if max(z_with(fitted, train.of([one])) for one in others) > rule.misfit:
+        if max(robust_z(train.of([one]), fitted) for one in others) > rule.misfit:
             continue
         one = train.of([run])
-        if z_with(fitted, one) <= rule.misfit:
+        if robust_z(one, fitted) <= rule.misfit:
             continue
         if told := other_zero(fitted, one, rule) or other_gain(fitted, one, rule):
             return f"{called} explains all runs but {run.name}. {told} Else {LEFT_OUT}."
@@ -80,7 +80,7 @@ def _amount(model: Model, one: Problem, shape: Array) -> tuple[float, float]:
     normalised = shape[run.skip :] / expected[0][1][run.skip :]
     left = residuals(one, model, expected)
     amount = float(left @ normalised) / max(float(normalised @ normalised), TINY)
-    return amount, z_scale(left - amount * normalised)
+    return amount, z_scale(in_noises(one, left - amount * normalised, expected))
 
 
 def other_zero(model: Model, one: Problem, rule: DecisionRule) -> str:
@@ -122,8 +122,3 @@ def other_gain(model: Model, one: Problem, rule: DecisionRule) -> str:
         "the range was another one, set it right in study.toml: "
         f'correct = [{{channel = "force", fault = "gain", value = {gain:.4g}}}].'
     )
-
-
-def z_with(model: Model, problem: Problem) -> float:
-    """Return error over noise of a model on all runs of a problem together."""
-    return z_scale(residuals(problem, model, problem.expectation(model)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -98,6 +98,12 @@ class Opening:
     def searched(self) -> Problem:
         """The training runs, or the part of them, that effects are searched on."""
         return self.part or self.problem
+
+    def with_excess(self, excess: float) -> Opening:
+        """Return the same runs with what no model explains counted beside the noise [N2]."""
+        problem, held_out = (one.with_excess(excess) for one in (self.problem, self.held_out))
+        part = None if self.part is None else self.part.with_excess(excess)
+        return replace(self, problem=problem, held_out=held_out, part=part)
 
     def known(self, model: Model) -> Known:
         """Return what sizes of effects beside a fitted model are found with."""

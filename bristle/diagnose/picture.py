@@ -21,11 +21,11 @@ def draw_diagnosis(found: Diagnosis) -> Page:
     """Return the figure of a verdict, drawn and not yet written.
 
     Of a building it shows the site where the model errs the most. Data that carry no verdict have
-    no trials: then the figure is the verdict's words.
+    no trials, without a known noise there is no z: then the figure is the verdict's words.
     """
     trials = found.trials[:MOST]
     with look():
-        if not trials or found.before is None or found.worst is None:
+        if not trials or found.before is None or found.worst is None or not found.noise_known:
             return Page(7.6, 0.0, headline(found), found.words)
         worst, without = found.worst, _without(found.laws.as_dict() if found.laws else {})
         rows = [(trial.effects[-1], trial.z) for trial in trials]
@@ -40,6 +40,8 @@ def draw_evidence(verdict: Mapping[str, Any]) -> Page | None:
 
     None where it holds none.
     """
+    if not verdict.get("noise_known", True):
+        return None
     findings = [one for one in verdict.get("findings") or [] if "z_holdout_before" in one]
     at = max(findings, key=lambda one: float(one["z_holdout_before"]), default=verdict)
     rows = [

@@ -259,20 +259,37 @@ class Diagnosis:
             out["refined"] = refined
         if self.worst is not None and (gains := gains_of(self.worst)):
             out["gains"] = gains
+        if not self.noise_known:
+            out = {**_without_z(out), "noise_known": False}
         return out | {"words": " ".join(verdict_text.sentences(out))}
+
+    @property
+    def noise_known(self) -> bool:
+        """Whether the noise is known at every site, so that z says something."""
+        return all(found.noise_known for found in self.findings.values())
 
     def _ranking(self) -> list[dict[str, Any]]:
         """Return one row per trial of all sites, the largest gain first."""
         rows = [
             {
                 "effect": trial.effects[-1], "site": found.site, "z_holdout": round(trial.z, 4),
-                "z_train": round(trial.train, 4), "gain": round(1.0 - trial.z / found.z_before, 4),
+                "z_train": round(trial.train, 4), "gain": round(found.gain(trial), 4),
                 "refined": trial.refined,
             }
             for found in self.findings.values()
             for trial in found.trials
         ]  # fmt: skip
         return sorted(rows, key=lambda row: -row["gain"])
+
+
+def _without_z(value: Any) -> Any:
+    """Return what json holds with each z as None: nobody knows the noise."""
+    if isinstance(value, dict):
+        return {
+            name: None if name.startswith("z_") or name == "interval95" else _without_z(one)
+            for name, one in value.items()
+        }
+    return [_without_z(one) for one in value] if isinstance(value, list) else value
 
 
 def _in_a_storey(name: str) -> bool:

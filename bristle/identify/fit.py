@@ -111,7 +111,7 @@ def fit(
     if not scaled.names:
         cost = mean_loss(loss(scaled.residuals(np.zeros(0))))
         return Fit(model, {}, cost)
-    with watched(problem, scaled.at) as accepted:
+    with watched(problem, scaled.at, expected=expected) as accepted:
         found = descend(
             scaled.residuals,
             scaled.start,

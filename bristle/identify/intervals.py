@@ -45,7 +45,7 @@ def covariance_of(scaled: Scaled, theta: Array) -> tuple[Array, tuple[str, ...]]
         scores = np.array([J.T @ np.clip(e, -2.0, 2.0) for e in drawn])
         scores -= scores.mean(axis=0)
         B = B + scores.T @ scores / (len(drawn) - 1)
-    if mean_loss(loss(r)) > _MISFIT**2 * HUBER_AT_ONE:
+    if scaled.problem.excess or mean_loss(loss(r)) > _MISFIT**2 * HUBER_AT_ONE:
         B = _scores_of_blocks(J, r)
     covariance = inverse @ B @ inverse
     size = scaled.scale / safe

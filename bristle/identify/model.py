@@ -70,7 +70,9 @@ class Run:
     samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
     besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
     was not measured and follows from the motion, beside `noise` and each with its draw of `draws`;
-    `finer` how models are evaluated between the samples of a decimated run, None for others.
+    `finer` how models are evaluated between the samples of a decimated run, None for others;
+    `noise_known` is False where the force's noise cannot be told from its signal: `noise` is then
+    a lower limit.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Run:
     extra: Mapping[str, Extra] = field(default_factory=dict)
     force_draws: Array | None = None
     finer: Finer | None = None
+    noise_known: bool = True
 
     @cached_property
     def smoothed(self) -> Moments:
@@ -206,15 +209,23 @@ class Problem:
     free_zero = False
     """Whether the force's zero is fitted along with every model; see `residuals.zero_of`."""
 
+    excess = 0.0
+    """Variance [N2] of what no model here explains, beside the noise; see `residuals.excess_of`."""
+
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
         self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
         self._sizes: dict[str, float] = {}
 
+    @property
+    def noise_known(self) -> bool:
+        """Whether the force's noise is known in most runs, so that z says something."""
+        return 2 * sum(run.noise_known for run in self.runs) >= len(self.runs)
+
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""
         made = self._made_of(runs)
-        made.free_zero = self.free_zero
+        made.free_zero, made.excess = self.free_zero, self.excess
         return made
 
     def _made_of(self, runs: list[Run]) -> Problem:
@@ -235,6 +246,18 @@ class Problem:
         """Return the same runs with the force's zero fitted along with every model."""
         made = self.of(self.runs)
         made.free_zero = True
+        return made
+
+    def with_excess(self, excess: float) -> Problem:
+        """Return the same runs, what no model explains counted as variance [N2] beside the noise.
+
+        The same for all samples, so that fits and losses weigh them nearly alike where it is large.
+        """
+        if excess == self.excess:
+            return self
+        made = self.of(self.runs)
+        made.excess = excess
+        made._sizes, made._benches = self._sizes, self._benches
         return made
 
     def damper_effects(self, law: str) -> list[str]:
@@ -353,8 +376,9 @@ class Problem:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].
 
         What a true model would show: its prediction from the smoothed motion is off by `bias` in
-        the mean, and scatters about that by `noise`, the force's own and the motion's; `draws` are
-        the motion's part alone. Samples that were not measured get a noise of `LOST`.
+        the mean, and scatters about that by `noise`, the force's own and the motion's, with
+        `excess` if there is any; `draws` are the motion's part alone. Samples that were not
+        measured get a noise of `LOST`.
         """
         return [self._expected(model, run, draws) for run in self.runs]
 
@@ -371,7 +395,7 @@ class Problem:
         # A jump that no draw put at this sample may still be here if one put it at the next.
         variance = np.mean((spread - bias) ** 2, axis=0)
         around = np.convolve(variance, _AROUND, "same")
-        noise = np.sqrt(run.noise**2 + np.maximum(variance, around))
+        noise = np.sqrt(run.noise**2 + np.maximum(variance, around) + self.excess)
         if run.measured is not None:
             noise = np.where(run.measured, noise, LOST * noise)
         return bias, noise, spread - bias

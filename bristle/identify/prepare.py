@@ -63,11 +63,12 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     needed = ("force", drive, *(alone if len(alone) == 1 else ()))
     force = measurement["force"]
     begin = begin_of(motion.x, force, dt)
+    facts = measurement.noise_facts.get("force")
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, begin.first, measurement.left_out(*needed),
         drive or VOLTAGE.name, measurement.labels, begin.rest, measurement.extra,
-        finer=measurement.finer,
+        finer=measurement.finer, noise_known=facts is None or facts.known,
     )  # fmt: skip
 
 

@@ -23,6 +23,12 @@ BLOCK = 250
 PASSES = 5
 """Weighted means until the constant of a residual has settled."""
 
+EXPLAINS = 1.2
+"""z up to which a model explains the runs: what it leaves counts as noise."""
+
+FAR = 10.0
+"""Robust standard deviations up to which errors count in the variance of what a model misses."""
+
 FINITE = 1e6
 """What counts as the normalised residual where a prediction is not finite."""
 
@@ -113,7 +119,47 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
 
 def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:
     """Return z, the robust RMS of residual over expected noise: 1 for a true model."""
-    return z_scale(residuals(problem, model, problem.expectation(model, draws)))
+    expected = problem.expectation(model, draws)
+    return z_scale(in_noises(problem, residuals(problem, model, expected), expected))
+
+
+def told_z(problem: Problem, model: Model) -> float:
+    """Return z of a model, NaN where the noise is not known and z says nothing."""
+    return robust_z(problem, model) if problem.noise_known else float("nan")
+
+
+def in_noises(problem: Problem, r: Array, expected: Expected) -> Array:
+    """Return normalised residuals (n,) over the noise alone, without the problem's excess.
+
+    Parameters
+    ----------
+    problem : the runs
+    r : normalised residuals (n,) of a model on them
+    expected : what they were divided by
+    """
+    if not problem.excess:
+        return r
+    pairs = zip(problem.runs, expected, strict=True)
+    sigma = np.concatenate([e[1][run.skip :] for run, e in pairs])
+    return np.asarray(r * sigma / np.sqrt(sigma**2 - problem.excess))
+
+
+def excess_of(problem: Problem, model: Model) -> float:
+    """Return the variance [N2] of what a fitted model misses, beside the noise; 0 up to `EXPLAINS`.
+
+    Noise says how much a sample tells of a true model. Of a model that misses many times the noise
+    it says nothing: a fit by noise alone follows the quiet samples and runs, and counts all others
+    by their absolute error. The variance is that of the error, those far out bounded; it grows from
+    0 with z.
+    """
+    expected = problem.expectation(model)
+    z = z_scale(in_noises(problem, residuals(problem, model, expected), expected))
+    if not z > EXPLAINS:
+        return 0.0
+    pairs = zip(errors(problem, model, expected), problem.runs, strict=True)
+    left = np.abs(np.concatenate([error[run.judged] for error, run in pairs]))
+    most = FAR * float(np.median(left)) / 0.6745
+    return float((1.0 - (EXPLAINS / z) ** 2) * np.mean(np.minimum(left, most) ** 2))
 
 
 def drawn_noise(problem: Problem, expected: Expected) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from .error import ForceError, errors_by_run, pooled
 from .fit import Fit
 from .line import DAMPING, at_bound
 from .model import Model, Problem
-from .residuals import robust_z
+from .residuals import told_z
 from .rig import DAMPER, ROLES, Rig, Site
 from .site_fit import fit_site, with_line
 from .structure import StructureProblem
@@ -226,7 +226,7 @@ def errors_of(models: SiteModels, cutoff: float) -> RigErrors:
     force = {role: pooled(found.values()) for role, found in at.items()}
     for role, error in force.items():
         pairs = [pair for _, pair in _pairs(models, role)]
-        out[f"z_{role}"] = max(robust_z(*pair) for pair in pairs)
+        out[f"z_{role}"] = max(told_z(*pair) for pair in pairs)
         out[f"error_{role}"], out[f"error_share_{role}"] = error.headline
         squares = [error_rms(*pair, cutoff) ** 2 for pair in pairs]
         forces = [force_rms(problem.runs, cutoff) ** 2 for problem, _ in pairs]

@@ -68,7 +68,7 @@ class Search:
 
     def run(self, sweeps: int) -> tuple[Model, Descent]:
         """Search from the model's own values."""
-        with watched(self.problem, self.at) as accepted:
+        with watched(self.problem, self.at, expected=self.expected) as accepted:
             found = descend(
                 self.residuals, self.start, self.low, self.high, sweeps, rough=self.rough,
                 accepted=accepted,

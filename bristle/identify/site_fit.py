@@ -5,7 +5,7 @@ Effects of a structure join one by one, each searched from several starts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from ..physics.effect import EFFECTS
@@ -13,7 +13,8 @@ from .assigned import at_site
 from .fit import Fit, fit, identify
 from .line import fit_line
 from .model import Model, Problem
-from .rig import Site
+from .residuals import excess_of
+from .rig import DAMPER, Site
 from .search_context import refine
 from .start_grid import initial_guesses
 from .structure import StructureProblem, thinned
@@ -21,6 +22,9 @@ from .watch import MODEL, series
 
 QUICK = 8
 """Sweeps of the first, short search from each start, on every fifth sample."""
+
+MORE = 2
+"""Times as many starts where a law does not explain the runs: its loss has several valleys then."""
 
 Values = Mapping[str, float]
 
@@ -36,42 +40,71 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
     also : values in SI by name from which one more fit begins; the better one counts
     """
     own = at_site(model, site.name, sites)
+
+    def searched(train: Problem) -> Fit:
+        if site.is_line:
+            return _fit_line(own, train, also)
+        return _fit_law(own, train, MORE * count if train.excess else count, also)
+
     with series(MODEL, site.shown):
-        return _fit_line(own, site, also) if site.is_line else _fit_law(own, site, count, also)
+        if site.is_line and not own.effects:
+            return searched(site.train)  # a line's weights follow its error by themselves
+        return weighed(site.train, searched)
 
 
-def _fit_law(own: Model, site: Site, count: int, also: Values) -> Fit:
+def weighed(problem: Problem, searched: Callable[[Problem], Fit]) -> Fit:
+    """Return what a search ends at, made anew where its model does not explain the runs.
+
+    What the model misses then counts beside the noise; see `residuals.excess_of`.
+
+    Parameters
+    ----------
+    problem : the runs, without an excess
+    searched : the search for a model on them
+    """
+    found = searched(problem)
+    excess = excess_of(problem, found.model)
+    if not excess:
+        return found
+    problem = problem.with_excess(excess)
+    again, from_there = searched(problem), fit(problem, found.model)
+    if again.cost <= from_there.cost:
+        return again
+    return replace(from_there, starts=again.starts, agreed=again.agreed)
+
+
+def _fit_law(own: Model, train: Problem, count: int, also: Values) -> Fit:
     """Return the damper's law fitted from several starts, and from the values in `also`."""
-    inside = isinstance(site.train, StructureProblem)
+    inside = isinstance(train, StructureProblem)
     layer = [name for name in own.effects if inside and EFFECTS[name].site == "structure"]
     if not layer:
         found = identify(
-            site.train, own.law, own.effects, count, values=own.values, fixed=own.fixed,
+            train, own.law, own.effects, count, values=own.values, fixed=own.fixed,
             limits=own.limits,
         )  # fmt: skip
         late = [] if inside else [name for name in own.effects if EFFECTS[name].start_shares]
         if late:  # whose defaults may be where the runs never come
-            found = min(found, _fit_grown(own, late, site), key=lambda one: one.cost)
+            found = min(found, _fit_grown(own, late, train), key=lambda one: one.cost)
     else:  # of a reconstructed force the layer's effects are a part
-        found = _fit_grown(own, layer, site)
+        found = _fit_grown(own, layer, train)
     if also:
         known = {name: value for name, value in also.items() if _belongs(name, own)}
         values = {**found.model.values, **known}
-        other = fit(site.train, replace(found.model, values=values))
+        other = fit(train, replace(found.model, values=values))
         if other.cost < found.cost:
             found = replace(other, starts=found.starts, agreed=found.agreed)
     return found
 
 
-def _fit_grown(own: Model, late: list[str], site: Site) -> Fit:
+def _fit_grown(own: Model, late: list[str], train: Problem) -> Fit:
     """Return a law fitted without some of its effects, which then join one by one."""
     first = replace(own, effects=tuple(name for name in own.effects if name not in late))
-    without = fit_damper(site.train, at_site(first, site.name, (site.name,)))
+    without = fit_damper(train, at_site(first, DAMPER, (DAMPER,)))
     grown = without.model
     for name in late:
-        grown = joined(name, grown, site.train)
-    whole = refine(replace(grown, effects=own.effects, fixed=own.fixed), site.train)
-    return replace(fit(site.train, whole), starts=without.starts, agreed=without.agreed)
+        grown = joined(name, grown, train)
+    whole = refine(replace(grown, effects=own.effects, fixed=own.fixed), train)
+    return replace(fit(train, whole), starts=without.starts, agreed=without.agreed)
 
 
 def fit_damper(problem: Problem, present: Model) -> Fit:
@@ -90,9 +123,9 @@ def _belongs(name: str, model: Model) -> bool:
     return effect in model.effects if dot else name in model.values
 
 
-def _fit_line(own: Model, site: Site, also: Values) -> Fit:
+def _fit_line(own: Model, problem: Problem, also: Values) -> Fit:
     """Return a layer's or storey's line fitted with its effects."""
-    train = _structure(site)
+    train = _structure(problem)
     found = fit_line(train, own.law)
     if not own.effects:
         return found
@@ -109,16 +142,17 @@ def _fit_line(own: Model, site: Site, also: Values) -> Fit:
 
 def with_line(own: Model, site: Site) -> Model:
     """Return a model's part at a line's site with its line fitted, its effects as they stand."""
-    train = _structure(site)
+    train = _structure(site.train)
     line = fit_line(train, own.law).model
     fixed = tuple(name for name in own.values if "." in name)
     values, limits = {**line.values, **own.values}, {**line.limits, **own.limits}
     own = replace(own, values=values, fixed=fixed, limits=limits)
-    return fit(train, own, with_std=False).model if own.effects else own
+    if not own.effects:
+        return own
+    return weighed(train, lambda problem: fit(problem, own, with_std=False)).model
 
 
-def _structure(site: Site) -> StructureProblem:
-    problem = site.train
+def _structure(problem: Problem) -> StructureProblem:
     assert isinstance(problem, StructureProblem)
     return problem
 

@@ -58,6 +58,7 @@ class _Net:
         self.problem, self.model_0 = problem, model
         self.law = model.law_class
         self.linear = list(self.law.linear())
+        self._signed = [model.bounds(name)[0] < 0.0 for name in self.linear]
         idle = self.law.idle(model.values)
         self.grids = {
             name: self._nodes(name, shape)[: 1 if name in idle else None]
@@ -145,12 +146,16 @@ class _Net:
         b = b - G[:, ~free] @ theta[~free]
         G, b = G[np.ix_(free, free)], b[free]
         size = np.sqrt(np.diag(G))
-        # G = R'R turns the normal equations into a small least-squares problem with theta >= 0.
+        # G = R'R turns the normal equations into a small least-squares problem with theta >= 0;
+        # what may be negative is the difference of two such numbers.
         values, vectors = np.linalg.eigh(G / np.outer(size, size))
         values = np.maximum(values, 1e-12 * values[-1])
         R = np.sqrt(values)[:, None] * vectors.T
-        found, _ = nnls(R, (vectors.T @ (b / size)) / np.sqrt(values))
-        theta[free] = found / size
+        signed = np.flatnonzero(np.array(self._signed)[free])
+        found, _ = nnls(np.hstack([R, -R[:, signed]]), (vectors.T @ (b / size)) / np.sqrt(values))
+        own, below = np.split(found, [len(size)])
+        own[signed] -= below
+        theta[free] = own / size
         own = theta[free]
         return self.square - 2.0 * float(b @ own) + float(own @ G @ own), theta
 
@@ -166,5 +171,7 @@ class _Net:
                 unit = self.law.parameters[name].unit
                 low, high = model.bounds(name)
                 least = _AT_LEAST * self.problem.size(unit)
-                values[name] = min(max(values[name], low, least), high)
+                if values[name] >= 0.0:
+                    values[name] = max(values[name], least)
+                values[name] = min(max(values[name], low), high)
         return replace(model, values=values)

@@ -22,7 +22,8 @@ from ..physics.drive import DRIVES
 from ..snapshots import Watcher, watcher
 from .error import force_error
 from .model import Model, Problem, Run, parameter
-from .search import Accepted, z_of
+from .residuals import Expected, in_noises
+from .search import Accepted, z_of, z_scale
 from .structure import StructureRun
 
 Array = NDArray[np.float64]
@@ -74,6 +75,8 @@ def watched(
     at: Callable[[Array], Model],
     share: Callable[[Array], float] | None = None,
     last: bool = True,
+    *,
+    expected: Expected | None = None,
 ) -> Iterator[Accepted | None]:
     """Give what `search.descend` tells its accepted steps to, None where nobody watches.
 
@@ -85,12 +88,13 @@ def watched(
         are over the noise, so that its cost tells z
     last : whether its end may be what comes of the series; not that of a search on a part of the
         samples, whose errors are not those of all
+    expected : what a true model would show on each run, where that has an excess: z is without
     """
     present = _series.get()
     if present is None:
         yield None
         return
-    search = _Search(present, problem, at, share, last)
+    search = _Search(present, problem, at, (share, expected), last)
     yield search
     search.end()
 
@@ -168,19 +172,24 @@ class _Search:
 
     def __init__(
         self, series: _Series, problem: Problem, at: Callable[[Array], Model],
-        share: Callable[[Array], float] | None, last: bool,
+        told_by: tuple[Callable[[Array], float] | None, Expected | None], last: bool,
     ) -> None:  # fmt: skip
         self._series, self._problem, self._at = series, problem, at
-        self._share, self._is_last = share, last
+        (self._share, self._expected), self._is_last = told_by, last
         self._number, self._errors = series.begin()
         self._left: tuple[Array, float | None] | None = None  # what was not told yet
 
     def __call__(self, theta: Array, r: Array, cost: float) -> None:
-        told = z_of(cost) if self._share is None else self._share(r)
+        told = self._z(r, cost) if self._share is None else self._share(r)
         self._errors.append(told)
         self._left = theta.copy(), told if self._share is None else None
         if self._series.due:
             self.end()
+
+    def _z(self, r: Array, cost: float) -> float:
+        if not self._problem.excess or self._expected is None:
+            return z_of(cost)
+        return z_scale(in_noises(self._problem, r, self._expected))
 
     def end(self) -> None:
         """Tell the last step, unless it was told."""

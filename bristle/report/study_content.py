@@ -100,4 +100,6 @@ def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> Histor
         return step  # the model that a study begins with is nobody's guess of this damper
     then = read_model(study.history.model_file(step.number), study.folder)
     runs = against.predictions(as_model(then))
+    if not all(one.noise_known for one in runs):
+        return step
     return replace(step, z=z_scale(np.concatenate([one.normalised for one in runs])))

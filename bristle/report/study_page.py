@@ -79,10 +79,11 @@ def _tiles(content: Content) -> str:
     if now is None:
         return ""
     low, high = now.z_interval
+    span = f"; 95 %: {low:.2f} to {high:.2f}" if now.noise_known else ""
     pairs = [
         (
             f"z = {short_z(now.z)}",
-            f"error / noise (z) on held-out runs; 95 %: {low:.2f} to {high:.2f}",
+            f"error / noise (z) on held-out runs{span}",
         ),
         (
             now.error.text(now.unit),

@@ -27,6 +27,7 @@ _COLOURS = {
     "low-passed": "estimated from the samples: white, low-passed above",
     "blue": "estimated from the samples: it grows with frequency, so this is an upper limit",
     "resting": "estimated where the channel is at rest",
+    "slow": "estimated where the channel moves slowest: hard to separate from the signal",
     "hidden": "estimated: hard to separate from the signal, so this is a lower limit",
     "rough": "estimated: the signal itself is rough, so this is an upper limit",
     "none": "none seen",

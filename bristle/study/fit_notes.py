@@ -43,7 +43,7 @@ def doubts(runs: list[Measurement]) -> list[str]:
     doubtful: dict[str, int] = {}
     for run in runs:
         for channel, fact in run.noise_facts.items():
-            if fact is not None and fact.colour in ("hidden", "rough", "blue"):
+            if fact is not None and fact.colour in ("slow", "hidden", "rough", "blue"):
                 doubtful[channel] = doubtful.get(channel, 0) + 1
     if doubtful:
         where = ", ".join(f"{c} ({n} of {len(runs)} runs)" for c, n in doubtful.items())
@@ -94,16 +94,19 @@ def weighing(rows: list[LawError], model: StudyModel, own: ForceError, z: float)
     """
     if z <= _MISFIT:
         return []
+    lead = "The error exceeds the noise"
+    if z != z:
+        lead = "The noise of the force is not known, so that there is no z"
     notes = [
-        "The error exceeds the noise. The intervals come from the error itself: they describe "
+        f"{lead}. The intervals come from the error itself: they describe "
         "the best values of this model, not the constants of a damper."
     ]
     same = [row for row in rows if row.law == model.law and not model.effects]
     if same and same[0].error_train.rms < _LESS * own.rms:
         notes.append(
-            f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
-            f"the force alone, as in the table, would leave {same[0].error_train.text()} on the "
-            f"training runs instead of {own.text()}."
+            f"The fit weighs each sample by its noise and by what the model misses, and counts "
+            f"outliers less. Least squares of the force alone, as in the table, would leave "
+            f"{same[0].error_train.text()} on the training runs instead of {own.text()}."
         )
     return notes
 

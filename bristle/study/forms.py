@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -51,8 +51,13 @@ class FormError:
         _, _, knots = split_form(self.model.law)
         return {
             "command": self.form, "knots": list(knots), "fitted": self.numbers,
-            "errors": self.errors, "values": self.model.values(),
+            "errors": finite(self.errors), "values": self.model.values(),
         }  # fmt: skip
+
+
+def finite(errors: Mapping[str, float]) -> dict[str, float | None]:
+    """Return errors as json can hold them: z is None where the noise is not known."""
+    return {name: value if value == value else None for name, value in errors.items()}
 
 
 def form_of(model: StudyModel) -> str:

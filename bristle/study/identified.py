@@ -13,7 +13,7 @@ from ..identify.rig_fit import RigErrors, SiteModel
 from ..identify.table import LawError
 from ..physics.forms import shown_law, split_form
 from ..shown import shown
-from .forms import FormError, form_of
+from .forms import FormError, finite, form_of
 from .history import Step
 
 if TYPE_CHECKING:
@@ -115,7 +115,11 @@ class Identified:
         None before where that model was not fitted.
         """
         own = {"cut_off": self.cutoff}
-        return {**self.before, **own} if self.before else {}, {**self.after, **own}
+        before, after = (
+            {name: value for name, value in errors.items() if value == value}
+            for errors in (self.before, self.after)
+        )
+        return {**before, **own} if before else {}, {**after, **own}
 
     @property
     def unidentified(self) -> tuple[str, ...]:
@@ -173,8 +177,9 @@ class Identified:
             "starts": self.fit.starts,
             "agreed": self.fit.agreed,
             "cut_off": self.cutoff,
-            "before": self.before,
-            "after": self.after,
+            "before": finite(self.before),
+            "after": finite(self.after),
+            "noise_known": self.train.noise_known,
             "error": {role: one.as_dict() for role, one in self.errors.force.items()},
             "error_by_site": {
                 role: {site: one.as_dict() for site, one in sites.items()}

@@ -89,7 +89,9 @@ class Staircase:
 
     def _line(self, one: HistoryStep, top: float, mark: str) -> list[tuple[str, str]]:
         if one.z is None:
-            return [("not judged", "dim")]
+            if one.share is None:
+                return [("not judged", "dim")]
+            return [(f"z not known, {100.0 * one.share:.1f} % of the force is missed", "dim")]
         done = one.z <= CLOSE * self.floor
         share = log10(max(one.z / self.floor, 1.0)) / log10(top / self.floor)
         bar = mark * max(1, round(WIDTH * share))

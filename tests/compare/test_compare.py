@@ -295,7 +295,7 @@ def test_the_axis_of_a_signal_far_from_zero_begins_where_its_data_do():
 def test_where_it_is_right_is_said_once():
     cell = Regime("at low speed and at 0 A", "at low speed", "at 0 A", 1.0, 900)
     other = Regime("at high speed", "at high speed", "", 4.0, 900)
-    text = _where_right(SimpleNamespace(regimes=(cell, other), right=False))
+    text = _where_right(SimpleNamespace(regimes=(cell, other), right=False, noise_known=True))
     assert text == "At low speed and at 0 A it is right within its noise (z = 1.00)."
 
 

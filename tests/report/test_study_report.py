@@ -185,7 +185,7 @@ def test_a_single_run_is_said_to_be_weaker(tmp_path):
             {"kind": "unknown", "coordinate": "displacement"},
             "The remaining error depends mainly on displacement.",
         ),
-        ({"kind": "insufficient", "words": "All runs are equal."}, "All runs are equal."),
+        ({"kind": "insufficient", "reasons": ["All runs are equal."]}, "All runs are equal."),
         ({"kind": "effect", "effects": ["mine"]}, "mine is an effect of the user&#x27;s own"),
     ],
 )

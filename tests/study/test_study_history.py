@@ -73,7 +73,7 @@ def test_steps_and_undo(study: Study) -> None:
         "add gas_spring", "residual follows x", second, {"holdout": 1.4}, {"holdout": 1.0}
     )
     assert step.number == 1
-    study.write_verdict({"schema": 1, "kind": "none"})
+    study.write_verdict({"schema": 2, "kind": "none"})
     third = second.with_effect("stribeck")
     study.add_step("add stribeck", "to see", third)
     assert study.verdict() is None
@@ -83,7 +83,7 @@ def test_steps_and_undo(study: Study) -> None:
     assert again.model() == second
     verdict = again.verdict()
     assert verdict is not None
-    assert (verdict["schema"], verdict["kind"]) == (2, "none")  # of schema 1 as it was written
+    assert (verdict["schema"], verdict["kind"]) == (2, "none")
     assert again.steps()[1].before == {"holdout": 1.4}
     again.undo()
     assert again.model() == first
@@ -140,9 +140,9 @@ def test_change_by_another_process_is_not_overwritten(study: Study) -> None:
     with pytest.raises(StudyError, match="changed meanwhile"):
         study.add_step("add stribeck", "too late", new_model("lugre", ("stribeck",)))
     with pytest.raises(StudyError, match="changed meanwhile"):
-        study.write_verdict({"schema": 1})
+        study.write_verdict({"schema": 2})
     study.model()
-    study.write_verdict({"schema": 1})
+    study.write_verdict({"schema": 2})
 
 
 def test_process_that_writes_is_waited_for(study: Study) -> None:

@@ -21,6 +21,7 @@ _COLOURS = {
     "low-passed": "it fades towards half the sampling rate: this is its level below",
     "blue": "it grows towards high frequencies, as after a numerical derivative: an upper limit",
     "resting": "the channel was low-passed: this is its RMS while at rest",
+    "slow": "the channel was low-passed and never rests: its slowest stretch has motion in it, too",
     "hidden": "the channel was low-passed and never rests, so that this is a lower limit",
     "rough": "the channel changes so much from sample to sample that this is an upper limit",
     "none": "no noise is to be seen",
@@ -172,7 +173,7 @@ def _coloured(
     if facts.colour == "white":
         yield Finding("noise", "note", f"{text}.", "", run.name, channel, share)
         return
-    doubtful = facts.colour in ("hidden", "rough", "blue")
+    doubtful = facts.colour in ("slow", "hidden", "rough", "blue")
     yield Finding(
         "noise",
         "warning" if doubtful else "note",

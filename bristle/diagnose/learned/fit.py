@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...identify.fit import Model, Problem, intervals_of
-from ...identify.residuals import residuals
-from ...identify.search import z_scale
+from ...identify.residuals import robust_z
 from ...identify.search_context import refine
 from ...identify.threads import in_threads
 from ...physics.user import defined
@@ -233,10 +232,10 @@ def _inside(curve: Curve, own: str, base: Model, opened: Opening) -> Fitted:
         laws = _laws(beside, train)
         starts = (replace(joined, values={**law, **memory, **values}) for law in laws)
         ends = [refine(start, train, SWEEPS) for start in starts]
-        return min(ends, key=lambda end: _error(train, end))
+        return min(ends, key=lambda end: robust_z(train, end))
 
     model = fitted_from(values, base)
-    if _error(train, model) > _error(train, present):  # the scan, which is linear, misled it
+    if robust_z(train, model) > robust_z(train, present):  # the scan, which is linear, misled it
         model = fitted_from(dict.fromkeys(entries, 0.0), present)
     std = intervals_of(train, model).std
     fitted = replace(
@@ -277,11 +276,6 @@ def _laws(base: Model, train: Problem) -> list[dict[str, float]]:
     names = [name for name in (*falling, over) if name and name not in base.fixed]
     usual = {name: train.scaled(base.law, name) for name in names}
     return [base.values, {**base.values, **usual}] if usual else [base.values]
-
-
-def _error(train: Problem, model: Model) -> float:
-    """Return z of a model on the runs that it was fitted to."""
-    return z_scale(residuals(train, model, train.expectation(model)))
 
 
 def _renamed(trial: Trial, own: str, name: str) -> Trial:

@@ -1,0 +1,132 @@
+"""A force that was low-passed and never rests: nobody knows its noise, and no command tells a z."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from bristle.cli import main
+from bristle.study.study import Study
+
+RATE, OVER, SECONDS = 500.0, 4, 8.0  # the logger's; the recorder filters before it
+CORNER = 60.0  # Hz, of the recorder's filter
+MOTIONS = ((12e-3, 1.3), (20e-3, 0.9), (15e-3, 1.7))
+HARD = 2.9e6  # N/m3
+
+
+def write_runs(folder: Path, hard: float) -> None:
+    """Write runs of a damper beside a spring that grows stiffer, or is none."""
+    random = np.random.default_rng(3)
+    t = np.arange(int(SECONDS * RATE * OVER)) / (RATE * OVER)
+    for k, (size, f) in enumerate(MOTIONS, 1):
+        x = size * (np.sin(2.0 * np.pi * f * t) + 0.3 * np.sin(4.62 * np.pi * f * t + 1.0))
+        v = np.gradient(x, t)
+        force = 60.0 * np.tanh(v / 0.01) + 400.0 * v + hard * x**3
+        force += random.standard_normal(t.size)
+        corner = butter(4, CORNER, fs=RATE * OVER, output="sos")
+        rows = np.column_stack([t, 1e3 * (x + 2e-6 * random.standard_normal(t.size)), force])
+        rows[:, 2] = sosfiltfilt(corner, force)
+        title = "time [s],displacement [mm],force [N]"
+        path = folder / f"run{k}.csv"
+        np.savetxt(path, rows[::OVER], delimiter=",", header=title, comments="", fmt="%.9g")
+
+
+def study_of(folder: Path, hard: float, capsys: pytest.CaptureFixture[str]) -> Path:
+    """Return a study of such runs, its model identified."""
+    write_runs(folder, hard)
+    study = folder / "rig"
+    assert main(["study", "new", str(study), "--data", str(folder / "*.csv"), "--law", "tanh"]) == 0
+    assert main(["identify", str(study), "--no-table"]) == 0
+    assert "z, held-out runs" in capsys.readouterr().out
+    return study
+
+
+def numbers_of_z(value: Any, key: str = "") -> list[Any]:
+    """Return all values of keys that are a z, wherever they are in an answer."""
+    if isinstance(value, dict):
+        return [one for name, part in value.items() for one in numbers_of_z(part, str(name))]
+    if isinstance(value, list):
+        return [one for part in value for one in numbers_of_z(part, key)]
+    return [value] if key == "z" or key.startswith("z_") else []
+
+
+def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study = study_of(tmp_path, 0.0, capsys)
+    assert main(["identify", str(study), "--no-table", "--dry-run"]) == 0
+    told = capsys.readouterr().out
+    rows = [line for line in told.splitlines() if line.startswith("  z, ")]
+    assert len(rows) == 2
+    assert all(row.count("not known") == 2 for row in rows)
+    assert "the noise cannot be told from the force" in told
+    assert "times the noise" not in told
+    assert main(["identify", str(study), "--no-table", "--dry-run", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["noise_known"] is False
+    assert set(numbers_of_z(answer)) == {None}
+    assert "NaN" not in json.dumps(answer)
+
+    assert main(["compare", str(study)]) == 0
+    told = capsys.readouterr().out
+    assert "noise included, which is not known" in told
+    assert "times the noise" not in told
+    assert "nan" not in told
+    assert main(["compare", str(study), "--json"]) == 0
+    assert set(numbers_of_z(json.loads(capsys.readouterr().out))) == {None}
+
+    steps = Study(study).history.steps()
+    assert all("z_holdout" not in step.after for step in steps)
+    assert main(["report", str(study)]) == 0
+    told = capsys.readouterr().out
+    assert "z not known" in told
+    assert "nan" not in told
+    page = (study / "reports" / "report.html").read_text(encoding="utf-8")
+    assert "z = not known" in page
+    assert "nan to nan" not in page
+
+
+def test_no_effect_that_lowers_the_error_is_no_proof_that_none_is_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = study_of(tmp_path, 0.0, capsys)
+    assert main(["diagnose", str(study), "--json"]) == 0
+    verdict = json.loads(capsys.readouterr().out)
+    assert verdict["kind"] == "insufficient"
+    assert verdict["effects"] == []
+    assert verdict["noise_known"] is False
+    assert set(numbers_of_z(verdict)) == {None}
+    assert "No effect of the library lowers the error" in verdict["words"]
+    assert "% of the force is unexplained, noise included" in verdict["words"]
+    assert "[channels.force]" in verdict["words"]
+
+
+def test_an_effect_is_named_for_the_error_that_it_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = study_of(tmp_path, HARD, capsys)
+    assert main(["diagnose", str(study)]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("The model misses duffing")
+    assert "of the force, noise included" in told
+    assert "z = " not in told
+    verdict = json.loads((study / "verdict.json").read_text(encoding="utf-8"))
+    assert set(numbers_of_z(verdict)) == {None}
+    best = max(verdict["ranking"], key=lambda row: row["gain"])
+    assert (best["effect"], best["gain"] > 0.9) == ("duffing", True)
+
+
+def test_noise_that_the_user_states_is_known(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = study_of(tmp_path, 0.0, capsys)
+    settings = study / "study.toml"
+    text = settings.read_text(encoding="utf-8")
+    settings.write_text(text.replace("[channels.force]\n", "[channels.force]\nnoise = 0.3\n"))
+    assert main(["identify", str(study), "--no-table", "--dry-run", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["noise_known"] is True
+    assert 0.3 < answer["after"]["z_holdout"] < 3.0
