@@ -235,6 +235,13 @@ def write_inputs(held: HeldOut, step: float, folder: Path) -> list[Path]:
 def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proof:
     """Run an exported FMU as FMPy does, and return its error beside the one that is told.
 
+    Parameters
+    ----------
+    held : the runs
+    fmu : the exported file
+    step : s, of the FMU
+    timeout : s, for each run
+
     Raises
     ------
     RunError
@@ -277,7 +284,15 @@ def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proo
 
 
 def write_proof(proof: Proof, held: HeldOut, fmu: Path, folder: Path) -> list[Path]:
-    """Write what the FMU gives, what its host has to set and to apply, and a check in FMPy."""
+    """Write what the FMU gives, what its host has to set and to apply, and a check in FMPy.
+
+    Parameters
+    ----------
+    proof : what the FMU gives
+    held : the runs
+    fmu : the exported file
+    folder : where the inputs are
+    """
     data = {
         "fmu": fmu.name, **proof.as_dict(),
         "load_cell_zero": held.zero,

@@ -71,7 +71,13 @@ class Finer:
         return Finer(2 * self.parts, 2.0 * self.since - 0.5)
 
     def motion(self, x: Array, v: Array, a: Array, dt: float) -> tuple[Array, Array, Array]:
-        """Return a motion (n,) at all moments (m,): Hermite's cubics, that of `a` by its slope."""
+        """Return a motion (n,) at all moments (m,): Hermite's cubics, that of `a` by its slope.
+
+        Parameters
+        ----------
+        x, v, a : (n,) displacement, velocity, acceleration [m, m/s, m/s2]
+        dt : s between samples
+        """
         slope = np.gradient(a, dt)
         return (
             between(x, v, dt, self.parts), between(v, a, dt, self.parts),

@@ -369,7 +369,15 @@ class Problem:
         return Fed(Moments(x, v, a, V, dt), values, tracks)
 
     def shown(self, model: Model, run: Run, fed: Fed, force: Array) -> Array:
-        """Return a damper's force (m,) [N] at these moments as the load cell shows it (n,) [N]."""
+        """Return a damper's force at a run's moments as the load cell shows it (n,) [N].
+
+        Parameters
+        ----------
+        model : with the effects of the load cell
+        run : behind whose filter the force is
+        fed : what the damper was given
+        force : (m,) N
+        """
         return run.seen(shown_force(model.effects, fed.values, force, fed.moments.dt))
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
