@@ -18,7 +18,16 @@ from benchmarks._calibrate.trials import NotStoredError, Stored
 from bristle.diagnose import damper, decision, inconsistent_runs, sites
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.decision import decide
-from bristle.diagnose.rule import BENCH, DRIVE, INSIDE, LIMITED, SENSOR, SITE, DecisionRule
+from bristle.diagnose.rule import (
+    BENCH,
+    DRIVE,
+    INSIDE,
+    LIMITED,
+    RECONSTRUCTED,
+    SENSOR,
+    SITE,
+    DecisionRule,
+)
 from bristle.identify.fit import Model
 
 N = 5000
@@ -47,9 +56,12 @@ def test_every_field_says_what_it_decides_trades_and_how_it_was_found() -> None:
 def test_the_instances_differ_where_the_docs_say_so() -> None:
     assert varied.instances() == {
         "BENCH": BENCH, "INSIDE": INSIDE, "SITE": SITE, "SENSOR": SENSOR, "DRIVE": DRIVE,
-        "LIMITED": LIMITED,
+        "LIMITED": LIMITED, "RECONSTRUCTED": RECONSTRUCTED,
     }  # fmt: skip
-    assert varied.values_of("gain") == "0.02, SITE 0.03, SENSOR 0.03, DRIVE 0.03, LIMITED 0.03"
+    assert (
+        varied.values_of("gain")
+        == "0.02, RECONSTRUCTED 0.05, SITE 0.03, SENSOR 0.03, DRIVE 0.03, LIMITED 0.03"
+    )
     assert varied.values_of("loud") == "0.9"
 
 

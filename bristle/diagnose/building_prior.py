@@ -6,12 +6,13 @@ a fluid's. So the file's numbers are taken as a laboratory knows them, and move 
 with the law; what they cannot absorb is left for the effects.
 
 The first level's mass stays: the scale of all forces is not told by motion, and a residual shrinks
-with it.
+with it. By how much all that stands on it is heavier and stiffer alike is therefore a number of its
+own; the storeys' stiffnesses beside that are told by their lines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from ..identify.search import HUBER
 from ..identify.search_context import Search
 from ..identify.structure import StructureProblem, damper_run
 from ..physics.building import Building
+from .masses import DEVIATIONS, with_masses
 from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
@@ -53,7 +55,7 @@ def within_prior(
     rule : how well a building's numbers are known, and how far they may move
     """
     slopes = _slopes(responses, building, law, straight, rule)
-    shift = np.zeros(2 * building.size - 1)
+    shift = np.zeros(2 * building.size)
     for _ in range(TURNS):
         now = moved(building, shift, rule)
         problem = StructureProblem(
@@ -67,10 +69,17 @@ def within_prior(
 
 
 def moved(building: Building, shift: Array, rule: DecisionRule = BENCH) -> Building:
-    """Return a building with stiffnesses and upper masses (2 n - 1,) moved, in deviations."""
-    n = building.size
-    M, K = np.array(building.M), np.array(building.K)
-    stiffnesses = np.array(building.stiffnesses)
+    """Return a building with its numbers (2 n,) moved, in standard deviations.
+
+    Stiffnesses (n,), masses above the first level (n - 1,), and by how much all masses and
+    stiffnesses above it are larger alike.
+    """
+    n, first = building.size, building.stiffnesses[0]
+    alike = 1.0 + rule.mass_doubt / DEVIATIONS * float(shift[-1])
+    upper = np.append(0.0, np.full(n - 1, alike - 1.0))
+    M = np.array(with_masses(building, upper).M)
+    K, stiffnesses = alike * np.array(building.K), np.array(building.stiffnesses) * (1.0 + upper)
+    K[0, 0] -= (alike - 1.0) * first
     for i in range(n):
         more = rule.stiffness_known * shift[i] * stiffnesses[i]
         across = np.eye(n)[i] - (np.eye(n)[i - 1] if i else 0.0)
@@ -81,6 +90,29 @@ def moved(building: Building, shift: Array, rule: DecisionRule = BENCH) -> Build
     return building._replace(
         M=tuple(map(tuple, M.tolist())), K=tuple(map(tuple, K.tolist())),
         stiffnesses=tuple(stiffnesses.tolist()),
+    )  # fmt: skip
+
+
+def with_storeys(building: Building, lines: Mapping[int, Model]) -> Building:
+    """Return a building whose storeys are as their lines have them, in stiffness and in damping.
+
+    Parameters
+    ----------
+    building : as its file has it
+    lines : by level, the line fitted to the shear of the storey below it
+    """
+    C, K = np.array(building.C), np.array(building.K)
+    stiffnesses = list(building.stiffnesses)
+    for level, line in lines.items():
+        across = np.eye(building.size)[level]
+        across = across - (np.eye(building.size)[level - 1] if level else 0.0)
+        both = np.outer(across, across)
+        K += (line.value("k") - stiffnesses[level]) * both
+        C += line.value("c") * both
+        stiffnesses[level] = line.value("k")
+    return building._replace(
+        C=tuple(map(tuple, C.tolist())), K=tuple(map(tuple, K.tolist())),
+        stiffnesses=tuple(stiffnesses),
     )  # fmt: skip
 
 
@@ -116,7 +148,7 @@ def _slopes(
     """Return, per number and run, what a standard deviation of it adds to the force (n,) [N]."""
     here = [damper_run(one, building, law, straight) for one in responses]
     slopes = []
-    for unit in np.eye(2 * building.size - 1):
+    for unit in np.eye(2 * building.size):
         other = moved(building, unit, rule)
         there = [damper_run(one, other, law, straight) for one in responses]
         slopes.append([(b.force - a.force)[a.skip :] for a, b in zip(here, there, strict=True)])

@@ -85,6 +85,11 @@ def blurred(faults: Sequence[SensorFault]) -> bool:
     return any(map(_blurs, faults))
 
 
+def moves_measured(runs: Sequence[Measurement], building: Building) -> bool:
+    """Return whether the velocity of each end of the damper was measured, in every run."""
+    return all(run.has(f"{end}_velocity") for run in runs for end in _ends(building))
+
+
 def _blurs(fault: SensorFault) -> bool:
     return fault.channel.endswith("velocity") and fault.fault in BLURRED
 

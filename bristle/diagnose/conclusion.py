@@ -14,13 +14,14 @@ from .faults import SensorFault, instruments_of
 from .finding import Finding
 from .load_cell import FORCE_GAIN
 from .low_pass import low_pass_text
-from .rule import BENCH
+from .rule import BENCH, SITE, DecisionRule
 from .verdict import Diagnosis
 
 LAYER = "layer"
 """The site beside which a building's damper stands, as a rule."""
 
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
+LITTLE = "Little beside what was found:"
 NOT_DRIVEN = "No command was recorded: one that changed would look like this."
 
 
@@ -58,6 +59,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     reconstructed = about.force == "reconstructed" and about.beside_layer
     sensors = _sensors(findings, about)
     parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
+    parts = _beside_what_is_found(parts)
     named: list[str] = []
     rivals: list[str] = []
     alike: dict[str, str] = {}
@@ -65,14 +67,14 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     for part in parts:
         twins = lookalikes(part.effects) if reconstructed and part.site == DAMPER else {}
         alike |= twins
-        sure = part.kind == "effect" and not twins
-        # What is no effect, such as a mass of the base, is an alternative in words alone.
+        # What is no effect, such as a mass of the base, is told in words: nobody can add it.
+        sure = part.kind == "effect" and not any(one in EFFECTS for one in twins)
         known = [one for one in (*part.effects, *twins) if one in EFFECTS]
         (named if sure else rivals).extend(known if part.kind != "unknown" else [])
         acting = [*part.effects, *known]
         sites.update({e: sites.get(e, _site_of(e, part.site)) for e in acting})
     kind = _kind_of([part.kind for part in parts], named, rivals)
-    if kind in ("none", "effect") and (shown := instruments_of(sensors)):
+    if kind in ("none", "effect", "insufficient") and (shown := instruments_of(sensors)):
         kind, named = "effect", [*shown, *named]
         sites |= dict.fromkeys(shown, "sensor")
     effects = tuple(dict.fromkeys([*named, *rivals]))
@@ -131,6 +133,25 @@ def _after_the_force(found: Finding, damper: Finding | None) -> Finding:
     return replace(found, kind="insufficient", reasons=(why,))
 
 
+def _beside_what_is_found(parts: Sequence[Finding], rule: DecisionRule = SITE) -> list[Finding]:
+    """Return what sites show, a little beside a clear finding as told in words alone.
+
+    Where an effect is found, another site may show a trace of it, of the instruments, or of what
+    the file has wrong. That takes nothing from the name, and adds none.
+    """
+    found = [part for part in parts if part.kind in ("effect", "ambiguous")]
+    if not found:
+        return list(parts)
+    clear = max(found, key=lambda part: part.z_before)
+    little = max(rule.excess(rule.beside), rule.trace * rule.excess(clear.z_before))
+    return [
+        replace(part, kind="none", effects=(), reasons=(f"{LITTLE} {' '.join(part.reasons)}",))
+        if part is not clear and part.kind != "none" and rule.excess(part.z_before) <= little
+        else part
+        for part in parts
+    ]
+
+
 def _kind_of(kinds: Sequence[str], named: Sequence[str], rivals: Sequence[str]) -> str:
     """Return the kind of the verdict that sites of these kinds amount to."""
     if "unknown" in kinds:
@@ -149,7 +170,9 @@ def _reasons(parts: Sequence[Finding], kind: str) -> list[str]:
         out = [f"On held-out runs {Z} = {low:.2f} to {high:.2f} at the {len(parts)} sites."]
         parts = [part for part in parts if part.z_before > BENCH.clean]
     else:
-        out, parts = [], [part for part in parts if part.kind != "none"]
+        told = [part for part in parts if part.kind == "none" and part.reasons]
+        little = [part for part in told if part.reasons[0].startswith(LITTLE)]
+        out, parts = [], [*(part for part in parts if part.kind != "none"), *little]
     return out + [
         verdict_text.sited(part.site, " ".join(part.reasons)) for part in parts if part.reasons
     ]

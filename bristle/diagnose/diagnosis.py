@@ -99,6 +99,10 @@ def diagnose_rig(
         )
     if opened is not None:
         found, opened = look_at_damper(opened, say)
+        if isinstance(runs, BuildingRuns) and runs.suited_to(found):
+            again = runs.open_damper()
+            assert again is not None
+            found, opened = look_at_damper(again, say)
         excused = runs.excused(found, findings)
         say("intervals")
         # What an instrument explains contradicts nothing.

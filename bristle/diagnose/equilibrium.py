@@ -20,8 +20,8 @@ from ..identify.search_context import refine
 from ..identify.site_fit import fit_damper
 from ..identify.structure import ANY_LAW, StructureProblem, problems_of
 from ..physics.building import Building, with_damper
-from .building_prior import moved_numbers, within_prior
-from .building_sensors import blurred, faults_in_building, without_faults
+from .building_prior import moved_numbers, with_storeys, within_prior
+from .building_sensors import blurred, faults_in_building, moves_measured, without_faults
 from .candidates import SHOWN, Trial, judge
 from .conclusion import About
 from .damper import excused_by_sensor, left_by_filter
@@ -29,7 +29,7 @@ from .finding import Finding
 from .load_cell import load_cell
 from .masses import Shaken, suited_masses, text_of_masses
 from .opening import IN_BUILDING, Opening, Progress, median_noise
-from .rule import BENCH, INSIDE, SITE, DecisionRule
+from .rule import BENCH, INSIDE, RECONSTRUCTED, SITE, DecisionRule
 from .sites import present_at, shortened
 from .verdict import late_values
 
@@ -72,6 +72,7 @@ class BuildingRuns:
         self._sensors = tuple(faults_in_building([*train, *holdout], building))
         right = [without_faults(list(runs), self._sensors, building) for runs in (train, holdout)]
         self._noise = median_noise([*right[0], *right[1]])
+        self._velocities = moves_measured([*right[0], *right[1]], building)
         say("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)
         found, self._present = corrected_for_delay(found, present)
@@ -129,21 +130,42 @@ class BuildingRuns:
 
     def _correct_building(self, findings: Mapping[str, Finding]) -> None:
         self._say("damper: what the building's file leaves open")
-        storeys = [found for site, found in findings.items() if site.startswith("storey")]
-        self._straight = self._straight and all(found.kind == "none" for found in storeys)
+        storeys = {one: found for one, found in findings.items() if one.startswith("storey")}
+        self._straight = self._straight and all(one.kind == "none" for one in storeys.values())
+        given = 0 if self._building.isolated else 1
+        lines = {
+            int(site.removeprefix("storey")) - given: found.before.model
+            for site, found in storeys.items()
+            if found.kind == "none" and found.before is not None and not found.before.effects
+        }
+        self._building = with_storeys(self._building, lines)
         self._problems = self._made(self._building)
-        known = self._within_prior()
-        suited = self._made(known)
-        part = self.part(DAMPER)
-        if _suits(suited[DAMPER], self._problems[DAMPER], part):
-            self._problems, self._notes = suited, moved_numbers(self._building, known)
+        self._suit(self.part(DAMPER))
 
-    def _within_prior(self) -> Building:
-        """Return the building that makes the damper's force, its numbers as far as known."""
-        present, straight = self._present, self._straight
-        problem = problems_of(self._train, [], self._building, present.law, straight)
-        damper = fit_damper(problem[DAMPER][0], at_site(present, DAMPER, problem))
-        return within_prior(damper.model, self._train, self._building, present.law, straight)
+    def suited_to(self, found: Finding) -> bool:
+        """Adjust the building's numbers beside what was found at the damper; return whether so.
+
+        Where the force follows from equilibrium, the file's numbers show in what an effect leaves,
+        and hardly before.
+        """
+        if not self._problems[DAMPER][0].reconstructed or found.kind == "none":
+            return False
+        best = found.after if found.kind != "unknown" else next(iter(found.trials), None)
+        if best is None or max(best.z, best.train) <= BENCH.adequate:
+            return False
+        return self._suit(best.model)
+
+    def _suit(self, damper: Model) -> bool:
+        """Take the building that suits a damper's model best, within what is known; or leave it."""
+        law, straight = self._present.law, self._straight
+        train = self._problems[DAMPER][0]
+        fitted = fit_damper(train, damper).model
+        known = within_prior(fitted, self._train, self._building, law, straight)
+        suited = self._made(known)
+        if not _suits(suited[DAMPER], self._problems[DAMPER], damper):
+            return False
+        self._problems, self._notes = suited, moved_numbers(self._building, known)
+        return True
 
     def planned(self, runs: Sequence[Measurement], draws: int) -> dict[str, StructureProblem]:
         """Return, by site, runs that were not measured yet: the channels that they would show.
@@ -210,21 +232,21 @@ class BuildingRuns:
         """
         train, held_out = self._problems[DAMPER]
         # A force that no load cell shows cannot be late.
-        shown = () if train.reconstructed else SHOWN
+        shown, rule = ((), RECONSTRUCTED) if train.reconstructed else (SHOWN, INSIDE)
         return Opening(
             before, train, held_out, self._sensors, self._noise, shown,
-            shortened(train, SEARCHED), INSIDE, IN_BUILDING,
+            shortened(train, SEARCHED), rule, IN_BUILDING,
         )  # fmt: skip
 
     def excused(self, finding: Finding, findings: Mapping[str, Finding]) -> Finding:
         """Return the damper's finding, not unknown where an instrument explains what is left."""
-        if blurred(self._sensors):
+        if blurred(self._sensors) or not self._velocities:
             why = "Without the velocity of the base, its reversals are not located exactly."
             finding = excused_by_sensor(finding, BENCH.blurred, why)
         beside = findings.get(self._beside)
-        if beside is not None and _rounded(beside):
+        if beside is not None and late_values(beside):
             most = left_by_filter(self._present.law, *self._problems[DAMPER])
-            why = "The load cell's filter has a different functional form."
+            why = "The load cell is late in a different functional form."
             finding = excused_by_sensor(finding, most, why)
         return finding
 

@@ -125,7 +125,8 @@ def _shift(
     n = building.size
     unit = rule.mass_doubt / DEVIATIONS
     able = _determined(n, shaken.lowest, shaken.measured)
-    others = [shaken.lines(with_masses(building, unit * np.eye(n)[j])) for j in range(n)]
+    moved = [with_masses(building, unit * np.eye(n)[j]) for j in range(n)]
+    others = [shaken.lines(one) for one in moved]
     normal, gradient = np.eye(n), np.zeros(n)
     for site, (train, _) in lines.items():
         law = law_of_part(site)
@@ -142,10 +143,29 @@ def _shift(
             scaled = values * weight
             return np.asarray(scaled - Q @ (Q.T @ scaled))
 
-        slopes = np.stack([left(_target(other[site][0]) - here) for other in others], axis=1)
+        above = _above(building, train)
+        slopes = np.stack(
+            [
+                left(_target(other[site][0]) * above / _above(one, train) - here)
+                for one, other in zip(moved, others, strict=True)
+            ],
+            axis=1,
+        )
         normal += slopes.T @ slopes
         gradient += slopes.T @ left(here)
     return np.asarray(-unit * able @ np.linalg.solve(able.T @ normal @ able, able.T @ gradient))
+
+
+def _above(building: Building, problem: StructureProblem) -> float:
+    """Return the mass that a storey carries [kg]: its residual is per mass, else it would shrink.
+
+    Lighter masses would seem to suit better, for the noise is theirs. At the layer the damper's
+    force says how large forces are: 1.
+    """
+    if not problem.storey:
+        return 1.0
+    level = problem.storey - (not building.isolated)
+    return float(np.diag(np.array(building.M))[level:].sum())
 
 
 def _determined(n: int, lowest: int, measured: bool) -> Array:

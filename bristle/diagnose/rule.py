@@ -407,6 +407,19 @@ class DecisionRule:
     missing effects are excused; if lower, an instrument's fault gives unknown. Found: blind seeds.
     """
 
+    beside: float = 1.3
+    """z of a building's site up to which it is told in words alone where another site has a name.
+
+    Trades: if higher, what else is missing is not called unknown; if lower, a trace of what was
+    found, or of an instrument, takes its name away. Found: blind seeds.
+    """
+
+    trace: float = 0.05
+    """Share of the found effect's excess up to which another site is told in words alone, too.
+
+    Trades and found: as `beside`.
+    """
+
     @property
     def quiet(self) -> float:
         """z up to which no effect can lower it by `gain`: noise is all there is."""
@@ -423,6 +436,10 @@ BENCH = DecisionRule()
 INSIDE = replace(BENCH, organised=1.0)
 """A damper's law in a building: errors of equilibrium are correlated, so that a pattern alone, by
 which the residual depends on a coordinate, accuses nothing."""
+
+RECONSTRUCTED = replace(INSIDE, gain=0.05)
+"""A damper's law held against a force that equilibrium gives: what a few per cent in the building's
+numbers leave of it is no finding."""
 
 SITE = replace(BENCH, gain=0.03, share=0.7, close=0.005, rival=2.0)
 """A building's site, whose model is a line and whose noise is white and known: few effects, and

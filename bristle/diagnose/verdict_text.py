@@ -62,7 +62,8 @@ def effects_at(verdict: Verdict) -> list[str]:
     sites, findings = verdict.get("sites") or {}, verdict.get("findings") or []
     several = bool(set(sites.values()) - {DAMPER}) or len(findings) > 1
     names = [str(name) for name in verdict.get("effects") or []]
-    names += [str(one) for one in verdict.get("alternatives") or []]
+    if verdict.get("kind") == "ambiguous":
+        names += [str(one) for one in verdict.get("alternatives") or []]
     if not several:
         return names
     at = {one: [found["site"] for found in findings if one in found["effects"]] for one in names}

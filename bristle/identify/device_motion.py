@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,12 +74,6 @@ def measured_across(
         None if (seen := _difference(run, *pair)) is None else smoothed_level(seen, _NAME, jerk)
         for run in runs
     ]
-    there = [(one, run) for one, run in zip(smoothed, runs, strict=True) if one is not None]
-    made: dict[tuple[tuple[bool, ...], float], Array] = {}
-    for have, dt in dict.fromkeys((_have(one), run.step) for one, run in there):
-        alike = [(one, run) for one, run in there if (_have(one), run.step) == (have, dt)]
-        longest = max(len(run.time) for _, run in alike)
-        made[have, dt] = level_draws(longest, [one for one, _ in alike], dt, draws, seed)
     return [
         None
         if one is None
@@ -88,14 +81,10 @@ def measured_across(
             one["state"][:, 0],
             one["state"][:, 1],
             one["std"],
-            made[_have(one), run.step][:, : len(run.time)],
+            level_draws(len(run.time), one, run.step, draws, seed),
         )
         for one, run in zip(smoothed, runs, strict=True)
     ]
-
-
-def _have(level: dict[str, Any]) -> tuple[bool, ...]:
-    return tuple(bool(one) for one in level["have"])
 
 
 def _difference(run: Measurement, lower: str, upper: str) -> Measurement | None:

@@ -107,21 +107,19 @@ def _likeliest(
     return float(10.0**found.x)
 
 
-def level_draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int) -> Array:
-    """Return draws (d, n, 3) of the smoother's error at the median jerk and noise of the runs.
+def level_draws(n: int, level: dict[str, Any], dt: float, draws: int, seed: int) -> Array:
+    """Return draws (d, n, 3) of the smoother's error at the jerk and the noise of a run.
 
     Parameters
     ----------
     n : how many samples a draw has
-    runs : the level's motion in each, see `corrected`; all have the same instruments
+    level : the level's motion in the run, see `corrected`
     dt : step [s]
     draws : how many draws, d
     seed : of the draws
     """
     generator = np.random.default_rng(seed)
-    jerk = float(np.median([run["jerk"] for run in runs]))
-    r = np.median([run["r"] for run in runs], axis=0)
-    have = runs[0]["have"]
+    jerk, r, have = level["jerk"], level["r"], level["have"]
     lead = min(200, n)
     total = n + 2 * lead
     out = np.zeros((draws, n, 3))

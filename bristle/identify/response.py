@@ -198,8 +198,9 @@ def responses(
     """Return the measurements of one rig as responses.
 
     The smoother's jerk is each run's own, times `looser`: likeliest is not without bias, and a
-    looser smoother trades a little noise for much of that. The draws of its error are made once per
-    level; those of a floor without an accelerometer from each run's own motion.
+    looser smoother trades a little noise for much of that. The draws of its error are each run's
+    own too, for a weak run has other noise than a strong one; those of a floor without an
+    accelerometer are made from its motion.
 
     Parameters
     ----------
@@ -220,16 +221,6 @@ def responses(
     smoothed = [
         [smoothed_level(m, name, looser) for name in building.levels()] for m in measurements
     ]
-    steps = [m.step for m in measurements]
-    made: dict[tuple[int, tuple[bool, ...], float], Array] = {}
-    for i in range(building.size):
-        kinds = [(_instruments(run[i]), dt) for run, dt in zip(smoothed, steps, strict=True)]
-        for have, dt in dict.fromkeys(kinds):
-            if not _is_smooth(i, have, building):
-                alike = [k for k, kind in enumerate(kinds) if kind == (have, dt)]
-                longest = max(len(measurements[k].time) for k in alike)
-                runs = [smoothed[k][i] for k in alike]
-                made[i, have, dt] = level_draws(longest, runs, dt, draws, seed + i)
     across = measured_across(measurements, building, device, draws, seed + building.size, looser)
     out = []
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
@@ -239,7 +230,7 @@ def responses(
                 levels[i], error = corrected(one, m.step, draws, seed + i)
                 errors.append(error)
             else:
-                errors.append(made[i, _instruments(one), m.step])
+                errors.append(level_draws(len(m.time), one, m.step, draws, seed + i))
         found = _response(m, levels, errors, _accelerations(m, building, levels))
         reasons = m.left_out(*m.channels)
         found = replace(

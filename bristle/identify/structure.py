@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from ..data.left_out import occurring
 from ..data.measurement import Measurement
@@ -41,6 +42,9 @@ base may be held there, and the force is then whatever holds it."""
 
 ANY_LAW = ""
 """The name of a damper's law that is sought: samples count that every law tells."""
+
+WHILE = 101
+"""Samples over which the motion's error is about as large, for a line."""
 
 BESIDE = 3
 """Samples on either side of such a one that are left out with it."""
@@ -133,6 +137,19 @@ class StructureProblem(Problem):
         if effects not in self._along:
             self._along[effects] = Along(list(effects), self.storey)
         return self._along[effects]
+
+    def _expected(self, model: Model, run: Run, draws: int) -> tuple[Array, Array, Array]:
+        bias, noise, spread = super()._expected(model, run, draws)
+        if model.law_class.site != "structure" or len(spread) < 2:
+            return bias, noise, spread
+        # A line shows the motion's error as it is: without bias, and about as large for a while.
+        # Of a dozen draws the mean of each sample is noise by itself, and so is its variance.
+        spread = spread * np.sqrt(len(spread) / (len(spread) - 1))
+        variance = uniform_filter1d(np.mean(spread**2, axis=0), WHILE)
+        steady = np.sqrt(run.noise**2 + variance)
+        if run.measured is not None:
+            steady = np.where(run.measured, steady, noise)
+        return np.zeros_like(bias), steady, spread
 
     def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force [N] at the samples of a run that count."""

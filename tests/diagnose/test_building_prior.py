@@ -40,7 +40,7 @@ def known(file, runs):
 
 def test_a_move_is_that_of_the_numbers():
     b = building(2, True, 6)
-    other = moved(b, np.array([1.0, -1.0, 0.0, 0.0, 2.0]))
+    other = moved(b, np.array([1.0, -1.0, 0.0, 0.0, 2.0, 0.0]))
     assert other.stiffnesses[0] == pytest.approx((1.0 + BENCH.stiffness_known) * b.stiffnesses[0])
     assert other.stiffnesses[1] == pytest.approx((1.0 - BENCH.stiffness_known) * b.stiffnesses[1])
     assert other.stiffnesses[2] == b.stiffnesses[2]
@@ -51,13 +51,13 @@ def test_a_move_is_that_of_the_numbers():
     assert np.allclose(K, K.T)
     assert K.sum() == pytest.approx(other.stiffnesses[0])  # moved as one, the first spring alone
     assert K[2, 2] == pytest.approx(file[2, 2])
-    assert moved(b, np.zeros(5)).K == b.K
+    assert moved(b, np.zeros(6)).K == b.K
 
 
 @pytest.mark.parametrize("off", [0.0, 1.0, -1.0])
 def test_stiffnesses_that_the_file_has_wrong_come_back(shaken, off):
     b, runs = shaken
-    file = moved(b, np.array([off, -0.7 * off, 0.0, 0.0, 0.0]))
+    file = moved(b, np.array([off, -0.7 * off, 0.0, 0.0, 0.0, 0.0]))
     found = known(file, runs)
     for mine, true in zip(found.stiffnesses[:2], b.stiffnesses[:2], strict=True):
         assert mine == pytest.approx(true, rel=0.004)
@@ -66,7 +66,7 @@ def test_stiffnesses_that_the_file_has_wrong_come_back(shaken, off):
 
 def test_what_is_farther_off_than_anybody_errs_stays(shaken):
     b, runs = shaken
-    file = moved(b, np.array([-8.0, 0.0, 0.0, 0.0, 0.0]))
+    file = moved(b, np.array([-8.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     found = known(file, runs)
     assert found.stiffnesses[0] / file.stiffnesses[0] == pytest.approx(
         1.0 + BENCH.farthest * BENCH.stiffness_known

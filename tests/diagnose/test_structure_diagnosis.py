@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
@@ -22,6 +24,7 @@ from bristle.errors import RecordError
 from bristle.identify.fit import Model
 from bristle.identify.response import responses
 from bristle.identify.structure import StructureProblem, problems_of
+from bristle.physics.effect import EFFECTS
 
 
 def duffing(x, v):
@@ -197,6 +200,56 @@ def test_findings_of_sites_become_one_verdict():
     found = conclude(both, About())
     assert (found.kind, found.coordinate) == ("unknown", "velocity")
     assert "Besides, the model misses duffing (layer)." in found.words
+
+
+def seen(site, kind, before, *effects):
+    """Return what a site shows, with z before."""
+    return Finding(site, kind, effects, before, 1.0, 1.0, 0.01, reasons=("Because.",))
+
+
+def test_what_is_found_is_named_whatever_a_quiet_site_does():
+    for kind, *effects in (("unknown",), ("insufficient",), ("effect", "base_friction")):
+        sites = {
+            "layer": seen("layer", kind, 1.17, *effects),
+            "damper": seen("damper", "effect", 6.28, "flattening"),
+        }
+        found = conclude(sites, About())
+        assert (found.kind, found.effects) == ("effect", ("flattening",))
+        assert "little beside what was found: Because." in found.words
+
+
+def test_a_loud_site_without_a_name_stays_unknown_beside_a_finding():
+    sites = {
+        "layer": seen("layer", "unknown", 2.0),
+        "damper": seen("damper", "effect", 3.0, "flattening"),
+    }
+    assert conclude(sites, About()).kind == "unknown"
+
+
+@pytest.mark.parametrize("name", ["fluid_inertia", "base_friction"])
+def test_an_ambiguous_verdict_has_two_names_that_can_be_added(name):
+    sites = {"damper": seen("damper", "effect", 7.41, name)}
+    found = conclude(sites, About(force="reconstructed"))
+    assert (found.kind, found.effects) == ("effect", (name,))
+    assert all(one not in EFFECTS for one in found.alternatives)
+    assert "a load cell at the damper would distinguish them" in found.words
+    twins = {"damper": seen("damper", "effect", 7.41, "gas_spring")}
+    both = conclude(twins, About(force="reconstructed"))
+    assert (both.kind, both.effects) == ("ambiguous", ("gas_spring", "duffing"))
+
+
+def test_each_run_has_the_noise_of_its_own_instruments():
+    b = building(2, True, 6)
+    runs = [measured(shake(b, 20 + i), i) for i in range(3)]
+    rng = np.random.default_rng(3)
+    loud = {
+        n: v + 3.0 * runs[0].noise.get(n, 0.0) * rng.standard_normal(len(v))
+        for n, v in runs[0].channels.items()
+    }
+    noise = {name: 3.0 * value for name, value in runs[0].noise.items()}
+    found = responses([replace(runs[0], channels=loud, noise=noise), *runs[1:]], b)
+    wide = [float(np.std(one.draws[1][:, :, 0])) for one in found]
+    assert wide[0] > 1.8 * wide[1]
 
 
 def test_missing_channels_are_named():

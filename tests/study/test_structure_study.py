@@ -94,6 +94,7 @@ def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
 def test_mass_of_the_base_is_a_rival_in_words_alone():
     damper = Finding("damper", "effect", ("fluid_inertia",), 2.0, 1.0, 1.0, float("nan"))
     found = conclude({"damper": damper}, About("reconstructed"))
-    assert (found.kind, found.effects) == ("ambiguous", ("fluid_inertia",))
+    assert (found.kind, found.effects) == ("effect", ("fluid_inertia",))
     assert all(name in EFFECTS for name in found.effects)
-    assert "a mass of the base that the file does not know" in found.words
+    assert found.alternatives == ("a mass of the base that the file does not know",)
+    assert "a load cell at the damper would distinguish them" in found.words
