@@ -5,11 +5,15 @@ with and without white noise: how many samples no error counts, besides those in
 settles.
 
 `fit`: each law on each measured set, by bristle's fit and by plain least squares.
+
+`buildings`: verdicts on buildings whose file and instruments are off, as far as they were made:
+`python -m benchmarks honest buildings --help` makes more.
 """
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +24,7 @@ from numpy.typing import NDArray
 import bristle
 from bristle.identify.prepare import prepare
 
-from . import _honest_fit
+from . import _honest_buildings, _honest_fit
 from ._motions import DATA as MOTIONS
 from ._rows import Row
 
@@ -50,7 +54,14 @@ class Record(NamedTuple):
 
 def run() -> list[Row]:
     """Return the figures of all sections."""
-    return [*left_out(), *_honest_fit.rows(DATA)]
+    return [*left_out(), *_honest_fit.rows(DATA), *_honest_buildings.run()]
+
+
+def main(given: Sequence[str]) -> int:
+    """Make cases of a section that has options of its own."""
+    if given[0] != "buildings":
+        raise SystemExit(f"honest: expected buildings, with --clean or --effect; found {given[0]}.")
+    return _honest_buildings.main(list(given[1:]))
 
 
 def left_out() -> list[Row]:
