@@ -70,7 +70,14 @@ def weighed(problem: Problem, searched: Callable[[Problem], Fit]) -> Fit:
     again, from_there = searched(problem), fit(problem, found.model)
     if again.cost <= from_there.cost:
         return again
-    return replace(from_there, starts=again.starts, agreed=again.agreed)
+    return _in_place_of(again, from_there)
+
+
+def _in_place_of(searched: Fit, other: Fit) -> Fit:
+    """Return a fit from one start with what the search knows besides: starts, what nothing moves."""
+    held = [name for name in searched.unidentified if name not in searched.std]
+    lost = tuple(dict.fromkeys((*held, *other.unidentified)))
+    return replace(other, starts=searched.starts, agreed=searched.agreed, unidentified=lost)
 
 
 def _fit_law(own: Model, train: Problem, count: int, also: Values) -> Fit:
@@ -92,7 +99,7 @@ def _fit_law(own: Model, train: Problem, count: int, also: Values) -> Fit:
         values = {**found.model.values, **known}
         other = fit(train, replace(found.model, values=values))
         if other.cost < found.cost:
-            found = replace(other, starts=found.starts, agreed=found.agreed)
+            found = _in_place_of(found, other)
     return found
 
 

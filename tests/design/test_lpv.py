@@ -180,7 +180,7 @@ def test_a_grid_beyond_the_dampers_data_is_refused() -> None:
 
 def test_a_damper_without_authority_is_refused() -> None:
     damper = Damper(values={"f_v": 0.0, "c_v": 0.0})
-    with pytest.raises(DesignError, match="voltage does not raise the force"):
+    with pytest.raises(DesignError, match="voltage has no effect on the force"):
         design(Task("lpv", damper=damper))
 
 

@@ -37,7 +37,7 @@ def known_with(other: Model, share: float) -> Known:
         problem = Problem([one])
         force, more = problem.predict(TRUE, one), problem.predict(other, one)
         force = force + share * (more - force) + 0.2 * rng.standard_normal(len(t))
-        runs.append(Run(**{**one.__dict__, "force": force}))
+        runs.append(replace(one, force=force))
     problem = Problem(runs)
     model = refine(TRUE, problem)
     return Known(problem, model, problem.expectation(model), 1500)

@@ -92,7 +92,8 @@ def test_what_cannot_be_set_or_read_is_answered() -> None:
     ]
     reference, room = (ctypes.c_uint32 * 1)(999), (ctypes.c_double * 2)()
     assert one.status("GetFloat64", reference, 1, room, 1) == ERROR
-    assert one.status("GetFloat64", (ctypes.c_uint32 * 1)(12), 1, room, 1) == ERROR
+    # An integer is read as the number that it is.
+    assert one.status("GetFloat64", (ctypes.c_uint32 * 1)(12), 1, room, 1) == WARNING
     assert one.status("GetFloat64", (ctypes.c_uint32 * 1)(4), 1, room, 2) == ERROR
     assert one.status("GetFloat32", reference, 0, (ctypes.c_float * 1)(), 0) == 0
     assert one.status("GetFloat32", reference, 1, (ctypes.c_float * 1)(), 1) == ERROR

@@ -810,7 +810,7 @@ def test_a_base_class_without_a_name_is_not_registered() -> None:
 
 def test_a_defined_effect_is_registered_and_found_by_site_and_law() -> None:
     try:
-        trial = define(laws=("bingham",))
+        trial = define(acts_on=("sign",))
         assert EFFECTS["trial"] is trial
         assert trial in effects_of("damper", "bingham")
         assert trial not in effects_of("damper", "lugre")

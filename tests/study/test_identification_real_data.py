@@ -42,7 +42,7 @@ def test_crank_driven_damper_needs_a_spring_beside_its_law():
     plain = identify(train, "lugre", holdout=held)
     spring = identify(train, "lugre", effects=("gas_spring",), holdout=held)
     assert spring.fit.model.values["gas_spring.preload"] == pytest.approx(130.0, abs=25.0)
-    assert spring.after["share_holdout"] < 0.22 < 0.35 < plain.after["share_holdout"]
+    assert spring.after["share_holdout"] < 0.22 < 0.34 < plain.after["share_holdout"]
     # Its README: mean dissipative force 85-108 N at 0 V, 653-794 N at 3.212 V (loop area over
     # path, viscous part included).
     values = spring.fit.model.values

@@ -85,7 +85,7 @@ def test_a_motion_is_known_by_its_shape() -> None:
         ('kind = "policy"\n[motions]\nrecords = 3', "list of names"),
         (f'kind = "policy"\n{SEEN}', "el_centro_1940_ns is trained on and"),
         (f'kind = "policy"\n{MOTIONS}[damper]\nv_max = 0.0', "nothing to control"),
-        (f'kind = "policy"\n{BRAKES}', "does not follow the voltage"),
+        (f'kind = "policy"\n{BRAKES}', "voltage has no effect on the force"),
         (f'kind = "policy"\nsample_period = 0.1\n{MOTIONS}', "too long for"),
     ],
 )
