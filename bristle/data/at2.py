@@ -24,7 +24,9 @@ _WHOLE = rf"([1-9][0-9]{{0,2}}(?:[,' ][0-9]{{3}})+(?![0-9.])|{_NUMBER[1:-1]})"
 """A count, which may have its thousands in groups: 1,200."""
 _SPELLED = r"(?:\s*[\[(]?\s*([A-Z][A-Z.]*))?"
 _COUNT = re.compile(rf"NPTS\s*[=:]?\s*{_WHOLE}", re.IGNORECASE)
-_STEP = re.compile(rf"\bDT\s*[=:]?\s*{_NUMBER}(?![0-9.]*(?:,|\s*/\s*)[0-9]){_SPELLED}", re.IGNORECASE)
+_STEP = re.compile(
+    rf"\bDT\s*[=:]?\s*{_NUMBER}(?![0-9.]*(?:,|\s*/\s*)[0-9]){_SPELLED}", re.IGNORECASE
+)
 """With its unit; not the first number of a fraction such as 1/200, or of a decimal comma."""
 _BOTH_BEFORE = re.compile(rf"^\s*{_WHOLE}\s+{_NUMBER}\s+NPTS\b.*\bDT\b{_SPELLED}", re.IGNORECASE)
 _SIGN_INSIDE = re.compile(r"(?<=[0-9.])(?=[-+])")
