@@ -18,13 +18,16 @@ from .titles import unit_or_none
 _TITLE_LINES = 10  # at most; four in the files of the database
 _SHORTEST = 1e-6  # s; times are rounded to a thousandth of it
 _LONGEST = 60.0  # s; what takes longer between two samples is no shaking
+_PLAIN = 1.0  # s; a longer step without a unit may be in ms
 _NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[ED][-+]?[0-9]+)?)"
 _WHOLE = rf"([1-9][0-9]{{0,2}}(?:[,' ][0-9]{{3}})+(?![0-9.])|{_NUMBER[1:-1]})"
 """A count, which may have its thousands in groups: 1,200."""
 _SPELLED = r"(?:\s*[\[(]?\s*([A-Z][A-Z.]*))?"
 _COUNT = re.compile(rf"NPTS\s*[=:]?\s*{_WHOLE}", re.IGNORECASE)
-_STEP = re.compile(rf"\bDT\s*[=:]?\s*{_NUMBER}(?![0-9.]*\s*/\s*[0-9]){_SPELLED}", re.IGNORECASE)
-"""With its unit; not the first number of a fraction such as 1/200."""
+_STEP = re.compile(
+    rf"\bDT\s*[=:]?\s*{_NUMBER}(?![0-9.]*(?:,|\s*/\s*)[0-9]){_SPELLED}", re.IGNORECASE
+)
+"""With its unit; not the first number of a fraction such as 1/200, or of a decimal comma."""
 _BOTH_BEFORE = re.compile(rf"^\s*{_WHOLE}\s+{_NUMBER}\s+NPTS\b.*\bDT\b{_SPELLED}", re.IGNORECASE)
 _SIGN_INSIDE = re.compile(r"(?<=[0-9.])(?=[-+])")
 """Where a column ends and the next begins, in rows of a fixed width that leaves no blank."""
@@ -115,6 +118,11 @@ def _count_and_step(row: str, name: str, line: int) -> tuple[int, float]:
     points = number(re.sub("[,' ]", "", whole.upper()).replace("D", "E"), name, line)
     spacing = number(fraction.upper().replace("D", "E"), name, line)
     spacing *= _seconds(spelled, f"{name}, line {line}")
+    if not spelled and _PLAIN < spacing <= _LONGEST:
+        raise PhysicsError(
+            f"{name}, line {line}: DT = {spacing:g} has no unit, and is long for one in s. "
+            "Write SEC or MSEC behind it."
+        )
     if points != int(points) or points < 1 or not _SHORTEST <= spacing <= _LONGEST:
         raise PhysicsError(
             f"{name}, line {line}: NPTS = {whole} and DT = {spacing:g} s. NPTS is a count, "

@@ -15,9 +15,10 @@ _SAME = 0.02  # share of its spread by which a raw signal may leave the line, by
 
 
 def is_electric(column: Column) -> bool:
-    """Return whether a column is in volts or amperes."""
-    return column.unit is not None and any(
-        same_dimension(column.unit.name, PLAIN[name]) for name in ("voltage", "current")
+    """Return whether a column is in volts or amperes, or in mV/V as of a bridge."""
+    unit = column.unit.name if column.unit else ""
+    return unit.endswith("V/V") or any(
+        same_dimension(unit, PLAIN[name]) for name in ("voltage", "current")
     )
 
 

@@ -29,6 +29,17 @@ def test_the_same_is_said_of_equal_sentences_alone():
     assert told("not UTF-8", "no velocity", "not UTF-8") == [
         "r0: not UTF-8 (the same in 1 other run)", "r1: no velocity",
     ]  # fmt: skip
+    noise = [
+        Finding("noise", "warning", text, run=f"r{k}", channel="force", value=value)
+        for k, (text, value) in enumerate([
+            ("noise of force: 2 N; a lower limit.", 0.01), ("noise of force: 3 N; slow.", 0.02),
+            ("noise of force: 900 N; slow.", 3.0),
+        ])
+    ]  # fmt: skip
+    assert [sentence(*one) for one in grouped(noise)] == [
+        "r0: noise of force: 2 N; a lower limit.",
+        "r2: noise of force: 900 N; slow. (3 to 900 N in 2 runs)",
+    ]
     units = [Finding("size", "warning", text, run=text) for text in ("900 N", "1.1 kN")]
     assert sentence(*grouped(units)[0]) == "900 N: 900 N (similar in 1 other run)"
 

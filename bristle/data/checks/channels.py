@@ -227,8 +227,8 @@ def _force_offset(run: Measurement, force: Array, velocity: Array) -> Iterator[F
         "offset",
         "warning" if abs(offset) > 0.1 * rms else "note",
         f"force at equal speeds to both sides has a mean of {plain(offset, 4)} N "
-        f"({plain(100 * offset / rms)} % of its RMS): the zero of the load cell, a preload, or an "
-        "asymmetric damper.",
+        f"({plain(100 * offset / rms)} % of its RMS about the mean): the zero of the load cell, "
+        "a preload, or an asymmetric damper.",
         "Note the load cell's reading without a damper; asymmetry shows only with it.",
         run.name,
         "force",

@@ -51,8 +51,9 @@ def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[Finding]]]:
     groups: dict[tuple[str, ...], list[Finding]] = defaultdict(list)
     for finding in findings:
         run = finding.run if finding.kind in _OF_ONE_RUN else ""
-        # Notes of a reader are of one kind whatever they say.
-        said = _NUMBER.sub("", finding.text) if finding.kind == "reading" else ""
+        # Notes of a reader are of one kind whatever they say, and a noise may be a lower limit in
+        # one run and too high in another: what lies 1000 times apart is not "similar".
+        said = _NUMBER.sub("", finding.text) if finding.kind in ("reading", "noise") else ""
         groups[finding.kind, finding.channel, run, said].append(finding)
     out = [(min(group, key=_worst_first), group) for group in groups.values()]
     return sorted(out, key=lambda pair: _ORDER[pair[0].level])

@@ -42,6 +42,19 @@ def test_a_step_in_another_unit_is_refused(tmp_path: Path, unit: str) -> None:
         at2(tmp_path, f"NPTS= 1200, DT= 100 {unit}")
 
 
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        ("10.0", r"line 4: DT = 10 has no unit.* Write SEC or MSEC"),
+        ("2,5 MSEC", r"line 4: .*2,5 MSEC.* does not give both NPTS and DT"),
+        ("12,5 MSEC", r"line 4: .*12,5 MSEC.* does not give both NPTS and DT"),
+    ],
+)
+def test_a_step_that_may_be_another_is_refused(tmp_path: Path, step: str, said: str) -> None:
+    with pytest.raises(RecordError, match=said):
+        at2(tmp_path, f"NPTS= 1200, DT= {step}")
+
+
 @pytest.mark.parametrize("end", ["\x1a", "\r\n\x1a\r\n", "\n" + 90 * "\x1a", "\x1a\0\0\0"])
 def test_the_byte_that_ends_a_text_of_dos(tmp_path: Path, end: str) -> None:
     assert len(at2(tmp_path, end=end).time) == 1200

@@ -48,6 +48,7 @@ def test_raw_volts_beside_each_calibrated_column(tmp_path, capsys) -> None:
     [
         ({"AI0 (V)": F / 200.0, "AI1 (V)": X / 10.0}, {}),
         ({"Temperature (V)": WARM / 25.0}, {"extra temperature_2": "Temperature (V)"}),
+        ({"Load cell (mV/V)": F / 300.0}, {}),
         ({"Druck [mA]": 4.0 + WARM / 7.0}, {"extra druck": "Druck [mA]"}),
         ({"AI0 (V)": F / 200.0, "Coil (V)": U}, {"voltage": "Coil (V) in V"}),
         ({"Öltemperatur [V]": WARM / 25.0, "Öltemperatur [°C]": WARM, "Strom [A]": U},
