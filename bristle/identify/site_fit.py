@@ -74,7 +74,7 @@ def weighed(problem: Problem, searched: Callable[[Problem], Fit]) -> Fit:
 
 
 def _in_place_of(searched: Fit, other: Fit) -> Fit:
-    """Return a fit from one start with what the search knows besides: starts, what nothing moves."""
+    """Return a fit from one start with the starts of a search and what it found to be silent."""
     held = [name for name in searched.unidentified if name not in searched.std]
     lost = tuple(dict.fromkeys((*held, *other.unidentified)))
     return replace(other, starts=searched.starts, agreed=searched.agreed, unidentified=lost)

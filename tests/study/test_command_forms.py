@@ -71,7 +71,9 @@ def test_the_rigs_form_is_found_with_intervals_that_hold(
     judged = {row.form: row.judged for row in found.forms}
     assert all(f">{form}</td>" in found._repr_html_() for form in judged)
     assert found.model.law == "bingham"
-    assert judged["quadratic"] < judged["table"] < 0.5 * judged["linear"]
+    # All hold the velocity's noise about the turns of a sign law; what a form adds tells them.
+    noise, table, linear = (judged[n] ** 2 for n in ("quadratic", "table", "linear"))
+    assert 0.0 < table - noise < 0.2 * (linear - noise)
     bent = bristle.identify(rig[0], "bingham", holdout=rig[1], command="quadratic")
     assert bent.after["z_holdout"] < 1.15
     assert not bent.unidentified

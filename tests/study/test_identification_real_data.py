@@ -50,7 +50,7 @@ def test_crank_driven_damper_needs_a_spring_beside_its_law():
         (values["sigma_a"] + V * values["sigma_0"]) / values["a_0"] for V in (0.0, 3.212)
     )
     assert 20.0 < at_rest < 108.0
-    assert 250.0 < at_top < 794.0
+    assert 200.0 < at_top < 794.0  # the viscous part carries the rest
     # It is not the whole truth, and says so.
     assert spring.after["z_holdout"] > 1.15
     assert any("exceeds the noise" in note for note in spring.notes)
