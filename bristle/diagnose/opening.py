@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..data.cut_off import ends_of
 from ..data.derived import derived_velocity
 from ..data.left_out import WAYS_OUT
 from ..data.measurement import Measurement
@@ -332,9 +333,12 @@ def _lacking(
     out += [fault.words for fault in faults if fault.fault == "unrelated"]
     cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
     if cut:
-        share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))
+        # Of each run at its own ends: ranges may differ between runs.
+        able = [run for run in runs if run.has("force")]
+        count = sum(np.count_nonzero(np.isin(run["force"], ends_of(run, "force"))) for run in able)
+        share = count / len(force)
         if share > rule.cut:
-            count, there = round(share * len(force)), _where(runs, cut[0].runs)
+            there = _where(runs, cut[0].runs)
             out.append(
                 f"The force is saturated in {count:,} of {len(force):,} samples ({share:.0%}) "
                 f"{there}; {rule.cut:.0%} is the most. Measure with a wider range, or leave these "
