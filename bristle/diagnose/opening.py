@@ -334,14 +334,15 @@ def _lacking(
     cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
     if cut:
         # Of each run at its own ends: ranges may differ between runs.
-        able = [run for run in runs if run.has("force")]
-        count = sum(np.count_nonzero(np.isin(run["force"], ends_of(run, "force"))) for run in able)
+        there = [run for run in runs if run.has("force")]
+        at_ends = [np.isin(run["force"], ends_of(run, "force")) for run in there]
+        count = sum(int(np.count_nonzero(one)) for one in at_ends)
         share = count / len(force)
         if share > rule.cut:
-            there = _where(runs, cut[0].runs)
+            where = _where(runs, cut[0].runs)
             out.append(
                 f"The force is saturated in {count:,} of {len(force):,} samples ({share:.0%}) "
-                f"{there}; {rule.cut:.0%} is the most. Measure with a wider range, or leave these "
+                f"{where}; {rule.cut:.0%} is the most. Measure with a wider range, or leave these "
                 "runs out."
             )
     return out

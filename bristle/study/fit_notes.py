@@ -7,6 +7,7 @@ import numpy as np
 from ..data.checks.clipping import saturated_share
 from ..data.measurement import Measurement
 from ..data.model import StudyModel
+from ..errors import StudyError
 from ..identify.begin import under_load_text
 from ..identify.error import ForceError
 from ..identify.residuals import robust_z
@@ -17,13 +18,26 @@ from .identified import Identified
 
 _MISFIT = 1.15  # z above which an error is more than noise
 _LESS = 0.95  # share of the model's error below which what least squares leave is told
+_SATURATED = 0.95  # share of samples at the extremes of a force above which it tells nothing else
 
 
 def doubts(runs: list[Measurement]) -> list[str]:
-    """Return the sentences on what weakens an identification."""
+    """Refuse a force that is nothing but its ends; return what weakens an identification.
+
+    Raises
+    ------
+    StudyError
+        If nearly all samples of a force are at its extremes.
+    """
     notes = []
     for run in runs:
         share = saturated_share(run["force"])
+        if share > _SATURATED:
+            raise StudyError(
+                f"{run.name}: {share:.0%} of the force's samples are at its extremes: the load "
+                "cell or its amplifier is saturated. Measure with a wider range, or leave the run "
+                "out in study.toml."
+            )
         if share > 0.0:
             notes.append(f"{run.name}: {share:.1%} of the force's samples are at its extremes.")
     doubtful: dict[str, int] = {}
