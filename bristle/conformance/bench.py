@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..findings import listed
 from ..fmu.archive import library_member
 from ..fmu.description import Value, Variable
 from .native import DISCARD, OK, STATUS, WARNING, BlackBox, Instance, Library
@@ -216,8 +217,7 @@ def not_finite(variables: Sequence[Variable], values: Values) -> list[str]:
 
 def some(names: Sequence[Any], most: int = 3) -> str:
     """Return the first few of many names, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(str(name) for name in names[:most]) + more
+    return listed(map(str, names), most)
 
 
 def _same(a: Value, b: Value, less: float) -> bool:

@@ -93,7 +93,8 @@ def without_cut_off(runs: Sequence[Measurement]) -> tuple[list[Measurement], tup
             if cut.any():
                 out[k] = replace(run, saturated=merged(run.saturated, channel, cut))
                 unit = channel_unit(channel)
-                at = " and ".join(quantity(end, unit, 4) for end in outermost(ends))
+                own = outermost(ends_of(run, channel) or ends)  # ranges may differ between runs
+                at = " and ".join(quantity(end, unit, 4) for end in own)
                 notes.append(
                     f"{run.name}: {channel} is cut off at {at}; the "
                     f"{100.0 * float(cut.mean()):.2g} % of its samples there are not judged."

@@ -22,6 +22,9 @@ MAX_FILLED = 3
 _TOLERATED = 0.02  # share of the step by which a time may be off before all is resampled
 _MOVED = 0.02  # share of samples that may be off by more before all are interpolated
 
+LOST = "lie in no piece"
+"""How a note says that samples are not read at all, for too many are missing around them."""
+
 
 @dataclass(frozen=True)
 class Sampling:
@@ -111,9 +114,7 @@ def evenly(
     filled = sum(int((~good).sum()) for _, _, good in pieces)
     lost = len(time) - (kept - filled)
     if lost > 0 and len(pieces) + len(breaks) > 1:
-        notes.append(
-            f"{lost} of {len(time)} samples lie in no piece of {SHORTEST} and are left out"
-        )
+        notes.append(f"{lost:,} of {len(time):,} samples {LOST} of {SHORTEST} and are left out")
     if filled:
         notes.append(
             f"{filled} samples ({100.0 * filled / kept:.2g} %) were missing, at most {MAX_FILLED} "

@@ -90,13 +90,13 @@ def diagnose_rig(
         runs = BenchRuns(train, holdout, present, identified, say)
     else:
         runs = BuildingRuns(train, holdout, present, building, say)
+        if runs.lacking is not None:
+            return _insufficient(runs.lacking)
     findings = look_at_lines(runs, say, profile=profile)
     runs.correct(findings)
     opened = runs.open_damper()
     if isinstance(opened, Insufficient):
-        return Diagnosis(
-            "insufficient", (), opened.reasons, sensors=opened.faults, noise=opened.noise
-        )
+        return _insufficient(opened)
     if opened is not None:
         found, opened = look_at_damper(opened, say)
         if isinstance(runs, BuildingRuns) and runs.suited_to(found):
@@ -111,6 +111,10 @@ def diagnose_rig(
             runs.beside_other_laws(settled, opened), opened, profile=profile
         )
     return conclude(findings, runs.about())
+
+
+def _insufficient(why: Insufficient) -> Diagnosis:
+    return Diagnosis("insufficient", (), why.reasons, sensors=why.faults, noise=why.noise)
 
 
 def look_at_lines(

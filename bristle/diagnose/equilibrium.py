@@ -28,7 +28,7 @@ from .damper import excused_by_sensor, left_by_filter
 from .finding import Finding
 from .load_cell import load_cell
 from .masses import Shaken, suited_masses, text_of_masses
-from .opening import IN_BUILDING, Opening, Progress, median_noise
+from .opening import IN_BUILDING, Opening, Progress, lacking_in_building, median_noise
 from .rule import BENCH, INSIDE, RECONSTRUCTED, SITE, DecisionRule
 from .sites import present_at, shortened
 from .verdict import late_values
@@ -54,6 +54,10 @@ class BuildingRuns:
     present : the model as it is, with the effects of all sites
     building : its masses are taken as known
     free : whether the damper's law is sought: then those samples count that every law tells
+
+    Attributes
+    ----------
+    lacking : why the runs carry no verdict, None where they do
     """
 
     def __init__(
@@ -72,6 +76,7 @@ class BuildingRuns:
         self._sensors = tuple(faults_in_building([*train, *holdout], building))
         right = [without_faults(list(runs), self._sensors, building) for runs in (train, holdout)]
         self._noise = median_noise([*right[0], *right[1]])
+        self.lacking = lacking_in_building([*train, *holdout], right, self._sensors, self._noise)
         self._velocities = moves_measured([*right[0], *right[1]], building)
         say("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)

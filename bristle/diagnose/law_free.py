@@ -60,8 +60,10 @@ def diagnose_laws(
     """
     if building is not None:
         runs = BuildingRuns(train, holdout, present, building, say, free=True)
-        return _in_building(runs, tells_a_bend(train), (named, profile), say, rule)
-    data = bench_data(train, holdout, present, say)
+        if runs.lacking is None:
+            return _in_building(runs, tells_a_bend(train), (named, profile), say, rule)
+    lacking = None if building is None else runs.lacking
+    data = lacking or bench_data(train, holdout, present, say)
     if isinstance(data, Insufficient):
         return Diagnosis("insufficient", (), data.reasons, sensors=data.faults, noise=data.noise)
     say("trying every law")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..data.cut_off import ends_of
 from ..data.derived import derived_velocity
 from ..data.left_out import WAYS_OUT
 from ..data.measurement import Measurement
@@ -283,6 +284,28 @@ def _too_few(role: str, runs: Sequence[Measurement]) -> str:
     )
 
 
+def lacking_in_building(
+    recorded: Sequence[Measurement],
+    right: Sequence[Sequence[Measurement]],
+    faults: tuple[SensorFault, ...],
+    noise: Mapping[str, float],
+) -> Insufficient | None:
+    """Return why a building's runs carry no verdict: too little of the damper's force is left.
+
+    Parameters
+    ----------
+    recorded : all runs, as they were measured
+    right : those for training and those held out, freed of faults
+    faults, noise : what was found of the channels
+    """
+    reasons = _saturated(recorded, faults)
+    for role, runs in zip(("for training", "held out"), right, strict=True):
+        force = [replace(r, channels={"force": r["force"]}) for r in runs if r.has("force")]
+        if force and not _left(force):
+            reasons.append(_too_few(role, force))
+    return Insufficient((*reasons, *words_of(faults)), faults, noise) if reasons else None
+
+
 def _where(runs: Sequence[Measurement], names: Sequence[str] = ()) -> str:
     """Return which runs something is in, by name or all, and how many samples they have."""
     own = [run for run in runs if run.name in names] or list(runs)
@@ -330,14 +353,25 @@ def _lacking(
                 "Look at its column:  bristle study channels ; or measure with motion."
             )
     out += [fault.words for fault in faults if fault.fault == "unrelated"]
+    return [*out, *_saturated(runs, faults, rule)]
+
+
+def _saturated(
+    runs: Sequence[Measurement], faults: Sequence[SensorFault], rule: DecisionRule = BENCH
+) -> list[str]:
+    """Return that the force is too often at the ends of its range, in a sentence."""
     cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
-    if cut:
-        share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))
-        if share > rule.cut:
-            count, there = round(share * len(force)), _where(runs, cut[0].runs)
-            out.append(
-                f"The force is saturated in {count:,} of {len(force):,} samples ({share:.0%}) "
-                f"{there}; {rule.cut:.0%} is the most. Measure with a wider range, or leave these "
-                "runs out."
-            )
-    return out
+    there = [run for run in runs if run.has("force")]
+    total = sum(len(run.time) for run in there)
+    if not cut:
+        return []
+    # Of each run at its own ends: ranges may differ between runs.
+    at_ends = [np.isin(run["force"], ends_of(run, "force")) for run in there]
+    count = sum(int(np.count_nonzero(one)) for one in at_ends)
+    if count <= rule.cut * total:
+        return []
+    return [
+        f"The force is saturated in {count:,} of {total:,} samples ({count / total:.0%}) "
+        f"{_where(runs, cut[0].runs)}; {rule.cut:.0%} is the most. Measure with a wider range, or "
+        "leave these runs out."
+    ]

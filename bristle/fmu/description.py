@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import FmuError
+from ..findings import listed
 from ..units import Measure
 from . import description_fmi3
 from .archive import (
@@ -110,12 +111,12 @@ def describe(root: ElementTree.Element) -> Description:
         for child in simple
     }
     units = units_of(root)
-    listed = [_variable(e, types, units) for e in root.iterfind("ModelVariables/ScalarVariable")]
-    variables = {v.name: v for v in listed}
-    if len(variables) != len(listed):
-        twice = sorted(n for n, times in Counter(v.name for v in listed).items() if times > 1)
-        raise FmuError(f"variables defined twice: {', '.join(twice)}.")
-    _add_dependencies(root, listed, variables)
+    every = [_variable(e, types, units) for e in root.iterfind("ModelVariables/ScalarVariable")]
+    variables = {v.name: v for v in every}
+    if len(variables) != len(every):
+        twice = sorted(n for n, times in Counter(v.name for v in every).items() if times > 1)
+        raise FmuError(f"variables defined twice: {listed(twice)}.")
+    _add_dependencies(root, every, variables)
     _mark_optional(root, variables)
     check_jumps(variables)
     return Description(
@@ -194,25 +195,25 @@ def _annotation(element: ElementTree.Element, tag: str) -> str | None:
 
 
 def _add_dependencies(
-    root: ElementTree.Element, listed: list[Variable], variables: dict[str, Variable]
+    root: ElementTree.Element, every: list[Variable], variables: dict[str, Variable]
 ) -> None:
     for unknown in root.iterfind("ModelStructure/Outputs/Unknown"):
-        output = _indexed(listed, unknown.get("index"))
+        output = _indexed(every, unknown.get("index"))
         text = unknown.get("dependencies")
         if text is None:
             continue
-        causes = [_indexed(listed, index) for index in text.split()]
+        causes = [_indexed(every, index) for index in text.split()]
         names = tuple(v.name for v in causes if v.causality == "input")
         variables[output.name] = replace(variables[output.name], dependencies=names)
 
 
-def _indexed(listed: list[Variable], text: str | None) -> Variable:
+def _indexed(every: list[Variable], text: str | None) -> Variable:
     number = unsigned(text)
-    if number is None or not 1 <= number <= len(listed):
+    if number is None or not 1 <= number <= len(every):
         raise FmuError(
-            f"ModelStructure names variable {text!r}; the variables are 1 to {len(listed)}."
+            f"ModelStructure names variable {text!r}; the variables are 1 to {len(every)}."
         )
-    return listed[number - 1]
+    return every[number - 1]
 
 
 def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:

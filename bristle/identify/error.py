@@ -257,6 +257,7 @@ def _mean(counts: Sequence[int], sizes: Sequence[float]) -> float:
     return sqrt(sum(n * size**2 for n, size in known) / whole) if whole else nan
 
 
+@np.errstate(over="ignore")  # what is not finite is told by who reads the error
 def _rms(values: Array) -> float:
     if not len(values):
         return nan

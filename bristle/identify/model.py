@@ -390,6 +390,7 @@ class Problem:
         """
         return [self._expected(model, run, draws) for run in self.runs]
 
+    @np.errstate(over="ignore", invalid="ignore")  # of a force that is not finite nothing is
     def _expected(self, model: Model, run: Run, draws: int) -> tuple[Array, Array, Array]:
         middle = self.predict(model, run)
         spread = np.array(

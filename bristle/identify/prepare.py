@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -93,15 +95,24 @@ def _noise_of_force(measurement: Measurement) -> float:
     return max(noise, 1e-6 * float(np.std(measurement["force"])))
 
 
+def refuse_short(measurement: Measurement) -> None:
+    """Refuse a run, or a piece between gaps, of fewer than `SHORTEST` samples."""
+    if len(measurement.time) < SHORTEST:
+        raise RecordError(
+            f"{measurement.name}: {len(measurement.time)} samples; a fit needs {SHORTEST} or more "
+            "without a gap. Record longer runs without gaps, or leave this one out with  bristle "
+            f'study roles STUDY --exclude "{Path(measurement.source).name or measurement.name}"'
+        )
+
+
 def _refuse(measurement: Measurement) -> None:
     """Refuse a run that no model can be held against."""
-    name, n = measurement.name, len(measurement.time)
+    name = measurement.name
     if not measurement.has("force"):
         raise RecordError(f"{name}: no force was measured; a bench run needs one.")
     if not (measurement.has("displacement") or measurement.has("velocity")):
         raise RecordError(f"{name}: neither displacement nor velocity was measured.")
-    if n < SHORTEST:
-        raise RecordError(f"{name}: {n} samples; a fit needs {SHORTEST} or more.")
+    refuse_short(measurement)
     for channel in ("force", "displacement", "velocity"):
         if not measurement.has(channel):
             continue

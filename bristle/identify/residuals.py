@@ -128,6 +128,7 @@ def told_z(problem: Problem, model: Model) -> float:
     return robust_z(problem, model) if problem.noise_known else float("nan")
 
 
+@np.errstate(invalid="ignore")  # of a force that is not finite nothing is
 def in_noises(problem: Problem, r: Array, expected: Expected) -> Array:
     """Return normalised residuals (n,) over the noise alone, without the problem's excess.
 

@@ -29,7 +29,7 @@ from .anchored import SLOW, Load, anchored, deflected
 from .device_motion import DeviceMotion, measured_across
 from .drive import smooth_steps
 from .level import corrected, level_draws, smoothed_level
-from .prepare import SHORTEST
+from .prepare import refuse_short
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -158,10 +158,7 @@ def check_channels(measurement: Measurement, building: Building) -> None:
             f"levels {', '.join(levels)}. Give the building.toml of the structure that was tested."
         )
     _refuse_unmeasured(measurement, building)
-    if len(measurement.time) < SHORTEST:
-        raise RecordError(
-            f"{measurement.name}: {len(measurement.time)} samples; a fit needs {SHORTEST} or more."
-        )
+    refuse_short(measurement)
 
 
 def _refuse_unmeasured(measurement: Measurement, building: Building) -> None:

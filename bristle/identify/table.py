@@ -243,6 +243,7 @@ def error_rms(problem: Problem, model: Model, cutoff: float = CUTOFF) -> float:
     return _rms([error[run.judged] for error, run in pairs])
 
 
+@np.errstate(over="ignore")  # the error of a law that is not finite on a run is none
 def _rms(parts: list[Array]) -> float:
     whole = np.concatenate(parts)
     return float(np.sqrt(np.mean(whole * whole))) if len(whole) else float("nan")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..errors import UnitError
-from ..findings import Findings, nearest, number, unknown, written
+from ..findings import Findings, listed, nearest, number, unknown, written
 from ..fmu.description import Variable
 from ..fmu.variables import passes
 from ..lines import KeyPath
@@ -190,10 +190,9 @@ def _wrong_end(end: str, part: Part, variable: Variable, wanted: str) -> str:
             f"{part.name}."
         )
     place = "left" if wanted == "input" else "right"
-    listed = ", ".join(names) if names else "none"
     return (
         f'"{end}" is {kind}; {_ARTICLE[wanted]} belongs on the {place} of "=". '
-        f"{part.fmu} has: {listed}."
+        f"{part.fmu} has: {listed(names) or 'none'}."
     )
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import RunError, not_usable
-from ..findings import written
+from ..findings import LINES, command, written
 from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
 from ..progress import Progress, listening, tell
@@ -171,8 +171,13 @@ def execute(
             raise not_usable(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}.')
         ensure = ensure_of(fmus, engine)
         scenario = loaded_with(scenario, overrides)
-        for line in scenario.remarks():
+        remarks = scenario.remarks()
+        for line in remarks[: LINES - 1]:
             output.show(line)
+        if len(remarks) >= LINES:
+            name = scenario.package
+            again = command("import-ssp", name) if name else command("check", scenario.file)
+            output.show(f"and {len(remarks) - LINES + 1} more; all:  {again}")
         job = _Job(scenario, engine, output, ensure)
         if engine == "compiled":
             if coupling_error:

@@ -18,16 +18,16 @@ from .identified import Identified
 
 _MISFIT = 1.15  # z above which an error is more than noise
 _LESS = 0.95  # share of the model's error below which what least squares leave is told
-_SATURATED = 0.05  # share of samples at one and the same extreme of the force
+_SATURATED = 0.95  # share of samples at the extremes of a force above which it tells nothing else
 
 
 def doubts(runs: list[Measurement]) -> list[str]:
-    """Refuse a saturated force; return the sentences on what weakens an identification.
+    """Refuse a force that is nothing but its ends; return what weakens an identification.
 
     Raises
     ------
     StudyError
-        If too many samples of a force are at its extremes.
+        If nearly all samples of a force are at its extremes.
     """
     notes = []
     for run in runs:

@@ -13,9 +13,10 @@ from ..data.channels import DRIVE, PLAIN
 from ..data.formats.delimited import decoded
 from ..data.labels import UNITS, Label, label_text
 from ..data.titles import title, unit_or_none
-from ..data.tone import Tone, label_doubt
+from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubt
 from ..errors import RecordError, StudyError, UnitError
 from ..findings import listed
+from ..quantity import quantity
 from ..units import convert
 from .file_names import (
     DOUBTFUL,
@@ -124,7 +125,10 @@ def facts_of(
         )
     if len(asked) > 1:
         raise StudyError(f"{' and '.join(sorted(asked))} both as levels; one command is right.")
-    return found, [*notes, *_doubted(files, found, tones)]
+    doubts = _doubted(files, found, tones)
+    if not doubts and choices.table is None:
+        doubts = _told_twice(files, tones, reading)
+    return found, [*notes, *doubts]
 
 
 def _doubted(
@@ -144,6 +148,36 @@ def _doubted(
         f"{name}: {text}{more}: what the names say is doubtful, the level of a command as well. "
         "--runs FILE, a table with a row per file, says it"
     ]
+
+
+def _told_twice(files: Sequence[Path], tones: Sequence[Tone | None], reading: Reading) -> list[str]:
+    """Return that two names differ in how numbers are written alone, and their motions differ."""
+    first: dict[str, tuple[Path, Tone]] = {}
+    for file, tone in zip(files, tones, strict=True):
+        tokens = tokens_of(file, reading)
+        if tone is None or not tokens:
+            continue
+        key = file.stem
+        for name, token in tokens.items():
+            key = key.replace(token.text, f"<{name} {token.value:g}>")
+        other, motion = first.setdefault(key, (file, tone))
+        if other.stem == file.stem or (
+            frequency_fits(motion.frequency, tone) and amplitude_fits(motion.amplitude, tone)
+        ):
+            continue
+        one, two = (
+            f"{quantity(each.frequency, 'Hz', 3)}, {quantity(each.amplitude, 'm', 3, fine=True)}"
+            for each in (motion, tone)
+        )
+        told = ", ".join(
+            label_text(name, token.value, PLAIN.get(name, "")) for name, token in tokens.items()
+        )
+        return [
+            f"{other.name} and {file.name} tell the same, {told}, and their motions differ ({one} "
+            f"and {two}): what one of the names says is doubtful. --runs FILE, a table with a row "
+            "per file, says it"
+        ]
+    return []
 
 
 def _levels_found(rows: Sequence[Facts], pattern: str) -> str:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data.measurement import Measurement
+from ..data.left_out import MISSING, WAYS_OUT
+from ..data.measurement import Measurement, stem_of
+from ..data.sampling import LOST
 from ..errors import StudyError
 from ..findings import command
 from ..identify.prepare import SHORTEST
@@ -34,13 +36,14 @@ class Runs:
 
 
 def usable(pieces: list[Measurement]) -> tuple[list[Measurement], tuple[str, ...]]:
-    """Return the pieces that a model can be held against, and which ones are left out, and why.
+    """Return the pieces that a model can be held against, and what is left out, and why.
 
     Missing values cut a file into pieces, and one may be short or hold a rest only: that is no
     reason to refuse the file. A file in one piece, or with no piece that is of use, stays whole,
     to be refused by what needs more of it.
     """
     kept, left = [], []
+    way_out = WAYS_OUT[MISSING].capitalize()
     for piece in pieces:
         of_file = [one for one in pieces if one.source == piece.source]
         reason = _idle(piece)
@@ -48,7 +51,11 @@ def usable(pieces: list[Measurement]) -> tuple[list[Measurement], tuple[str, ...
             kept.append(piece)
         else:
             left.append(f"{piece.name} is left out: {reason}.")
-    return kept, tuple(left)
+    lost = {
+        f"{stem_of(piece.source)}: {note}. {way_out}."
+        for piece in pieces for note in piece.notes if LOST in note
+    }  # fmt: skip
+    return kept, (*sorted(lost), *left)
 
 
 def _idle(piece: Measurement) -> str:

@@ -81,10 +81,14 @@ def on_one_time(series: Sequence[Series], name: str) -> Joined:
     kept = (chosen.time >= begin - slack) & (chosen.time <= end + slack)
     if int(kept.sum()) < SHORTEST:
         where = "; ".join(_where(one) for one in series[:4])
+        few = (
+            f"overlap in time by {kept.sum()} samples alone"
+            if kept.any()
+            else "do not overlap in time"
+        )
         raise RecordError(
-            f"{name}: its channels do not overlap in time: {where}. A measurement needs "
-            f"{SHORTEST} samples that all of them have: save what was recorded together in one "
-            "file."
+            f"{name}: its channels {few}: {where}. A measurement needs {SHORTEST} samples that all "
+            "of them have: save what was recorded together in one file."
         )
     time = chosen.time[kept]
     data: dict[str, AnyArray] = {}
