@@ -91,8 +91,9 @@ class Proof:
         )
         if self.part < 1.0 and self.expected is not None:
             out.append(f"Over the same part the model has {self.expected.text()}.")
-        if self.raw is not None:
-            out.append(f"Fed with the measured columns as they are: {self.raw.text()}.")
+        if self.raw is None:
+            return [*out, "It was not fed with measured columns: none is the motion of the damper."]
+        out.append(f"Fed with the measured columns as they are: {self.raw.text()}.")
         return out
 
     def as_dict(self) -> dict[str, Any]:
@@ -109,7 +110,8 @@ class HeldOut(NamedTuple):
     """The damper of a model and the runs that it is held against.
 
     `runs` have all their samples; `fed` is what the damper is given of each; `zero` [N] that of the
-    load cell; `raw` the measured columns that a user would feed, by input, None where one lacks.
+    load cell; `raw` the measured columns that a user would feed, by input, where the fit's serve
+    for an input that was not measured; None where no motion of the damper was.
     """
 
     damper: StudyModel
@@ -121,8 +123,8 @@ class HeldOut(NamedTuple):
     raw: Sequence[dict[str, Array] | None]
     training: bool
 
-    def force(self, k: int, moments: Moments, fed: Fed) -> Array:
-        """Return the force (m,) [N] of the damper at moments of run k."""
+    def force(self, moments: Moments, fed: Fed) -> Array:
+        """Return the force (m,) [N] of the damper at the moments of a run."""
         return self.problem.bench(self.model).force(*moments, fed.values, fed.tracks)
 
     def shown(self, k: int, force: Array) -> Array:
@@ -134,7 +136,7 @@ class HeldOut(NamedTuple):
         """Return the error of the model on the runs, or on the first `samples` of each."""
         found = []
         for k, run in enumerate(self.runs):
-            force = self.shown(k, self.force(k, self.fed[k].moments, self.fed[k]))
+            force = self.shown(k, self.force(self.fed[k].moments, self.fed[k]))
             found.append(error_on(*_first(run, force, samples[k] if samples else len(run.force))))
         return pooled(found)
 
@@ -181,7 +183,7 @@ def step_for(held: HeldOut) -> float:
     while dt / n >= 2.0 * FINEST:
         late = []
         for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
-            force = held.force(k, *_dense(fed, n))
+            force = held.force(*_dense(fed, n))
             force = np.concatenate([force[:1], force[:-1]])[::n]
             late.append(error_on(run, held.shown(k, force)))
         if agree(pooled(late), told, 0.5):
@@ -223,7 +225,7 @@ def write_inputs(held: HeldOut, step: float, folder: Path) -> list[Path]:
         time = fed.moments.dt * rows / per
         files.append(_table(folder / f"{run.name}_inputs.csv", {"time [s]": time, **columns}))
         out = np.any([np.zeros(len(run.force), bool), *reasons_of(run).values()], axis=0)
-        predicted = held.shown(k, held.force(k, fed.moments, fed))
+        predicted = held.shown(k, held.force(fed.moments, fed))
         force = {
             "time [s]": run.dt * np.arange(len(run.force)), "force [N]": run.force,
             "model_force [N]": predicted, "counts": (~out).astype(float),
