@@ -9,7 +9,7 @@ from typing import Any
 from pictures import picture
 from tables import formula, span, table, unit
 
-from bristle.cli.effects import tell
+from bristle.cli.list_ import effect_as_dict
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import DEFAULT, LAWS, Law, law_names, laws_of
@@ -24,7 +24,7 @@ def picture_of(name: str) -> tuple[bytes, str, float] | None:
 def effect_page(name: str) -> str:
     """Return the page of an effect: formula, parameters, what its absence looks like, source."""
     effect = EFFECTS[name]
-    told = tell(effect)
+    told = effect_as_dict(effect)
     site = {"damper": "a damper", "sensor": "a sensor"}.get(effect.site, f"the {effect.site}")
     laws = f" Joins the laws {' and '.join(told['laws'])}." if told["laws"] else ""
     parts = [f"# {name}", told["about"], formula(told["text"])]
@@ -62,7 +62,9 @@ def law_page(law: type[Law]) -> str:
     if law.variants:
         names = ", ".join(f"`{law.name}_{suffix}`" for suffix in law.variants)
         parts.append(f"Variants: {names}.")
-    joining = [name for name in sorted(EFFECTS) if law.name in tell(EFFECTS[name])["laws"]]
+    joining = [
+        name for name in sorted(EFFECTS) if law.name in effect_as_dict(EFFECTS[name])["laws"]
+    ]
     links = ", ".join(f"[{name}](../effects/{name}.md)" for name in joining)
     parts += ["## Effects that join it", f"{links}."]
     parts += ["## Source", f"{law.source}."]
@@ -78,7 +80,7 @@ def effect_index() -> str:
     ]
     return (
         "# Effects\n\nPhysics beyond the base laws, each in one file and switched on by a "
-        "parameter; `bristle effects` prints the same. [Write your own](../own_effect.md).\n\n"
+        "parameter; `bristle list effects` prints the same. [Write your own](../own_effect.md).\n\n"
         + table(["effect", "site", "what it does", "when it is missing"], rows)
     )
 

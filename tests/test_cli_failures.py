@@ -216,10 +216,10 @@ def test_a_file_may_follow_an_option(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["laws", "new", "--json", "my_law"]) == 0
+    assert main(["new", "law", "--json", "my_law"]) == 0
     assert (tmp_path / "my_law.py").is_file()
     with pytest.raises(SystemExit):
-        main(["laws", "new", "--json", "my_law", "other"])
+        main(["new", "law", "--json", "my_law", "other"])
     assert "unrecognized arguments: my_law other" in capsys.readouterr().err
 
 

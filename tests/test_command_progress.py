@@ -27,8 +27,7 @@ needs_terminal = pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-te
 OWN_MESSAGE = {"run", "ensemble"}
 """Commands that tell themselves how much they kept."""
 SHORT = {
-    "check", "components", "effects", "example", "import-ssp", "laws", "list", "page", "scenarios",
-    "study", "undo",
+    "check", "example", "import-ssp", "list", "new", "page", "study", "undo",
 }  # fmt: skip
 """Commands that are done in a moment, wait for the user, or have actions that are told apart."""
 

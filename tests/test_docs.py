@@ -16,7 +16,7 @@ import pytest
 import bristle
 from benchmarks.paper.figures import paper_figures
 from bristle.cli import build_parser
-from bristle.cli.effects import tell
+from bristle.cli.list_ import effect_as_dict
 from bristle.data.equation import formulas
 from bristle.draw.mathml import formula_html
 from bristle.fmu import catalogue
@@ -140,7 +140,7 @@ def test_every_effect_has_a_page_with_text_parameters_and_source() -> None:
         assert effect.first_line() in text
         assert effect.source in text
         assert effect.expect[1:] in text
-        body = tell(effect)["text"]
+        body = effect_as_dict(effect)["text"]
         assert len(body) > 60
         prose = [line for line in body.splitlines() if line and not line.startswith("    ")]
         assert all(line in text for line in prose)

@@ -1,4 +1,4 @@
-"""`bristle effects`: everything about every effect, from the code."""
+"""`bristle list effects`: everything about every effect, from the code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bristle.quantity import typed
 
 
 def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert main(["effects", *arguments]) == 0
+    assert main(["list", "effects", *arguments]) == 0
     return capsys.readouterr().out
 
 
@@ -60,5 +60,5 @@ def test_on_a_terminal_there_is_a_table(
 def test_an_unknown_effect_is_an_error_that_names_the_nearest(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["effects", "gas_sprin"]) == 2
+    assert main(["list", "effects", "gas_sprin"]) == 2
     assert 'Did you mean "gas_spring"?' in capsys.readouterr().err

@@ -98,13 +98,13 @@ def test_a_terminal_gets_a_table(capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["ports"], "wants a name"),
+        (["ports"], "expected a name"),
         (["ports", "LugreDamper"], 'Did you mean "LuGreDamper"?'),
         (["ports", "nix.fmu"], "nix.fmu"),
         (["ports", "LuGreDamper", "--building", "x.toml"], "--building goes with Structure"),
         (["ports", "Structure", "--building", "nix.toml"], "nix.toml"),
-        (["components", "LuGreDamper"], 'only "list ports" takes a name'),
-        (["records", "--building", "x.toml"], 'only "list ports" takes a name'),
+        (["components", "LuGreDamper"], "only ports, effects and laws take a name"),
+        (["records", "--building", "x.toml"], "--building goes with ports"),
     ],
 )
 def test_a_wrong_question_is_one_message(capsys, arguments, words):

@@ -35,7 +35,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def file(here: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     """Return the file of a new controller."""
-    assert main(["components", "new", "my_controller"]) == 0
+    assert main(["new", "controller", "my_controller"]) == 0
     assert "bristle build my_controller.py" in capsys.readouterr().out
     return here / "my_controller.py"
 
@@ -132,7 +132,7 @@ def test_a_name_that_cannot_be_is_refused(
     file: Path, name: str, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = file.read_text()
-    assert main(["components", "new", name]) == 2
+    assert main(["new", "controller", name]) == 2
     assert words in capsys.readouterr().err
     assert [path.name for path in file.parent.glob("*.py")] == [file.name]
     assert file.read_text() == before
@@ -193,15 +193,15 @@ def test_a_copy_of_a_stock_scenario_runs_the_same(here: Path, stock: Path) -> No
 def test_a_copy_overwrites_nothing_and_names_what_is_near(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["scenarios", "copy", "no_damper", "mine.toml"]) == 0
+    assert main(["new", "scenario", "mine", "--like", "no_damper"]) == 0
     assert "bristle run mine.toml" in capsys.readouterr().out
     (here / "mine.toml").write_text("mine")
-    assert main(["scenarios", "copy", "no_damper", "mine.toml"]) == 2
+    assert main(["new", "scenario", "mine", "--like", "no_damper"]) == 2
     assert "is there already" in capsys.readouterr().err
     assert (here / "mine.toml").read_text() == "mine"
-    assert main(["scenarios", "copy", "no_dampr"]) == 2
+    assert main(["new", "scenario", "other", "--like", "no_dampr"]) == 2
     assert 'Did you mean "no_damper"?' in capsys.readouterr().err
-    assert main(["scenarios", "copy"]) == 2
+    assert main(["new", "scenario", "mine"]) == 2
     with pytest.raises(ScenarioError, match="cannot be written"):
         copy_scenario("no_damper", here / "gone" / "mine.toml")
 

@@ -76,7 +76,7 @@ RUNNING = (
     "identify", "identify --dry-run", "compare", "diagnose", "diagnose --json", "add {} stribeck",
     "export", "study auto", "effects seal --study",
 )  # fmt: skip
-READING = ("undo", "report", "study check", "effects --study")
+READING = ("undo", "report", "study check", "list effects --study")
 
 
 def words(line: str, study: Path) -> list[str]:
@@ -241,18 +241,18 @@ def test_nor_is_it_built_into_an_fmu(
 
 
 def test_consent_is_remembered_until_the_text_changes(mailed: Path, marker: Path) -> None:
-    assert main(["effects", "seal", "--study", str(mailed), "--trust"]) == 0
+    assert main(["list", "effects", "seal", "--study", str(mailed), "--trust"]) == 0
     assert marker.exists()
     marker.unlink()
     user.unload_effects()
     moved = mailed.rename(mailed.with_name("elsewhere"))
-    assert main(["effects", "seal", "--study", str(moved)]) == 0
+    assert main(["list", "effects", "seal", "--study", str(moved)]) == 0
     assert marker.exists()
     marker.unlink()
     user.unload_effects()
     file = moved / "effects" / "seal.py"
     file.write_text(file.read_text(encoding="utf-8") + "\n# more\n", encoding="utf-8")
-    assert main(["effects", "seal", "--study", str(moved)]) == 2
+    assert main(["list", "effects", "seal", "--study", str(moved)]) == 2
     assert not marker.exists()
 
 
@@ -289,14 +289,14 @@ def test_the_environment_consents_for_ci_and_is_not_remembered(
     mailed: Path, marker: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(trust.VARIABLE, "0")
-    assert main(["effects", "seal", "--study", str(mailed)]) == 2
+    assert main(["list", "effects", "seal", "--study", str(mailed)]) == 2
     monkeypatch.setenv(trust.VARIABLE, "1")
-    assert main(["effects", "seal", "--study", str(mailed)]) == 0
+    assert main(["list", "effects", "seal", "--study", str(mailed)]) == 0
     assert marker.exists()
     marker.unlink()
     user.unload_effects()
     monkeypatch.delenv(trust.VARIABLE)
-    assert main(["effects", "seal", "--study", str(mailed)]) == 2
+    assert main(["list", "effects", "seal", "--study", str(mailed)]) == 2
     assert not marker.exists()
 
 
@@ -304,19 +304,19 @@ def test_a_file_made_here_is_trusted_and_checking_it_is_consent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["effects", "new", "rub"]) == 0
+    assert main(["new", "effect", "rub"]) == 0
     file = tmp_path / "rub.py"
     assert trust.load_file(file).name == "rub"
     file.write_text(file.read_text().replace("Parameter(0.2,", "Parameter(0.4,"))
     with pytest.raises(TrustError):
         trust.load_file(file)
-    assert main(["effects", "check", "rub.py"]) == 0
+    assert main(["check", "rub.py"]) == 0
     assert trust.load_file(file).parameters["f_s"].value == 0.4
     other = tmp_path / "sent.py"
     other.write_text(template("sent"))
-    assert main(["effects", "check", "sent.py"]) == 2
+    assert main(["check", "sent.py"]) == 2
     assert "sent.py: this file's code has not run here" in capsys.readouterr().err
-    assert main(["effects", "check", "sent.py", "--trust"]) == 0
+    assert main(["check", "sent.py", "--trust"]) == 0
 
 
 def test_links_and_odd_files_are_no_way_round(tmp_path: Path, marker: Path) -> None:
@@ -380,7 +380,7 @@ def test_consent_that_cannot_be_kept_is_said(
 ) -> None:  # fmt: skip
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("BRISTLE_STATE", str(tmp_path / "file"))
-    assert main(["effects", "seal", "--study", str(mailed), "--trust"]) == 2
+    assert main(["list", "effects", "seal", "--study", str(mailed), "--trust"]) == 2
     assert "cannot be kept" in capsys.readouterr().err
     assert not marker.exists()
 

@@ -1,6 +1,6 @@
 """Checks a file with a user's effect or law: `python -m bristle.check.own effect FILE`, as JSON.
 
-`bristle effects check` and `bristle laws check` run it in a process of its own, under a limit.
+`bristle check` runs it in a process of its own, under a limit.
 """
 
 from __future__ import annotations

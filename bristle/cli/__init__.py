@@ -26,6 +26,14 @@ narrow, and laws, effects and runs have threads of their own: both together are 
 _SLOW_TO_LEAVE = ("bristle.simulate.session", "numba")
 """Modules with which a process takes half a second and more to be taken down."""
 
+_FORMER = {
+    "components": "list components, and new controller NAME",
+    "effects": "list effects, new effect NAME, and check FILE",
+    "laws": "list laws, new law NAME, and check FILE",
+    "scenarios": "list scenarios, and new scenario NAME --like SCENARIO",
+}
+"""Commands of before, and what took their place."""
+
 _NAMES = {"list_": "list", "export_ssp": "export-ssp", "import_ssp": "import-ssp"}
 
 
@@ -53,18 +61,12 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
-    """Return the arguments of a command line.
-
-    argparse gives a word that may be missing up at the first option: in `laws check --trust FILE`
-    the file would be left over.
-    """
+    """Return the arguments of a command line; an old spelling is an error that names the new."""
     parser = build_parser()
-    arguments, rest = parser.parse_known_args(argv)
-    if len(rest) == 1 and not rest[0].startswith("-") and getattr(arguments, "target", "") is None:
-        arguments.target = rest.pop()
-    if rest:
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
-    return arguments
+    words = sys.argv[1:] if argv is None else argv
+    if words and words[0] in _FORMER:
+        parser.error(f"{words[0]} is now {_FORMER[words[0]]}.")
+    return parser.parse_args(words)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""The file that `bristle components new NAME` writes."""
+"""The file that `bristle new controller NAME` writes."""
 
 TEMPLATE = '''"""FMU: {title}, a controller of my own."""
 

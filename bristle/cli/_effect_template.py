@@ -1,4 +1,4 @@
-"""The file that `bristle effects new NAME` writes."""
+"""The file that `bristle new effect NAME` writes."""
 
 TEMPLATE = '''"""{title}: an effect of my own."""
 
@@ -27,7 +27,7 @@ class {cls}(Effect):
     # drift, drift_rate, stiffness, storey in `spring`.
     needs = ("v",)
 
-    # `bristle effects check` tests these two: a closed cycle never produces energy; there is no
+    # `bristle check` tests these two: a closed cycle never produces energy; there is no
     # force at rest without history.
     passive = True
     zero_at_rest = True

@@ -13,6 +13,7 @@ _NO_FILE = f"No file was written. {_ANEW}"
 
 KEPT = {
     "add": _AS_IT_WAS,
+    "check": _ANEW,
     "build": _COMPILED,
     "compare": f"No picture was written. {_ANEW}",
     "conform": f"No verdict is kept. {_ANEW}",
@@ -20,7 +21,6 @@ KEPT = {
     "them, and runs each case once more.",
     "design": f"No controller was written. {_ANEW}",
     "diagnose": f"Of this diagnosis nothing is kept. {_AS_IT_WAS}",
-    "effects check": _ANEW,
     "example bench": f"No study was made. {_ANEW}",
     "example building": f"No study was made. {_ANEW}",
     "example perform": _AS_IT_WAS,
@@ -28,7 +28,6 @@ KEPT = {
     "export-ssp": "A package that is there is whole; its coupling error is not yet known. The same "
     "command begins anew, and finds FMUs that were built.",
     "identify": _AS_IT_WAS,
-    "laws check": _ANEW,
     "learn": _AS_IT_WAS,
     "limit": _NO_FILE,
     "optimise": _NO_FILE,

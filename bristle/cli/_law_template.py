@@ -1,4 +1,4 @@
-"""The file that `bristle laws new NAME` writes."""
+"""The file that `bristle new law NAME` writes."""
 
 TEMPLATE = '''"""{title}: a law of my own."""
 

@@ -22,7 +22,7 @@ HELP = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle add`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument("effects", nargs="+", metavar="EFFECT", help="names; see bristle effects")
+    parser.add_argument("effects", nargs="+", metavar="EFFECT", help="see `bristle list effects`")
     parser.add_argument("--why", default="", help="the reason, for the history")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

@@ -1,10 +1,18 @@
-"""Check scenario files without running them: every mistake at once, with its line."""
+"""Check scenarios, and effects and laws of your own, without running them.
+
+Of a scenario every mistake is printed at once, with its line. The hooks of your own effect or law
+are called some hundred thousand times: are they pure, finite, passive where they say so?
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
+import re
+import subprocess
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ._common import add_overrides
 from ._consent import add_trust
@@ -12,7 +20,10 @@ from ._consent import add_trust
 if TYPE_CHECKING:
     from ..scenario.scenario import Finding
 
-HELP = "check scenario files: every mistake at once, with its line"
+HELP = "check scenario files, or your own effects and laws: every mistake, with its line"
+
+WITHIN = 300.0
+"""Time [s] that a check of an effect or law may take."""
 
 _COLOURS = {"error": "31", "warning": "33", "note": "36"}
 
@@ -20,7 +31,10 @@ _COLOURS = {"error": "31", "warning": "33", "note": "36"}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle check`."""
     parser.add_argument(
-        "files", nargs="*", metavar="FILE", help="scenario files, or names of stock scenarios"
+        "files",
+        nargs="*",
+        metavar="FILE",
+        help="scenario files, names of stock scenarios, or the file of your own effect or law",
     )
     add_overrides(parser)
     add_trust(parser)
@@ -40,7 +54,11 @@ def main(arguments: argparse.Namespace) -> int:
         print(schema_text(), end="")
         return 0
     if not arguments.files:
-        raise ScenarioError("bristle check wants a FILE: a scenario, e.g. bristle check my.toml.")
+        raise ScenarioError("bristle check: expected a FILE, e.g. bristle check my.toml.")
+    if any(file.endswith(".py") for file in arguments.files):
+        if len(arguments.files) > 1 or arguments.overrides:
+            raise ScenarioError("bristle check: expected one effect or law, without --set.")
+        return _own(Path(arguments.files[0]), arguments.json)
     from ..scenario.scenario import check_scenario, parse_overrides
 
     overrides = parse_overrides(arguments.overrides)
@@ -55,8 +73,6 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _print_json(found: dict[str, list[Finding]]) -> None:
-    import json
-
     answer = [
         {
             "file": file,
@@ -81,3 +97,52 @@ def print_findings(file: str, findings: list[Finding]) -> None:
         print(f"{file}: {counted}")
     else:
         print(f"{file}: ok{', ' + counted if counted else ''}")
+
+
+def _own(file: Path, as_json: bool) -> int:
+    """Ask of an effect or law what is asked of the library's; 2 where something does not hold.
+
+    Of a file that `bristle new` made here, checking it is consent to what it holds now.
+    """
+    from ..errors import PhysicsError
+    from ..progress import tell
+    from ..trust import is_made_here, load_file
+
+    word = _word(file)
+    made = load_file(file, word, trust=is_made_here(file))  # refuses with file and line
+    tell(f"checking {file.name}: its hooks are called some hundred thousand times, and compiled")
+    program = [sys.executable, "-m", "bristle.check.own", word, str(file)]
+    try:
+        child = subprocess.run(program, capture_output=True, text=True, check=False, timeout=WITHIN)
+    except subprocess.TimeoutExpired:
+        raise PhysicsError(
+            f"{file}: the check does not end within {WITHIN:g} s. A hook is called some hundred "
+            "thousand times: arithmetic that takes microseconds is right."
+        ) from None
+    if child.returncode != 0:
+        told = child.stderr.strip().splitlines()
+        raise PhysicsError(f"{file}: the check fails: {told[-1] if told else child.returncode}")
+    checks: list[dict[str, Any]] = json.loads(child.stdout)
+    good = all(one["holds"] for one in checks)
+    if as_json:
+        print(json.dumps({word: made.name, "conforms": good, "checks": checks}, indent=2))
+        return 0 if good else 2
+    for one in checks:
+        found = f": {one['found']}" if one["found"] else ""
+        print(f"{'ok  ' if one['holds'] else 'FAIL'}  {one['asked']}{found}")
+    print(f"{file}: {made.name} {'conforms' if good else 'does not conform'}.")
+    return 0 if good else 2
+
+
+def _word(file: Path) -> str:
+    """Return what a file defines, "effect" or "law", by the class that its class extends."""
+    from ..errors import PhysicsError
+    from ..physics.user_text import text_of
+
+    try:
+        bases = re.findall(r"^class \w+\((\w+)", text_of(file, errors="replace"), re.MULTILINE)
+    except OSError as error:
+        raise PhysicsError(f"{file}: cannot be read ({error.strerror or error}).") from None
+    if "OwnController" in bases:
+        raise PhysicsError(f"{file}: a controller is checked where it is built: bristle build FILE")
+    return "law" if "Law" in bases else "effect"

@@ -211,7 +211,7 @@ def _then(verdict: Verdict, folder: Path) -> str:
             f"{command('learn', folder)} , which learns what is missing;  "
             f"{_gaining(verdict, folder)}"
             f"{command('compare', folder)} , which shows where the residual is;  "
-            "bristle effects new NAME  starts your own effect."
+            "bristle new effect NAME  starts your own effect."
         )
     if verdict["kind"] == "insufficient":
         return (

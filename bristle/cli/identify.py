@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--law",
-        help="another law than the model's, see `bristle laws`; all: keep the model's law, and "
-        "compare all laws on a test bench",
+        help="another law than the model's, see `bristle list laws`; all: keep the model's law, "
+        "and compare all laws on a test bench",
     )
     parser.add_argument(
         "--command",

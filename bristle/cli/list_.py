@@ -1,63 +1,89 @@
-"""List components, their ports, records, stock scenarios and effects."""
+"""List components, their ports, ground motions, stock scenarios, effects and laws; describe one.
+
+Your own begin with `bristle new`.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..quantity import typed
+from ..quantity import tick, typed
+from ._consent import add_trust
 
 if TYPE_CHECKING:
     from ..fmu.description import Description, Variable
 
-HELP = "list components, ports, records, scenarios, effects"
+HELP = "list components, ports, records, scenarios, effects, laws, or describe one"
 
-_TOPICS = ("components", "ports", "records", "scenarios", "effects")
+_KINDS = ("components", "ports", "records", "scenarios", "effects", "laws")
 _UNITS = {"peak": "m/s2", "duration": "s"}
 Rows = list[dict[str, Any]]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle list`."""
-    parser.add_argument(
-        "topic", nargs="?", choices=_TOPICS, help="what to list; everything but ports by default"
-    )
-    parser.add_argument("name", nargs="?", help="with ports: a component, or the path of an FMU")
-    parser.add_argument(
-        "--building", type=Path, metavar="FILE", help="with ports Structure: a building's data file"
-    )
+    text = "what to list; else everything but ports"
+    parser.add_argument("kind", nargs="?", choices=_KINDS, metavar="KIND", help=text)
+    text = "with effects, laws: the one to describe; with ports: a component or an FMU's path"
+    parser.add_argument("name", nargs="?", metavar="NAME", help=text)
+    text = "with ports Structure: a building's data file"
+    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
+    text = "with effects, laws: a study whose own count too"
+    parser.add_argument("--study", type=Path, metavar="FOLDER", help=text)
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Print the lists that were asked for."""
+    """Print the lists that were asked for, or everything about one effect or law."""
     from ..errors import ScenarioError
 
-    topic, name = arguments.topic, arguments.name
-    if topic == "ports" and not name:
-        raise ScenarioError("list ports wants a name, e.g. bristle list ports LuGreDamper.")
-    if topic != "ports" and (name or arguments.building):
-        raise ScenarioError(f'list {topic or ""}: only "list ports" takes a name or a building.')
+    kind, name = arguments.kind, arguments.name
+    if kind == "ports" and not name:
+        raise ScenarioError("list ports: expected a name, e.g. bristle list ports LuGreDamper.")
+    if name and kind not in ("ports", "effects", "laws"):
+        raise ScenarioError(f'list {kind}: only ports, effects and laws take a name, not "{name}".')
+    if arguments.building and kind != "ports":
+        raise ScenarioError("list: --building goes with ports alone.")
+    if arguments.study and kind not in ("effects", "laws"):
+        raise ScenarioError("list: --study goes with effects and laws alone.")
+    if kind in ("effects", "laws"):
+        return _physics(kind.removesuffix("s"), arguments)
     tables: dict[str, Rows] = {}
-    if topic in (None, "components"):
+    if kind in (None, "components"):
         tables["components"] = _components()
-    if topic == "ports":
+    if kind == "ports":
         tables["ports"] = _ports(name, arguments.building)
-    if topic in (None, "records"):
+    if kind in (None, "records"):
         tables["records"] = _records()
-    if topic in (None, "scenarios"):
+    if kind in (None, "scenarios"):
         tables["scenarios"] = _scenarios()
-    if topic in (None, "effects"):
-        tables["effects"] = _effects()
+    if kind is None:
+        tables["effects"], tables["laws"] = _effects(), _laws()
     if arguments.json:
-        import json
-
-        print(json.dumps(tables[topic] if topic else tables, indent=2))
+        print(json.dumps(tables[kind] if kind else tables, indent=2))
         return 0
     for title, rows in tables.items():
         _print(title, rows)
+    return 0
+
+
+def _physics(word: str, arguments: argparse.Namespace) -> int:
+    """Print a table of effects or laws, or everything about one."""
+    kind, told, left_out = _found(word, arguments.name, arguments.study)
+    if arguments.json:
+        print(json.dumps(told, indent=2))
+    elif isinstance(told, dict):
+        kind.one(told)
+    else:
+        kind.table(told)
+    for text in left_out:
+        print(f"left out: {text}", file=sys.stderr)
     return 0
 
 
@@ -138,6 +164,15 @@ def _effects() -> Rows:
     ]
 
 
+def _laws() -> Rows:
+    from ..physics.laws import laws_of
+
+    return [
+        {"name": law.name, "description": (law.__doc__ or "").partition("\n")[0]}
+        for law in sorted(laws_of("damper"), key=lambda law: law.name)
+    ]
+
+
 def _print(title: str, rows: Rows) -> None:
     """Print one table: with rules on a terminal, plain columns in a pipe."""
     columns = [
@@ -172,3 +207,242 @@ def _cell(value: Any) -> str:
     if value is None:
         return ""
     return typed(value) if isinstance(value, float) else str(value)
+
+
+class _Kind(NamedTuple):
+    """What differs between effects and laws.
+
+    `word` is "effect" or "law"; `registered` holds those that are known by name; `told` returns
+    what is told of one, as JSON has it; `one` and `table` print that of one and of several.
+    """
+
+    word: str
+    registered: Mapping[str, Any]
+    told: Callable[[Any], dict[str, Any]]
+    one: Callable[[dict[str, Any]], None]
+    table: Callable[[list[dict[str, Any]]], None]
+
+
+def _found(
+    word: str, name: str | None, study: Path | None
+) -> tuple[_Kind, dict[str, Any] | list[dict[str, Any]], list[str]]:
+    """Return the kind, what is told of one or of all, and why files of a study are left out.
+
+    Parameters
+    ----------
+    word : "effect" or "law"
+    name : of the one that is asked for; None for all
+    study : folder whose own count too
+    """
+    left_out = _read_own(study, word)
+    if study is not None and name in left_out:
+        _refuse_untrusted(study / f"{word}s" / f"{name}.py")
+    kind = _kind(word)
+    if name is not None:
+        told: dict[str, Any] | list[dict[str, Any]] = kind.told(_find(name, kind, left_out))
+    else:
+        told = [kind.told(one) for _, one in sorted(kind.registered.items())]
+    return kind, told, list(left_out.values())
+
+
+def _kind(word: str) -> _Kind:
+    from ..physics import effects as _registered  # noqa: F401  (importing registers them)
+    from ..physics.effect import EFFECTS
+    from ..physics.laws import laws_of
+
+    if word == "effect":
+        return _Kind(word, EFFECTS, effect_as_dict, _print_effect, _print_effects)
+    laws = {law.name: law for law in laws_of("damper")}
+    return _Kind(word, laws, law_as_dict, _print_law, _print_laws)
+
+
+def _read_own(study: Path | None, word: str) -> dict[str, str]:
+    """Register the files of a study; return those that are left out, and why."""
+    if study is None:
+        return {}
+    from ..errors import PhysicsError
+    from ..trust import load
+
+    if not study.is_dir():
+        raise PhysicsError(f"--study {study}: there is no such folder.")
+    load(study / "laws", "law")  # what an effect joins
+    return {one.name: one.error for one in load(study / f"{word}s", word) if one.error}
+
+
+def _refuse_untrusted(file: Path) -> None:
+    """Raise where the effect or law that is asked for waits for consent."""
+    from ..physics.user import waiting
+
+    if untrusted := waiting(file):
+        raise untrusted
+
+
+def _find(name: str, kind: _Kind, left_out: dict[str, str]) -> Any:
+    """Return the one of a name; PhysicsError that names the nearest where there is none."""
+    from ..errors import PhysicsError
+    from ..findings import unknown
+
+    if name in kind.registered:
+        return kind.registered[name]
+    if name in left_out:
+        raise PhysicsError(left_out.pop(name))
+    raise PhysicsError(f"{unknown(kind.word, name, sorted(kind.registered))}")
+
+
+def effect_as_dict(effect: Any) -> dict[str, Any]:
+    """Return what users are told of an effect: class data, first line and formula of its text."""
+    from ..physics.effect import laws_joined
+
+    about, text = _text_of(effect)
+    return {
+        "name": effect.name,
+        "site": effect.site,
+        "sites": list(effect.sites),
+        "laws": list(laws_joined(effect)),
+        "about": about,
+        "text": text,
+        "expect": effect.expect,
+        "source": effect.source,
+        "passive": effect.passive,
+        "zero_at_rest": effect.zero_at_rest,
+        "excludes": list(effect.excludes),
+        "states": dict(effect.states),
+        "parameters": _parameters_of(effect),
+    }
+
+
+def _print_effect(found: dict[str, Any]) -> None:
+    joins = f", joins {', '.join(found['laws'])}" if found["laws"] else ""
+    print(f"{found['name']} ({', '.join(found['sites'])}{joins}): {found['about']}\n")
+    print(found["text"])
+    print(f"\nWhen it is missing: {found['expect']}.\nSource: {found['source']}.\n")
+    print("\n".join(_parameter_lines(found, f"{found['name']}.")))
+    if found["site"] == "sensor":
+        print("\nUsed in a model that is compared with measurements; never inside a damper.")
+    else:
+        places = " or a ".join(found["sites"])
+        print(f'\nIn a scenario, among the parameters of a {places}:  "{found["name"]}.on" = true')
+    if len(found["sites"]) > 1:
+        first, *others = found["sites"]
+        named = " or ".join(f"{found['name']}@{site}" for site in others)
+        print(f"In a building's model the name alone is that of the {first}; else {named}.")
+
+
+def _print_effects(rows: list[dict[str, Any]]) -> None:
+    """Print the effects; each in a block of lines in a pipe, in a table on a terminal."""
+    if sys.stdout.isatty():
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(show_lines=True)
+        for title in ("effect", "site, laws", "what it does", "when it is missing", "parameters"):
+            table.add_column(title)
+        for row in rows:
+            where = "\n".join([*row["sites"], *row["laws"]])
+            about = f"{row['about']}\n({row['source']})".replace("[", r"\[")
+            table.add_row(row["name"], where, about, row["expect"], "\n".join(_shortly(row)))
+        Console().print(table)
+    else:
+        for row in rows:
+            where = ", ".join([*row["sites"], *row["laws"]])
+            print(f"{row['name']} ({where}): {row['about']}")
+            print(f"  when it is missing: {row['expect']}")
+            print(f"  parameters: {', '.join(_shortly(row))}")
+            print(f"  source: {row['source']}")
+    print("All of one:  bristle list effects NAME")
+
+
+def law_as_dict(law: Any) -> dict[str, Any]:
+    """Return what users are told of a law: class data, first line and formula of its text."""
+    from ..physics.effect import effects_of
+    from ..physics.forms import FORMS, LINEAR_FORM, choosable
+
+    about, text = _text_of(law)
+    free = list(choosable(law))  # quantities that may have another form
+    return {
+        "name": law.name,
+        "about": about,
+        "text": text,
+        "parts": list(law.parts),
+        "contains": list(law.contains),
+        "command": {
+            quantity: [type(form).__name__.lower(), *form.names()]
+            for quantity, form in law.command.items()
+        },
+        "forms": {form: free for form in FORMS if form != LINEAR_FORM and free},
+        "source": law.source,
+        "states": dict(law.states),
+        "variants": [f"{law.name}_{suffix}" for suffix in law.variants],
+        "inverse": law.affine() and law.exact() and not law.felt,
+        "effects": [effect.name for effect in effects_of("damper", law.name)],
+        "parameters": _parameters_of(law),
+    }
+
+
+def _print_law(found: dict[str, Any]) -> None:
+    print(f"{found['about']}\n")
+    print(found["text"])
+    print(f"\nParts: {', '.join(found['parts'])}.")
+    if found["contains"]:
+        print(f"Contains: {', '.join(found['contains'])}; no effect of that kind is offered.")
+    for quantity, (form, *names) in found["command"].items():
+        print(f"Over the voltage: {quantity} is {form}, by {', '.join(names)}.")
+    if found["forms"]:
+        forms = ", or ".join(f"--command {form}" for form in found["forms"])
+        print(f"To be identified in another form too:  {forms}")
+    print(f"Inverse for controllers: {'yes' if found['inverse'] else 'no'}.")
+    print(f"Effects that join it: {', '.join(found['effects'])}.")
+    print(f"Source: {found['source']}.\n")
+    print("\n".join(_parameter_lines(found, "")))
+    print(f"\nIn a study:  bristle identify STUDY --law {found['name']}")
+
+
+def _print_laws(rows: list[dict[str, Any]]) -> None:
+    """Print the laws, each in a block of lines."""
+    for row in rows:
+        print(f"{row['name']}: {row['about']}")
+        print(f"  parts: {', '.join(row['parts'])}")
+        if row["contains"]:
+            print(f"  contains: {', '.join(row['contains'])}")
+        print(f"  parameters: {', '.join(_shortly(row))}")
+        print(f"  source: {row['source']}")
+    print("All of one:  bristle list laws NAME")
+
+
+def _parameters_of(one: Any) -> dict[str, Any]:
+    """Return what users are told of the parameters."""
+    return {
+        name: {
+            "value": parameter.value,
+            "unit": parameter.unit,
+            "bounds": list(parameter.bounds),
+            "text": parameter.text,
+        }
+        for name, parameter in one.parameters.items()
+    }
+
+
+def _text_of(one: Any) -> tuple[str, str]:
+    """Return the first line of a docstring, and the rest of it."""
+    import textwrap
+
+    first, _, rest = (one.__doc__ or "").strip().partition("\n")
+    return first.strip(), textwrap.dedent(rest).strip("\n")
+
+
+def _parameter_lines(found: dict[str, Any], begin: str) -> list[str]:
+    """Return a line per parameter: value, unit, bounds, meaning."""
+    lines = []
+    for name, about in found["parameters"].items():
+        low, high = (tick(bound) for bound in about["bounds"])
+        value = f"{typed(about['value'])} {about['unit']}".removesuffix(" 1")
+        lines.append(f"  {begin}{name} = {value}  ({low} to {high}): {about['text']}")
+    return lines
+
+
+def _shortly(row: dict[str, Any]) -> list[str]:
+    """Return name, value and unit of each parameter."""
+    return [
+        f"{name} = {typed(about['value'])}" + (f" {about['unit']}" if about["unit"] != "1" else "")
+        for name, about in row["parameters"].items()
+    ]

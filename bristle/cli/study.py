@@ -38,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_roles(commands.add_parser("roles", help="show or change the roles of the runs"))
     add_channels(commands.add_parser("channels", help="show or correct columns, units and signs"))
-    # The name until 0.1; here for one release.
     auto = commands.add_parser(
         "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )

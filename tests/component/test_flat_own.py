@@ -77,6 +77,6 @@ def test_the_template_of_a_controller_compiles(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["components", "new", "my_controller"]) == 0
+    assert main(["new", "controller", "my_controller"]) == 0
     assert "my_controller.py" in capsys.readouterr().out
     check_run(str(tmp_path / "my_controller.py"), {})

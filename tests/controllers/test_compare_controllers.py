@@ -197,7 +197,7 @@ def test_a_controller_of_ones_own_is_stepped_as_an_fmu(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["components", "new", "my_law"]) == 0
+    assert main(["new", "controller", "my_law"]) == 0
     motion = "el_centro_1940_ns,stop=1"
     found = compare_controllers(
         [motion], ["my_law.py,gain=40", "Skyhook"], building=tower(tmp_path), grid=3, out="out",

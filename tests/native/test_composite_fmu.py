@@ -52,7 +52,7 @@ def test_so_are_those_of_a_trained_policy() -> None:
 
 def test_so_are_those_of_a_law_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["laws", "new", "my_law"]) == 0
+    assert main(["new", "law", "my_law"]) == 0
     text = load_scenario(PASSIVE).file.read_text(encoding="utf-8")
     scenario = tmp_path / "mine.toml"
     scenario.write_text(text.replace('fmu = "LuGreDamper"', 'law = "my_law.py"'), encoding="utf-8")
@@ -428,6 +428,6 @@ def test_a_chosen_form_of_the_command_is_in_it(tmp_path: Path) -> None:
 
 def test_effects_of_a_users_own_are_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["effects", "new", "my_effect"]) == 0
+    assert main(["new", "effect", "my_effect"]) == 0
     (tmp_path / "effect.toml").write_text(HOUSE.format(damper=OWN))
     assert compared(tmp_path / "effect.toml") <= EQUAL

@@ -222,7 +222,7 @@ def test_a_controller_of_ones_own_needs_no_python(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["components", "new", "my_controller"]) == 0
+    assert main(["new", "controller", "my_controller"]) == 0
     assert main(["build", "my_controller.py", "--native", "--platform", here().name]) == 0
     assert "MyController.fmu: built" in capsys.readouterr().out
     about = read_description(tmp_path / "MyController.fmu")

@@ -31,7 +31,7 @@ def difference(what: Plan, **values: object) -> float:
 
 def test_an_effect_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["effects", "new", "my_effect"]) == 0
+    assert main(["new", "effect", "my_effect"]) == 0
     file = tmp_path / "my_effect.py"
     what = plan("LuGreDamper", name="Mine", effects=[file])
     assert difference(what, **{"my_effect.on": True, "my_effect.f_s": 1.5}) <= 1e-12
@@ -44,7 +44,7 @@ def test_an_effect_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_a_law_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["laws", "new", "my_law"]) == 0
+    assert main(["new", "law", "my_law"]) == 0
     load_law(tmp_path / "my_law.py")
     what = plan("OwnMyLawDamper")
     assert what.laws

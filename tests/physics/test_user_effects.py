@@ -141,7 +141,7 @@ def test_a_bad_effect_is_left_out_with_file_line_and_reason(
     assert loaded.error.startswith(f"{file}, line {line}:" if line else f"{file}")
     assert set(EFFECTS) == before
     assert user.why_left_out(file) == loaded.error
-    assert main(["effects", "check", str(file)]) == 2
+    assert main(["check", str(file)]) == 2
     assert says in capsys.readouterr().err
 
 
@@ -169,10 +169,10 @@ def test_the_template_conforms(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["effects", "new", "lip_seal"]) == 0
-    assert main(["effects", "new", "lip_seal"]) == 2
+    assert main(["new", "effect", "lip_seal"]) == 0
+    assert main(["new", "effect", "lip_seal"]) == 2
     assert "is there already" in capsys.readouterr().err
-    assert main(["effects", "check", "lip_seal.py"]) == 0
+    assert main(["check", "lip_seal.py"]) == 0
     said = capsys.readouterr().out
     assert "lip_seal conforms" in said
     assert "FAIL" not in said
@@ -192,7 +192,7 @@ def test_the_template_conforms(
 def test_a_promise_that_does_not_hold_is_found(
     changes: dict[str, str], falls_short: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["effects", "check", str(written(tmp_path, **changes))]) == 2
+    assert main(["check", str(written(tmp_path, **changes))]) == 2
     rows = [row for row in capsys.readouterr().out.splitlines() if row.startswith("FAIL")]
     assert len(rows) == 1
     assert falls_short in rows[0]

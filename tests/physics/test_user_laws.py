@@ -147,7 +147,7 @@ def test_every_field_of_an_effect_is_asked_for_its_kind(
         raise AssertionError(f"{field} = {value} is taken")
     else:
         assert re.search(rf"\b{field}\b", loaded.error)
-    assert main(["effects", "check", str(file)]) == 2
+    assert main(["check", str(file)]) == 2
     assert capsys.readouterr().err.startswith("PhysicsError: ")
 
 
@@ -215,26 +215,26 @@ def test_the_command_starts_checks_and_lists(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["laws", "new", "my_damper"]) == 0
-    assert "bristle laws check my_damper.py" in capsys.readouterr().out
-    assert main(["laws", "new", "my_damper"]) == 2
-    assert main(["laws", "new", "lugre"]) == 2
+    assert main(["new", "law", "my_damper"]) == 0
+    assert "bristle check my_damper.py" in capsys.readouterr().out
+    assert main(["new", "law", "my_damper"]) == 2
+    assert main(["new", "law", "lugre"]) == 2
     assert "is the name of a law of the library" in capsys.readouterr().err
-    assert main(["laws", "check", "my_damper.py"]) == 0
+    assert main(["check", "my_damper.py"]) == 0
     said = capsys.readouterr().out
     assert "my_damper conforms" in said
     assert "FAIL" not in said
     user.unload_effects()
-    assert main(["laws", "--json"]) == 0
+    assert main(["list", "laws", "--json"]) == 0
     rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
     assert set(rows) == {law.name for law in LAWS.values() if law.site == "damper"}
     assert rows["modified_bouc_wen"]["contains"] == ["spring", "lag"]
-    assert main(["laws", "dahl"]) == 0
+    assert main(["list", "laws", "dahl"]) == 0
     said = capsys.readouterr().out
     assert "Parts: yield, bristle, viscous, command." in said
     assert "rho = 500 1/m" in said
     assert "Effects that join it: asymmetry, " in said
-    assert main(["laws", "dal"]) == 2
+    assert main(["list", "laws", "dal"]) == 2
     assert 'Did you mean "dahl"?' in capsys.readouterr().err
 
 
@@ -242,7 +242,7 @@ def test_a_promise_that_does_not_hold_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = written(tmp_path, **{"Gavin (2001)": "Gavin", ", 1281-1300": ""})
-    assert main(["laws", "check", str(file)]) == 2
+    assert main(["check", str(file)]) == 2
     assert "lacks a source with its year" in capsys.readouterr().out
 
 
@@ -302,4 +302,4 @@ def test_the_law_with_a_table_in_the_documentation_conforms(tmp_path, capsys):
     (text,) = [one for one in blocks if "Table(" in one]
     file = tmp_path / "stepped.py"
     file.write_text(text, encoding="utf-8")
-    assert main(["laws", "check", str(file), "--trust"]) == 0, capsys.readouterr()
+    assert main(["check", str(file), "--trust"]) == 0, capsys.readouterr()

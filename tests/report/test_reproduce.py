@@ -131,10 +131,10 @@ def test_printed_hints_can_be_pasted(study: Study, capsys: pytest.CaptureFixture
     assert main(["report", "my rig"]) == 0
     page = (study.folder / "reports" / "report.html").read_text(encoding="utf-8")
     assert "bristle diagnose &#x27;my rig&#x27;" in page or "bristle diagnose 'my rig'" in page
-    assert main(["effects", "new", "rub", "--study", "my rig"]) == 0
+    assert main(["new", "effect", "rub", "--study", "my rig"]) == 0
     told = capsys.readouterr().out
     hint = shlex.split(told.rpartition("then:  ")[2])
-    assert hint == ["bristle", "effects", "check", str(Path("my rig", "effects", "rub.py"))]
+    assert hint == ["bristle", "check", str(Path("my rig", "effects", "rub.py"))]
     assert main(hint[1:]) == 0
 
 

@@ -160,7 +160,7 @@ def test_a_damaged_verdict_or_model_is_one_message(
 
 
 def test_two_studies_with_effects_of_one_name_keep_their_own(rig: Path, tmp_path: Path) -> None:
-    assert main(["effects", "new", "seal", "--study", str(rig)]) == 0
+    assert main(["new", "effect", "seal", "--study", str(rig)]) == 0
     first = Study(rig, trust=True)
     first.add_step("add seal", "to see", first.model().with_effect("seal"))
     other = shutil.copytree(rig, tmp_path / "other")
