@@ -243,9 +243,9 @@ class StructureModel:
         effects: list[str] | None = None,
     ) -> None:
         self.m = matrices(building)
-        functions = functions_of(effects := effects or [])
-        self._store, state, self._work = laid_down(building, values or {}, effects, functions.slots)
-        self._settle, self._step, self._output = map(functions.link, (settle, step, output))
+        link = functions_of(effects or []).link
+        self._settle, self._step, self._output = map(link, (settle, step, output))
+        self._store, state, self._work = laid_down(building, values or {}, effects or [])
         self.constants = constants(self._store)
         size = 2 * self.m.n
         self.x, self.z = state[0:size], state[size : len(state) - self.m.n - 1]

@@ -10,7 +10,15 @@ from ..physics.codegen import Slots
 from ..physics.device import GROUND
 from ..physics.linear import Row, copy, invert
 from ..physics.rows import open_row, packed, place, row
-from ..physics.structure import EFFECT_STEP, fill_size, fill_step, pack, state_size, work_size
+from ..physics.structure import (
+    EFFECT_STEP,
+    fill_size,
+    fill_step,
+    functions_of,
+    pack,
+    state_size,
+    work_size,
+)
 from .devices import PER_DEVICE, PER_LEVEL
 
 
@@ -261,12 +269,12 @@ def discretise(dt: float, store: Row, work: Row) -> None:
 
 
 def laid_down(
-    building: Building, values: Mapping[str, float], effects: Sequence[str], slots: Slots
+    building: Building, values: Mapping[str, float], effects: Sequence[str]
 ) -> tuple[list[float], list[float], list[float]]:
-    """Return store, state and work of a structure from values by name, for plain Python."""
+    """Return store, state and work of a structure from values by name, for its `functions_of`."""
     names = [*values, *(f"{effect}.on" for effect in effects)]
     numbers = [*values.values(), *(1.0 for _ in effects)]
-    baked, counts = bake(building, names, slots), [0.0] * 4
+    baked, counts = bake(building, names, functions_of(effects).slots), [0.0] * 4
     sizes(numbers, baked, counts)
     store, state, _, work = ([0.0] * int(count) for count in counts)
     setup(numbers, [], baked, store, state)
