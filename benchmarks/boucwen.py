@@ -166,10 +166,12 @@ def simulate(model: Model, spectrum: NDArray[np.complex128]) -> Array:
     u = np.concatenate([u[-STEPS * BEFORE :], u]).tolist()
     dt = 1.0 / (RATE * STEPS)
     setup = damper.setup_of(model.law, model.values, list(model.effects))
-    z = list(damper.start_states(model.law, model.values))
-    end, work = [0.0] * len(z), [0.0] * damper.work_size()
+    functions = damper.functions_of(model.law, model.effects)
+    z = damper.start_states(model.law, model.values, functions.slots)
+    end, work, step = [0.0] * len(z), [0.0] * damper.room(len(z)), functions.link(damper.step)
     now = Inputs(0.0, 0.0, 0.0, 0.0, dt, 0.0, 0.0, False)
-    force, out = damper.evaluate(setup, now, z, work[: len(z)], work[len(z) :])[0], []
+    evaluate = functions.made["evaluate"]
+    force, out = evaluate(setup, now, z, work[: len(z)], work[len(z) :])[0], []
     now = now._replace(a=(u[0] - force) / MASS)
     for pushed in u:
         a = now.a
@@ -177,7 +179,7 @@ def simulate(model: Model, spectrum: NDArray[np.complex128]) -> Array:
             v = now.v + 0.5 * dt * (now.a + a)
             x = now.x + dt * now.v + 0.25 * dt * dt * (now.a + a)
             then = Inputs(x, v, a, 0.0, dt, 0.0, 0.0, False)
-            force = damper.step(setup, now, then, z, end, work)[0]
+            force = step(setup, now, then, z, end, work)[0]
             a = (pushed - force) / MASS
         now, z, end = then._replace(a=a), end, z
         out.append(x)
@@ -255,12 +257,10 @@ def own_law() -> Iterator[str]:
         def advance(q, z, p):  # type: ignore[no-untyped-def]
             return (bent(z.deflection, q.v, p.inward, p.outward, q.dt),)
 
-    damper.regenerate()
     try:
         yield FirstOrder.name
     finally:
         forget_law(FirstOrder)
-        damper.regenerate()
 
 
 TRAIN, TEST = 1, 2

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from bristle.component.damper import VOLTAGE
+from bristle.jit import compiled
 from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import LONGEST_SUBSTEP, compiled_loop, simulate
+from bristle.simulate.coupled import LONGEST_SUBSTEP, simulate
 from bristle.simulate.system import System
-from bristle.simulate.time_loop import MAX_SWEEPS, TOLERANCE
+from bristle.simulate.time_loop import INLINE, MAX_SWEEPS, TOLERANCE, integrate
 
 from ._published import DRIFT, SECOND_FLOOR, half_sine, passive, peak_errors, symbol
 from ._rows import Row, interleave, ratio_of
@@ -128,7 +129,7 @@ class _Ours:
         self.sweeps = 0
         self._slots = np.array(list(system.outputs.values()), dtype=np.int64)
         self._table = np.zeros((rows + 1, len(system.outputs)))
-        self._loop = compiled_loop()
+        self._loop = compiled(integrate, INLINE)
 
     def run(self, h: float) -> float:
         """Run once from the start; return the seconds of the loop alone."""

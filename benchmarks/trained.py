@@ -18,7 +18,6 @@ from bristle.control.controller import read_controller
 from bristle.design import Damper
 from bristle.errors import RecordError
 from bristle.fmu.catalogue import instantiate
-from bristle.physics.damper import start_states
 from bristle.resources import scenarios_folder
 from bristle.scenario.scenario import load_scenario
 from bristle.simulate.coupled import simulate
@@ -125,7 +124,7 @@ def closed_loop(ground: Array) -> tuple[float, float]:
     samples = ground[::PARTS].copy()
     A, B, W, scales = (np.array(each) for each in (c.A, c.B, c.W, c.C))
     policy = Policy(False, 0.0, c.n, hidden, A, B, W, scales)
-    loop = Loop(policy, len(samples), start_states("lugre", {}), 2 * task.building.size)
+    loop = Loop(policy, len(samples), task.damper, 2 * task.building.size)
     clean = Run(
         plant_of(task), setup_of(task.damper, 0.0), Motion(samples, np.zeros((len(samples), 4)), 0)
     )

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from .interrupt import deferred
+from .physics.codegen import with_globals
 from .progress import tell
 from .resources import cache_folder
 
@@ -124,6 +125,8 @@ event.register("numba:compile", _Told())
 # numba asks for the folder of its cache in a global of its own, more than once per function.
 _FOLDER = Lock()
 
+_compiled: dict[tuple[str, tuple[str, ...], Path | None], Any] = {}
+
 
 def compiled(
     function: Callable[..., Any],
@@ -143,7 +146,14 @@ def compiled(
         themselves and with it again.
     keep : bool
         Whether to keep the machine code on disk.
+
+    Returns
+    -------
+    callable
+        The same one for the same digest; the function itself under `BRISTLE_JIT=off`.
     """
+    if os.environ.get("BRISTLE_JIT") == "off":
+        return function
     _import_the_rest()
     name = digest(function)
     folder = _folder(name) if keep else None
@@ -151,8 +161,11 @@ def compiled(
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder or "")
         try:
-            root = _closed(function, {}, inline, name)
-            return numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
+            if (name, inline, folder) not in _compiled:
+                root = _closed(function, {}, inline, name)
+                made = numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
+                _compiled[name, inline, folder] = made
+            return _compiled[name, inline, folder]
         finally:
             numba.config.CACHE_DIR = before
 
@@ -267,9 +280,9 @@ def _closed(
     inline : as in `compiled`
     end : of the names of the copies in machine code
     """
-    namespace = dict(function.__globals__)
+    changed: dict[str, Any] = {}
     for name in _names(function.__code__):
-        value = namespace.get(name)
+        value = function.__globals__.get(name)
         if isinstance(value, FunctionType):
             if id(value) not in done:
                 short = f"{value.__module__.rpartition('.')[2]}.{value.__qualname__}"
@@ -277,13 +290,10 @@ def _closed(
                 done[id(value)] = numba.njit(inline=how, **_CALLEE)(
                     _closed(value, done, inline, end)
                 )
-            namespace[name] = done[id(value)]
+            changed[name] = done[id(value)]
         elif value is _MAKES_TUPLE:
-            namespace[name] = _record
-    copy = FunctionType(
-        function.__code__, namespace, function.__name__, function.__defaults__, function.__closure__
-    )
-    copy.__module__ = function.__module__
+            changed[name] = _record
+    copy = with_globals(function, changed)
     copy.__qualname__ = f"{function.__qualname__}_{end}" if end else function.__qualname__
     return copy
 

@@ -17,7 +17,6 @@ from bristle.design.sliding import coefficients
 from bristle.design.table import Bank
 from bristle.design.task import Task
 from bristle.errors import DesignError
-from bristle.physics.damper import start_states
 from bristle.progress import counted, tell
 
 from . import motions
@@ -68,7 +67,7 @@ def design_policy(task: PolicyTask) -> DesignResult:
     policy = _policy(task, s, largest, unit)
     grounds, held_out = _grounds(training, unit, h)
     longest = max(map(len, [*grounds, *held_out]))
-    loop = Loop(policy, longest, start_states(task.damper.kind.name, task.damper.values), len(s.A))
+    loop = Loop(policy, longest, task.damper, len(s.A))
     tell("compiling the closed loop, once")
     runs, choosing = ([_run(task, ground) for ground in each] for each in (grounds, held_out))
     loop.learn_states(runs[0])

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from math import ceil
 from typing import Any
 
@@ -54,14 +52,16 @@ class Loop:
     policy : Policy
     longest : int
         Samples of the longest motion.
-    states : list of float
-        Of the damper at the begin.
+    given : Damper
     m : int
         States of the building.
     """
 
-    def __init__(self, policy: Policy, longest: int, states: list[float], m: int) -> None:
+    def __init__(self, policy: Policy, longest: int, given: Damper, m: int) -> None:
         self.policy = policy
+        functions = damper.functions_of(given.kind.name, given.effects)
+        self._run = compiled(functions.link(compute))
+        states = damper.start_states(given.kind.name, given.values, functions.slots)
         n, k = policy.n, len(states)
         N, count = longest, n + BESIDES
         self.course = Course(
@@ -69,7 +69,7 @@ class Loop:
             np.zeros((N, n)), np.zeros(N), np.zeros(N), np.zeros((N, count)),
             np.zeros((N, policy.hidden)), np.zeros((N, m)), np.zeros((N, k)), np.zeros((N, 4)),
             np.zeros((N, n)), np.zeros(N), np.zeros(count), np.zeros(0, dtype=np.int64),
-            np.zeros((2, STATES)), np.zeros(STATES), np.zeros((3, k)), np.zeros(damper.work_size()),
+            np.zeros((2, STATES)), np.zeros(STATES), np.zeros((3, k)), np.zeros(damper.room(k)),
         )  # fmt: skip
         self.course.z[0] = states
         self.eps = np.zeros(STATES)
@@ -130,18 +130,11 @@ class Loop:
         slope: Any = None,
     ) -> None:  # fmt: skip
         none = np.zeros(0)
-        _compiled(damper.evaluate, damper.step_law)(
+        self._run(
             task, run.plant, run.setup, self.policy._replace(weights=weights), run.motion,
             self.course, none if by_y is None else by_y, none if by_x is None else by_x, self.eps,
             none if slope is None else slope,
         )  # fmt: skip
-
-
-@cache
-def _compiled(evaluate: Any, step_law: Any) -> Callable[..., None]:
-    """Compile as these generated functions are: there are new ones after a new effect."""
-    found: Callable[..., None] = compiled(compute)
-    return found
 
 
 def plant_of(task: PolicyTask, random: np.random.Generator | None = None) -> Plant:

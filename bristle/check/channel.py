@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from types import FunctionType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.codegen import Slots
+from ..physics.codegen import Slots, with_globals
 from ..physics.effect import Effect
 from ..physics.sensor import instrument
 
@@ -58,7 +57,4 @@ def _history(effect: type[Effect]) -> tuple[Callable[..., None], Slots]:
     from ..jit import compiled
 
     show, slots = instrument(effect)
-    namespace: dict[str, Any] = {**globals(), "show": show}
-    time_loop = FunctionType(channel_history.__code__, namespace, "channel_history")
-    time_loop.__module__, time_loop.__qualname__ = __name__, "channel_history"
-    return compiled(time_loop), slots
+    return compiled(with_globals(channel_history, {"show": show})), slots

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from math import cos, inf, pi, sin
 
-from ..physics.damper import DamperModel, step, work_size
+from ..physics.damper import DamperModel, room, step
 from ..physics.effect import effects_of
 from ..physics.inputs import Inputs
 from ..physics.law import Law
@@ -84,13 +84,14 @@ def _steps(law: type[Law]) -> Check:
 def _forces(law: type[Law], dt: float) -> list[float]:
     """Return the forces [N] of a motion that is linear over each step of dt [s]."""
     model, w, forces = DamperModel(law.name), 2.0 * pi * 2.0, []
-    before, z, work = Inputs(0.0, 0.006 * w, 0.0, 4.0, dt, 0.0, 0.0, False), model.z, work_size()
+    before, z = Inputs(0.0, 0.006 * w, 0.0, 4.0, dt, 0.0, 0.0, False), model.z
+    linked, work = model.functions.link(step), room(len(z))
     for k in range(1, round(0.5 / dt) + 1):
         x, v = 0.006 * sin(w * k * dt), 0.006 * w * cos(w * k * dt)
         now = Inputs(x, v, -w * w * x, 4.0, dt, 0.0, 0.0, False)
         z1 = [0.0] * len(z)
         setup = model.setup._replace(active=True)
-        forces.append(step(setup, before, now, z, z1, [0.0] * work)[0])
+        forces.append(linked(setup, before, now, z, z1, [0.0] * work)[0])
         before, z = now, z1
     return forces
 

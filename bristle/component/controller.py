@@ -73,7 +73,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     inputs : (4,) floor acceleration [m/s2], base displacement [m], base velocity [m/s], damper
         force [N]
     c : Constants
-    state : (n + `SLOTS.law_states` + 6,) states of the state-space law, of the damper's law that is
+    state : (n + `Slots.law_states` + 6,) states of the state-space law, of the damper's law that is
         inverted, and what is remembered; filled
     outputs : (3,) voltage [V], raw command [N or V] and scheduling velocity [m/s], filled
     work : (n + 4,) room to work

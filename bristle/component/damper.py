@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from math import inf, isfinite
-from typing import Any
 
 from ..control.switching import limited
-from ..physics.codegen import hold
-from ..physics.damper import force_at
+from ..physics.damper import force_at, hold_law
 from ..physics.damper import step as law_step
 from ..physics.inputs import Inputs
 from ..physics.linear import Row
@@ -37,9 +35,6 @@ __all__ = [
     "REMEMBERED", "STROKE_RATIO", "VELOCITY", "VOLTAGE", "Constants", "bake", "bind", "constants",
     "follow", "output", "setup", "sizes", "start", "step", "stick_force",
 ]  # fmt: skip
-
-hold_law: Any = None
-hold(globals(), "hold_law")
 
 ENERGY, ENERGY_SHOWN, ENERGY_AT_BEGIN, DISPLACEMENT_AT_END = range(-REMEMBERED, -5)
 VELOCITY_AT_END, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = range(-5, 0)
@@ -113,7 +108,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     inputs : (5,) displacement [m], velocity [m/s], voltage [V], holding force [N],
         acceleration [m/s2]
     c : Constants
-    state : (`SLOTS.z_size` + 9,) the states of law and effects as given; the last nine are filled
+    state : (`Slots.z_size` + 9,) the states of law and effects as given; the last nine are filled
     outputs : (4,) force [N], dissipated energy [J], stroke ratio [1], friction [N], filled
     work : room to work, of the size that `sizes` gives
 

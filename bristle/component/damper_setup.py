@@ -67,7 +67,7 @@ def bake(
     law : a damper's law, such as "bingham"
     names : of the values, in their order, as law and effects know them; those of `OWN` among them
     tracks : parameters of effects that follow an input, each with the input's number
-    slots : where law and effects have their places, `physics.damper.SLOTS`
+    slots : where law and effects have their places
     """
     own = [names.index(name) for name in OWN]
     pairs = [number for name, port in tracks for number in (slots.parameters[name], port)]

@@ -11,11 +11,11 @@ from ..physics.structure import (
     accelerations,
     add_force,
     free_step,
+    functions_of,
     holding_force,
     matrices,
     resting_contact,
     resting_forces,
-    state_size,
 )
 from ..physics.structure import step as effects_step
 from .damper import stick_force
@@ -62,7 +62,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     outputs : displacement [m], velocity [m/s], absolute acceleration [m/s2] of each of the n
         levels; the drifts [m], n of them or, isolated, n - 1; the holding force [N]; displacement
         [m], velocity [m/s] and holding force [N] of each of the d devices; filled
-    work : (`room(n)`,) room to work
+    work : (`room(n, slots)`,) room to work
 
     Returns
     -------
@@ -92,7 +92,7 @@ def step(
         With the matrices of a step of dt, as `discretise` returns them.
     state, new_state : states at begin (kept) and end (filled), as `setup` lays them down
     outputs : as in `start`, filled
-    work : (`room(n)`,) room to work, kept from one sweep of a step to the next
+    work : (`room(n, slots)`,) room to work, kept from one sweep of a step to the next
 
     Returns
     -------
@@ -133,7 +133,7 @@ def effect_steps(
         linearly from one to the other
     c : Constants
     state, new_state : states at begin (kept) and end (filled), as `setup` lays them down
-    work : (`room(n)`,) room to work
+    work : (`room(n, slots)`,) room to work
     """
     n, size, states = c.n, 2 * c.n, len(state) - 3 * c.n - 1
     room = work[0 : 6 * n]
@@ -243,10 +243,12 @@ class StructureModel:
         effects: list[str] | None = None,
     ) -> None:
         self.m = matrices(building)
+        link = functions_of(effects or []).link
+        self._settle, self._step, self._output = map(link, (settle, step, output))
         self._store, state, self._work = laid_down(building, values or {}, effects or [])
         self.constants = constants(self._store)
         size = 2 * self.m.n
-        self.x, self.z = state[0:size], state[size : size + state_size(self.m.n)]
+        self.x, self.z = state[0:size], state[size : len(state) - self.m.n - 1]
         self.p, self.on = self.constants.p, self.constants.on
         self._idle = [0.0] * len(building.devices)
         shown = PER_LEVEL * self.m.n + self.m.n + 1 + PER_DEVICE * len(building.devices)
@@ -257,7 +259,7 @@ class StructureModel:
     def settle(self) -> None:
         """Compute what follows from the state, which was set from outside."""
         self._state = [*self.x, *self.z, *[0.0] * (self.m.n + 1)]
-        settle(self.constants, self._state, self._work)
+        self._settle(self.constants, self._state, self._work)
 
     def step(self, dt: float, a0: float, a1: float, force: float) -> None:
         """Advance over one step, the ground acceleration linear and the devices' force held.
@@ -274,7 +276,7 @@ class StructureModel:
         new = list(self._state)
         inputs = [a0, 0.0, 0.0, *self._idle], [a1, force, 0.0, *self._idle]
         clock = (0.0, dt, 0)
-        step(clock, *inputs, self.constants, self._state, new, self._outputs, self._work)
+        self._step(clock, *inputs, self.constants, self._state, new, self._outputs, self._work)
         self._state, size = new, 2 * self.m.n
         self.x, self.z = new[0:size], new[size : size + len(self.z)]
 
@@ -290,4 +292,4 @@ class StructureModel:
 
     def _show(self, a_g: float, force: float, extra: float) -> None:
         inputs = [a_g, force, extra, *self._idle]
-        output(0.0, inputs, self.constants, self._state, self._outputs, self._work)
+        self._output(0.0, inputs, self.constants, self._state, self._outputs, self._work)

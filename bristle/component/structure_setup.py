@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from ..physics import structure as laws
 from ..physics.building import Building
 from ..physics.codegen import Slots
 from ..physics.device import GROUND
 from ..physics.linear import Row, copy, invert
 from ..physics.rows import open_row, packed, place, row
-from ..physics.structure import EFFECT_STEP, fill_size, fill_step, work_size
+from ..physics.structure import (
+    EFFECT_STEP,
+    fill_size,
+    fill_step,
+    functions_of,
+    pack,
+    state_size,
+    work_size,
+)
 from .devices import PER_DEVICE, PER_LEVEL
 
 
@@ -72,7 +79,7 @@ def bake(building: Building, names: Sequence[str], slots: Slots) -> list[float]:
     building : Building
     names : of the values in their order: "attached_mass", "duffing.on", "duffing.k3",
         "NAME.STATE_0"
-    slots : where effects have their places, `physics.structure.SLOTS`
+    slots : where effects have their places
     """
     at = {name: index for index, name in enumerate(names)}
     attached = at.get("attached_mass", -1)
@@ -90,14 +97,14 @@ def bake(building: Building, names: Sequence[str], slots: Slots) -> list[float]:
     contacts = [effect.contact for effect in slots.effects]
     states = [at.get(f"{name}_0", -1) for name in slots.states]
     return packed(
-        sizes, *matrices, building.stiffnesses, ends, laws.pack({}), into_p, switches, contacts,
+        sizes, *matrices, building.stiffnesses, ends, pack({}, slots), into_p, switches, contacts,
         states,
     )  # fmt: skip
 
 
-def room(n: int) -> int:
+def room(n: int, slots: Slots) -> int:
     """Return the size of work of a structure of n levels."""
-    return work_size(n) + 4 * n + 2 * laws.state_size(n)
+    return work_size(n) + 4 * n + 2 * state_size(n, slots)
 
 
 def sizes(values: Row, baked: Row, counts: Row) -> int:
@@ -264,10 +271,10 @@ def discretise(dt: float, store: Row, work: Row) -> None:
 def laid_down(
     building: Building, values: Mapping[str, float], effects: Sequence[str]
 ) -> tuple[list[float], list[float], list[float]]:
-    """Return store, state and work of a structure from values by name, for plain Python."""
+    """Return store, state and work of a structure from values by name, for its `functions_of`."""
     names = [*values, *(f"{effect}.on" for effect in effects)]
     numbers = [*values.values(), *(1.0 for _ in effects)]
-    baked, counts = bake(building, names, laws.SLOTS), [0.0] * 4
+    baked, counts = bake(building, names, functions_of(effects).slots), [0.0] * 4
     sizes(numbers, baked, counts)
     store, state, _, work = ([0.0] * int(count) for count in counts)
     setup(numbers, [], baked, store, state)

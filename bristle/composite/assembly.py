@@ -83,7 +83,7 @@ class Assembly:
         fed = cut & {(c.target, c.input) for c in whole.connections}
         left = [c for c in whole.connections if (c.target, c.input) not in cut]
         self.scenario = replace(whole, connections=tuple(left))
-        self.system = System(self.scenario)
+        self.system = System(self.scenario, offered=True)
         self.parts: dict[str, Any] = self.system.slaves
         open_ones = [
             Input(name, port, (name, port) not in fed)
@@ -95,7 +95,7 @@ class Assembly:
 
     def kind(self, part: str) -> int:
         """Return which of `KINDS` a part is."""
-        return KINDS[self.parts[part].functions]
+        return KINDS[type(self.parts[part]).functions]
 
     def is_held(self, one: Input) -> bool:
         """Return whether an input is held over a step: commands and values are, for they jump."""

@@ -12,7 +12,7 @@ from pythonfmu import DefaultExperiment
 
 from bristle.composite import functions, rows
 from bristle.composite.assembly import Assembly
-from bristle.composite.state import fit_records
+from bristle.composite.state import fitted
 from bristle.fmu.component import STEP_LENGTH, ComponentSlave, Played
 
 
@@ -95,9 +95,8 @@ class Composite(ComponentSlave):
         return self.assembly.bake()
 
     def flat_functions(self) -> Any:
-        """Return the functions, fitted to the laws and effects that are registered."""
-        fit_records()
-        return functions
+        """Return the functions, fitted to the laws and effects of the parts."""
+        return fitted(self.assembly.system).all_of(functions)
 
     def played(self) -> list[Played]:
         """Return from what the signals of all sources are read."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ..physics.codegen import Link
 from ..physics.linear import Row
 from ..physics.rows import row
 from ..simulate import records
+from ..simulate.coupled import linked
 from ..simulate.pushed import room
+from ..simulate.system import System
 from .rows import (
     CONTROLLER,
     DAMPERS,
@@ -32,22 +35,24 @@ NUMBERS = 8
 each of so many seconds; the largest force so far [N]. Behind them the signals, the inputs at the
 last step, and the records and the memory of the time loop."""
 
-SOURCE_RECORD: Any = None
-DAMPER_RECORD: Any = None
-STRUCTURE_RECORD: Any = None
-SAMPLED_RECORD: Any = None
-SOURCE_SIZE = DAMPER_SIZE = STRUCTURE_SIZE = SAMPLED_SIZE = 0
+SOURCE_RECORD = records.source_record()
+DAMPER_RECORD, STRUCTURE_RECORD = records.damper_record(), records.structure_record()
+SAMPLED_RECORD = records.sampled_record()
+SOURCE_SIZE, DAMPER_SIZE, STRUCTURE_SIZE, SAMPLED_SIZE = (
+    record.itemsize // 8
+    for record in (SOURCE_RECORD, DAMPER_RECORD, STRUCTURE_RECORD, SAMPLED_RECORD)
+)
 
 
-def fit_records() -> None:
-    """Fit the records to the laws and effects that are registered: before functions are used."""
-    made = {
-        "SOURCE": records.source_record(), "DAMPER": records.damper_record(),
-        "STRUCTURE": records.structure_record(), "SAMPLED": records.sampled_record(),
-    }  # fmt: skip
-    for name, record in made.items():
-        globals()[f"{name}_RECORD"] = record
-        globals()[f"{name}_SIZE"] = record.itemsize // 8
+def fitted(system: System) -> Link:
+    """Return what fits functions of a whole scenario to the laws and effects of its components."""
+    damper = records.damper_record(system.dampers.slots)
+    structure = records.structure_record(system.structures.slots)
+    return linked(
+        system.dampers, system.structures,
+        DAMPER_RECORD=damper, DAMPER_SIZE=damper.itemsize // 8,
+        STRUCTURE_RECORD=structure, STRUCTURE_SIZE=structure.itemsize // 8,
+    )  # fmt: skip
 
 
 class Opened(NamedTuple):

@@ -4,17 +4,16 @@ A law whose quantities are constant or linear in the voltage is affine in it at 
 f = f_0 + slope V, so that V = (u - f_0)/slope. Reconstructed from the prose of Shirazi et al.
 (2012), IEEE TCST 20(5), eq. (7).
 
-`law` is the code of a law (`physics.law.law_code`), `p` are its parameters in their order, `z` its
-states as the controller estimates them: after each sample they move on by `estimate_states`.
+`law` is the code of a law of the library (`physics.law.law_code`), `p` are its parameters in their
+order, `z` its states as the controller estimates them: after each sample they move on by
+`estimate_states`.
 """
 
 from __future__ import annotations
 
 from math import inf
-from typing import Any
 
-from ..physics import damper as _damper  # noqa: F401  (it generates what is held here)
-from ..physics.codegen import hold
+from ..physics.damper_source import advance_law, law_force
 from ..physics.inputs import Inputs
 from ..physics.linear import Row
 from ..physics.tuples import NO_EFFECT, record
@@ -25,10 +24,6 @@ STILL = 1e-3
 
 LEAST_SLOPE = 0.5
 """Least force per volt [N/V] that is divided by; with 0.05 the voltage chatters."""
-
-advance_law: Any = None
-law_force: Any = None
-hold(globals(), "advance_law", "law_force")
 
 
 def force_of_law(law: int, p: Row, v: float, V: float, z: Row, x: float = 0.0) -> float:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple, Optional
 
+from ..physics.codegen import Functions
 from ..physics.drive import VOLTAGE, declared_for, states_for, text_for, unit_for
 from ..physics.effect import Effect, Parameter, effects_of
 from .slave import STEPPING, Slave
@@ -17,6 +18,7 @@ class EffectSlave(Slave):
 
     drive = VOLTAGE
     """What commands the damper."""
+    functions: ClassVar[Any]
 
     def add_effects(self, site: str, law: str = "") -> None:
         """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
@@ -41,6 +43,11 @@ class EffectSlave(Slave):
         """Return the effects that the component offers at a site."""
         own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
         return tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
+
+    def take(self, made: Functions) -> None:
+        """Compute with the functions of a set of laws and effects."""
+        self.made = made
+        self.functions = made.link.all_of(type(self).functions)  # type: ignore[misc]
 
     def add_physical(self, name: str, parameter: Parameter) -> None:
         """Declare a parameter of a law or effect."""
@@ -102,7 +109,6 @@ class ComponentSlave(EffectSlave):
     warning comes before that of a code. `hidden` outputs have no port.
     """
 
-    functions: ClassVar[Any]
     texts: ClassVar[dict[int, str]] = {}
     warns_first: ClassVar[dict[int, int]] = {}
     hidden: ClassVar[int] = 0

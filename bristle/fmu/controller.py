@@ -18,8 +18,8 @@ from ..control import inverse
 from ..control.controller import Controller, read_controller
 from ..control.policy import LARGEST
 from ..errors import BristleError
-from ..physics import damper as damper_laws
-from ..physics.laws import DEFAULT, DEFAULT_OF_DESIGN, Law, law_code, laws_of
+from ..physics.damper_source import LIBRARY
+from ..physics.laws import DEFAULT, DEFAULT_OF_DESIGN, Law, law_code
 from .component import ComponentSlave
 from .slave import Slave
 
@@ -119,7 +119,7 @@ class ControllerSlave(SampledSlave):
         names = self.parameter_names()
         known = {law.name: (law_code(law.name), names_of(law)) for law in invertible()}
         laws = known if "inverse" in names else {}
-        kind, states = self.law_kind, damper_laws.SLOTS.law_states
+        kind, states = self.law_kind, LIBRARY.slots.law_states
         return controller.bake(names, kind, self.designed(), laws, states)
 
 
@@ -167,8 +167,7 @@ def declare_anti_windup(slave: Slave, rate: float) -> None:
 
 def invertible() -> list[type[Law]]:
     """Return the laws that can be inverted, the default first."""
-    known = [law for law in laws_of("damper") if not law.own]  # an FMU carries the library's
-    found = [law for law in known if law.affine() and law.exact() and not law.felt]
+    found = [law for law in LIBRARY.slots.laws if law.affine() and law.exact() and not law.felt]
     return sorted(found, key=lambda law: law.name != DEFAULT)
 
 

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from ..component import HELD, damper
 from ..physics import damper as laws
+from ..physics.codegen import Functions
 from ..physics.damper_setup import refusals
 from ..physics.drive import Drive, declared_for, drive_named, text_for, unit_for
 from ..physics.laws import LAWS
@@ -38,8 +39,7 @@ class DamperSlave(ComponentSlave):
 
     def declare(self) -> None:
         drive = self.drive = drive_named(self.baked.get("drive", ""))
-        said = f"the {drive.name} left 0 .. {{{drive.limit}:g}} {drive.unit}; the damper saturates."
-        self.texts = {damper.SATURATED: said, **refusals(laws.SLOTS)}  # type: ignore[misc]
+        self.take(laws.SETS.offering((LAWS[self.law].base,), self.offered("damper", self.law)))
         self.description = text_for(self.description or "", drive)
         self.add_input("displacement", "m", "displacement of the rod", over_step=HELD)
         self.add_input("velocity", "m/s", "velocity of the rod", over_step=HELD)
@@ -70,6 +70,12 @@ class DamperSlave(ComponentSlave):
             self.add_parameter(f"{name}_0", 0.0, unit_for(unit, drive), text)
         self.add_effects("damper", self.law)
 
+    def take(self, made: Functions) -> None:
+        super().take(made)
+        drive = self.drive
+        said = f"the {drive.name} left 0 .. {{{drive.limit}:g}} {drive.unit}; the damper saturates."
+        self.texts = {damper.SATURATED: said, **refusals(made.slots)}  # type: ignore[misc]
+
     def _add_channels(self) -> list[str]:
         """Declare an input for each channel that effects follow; return their names."""
         self.following: dict[str, list[str]] = {}
@@ -92,7 +98,7 @@ class DamperSlave(ComponentSlave):
             for name, parameters in self.following.items()
             for parameter in parameters
         ]
-        return damper.bake(self.law, self.known_names(), tracks, laws.SLOTS)
+        return damper.bake(self.law, self.known_names(), tracks, self.made.slots)
 
     def setup(self) -> tuple[Any, list[float], int]:
         self._acceleration = self._index["acceleration"]

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics import structure
-from ..physics.effect import EFFECTS
+from ..physics.structure import (
+    advance_effects,
+    contact_force,
+    effect_forces,
+    functions_of,
+    pack,
+    start_states,
+)
 
 Array = NDArray[np.float64]
-
-effect_forces = structure.effect_forces
-contact_force = structure.contact_force
-advance_effects = structure.advance_effects
 
 
 class Chain(NamedTuple):
@@ -71,23 +71,6 @@ def forces_along(chain: Any, x: Any, v: Any, z: Any, p: Any, on: Any, out: Any) 
             out[k] += contact_force(n, isolated, stiffnesses, level, dt, 0.0, stick_force, z, p, on)
 
 
-def compiled_forces() -> Callable[..., None]:
-    """Return the compiled `forces_along`; the first call on a machine takes seconds."""
-    return _compiled(structure.effect_forces)
-
-
-@cache
-def _compiled(effect_forces_now: Any) -> Callable[..., None]:
-    """Compile with the generated functions of now: there are new ones after a new effect."""
-    global effect_forces, contact_force, advance_effects
-    from ..jit import compiled
-
-    effect_forces = effect_forces_now
-    contact_force, advance_effects = structure.contact_force, structure.advance_effects
-    function: Callable[..., None] = compiled(forces_along)
-    return function
-
-
 class Along:
     """Evaluates effects of the structure along a motion.
 
@@ -100,11 +83,14 @@ class Along:
     """
 
     def __init__(self, effects: list[str], storey: int) -> None:
-        slots = structure.SLOTS
-        self.on = np.array([e.name in effects for e in slots.effects], dtype=np.bool_)
+        from ..jit import compiled
+
+        functions = functions_of(effects)
+        self._slots = functions.slots
+        self.on = np.array([e.name in effects for e in self._slots.effects], dtype=np.bool_)
         self.active = bool(self.on.any())
         self._storey = storey
-        self._forces = compiled_forces()
+        self._forces = compiled(functions.link(forces_along))  # seconds, once on a machine
 
     def force(
         self, x: Array, v: Array, dt: float, stiffness: float, values: dict[str, float]
@@ -121,13 +107,9 @@ class Along:
         out = np.zeros(len(x))
         if not self.active:
             return out
-        slots = structure.SLOTS
-        p = np.zeros(max(1, slots.p_size))
-        for name, slot in slots.parameters.items():
-            effect, own = name.split(".", 1)
-            p[slot] = values.get(name, EFFECTS[effect].parameters[own].value)
+        p = np.array(pack(values, self._slots) or [0.0])
         n = max(1, self._storey)
-        z = np.array(structure.start_states(n, values) or [0.0])
+        z = np.array(start_states(n, values, self._slots) or [0.0])
         chain = Chain(
             n, np.full(n, stiffness), self._storey == 0, dt, np.zeros(2 * n), np.zeros(n),
             np.zeros_like(z),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable, Collection, Mapping
 from threading import Lock
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -12,25 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.command_limits import JUMP
-from ..physics import damper
+from ..physics import damper, structure
+from ..physics.codegen import Functions, Slots
+from ..physics.damper import LIBRARY, evaluate, functions_of, jump, room, setup_of, step, step_law
 from ..physics.damper_setup import parameter_places, state_places
+from ..physics.effect import effects_of
 from ..physics.inputs import Inputs, Setup
-from ..physics.laws import LAWS
+from ..physics.laws import LAWS, laws_of
 from .ahead import Ahead, begun
 
 Array = NDArray[np.float64]
-
-damper_step = damper.step
-damper_jump = damper.jump
-damper_evaluate = damper.evaluate
-law_step = damper.step_law
-
 
 _INLINE = (
     "damper.step", "series.advance_series", "series.balanced_speed", "series.by_secants",
     "series.speed_excess",
 )  # fmt: skip
 """Callees of `force_history` that cost more to call than to hold in it."""
+
+_INLINE_LAW = ("codegen.step_law", "falling.falling")
+"""Those of `law_history`."""
 
 _ONE_AT_A_TIME = Lock()
 _ahead: dict[str, Ahead] = {}
@@ -74,7 +73,7 @@ def force_history(
     tracks : parameters that change over the run, set in `setup.p`
     z : (states,) at the begin, moved on in place
     z1 : room for as many states
-    work : room for `damper.work_size()` floats
+    work : room for `damper.room` floats
     out : (n,) N, filled
     """
     size = len(z)
@@ -83,17 +82,17 @@ def force_history(
     for i in range(len(tracks.slots)):
         setup.p[tracks.slots[i]] = tracks.values[i, 0]
     now = Inputs(x[0], v[0], a[0], V[0], dt, 0.0, 0.0, False)
-    out[0] = damper_evaluate(setup, now, z, work[0:size], work[size : 2 * size])[0]
+    out[0] = evaluate(setup, now, z, work[0:size], work[size : 2 * size])[0]
     for k in range(1, len(x)):
         for i in range(len(tracks.slots)):
             setup.p[tracks.slots[i]] = tracks.values[i, k]
         V1 = before_jump(V, k)
         begin = Inputs(x[k - 1], v[k - 1], a[k - 1], V[k - 1], dt, energy, 0.0, False)
         now = Inputs(x[k], v[k], a[k], V1, dt, energy, 0.0, False)
-        out[k] = damper_step(setup, begin, now, z, z1, work)[0]
+        out[k] = step(setup, begin, now, z, z1, work)[0]
         if V[k] != V1:
             now = Inputs(x[k], v[k], a[k], V[k], dt, energy, 0.0, False)
-            out[k] = damper_jump(setup, now, z1, work)
+            out[k] = jump(setup, now, z1, work)
         energy += 0.5 * dt * (out[k - 1] * v[k - 1] + out[k] * v[k])
         for i in range(size):
             z[i] = z1[i]
@@ -118,7 +117,7 @@ def law_history(
     for k in range(len(x)):  # the first sample too: a second call would be compiled once more
         V1 = before_jump(V, k) if setup.lags and k > 0 else V[k]
         now = Inputs(x[k], v[k], a[k], V1, h, 0.0, 0.0, False)
-        out[k] = law_step(law, p, before, now, z, z1)[0]
+        out[k] = step_law(law, p, before, now, z, z1)[0]
         before = Inputs(x[k], v[k], a[k], V[k], h, 0.0, 0.0, False)
         if k > 0:
             for i in range(setup.n_own):
@@ -126,29 +125,37 @@ def law_history(
         h = dt
 
 
-def compiled_history(effects: bool = True) -> Callable[..., None]:
+def compiled_history(functions: Functions, effects: bool = True) -> Callable[..., None]:
     """Return the compiled `force_history`, or `law_history` where there are no effects.
 
     The first call on a machine takes seconds, that without effects one or two.
     """
+    from ..jit import compiled
+
+    one, inline = (force_history, _INLINE) if effects else (law_history, _INLINE_LAW)
     with _ONE_AT_A_TIME:  # threads that try effects ask for it at once
-        begun_before = _ahead.get((force_history if effects else law_history).__name__)
-        if begun_before is not None:
-            begun_before.wait()
-        return _compiled(damper.evaluate) if effects else _compiled_law(damper.step_law)
+        if one.__name__ in _ahead and functions is LIBRARY:
+            _ahead[one.__name__].wait()
+        found: Callable[..., None] = compiled(functions.link(one), inline)
+        return found
 
 
-def compile_ahead(effects: bool = True) -> None:
+def compile_ahead(law: str = "", effects: Collection[str] = ()) -> None:
     """Begin to compile what predicts forces in other processes, where no machine code is kept yet.
 
     Parameters
     ----------
-    effects : whether effects will be asked for too, not a law alone
+    law, effects : what will be asked for; without a law it is every law with many an effect, for
+        which all of a user's own are then one set
     """
     from ..jit import digest, kept
 
-    _hold_generated()
-    for one in (force_history, law_history) if effects else (law_history,):
+    if not law:
+        damper.SETS.of(laws_of("damper"), effects_of("damper"))
+        structure.SETS.of((), effects_of("structure"))
+    elif functions_of(law, effects) is not LIBRARY:
+        return
+    for one in (force_history, law_history) if effects or not law else (law_history,):
         before = _ahead.get(one.__name__)
         if (before is None or not before.at_work) and not kept(one):
             process = begun(one.__name__, digest(one))
@@ -169,35 +176,9 @@ def keep(name: str, wanted: str) -> None:
     if digest({one.__name__: one for one in (law_history, force_history)}[name]) != wanted:
         return
     still = np.zeros(2)
-    effects = [] if name == law_history.__name__ else [damper.SLOTS.effects[0].name]
+    effects = [] if name == law_history.__name__ else [LIBRARY.slots.effects[0].name]
     Bench(next(iter(LAWS)), effects).force(still, still, still, still, 1e-3, {})
     print(name, flush=True)
-
-
-def _hold_generated() -> None:
-    """Hold the newest generated functions: there are new ones after a new effect or law."""
-    global damper_evaluate, law_step
-    damper_evaluate, law_step = damper.evaluate, damper.step_law
-
-
-@cache
-def _compiled(evaluate: Any) -> Callable[..., None]:
-    """Compile the history with this generated function: there is a new one after a new effect."""
-    from ..jit import compiled
-
-    _hold_generated()
-    function: Callable[..., None] = compiled(force_history, _INLINE)
-    return function
-
-
-@cache
-def _compiled_law(step_law: Any) -> Callable[..., None]:
-    """Compile the history of laws alone: there is a new one after a new law."""
-    from ..jit import compiled
-
-    _hold_generated()
-    function: Callable[..., None] = compiled(law_history, ("codegen.step_law", "falling.falling"))
-    return function
 
 
 class Bench:
@@ -214,17 +195,19 @@ class Bench:
     def __init__(self, law: str, effects: list[str]) -> None:
         self.law = law
         self.effects = list(effects)
-        self._setup = damper.setup_of(law, {}, self.effects, np.array, _slots)
-        self._history = compiled_history(self._setup.active)
+        functions = functions_of(law, self.effects)
+        slots = functions.slots
+        self._setup = setup_of(law, {}, self.effects, np.array, _slots)
+        self._history = compiled_history(functions, self._setup.active)
         # Laid down once: fits ask for thousands of forces, and to find each place takes its time.
-        self._places = parameter_places(law, damper.SLOTS)
-        self._state_places = state_places(law, damper.SLOTS)
+        self._places = parameter_places(law, slots)
+        self._state_places = state_places(law, slots)
         self._begins = [
             (slot, signal)
-            for state, signal in _starts(law).items()
+            for state, signal in _starts(law, slots).items()
             if (slot := self._state_places.get(f"{state}_0")) is not None
         ]
-        self._states, self._work = damper.SLOTS.z_size, damper.work_size()
+        self._states, self._work = slots.z_size, room(slots.z_size)
 
     def force(
         self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float],
@@ -265,11 +248,11 @@ class Bench:
         return out
 
 
-def _starts(law: str) -> dict[str, str]:
+def _starts(law: str, slots: Slots) -> dict[str, str]:
     """Return the signal that each state begins with, of those that a motion has, by the state."""
     begun = {
         f"{effect.name}.{state}": signal
-        for effect in damper.SLOTS.effects
+        for effect in slots.effects
         for state, signal in effect.starts.items()
         if signal in _SIGNALS
     }

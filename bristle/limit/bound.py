@@ -38,7 +38,7 @@ INEXACT = 0.01
 def largest_force(case: Case, speed: float) -> float:
     """Return the damper's largest force [N] in sliding at up to a speed [m/s], at full voltage."""
     most = 0.0
-    h, work = case.plant.h, np.zeros(room(case))
+    h, work, end = case.plant.h, np.zeros(room(case)), case.functions.link(damper_end)
     for v in np.linspace(speed / SPEEDS, speed, SPEEDS):
         u = np.zeros(7)
         u[V_0] = u[V_1] = v
@@ -46,7 +46,7 @@ def largest_force(case: Case, speed: float) -> float:
         z = case.states.copy()
         for _ in range(round(SLIDING / (case.frequency * h))):
             after = z.copy()
-            most = max(most, damper_end(case.setup, h, case.plant.mass, u, 0.0, z, after, work))
+            most = max(most, end(case.setup, h, case.plant.mass, u, 0.0, z, after, work))
             z = after
     return most
 

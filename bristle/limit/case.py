@@ -13,8 +13,9 @@ from ..component.damper import REMEMBERED
 from ..component.structure_setup import Constants as StructureConstants
 from ..errors import ScenarioError
 from ..findings import unknown
+from ..physics import damper as damper_laws
 from ..physics.building import frequencies
-from ..physics.damper import work_size
+from ..physics.codegen import Functions
 from ..physics.inputs import Setup
 from ..scenario.scenario import Scenario
 from ..simulate.system import System
@@ -44,6 +45,8 @@ class Case:
     output, unit : str
         The output that is judged, "component.port", and its unit.
     plant, setup : Plant, Setup
+    functions : Functions
+        Of the damper.
     ground : (N + 1,) array
         Ground acceleration [m/s2] at 0, h, ...
     states : (k,) array
@@ -68,6 +71,7 @@ class Case:
     unit: str
     plant: Plant
     setup: Setup
+    functions: Functions
     ground: Array
     states: Array
     v_max: float
@@ -115,7 +119,7 @@ def case_of(scenario: Scenario, output: str) -> Case:
     return Case(
         scenario, building, damper, command.name, output, unit,
         _plant(slave, h, ports.index(pushed), felt, output.partition(".")[2], bool(setup.signed)),
-        setup, _ground(system, building, h, scenario),
+        setup, law.made, _ground(system, building, h, scenario),
         np.array(law.state[: len(law.state) - REMEMBERED]), v_max,
         scenario.component(damper).description.variables[command.name].unit or "", frequency,
         np.linalg.inv(np.reshape(slave.constants.m_inverse, (slave.constants.n, -1))),
@@ -252,8 +256,12 @@ class _Tried:
             begin[state] = 1.0
         else:
             given[end][at] = 1.0
-        outputs, work = [0.0] * len(self._slave._outputs), [0.0] * structure.room(c.n)
-        structure.step((0.0, self._h, 0), given[0], given[1], c, begin, after, outputs, work)
+        outputs, work = (
+            [0.0] * len(self._slave._outputs),
+            [0.0] * len(self._slave._work),
+        )
+        step, clock = self._slave.functions.step, (0.0, self._h, 0)
+        step(clock, given[0], given[1], c, begin, after, outputs, work)
         return np.array(after[: self.states])
 
     def shown(self, state: int, at: int) -> Array:
@@ -264,13 +272,16 @@ class _Tried:
             begin[state] = 1.0
         else:
             given[at] = 1.0
-        outputs, work = [0.0] * len(self._slave._outputs), [0.0] * structure.room(c.n)
-        structure.settle(c, begin, work)
+        outputs, work = (
+            [0.0] * len(self._slave._outputs),
+            [0.0] * len(self._slave._work),
+        )
+        self._slave.functions.settle(c, begin, work)
         structure.show_motion(c, begin, outputs)
-        structure.output(0.0, given, c, begin, outputs, work)
+        self._slave.functions.output(0.0, given, c, begin, outputs, work)
         return np.array(outputs)
 
 
 def room(case: Case) -> int:
     """Return how many floats the damper's functions need as room to work."""
-    return work_size() + 3 * len(case.states)
+    return damper_laws.room(len(case.states)) + 3 * len(case.states)

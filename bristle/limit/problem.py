@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..jit import compiled
-from ..physics import damper
 from .case import Case, room
 from .derivative import Gradient
 from .horizon import PULL_BACK, RECEDE, RESPOND, SLOPES, START, Horizon, compute
@@ -42,6 +38,7 @@ class Problem:
 
     def __init__(self, case: Case, every: int = 1, last: int | None = None) -> None:
         self.case = case
+        self._run = compiled(case.functions.link(compute))
         self.last = len(case.ground) - 1 if last is None else last
         self.nodes = np.unique(np.append(np.arange(0, self.last, every), self.last))
         self._instants = np.arange(self.last + 1)
@@ -122,7 +119,7 @@ class Problem:
         horizon: Horizon | None = None,
     ) -> None:  # fmt: skip
         c = self.case
-        _compiled(damper.evaluate, damper.step_law)(
+        self._run(
             task, c.plant, c.setup, c.ground, voltage, voltage if weights is None else weights, 0,
             self.last if last is None else last, self.course, self._gradient,
             horizon or self._idle, np.zeros(STATES),
@@ -143,9 +140,3 @@ class Problem:
         changes[TRIED] = np.abs(self.course.force).max()
         changes[STATES:] = np.abs(self.course.z[:, active]).max(axis=0)
         return 1e-6 * changes + ROUNDING
-
-
-@cache
-def _compiled(evaluate: Any, step_law: Any) -> Any:
-    """Compile as these generated functions are: there are new ones after a new effect."""
-    return compiled(compute)

@@ -1,28 +1,35 @@
-"""Generates one plain function per site from the hooks of all registered laws and effects.
+"""Generates the plain functions of a site from the hooks of a set of laws and effects.
 
 numba cannot loop over a list of different functions, and a Python loop over them would be slow.
 So the loop is written out once as source, with a run-time switch per law and effect: the same text
 runs in plain Python inside FMUs and, compiled, on the fast path. Numbers live in flat sequences,
 `p` for parameters, `z` for states, `on` for switches; `Slots` say which is where. The first slots
 of `p` and `z` belong to the law, as many as the largest law needs.
+
+The functions of some laws and effects are a value, `Functions`. Modules import those of the library
+by name, which never change; `Link` makes copies that call those of another set.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
+from types import FunctionType, SimpleNamespace
 from typing import Any
 
 from .command import MOST_KNOTS, entered, rising
-from .effect import Effect, Q, effects_of
+from .effect import Effect, Q
 from .inputs import Inputs
-from .law import Law, laws_of
+from .law import Law
 from .parameter import climb
 from .tuples import listed, made, record
 
+Laws = tuple[type[Law], ...]
+Effects = tuple[type[Effect], ...]
+
 
 class Slots:
-    """Where each effect of a site keeps its switch, states and parameters in the flat sequences.
+    """Where each effect of a set keeps its switch, states and parameters in the flat sequences.
 
     Attributes
     ----------
@@ -41,9 +48,8 @@ class Slots:
         Source of what is added to a state's index: where the states of one of several places begin.
     """
 
-    def __init__(self, site: str, with_effects: bool = True) -> None:
-        self.laws = laws_of(site) if site == "damper" else ()
-        self.effects = effects_of(site) if with_effects else ()
+    def __init__(self, laws: Laws, effects: Effects) -> None:
+        self.laws, self.effects = laws, effects
         self.parameters: dict[str, int] = {}
         self.states: dict[str, int] = {}
         self.switches: dict[str, int] = {}
@@ -173,22 +179,115 @@ def generate(name: str, source: str, slots: Slots) -> Any:
     return function
 
 
-_HOLDERS: list[tuple[dict[str, Any], tuple[str, ...]]] = []
-_HANDED_OUT: dict[str, Any] = {}
+class Functions:
+    """The functions of a set of laws and effects at one site; nothing changes it.
 
-
-def hold(namespace: dict[str, Any], *names: str) -> None:
-    """Put generated functions into a module's globals, now and whenever they are made anew.
-
-    A function that numba compiles finds what it calls among its module's globals, so each module
-    that calls generated functions holds them.
+    Attributes
+    ----------
+    slots : Slots
+    made : dict
+        Name to function.
+    link : Link
+        Puts them in place of the library's.
     """
-    _HOLDERS.append((namespace, names))
-    namespace.update({name: _HANDED_OUT[name] for name in names if name in _HANDED_OUT})
+
+    def __init__(self, slots: Slots, texts: Mapping[str, Callable[[Slots], str]]) -> None:
+        self.slots = slots
+        self.made = {name: generate(name, text(slots), slots) for name, text in texts.items()}
+        self.link = Link(self.made)
+
+    def have(self, laws: Laws, effects: Effects) -> bool:
+        """Return whether these laws and effects are in the set."""
+        return {*laws}.issubset(self.slots.laws) and {*effects}.issubset(self.slots.effects)
 
 
-def hand_out(functions: Mapping[str, Any]) -> None:
-    """Give the functions that were generated to the modules that hold them."""
-    _HANDED_OUT.update(functions)
-    for namespace, names in _HOLDERS:
-        namespace.update({name: functions[name] for name in names if name in functions})
+class Sets:
+    """The sets of functions of a site, each made once: that of the `library`, then others.
+
+    Parameters
+    ----------
+    texts : mapping
+        Name of a function to what returns its source.
+    laws, effects : tuples of classes
+        Laws in the order of their codes, effects by name; those in this package are the library's.
+    """
+
+    def __init__(
+        self, texts: Mapping[str, Callable[[Slots], str]], laws: Laws, effects: Effects
+    ) -> None:
+        self._texts = texts
+        self._made: dict[tuple[Laws, Effects], Functions] = {}
+        here = __name__.rpartition(".")[0]
+        self.library = self.of(
+            tuple(law for law in laws if law.__module__.startswith(here)),
+            tuple(effect for effect in effects if effect.__module__.startswith(here)),
+        )
+
+    def of(self, laws: Laws, effects: Effects) -> Functions:
+        """Return the functions of these laws and effects alone."""
+        if (laws, effects) not in self._made:
+            self._made[laws, effects] = Functions(Slots(laws, effects), self._texts)
+        return self._made[laws, effects]
+
+    def offering(self, laws: Laws, effects: Effects) -> Functions:
+        """Return the functions of the library, or of these alone where it lacks one."""
+        return self.library if self.library.have(laws, effects) else self.of(laws, effects)
+
+    def serving(self, laws: Laws, effects: Effects) -> Functions:
+        """Return the first set that has these: what it has besides is switched off."""
+        known = [one for one in [*self._made.values()] if one.have(laws, effects)]
+        return known[0] if known else self.of(laws, effects)
+
+
+class Link:
+    """Returns functions as they are with others in place of what they call by name.
+
+    A function that numba compiles finds what it calls among its module's globals. So it is copied
+    with other ones, and so is what leads there; what calls nothing of that name stays as it is.
+
+    Parameters
+    ----------
+    names : mapping
+        Name of a global to what stands in its place.
+    keep : functions that stay as they are, with all that they call
+    """
+
+    def __init__(self, names: Mapping[str, Any], keep: Iterable[Any] = ()) -> None:
+        self.names = names
+        self._done = {one: one for one in keep}
+
+    def __call__(self, function: Any) -> Any:
+        """Return a function that is linked, the same one each time."""
+        if function not in self._done:
+            self._done[function] = function
+            known, changed = function.__globals__, {}
+            for name in function.__code__.co_names:
+                value = known.get(name)
+                if name in self.names and name in known:
+                    changed[name] = self.names[name]
+                elif isinstance(value, FunctionType):
+                    changed[name] = self(value)
+            if any(known[name] != value for name, value in changed.items()):
+                self._done[function] = with_globals(function, changed)
+        return self._done[function]
+
+    def all_of(self, module: Any) -> Any:
+        """Return a module's functions, linked: the module itself where that changes none."""
+        found = {
+            name: self(value)
+            for name, value in vars(module).items()
+            if isinstance(value, FunctionType)
+        }
+        if all(vars(module)[name] is value for name, value in found.items()):
+            return module
+        return SimpleNamespace(**{**vars(module), **found})
+
+
+def with_globals(function: Any, changed: Mapping[str, Any]) -> FunctionType:
+    """Return a copy of a function some of whose globals are others."""
+    copied = FunctionType(
+        function.__code__, {**function.__globals__, **changed}, function.__name__,
+        function.__defaults__, function.__closure__,
+    )  # fmt: skip
+    copied.__module__, copied.__qualname__ = function.__module__, function.__qualname__
+    return copied

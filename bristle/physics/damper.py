@@ -11,11 +11,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import PhysicsError
-from . import damper_setup
-from . import damper_source as source
-from . import effects as _effects  # noqa: F401  (importing it registers the effects)
-from .codegen import Slots, generate, hand_out, hold
+from .codegen import Slots
 from .damper_setup import bake, fill, refusals, setup_from, state_places, store_size
+from .damper_source import (
+    LIBRARY,
+    SETS,
+    advance_law,
+    evaluate,
+    felt_voltage,
+    functions_of,
+    hold_law,
+    inner_motion,
+    law_factors,
+    law_force,
+    series_element,
+    step_law,
+)
 from .implicit import advance_implicit
 from .inputs import Inputs, Setup
 from .linear import Row
@@ -23,43 +34,10 @@ from .rows import packed
 from .series import INSTANT, SETTLE, Balance, advance_series, balanced_speed
 from .tuples import record
 
-SLOTS: Slots
-advance_law: Any = None
-evaluate: Any = None
-felt_voltage: Any = None
-hold_law: Any = None
-inner_motion: Any = None
-law_factors: Any = None
-law_force: Any = None
-series_element: Any = None
-step_law: Any = None
-
-_GENERATED = {
-    "advance_law": source.advance_law_source,
-    "evaluate": source.evaluate_source,
-    "felt_voltage": source.voltage_source,
-    "hold_law": source.hold_law_source,
-    "inner_motion": source.motion_source,
-    "law_factors": source.law_factors_source,
-    "law_force": source.law_force_source,
-    "net_force": source.net_force_source,
-    "series_element": source.series_source,
-    "step_law": source.step_law_source,
-}
-
-
-def regenerate() -> None:
-    """Generate the damper's functions anew; call it after laws or effects were registered late."""
-    global SLOTS
-    SLOTS = Slots("damper")
-    hand_out({name: generate(name, text(SLOTS), SLOTS) for name, text in _GENERATED.items()})
-
-
-hold(
-    globals(), "advance_law", "evaluate", "felt_voltage", "hold_law", "inner_motion", "law_factors",
-    "law_force", "series_element", "step_law",
-)  # fmt: skip
-regenerate()
+__all__ = [
+    "LIBRARY", "SETS", "DamperModel", "evaluate", "force_at", "functions_of", "hold_law", "jump",
+    "law_force", "room", "setup_of", "start_states", "step", "step_law",
+]  # fmt: skip
 
 
 def step(
@@ -78,7 +56,7 @@ def step(
     z0, z1 : sequence of float
         State at begin (kept) and at end (filled).
     work : sequence of float
-        Room for `work_size()` floats.
+        Room for `room(len(z0))` floats.
     """
     if not setup.active:
         return step_law(setup.law, setup.p, begin, end, z0, z1)  # type: ignore[no-any-return]
@@ -161,27 +139,16 @@ def jump(setup: Setup, now: Inputs, z: Row, work: Row) -> float:
     return evaluate(setup, now, z, rates, after)[0]  # type: ignore[no-any-return]
 
 
-def work_size(more: int = 0) -> int:
-    """Return how many floats `step` needs as room to work, where states have so many `more`."""
-    return room(SLOTS.z_size + more)
-
-
 def room(size: int) -> int:
     """Return how many floats `step` needs as room to work, where the states are so many."""
     return 7 * size + 2 * size * size
 
 
-def moving_states(law: str, switched_on: Sequence[str]) -> list[int]:
-    """Return the slots that move by `rate` when these effects are on; empty if none does."""
-    setup = setup_of(law, {}, switched_on)
-    return list(setup.moving[: setup.n_moving])
-
-
 def setup_of(
     law: str, values: Mapping[str, float], effects: Sequence[str], row: Any = list,
-    slots: Any = list,
+    whole: Any = list,
 ) -> Setup:  # fmt: skip
-    """Return the setup of a damper.
+    """Return the setup of a damper, for its `functions_of`.
 
     Parameters
     ----------
@@ -191,7 +158,7 @@ def setup_of(
         Name ("f_c", "gas_spring.k") to value in SI; what is missing takes its default.
     effects : sequence of str
         The effects that are on.
-    row, slots : callable
+    row, whole : callable
         What makes sequences of numbers, of switches and slots, from lists.
 
     Raises
@@ -200,27 +167,23 @@ def setup_of(
         If two effects are series elements.
     """
     names = [*values, *(f"{effect}.on" for effect in effects)]
-    baked = packed(*bake(law, names, SLOTS))
-    store, z = [0.0] * store_size(baked), [0.0] * SLOTS.z_size
+    slots = functions_of(law, effects).slots
+    baked = packed(*bake(law, names, slots))
+    store, z = [0.0] * store_size(baked), [0.0] * slots.z_size
     if code := fill([*values.values(), *(1.0 for _ in effects)], baked, store, z):
-        raise PhysicsError(refusals(SLOTS)[code])
+        raise PhysicsError(refusals(slots)[code])
     setup = setup_from(store)
     moving = [int(slot) for slot in setup.moving[: setup.n_moving]]
-    switches = [switch != 0.0 for switch in setup.on]
-    return setup._replace(p=row(setup.p), on=slots(switches), moving=slots(moving or [0]))
+    on = [switch != 0.0 for switch in setup.on]
+    return setup._replace(p=row(setup.p), on=whole(on or [False]), moving=whole(moving or [0]))
 
 
-def start_states(law: str, values: Mapping[str, float]) -> list[float]:
+def start_states(law: str, values: Mapping[str, float], slots: Slots) -> list[float]:
     """Return the states at the begin; start values end in `_0`: "coil_lag.voltage_0"."""
-    z = [0.0] * SLOTS.z_size
-    for name, slot in state_places(law, SLOTS).items():
+    z = [0.0] * slots.z_size
+    for name, slot in state_places(law, slots).items():
         z[slot] = values.get(name, 0.0)
     return z
-
-
-def pack(law: str, values: Mapping[str, float]) -> list[float]:
-    """Return the flat parameters of a law and of all effects; missing ones take their defaults."""
-    return damper_setup.pack(law, values, SLOTS)
 
 
 class DamperModel:
@@ -235,6 +198,11 @@ class DamperModel:
         values of states end in `_0` ("bristle_deflection_0", "coil_lag.voltage_0").
     effects : list of str
         The effects that are on.
+
+    Attributes
+    ----------
+    functions : Functions
+        What it is made of; a user's own law or effect has functions of its own.
     """
 
     def __init__(
@@ -244,15 +212,17 @@ class DamperModel:
         effects: list[str] | None = None,
     ) -> None:
         values, effects = values or {}, effects or []
+        self.functions = functions_of(law, effects)
         self.setup = setup_of(law, values, effects)
         self.law, self.p, self.on = self.setup.law, self.setup.p, self.setup.on
         self.active = self.setup.active
         self.moving = list(self.setup.moving[: self.setup.n_moving])
         self.advances = self.setup.advances
-        self.z = start_states(law, values)
-        self._spare = [0.0] * SLOTS.z_size
-        self._work = [0.0] * work_size()
+        self.z = start_states(law, values, self.functions.slots)
+        self._work = [0.0] * room(len(self.z))
         self._end = list(self.z)
+        self._force, self._step = map(self.functions.link, (force_at, step))
+        self._hold_law = self.functions.made["hold_law"]
 
     def force(
         self, x: float, v: float, a: float, V: float, dt: float, energy: float,
@@ -268,9 +238,7 @@ class DamperModel:
         stick_force, sticks : force [N] that would stop the motion within dt; whether it is known
         """
         now = record(Inputs, (x, v, a, V, dt, energy, stick_force, sticks))
-        if not self.active:
-            return law_force(self.law, self.p, now, self.z)[0]  # type: ignore[no-any-return]
-        return evaluate(self.setup, now, self.z, self._work, self._spare)[0]  # type: ignore[no-any-return]
+        return self._force(self.setup, now, self.z, self._work)[0]  # type: ignore[no-any-return]
 
     def step(
         self, x: float, v: float, a: float, V: float, dt: float, energy: float,
@@ -285,8 +253,8 @@ class DamperModel:
         """
         now = record(Inputs, (x, v, a, V, dt, energy, stick_force, sticks))
         if self.active:
-            force = step(self.setup, now, now, self.z, self._end, self._work)[0]
+            force = self._step(self.setup, now, now, self.z, self._end, self._work)[0]
         else:
-            force = hold_law(self.law, self.p, now, self.z, self._end)[0]
+            force = self._hold_law(self.law, self.p, now, self.z, self._end)[0]
         self.z, self._end = self._end, self.z
-        return force
+        return force  # type: ignore[no-any-return]

@@ -91,7 +91,8 @@ def bake(law: str, names: Sequence[str], slots: Slots) -> list[list[float]]:
     slots : where law and effects have their places
     """
     kind, at = LAWS[law], {name: index for index, name in enumerate(names)}
-    numbers = [law_code(law), len(kind.states), kind.exact(), kind.has("sign"), bool(kind.felt)]
+    code, own = law_code(law, slots.laws), len(kind.states)
+    numbers = [code, own, kind.exact(), kind.has("sign"), bool(kind.felt)]
     into_p = [
         (at[name], slot)
         for name, places in parameter_places(law, slots).items()

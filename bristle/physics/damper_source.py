@@ -1,4 +1,4 @@
-"""The text of a damper's functions, generated from the hooks of all laws and effects.
+"""A damper's functions, generated from the hooks of laws and effects: their text, and their sets.
 
 A law's own calls stand where the hooks of the effects meet them: first what changes the voltage and
 the motion, then the factors, then the forces, then what the states make of all that.
@@ -6,11 +6,12 @@ the motion, then the factors, then the forces, then what the states make of all 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
-from .codegen import Slots, switched, switched_laws
-from .effect import Effect
-from .law import Law
+from . import effects as _effects  # noqa: F401  (importing it registers the effects)
+from .codegen import Functions, Sets, Slots, switched, switched_laws
+from .effect import Effect, effects_of
+from .law import LAWS, Law, laws_of
 from .tuples import FACTORS, FORM_OF_LAW, law_state, law_values
 
 _FACTORS = {"limit": " * yield_factor * slip_length", "viscous": " * viscous_factor"}
@@ -339,3 +340,32 @@ def net_force_source(slots: Slots) -> str:
         only = slots.only(lambda one, wanted=effect: one is wanted)  # type: ignore[misc]
         lines += switched(only, "rate", f"pull = {{call}}[{place}]", **q)
     return "\n".join([*lines, "    return pull"])
+
+
+SETS = Sets(
+    {
+        "advance_law": advance_law_source,
+        "evaluate": evaluate_source,
+        "felt_voltage": voltage_source,
+        "hold_law": hold_law_source,
+        "inner_motion": motion_source,
+        "law_factors": law_factors_source,
+        "law_force": law_force_source,
+        "net_force": net_force_source,
+        "series_element": series_source,
+        "step_law": step_law_source,
+    },
+    laws_of("damper"),
+    effects_of("damper"),
+)
+LIBRARY = SETS.library
+(
+    advance_law, evaluate, felt_voltage, hold_law, inner_motion, law_factors, law_force, net_force,
+    series_element, step_law,
+) = LIBRARY.made.values()  # fmt: skip
+
+
+def functions_of(law: str, effects: Collection[str]) -> Functions:
+    """Return functions of a law with effects: the library's, if it has them."""
+    wanted = tuple(effect for effect in effects_of("damper") if effect.name in effects)
+    return SETS.serving((LAWS[law].base,), wanted)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from .codegen import hold
+from .damper_source import evaluate
 from .inputs import Inputs, Setup
 from .linear import Row, solve_in_place
 
@@ -12,9 +10,6 @@ IMPLICIT_STEP = 5e-4
 """Longest substep [s] of states that move by `rate`."""
 
 _GAMMA = 1.0 - 0.5 * 2.0**0.5
-
-evaluate: Any = None
-hold(globals(), "evaluate")
 
 
 def between(begin: Inputs, end: Inputs, share: float, dt: float) -> Inputs:
@@ -50,7 +45,7 @@ def advance_implicit(setup: Setup, begin: Inputs, end: Inputs, z: Row, work: Row
     setup : Setup
     begin, end : Inputs at begin and end of the step of end.dt [s]
     z : (k,) state, advanced in place
-    work : room for `damper.work_size()` floats or more
+    work : room for `damper.room` floats or more
     """
     moving, n, size = setup.moving, setup.n_moving, len(z)
     f = work[0:size]

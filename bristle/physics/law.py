@@ -356,13 +356,13 @@ def laws_of(site: str = "damper") -> tuple[type[Law], ...]:
     return tuple(law for law in LAWS.values() if law.site == site)
 
 
-def law_code(name: str) -> int:
-    """Return the number of a damper's law, by which compiled code tells them apart.
+def law_code(name: str, laws: tuple[type[Law], ...] = ()) -> int:
+    """Return the number of a law among a set's, the registered ones, as compiled code knows it.
 
     From `FORM_STEP` on it says which form of the command was chosen (see `forms`).
     """
     law = LAWS[name]
-    return laws_of("damper").index(law.base) + FORM_STEP * law.form_code
+    return (laws or laws_of("damper")).index(law.base) + FORM_STEP * law.form_code
 
 
 def law_names(site: str = "damper") -> tuple[str, ...]:

@@ -59,7 +59,6 @@ def probe_law(law: type[Law]) -> None:
     _smooth(law, defaults)
     _moving(law, defaults)
     _at_zero(law, defaults)
-    damper.regenerate()
     for values in ends(law):
         for amplitude, frequency, V in CYCLES:
             cycle(law, values, amplitude, frequency, V)
@@ -80,7 +79,7 @@ def cycle(
 
     Parameters
     ----------
-    law : registered, its functions generated
+    law : registered
     values : parameters by name in SI; missing ones take their defaults
     amplitude, frequency, V : m, Hz, V
 

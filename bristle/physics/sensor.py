@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .codegen import Slots, call, generate, q_source
 from .effect import Effect
 
@@ -26,5 +25,5 @@ def instrument(effect: type[Effect]) -> tuple[Any, Slots]:
     It takes the next sample of the signal, advances the states `z` in place and returns what the
     instrument shows then.
     """
-    slots = Slots("sensor").only(lambda known: known is effect)
+    slots = Slots((), (effect,))
     return generate("show", _source(effect, slots), slots), slots

@@ -7,9 +7,9 @@ of each substep is found by trials.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from .codegen import hold
+from .damper_source import advance_law, felt_voltage, law_factors, net_force
 from .implicit import IMPLICIT_STEP, between
 from .inputs import Inputs, Setup
 from .linear import Row
@@ -31,12 +31,6 @@ INSTANT = 1e-9
 
 SETTLE = 5e-3
 """Time [s] over which forces act on a series mass that comes to its balance; its own is 0.1 ms."""
-
-net_force: Any = None
-advance_law: Any = None
-felt_voltage: Any = None
-law_factors: Any = None
-hold(globals(), "net_force", "advance_law", "felt_voltage", "law_factors")
 
 
 class Balance(NamedTuple):

@@ -9,12 +9,14 @@ inside FMUs, arrays under numba.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import inf
 from typing import Any, NamedTuple
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .building import Building
-from .codegen import Slots, generate
+from .codegen import Functions, Sets, Slots
+from .effect import effects_of
 from .linear import Row, inverse, multiply, phi_functions
 from .structure_source import advance_source, contact_source, forces_source
 
@@ -195,20 +197,21 @@ def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, other
     return total
 
 
-def regenerate() -> None:
-    """Generate the structure's functions anew; call it after effects were registered late."""
-    global SLOTS, effect_forces, contact_force, advance_effects
-    SLOTS = Slots("structure")
-    effect_forces = generate("effect_forces", forces_source(SLOTS), SLOTS)
-    contact_force = generate("contact_force", contact_source(SLOTS), SLOTS)
-    advance_effects = generate("advance_effects", advance_source(SLOTS), SLOTS)
+SETS = Sets(
+    {
+        "effect_forces": forces_source,
+        "contact_force": contact_source,
+        "advance_effects": advance_source,
+    },
+    (),
+    effects_of("structure"),
+)
+effect_forces, contact_force, advance_effects = SETS.library.made.values()
 
 
-SLOTS: Slots
-effect_forces: Any
-contact_force: Any
-advance_effects: Any
-regenerate()
+def functions_of(effects: Collection[str]) -> Functions:
+    """Return functions of effects: the library's, if it has them."""
+    return SETS.serving((), tuple(e for e in effects_of("structure") if e.name in effects))
 
 
 class Setup(NamedTuple):
@@ -367,24 +370,24 @@ def resting_contact(
     return contact_force(n, isolated, stiffnesses, x, inf, 0.0, stick, z, p, on)  # type: ignore[no-any-return]
 
 
-def pack(values: dict[str, float]) -> list[float]:
+def pack(values: dict[str, float], slots: Slots) -> list[float]:
     """Return the flat parameters of all effects; missing ones take their defaults."""
-    p = [0.0] * SLOTS.p_size
-    for effect in SLOTS.effects:
+    p = [0.0] * slots.p_size
+    for effect in slots.effects:
         for name, parameter in effect.parameters.items():
             key = effect.name + "." + name
-            p[SLOTS.parameters[key]] = values.get(key, parameter.value)
+            p[slots.parameters[key]] = values.get(key, parameter.value)
     return p
 
 
-def state_size(n: int) -> int:
+def state_size(n: int, slots: Slots) -> int:
     """Return how many states the effects have: those of the first level, then each level's own."""
-    return SLOTS.z_size * (n + 1)
+    return slots.z_size * (n + 1)
 
 
-def start_states(n: int, values: dict[str, float]) -> list[float]:
+def start_states(n: int, values: dict[str, float], slots: Slots) -> list[float]:
     """Return the states of n levels at the begin; `values` names start values, "EFFECT.STATE_0"."""
-    return [values.get(name + "_0", 0.0) for name in SLOTS.states] * (n + 1)
+    return [values.get(name + "_0", 0.0) for name in slots.states] * (n + 1)
 
 
 def work_size(n: int) -> int:

@@ -24,7 +24,7 @@ from typing import Any
 
 from .. import units
 from ..errors import PhysicsError, TrustError, UnitError
-from . import damper, structure, user_trial
+from . import user_trial
 from .effect import EFFECTS, Effect, laws_joined
 from .law import LAWS, Law, law_names
 from .parameter import fields_of
@@ -124,13 +124,11 @@ def load(folder: Path, word: str) -> list[Loaded]:
     files = sorted(folder.glob("*.py")) if folder.is_dir() else []
     here = {path.resolve() for path in files}
     gone = [path for path in _known if path.parent == folder.resolve() and path not in here]
-    changed = len([path for path in gone if _forget(path)]) > 0
+    for path in gone:
+        _forget(path)
     for path in [path for path in _waiting if path.parent == folder.resolve() and path not in here]:
         del _waiting[path]
-    found, new = _load(files, word)
-    if changed or new:
-        _regenerate()
-    return found
+    return _load(files, word)
 
 
 def load_effect(path: Path) -> type[Effect]:
@@ -155,9 +153,7 @@ def load_file(path: Path, word: str) -> Any:
     """Return the effect or law of one file, registered; see `load_effect` for what is raised."""
     if not path.is_file():
         raise PhysicsError(f"{path}: there is no such file with {_a(word)}.")
-    (loaded,), new = _load([path], word)
-    if new:
-        _regenerate()
+    (loaded,) = _load([path], word)
     if path.resolve() in _waiting:
         raise _waiting[path.resolve()]
     if loaded.made is None:
@@ -197,14 +193,13 @@ def leave_out(made: Any, why: str) -> None:
         if loaded.made is made:
             _forget(path)
             _known[path] = digest, Loaded(loaded.path, None, why)
-    _regenerate()
 
 
 def unload_effects() -> None:
     """Take every effect and law of a user's out of the library: it is as it came."""
     _waiting.clear()
-    if [path for path in list(_known) if _forget(path)]:
-        _regenerate()
+    for path in list(_known):
+        _forget(path)
 
 
 @contextmanager
@@ -227,13 +222,11 @@ def defined(texts: Mapping[str, str]) -> Iterator[None]:
                 made.append(_made(text, path, path, "effect"))
             except FlawError as error:
                 raise PhysicsError(_where(path, error)) from None
-        _regenerate()
         yield
     finally:
         for effect in made:
             if EFFECTS.get(effect.name) is effect:
                 del EFFECTS[effect.name]
-        _regenerate()
 
 
 def flaw_of(name: str, text: str) -> str:
@@ -246,25 +239,17 @@ def flaw_of(name: str, text: str) -> str:
     return "" if flaw is None else str(flaw)
 
 
-def _regenerate() -> None:
-    damper.regenerate()
-    structure.regenerate()
-
-
-def _forget(path: Path) -> bool:
-    """Drop what a file gave; return whether an effect or law went with it."""
+def _forget(path: Path) -> None:
+    """Drop what a file gave."""
     _, loaded = _known.pop(path)
     registry = LAWS if isinstance(loaded.made, type) and issubclass(loaded.made, Law) else EFFECTS
     if loaded.made is not None and registry.get(loaded.name) is loaded.made:
         del registry[loaded.name]
-        return True
-    return False
 
 
-def _load(files: list[Path], word: str) -> tuple[list[Loaded], bool]:
-    """Return what files give, and whether the library has changed."""
+def _load(files: list[Path], word: str) -> list[Loaded]:
+    """Return what files give."""
     kind, texts, found = _KINDS[word], {}, {}
-    changed = False
     for shown in files:
         path = shown.resolve()
         _waiting.pop(path, None)
@@ -282,7 +267,8 @@ def _load(files: list[Path], word: str) -> tuple[list[Loaded], bool]:
             if made is None or kind.known.get(known[1].name) is made:
                 found[shown] = known[1]
                 continue
-        changed = (path in _known and _forget(path)) or changed
+        if path in _known:
+            _forget(path)
         try:
             _require(shown, text)
         except TrustError as error:
@@ -298,10 +284,9 @@ def _load(files: list[Path], word: str) -> tuple[list[Loaded], bool]:
                 made = _made(text, path, shown, word)
             except FlawError as late:
                 flaw = late
-        changed = changed or made is not None
         found[shown] = Loaded(shown, made, _where(shown, flaw) if flaw is not None else "")
         _known[path] = digest, found[shown]
-    return [found[shown] for shown in files], changed
+    return [found[shown] for shown in files]
 
 
 def _where(shown: Path, flaw: FlawError) -> str:

@@ -58,9 +58,10 @@ def what_if_section(study: Study) -> str:
     from ..web.numbers import Numbers
 
     with movable(study) as found:
-        description = described(Numbers(found.scenario), shown=found.shown)
+        numbers = Numbers(found.scenario)
+        description = described(numbers, shown=found.shown)
     return html.section(
         f"What if: the model in {found.run}, with other numbers",
-        body(module(), description),
+        body(module(numbers.system), description),
         html.items(found.notes),
     )

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cache
 from math import isfinite
 from typing import Any
 
@@ -13,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import RunError
 from ..jit import compiled
-from ..physics import damper, structure
+from ..physics.codegen import Functions, Link
 from ..scenario.scenario import Scenario
 from . import time_loop
 from .layout import substeps_in
@@ -25,9 +22,6 @@ REFERENCE_SUBSTEP = 5e-5
 """The same [s] where the errors of other runs are told by this one: it must be better than they."""
 
 Array = NDArray[Any]
-
-_sample = time_loop.sample
-_has_clocks = False
 
 
 class StoppedError(RunError):
@@ -66,7 +60,8 @@ def simulate(scenario: Scenario, longest: float = LONGEST_SUBSTEP) -> dict[str, 
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
-    filled, unsettled, _ = compiled_loop(bool(system.names["sampled"]))(
+    loop = linked(system.dampers, system.structures)(time_loop.integrate)
+    filled, unsettled, _ = compiled(loop, time_loop.INLINE)(
         (rows, substeps, h), system.sources(), system.coupled(h), system.sampled(h),
         system.start_values(), slots, table,
     )  # fmt: skip
@@ -108,32 +103,10 @@ def substeps_of(scenario: Scenario, system: System, longest: float = LONGEST_SUB
     return substeps_in(scenario.step, longest, system.periods())
 
 
-def compiled_loop(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
-    """Return the compiled time loop, with sampled components or without.
+def linked(*sets: Functions, **more: Any) -> Link:
+    """Return what lets the time loop call these functions, and puts other globals in place.
 
-    The first call on a machine takes seconds, more of them with sampled components. A process that
-    has the loop with them uses it for everything: it gives the same numbers.
+    A controller inverts a law of the library, whatever the dampers are.
     """
-    global _has_clocks
-    _has_clocks = _has_clocks or clocked
-    return _compiled(damper.evaluate, structure.effect_forces, _has_clocks)
-
-
-@contextmanager
-def whole_loop() -> Iterator[tuple[Any, tuple[str, ...]]]:
-    """Give the time loop with sampled components, and which of its callees become part of it."""
-    before, time_loop.sample = time_loop.sample, _sample
-    try:
-        yield time_loop.integrate, time_loop.INLINE
-    finally:
-        time_loop.sample = before
-
-
-@cache
-def _compiled(
-    evaluate: Any, effect_forces: Any, clocked: bool
-) -> Callable[..., tuple[int, int, int]]:
-    """Compile the loop as these generated functions are: there are new ones after a new effect."""
-    time_loop.sample = _sample if clocked else time_loop.idle
-    function: Callable[..., tuple[int, int, int]] = compiled(time_loop.integrate, time_loop.INLINE)
-    return function
+    made = {name: function for one in sets for name, function in one.made.items()}
+    return Link({**made, **more}, [time_loop.take_command])

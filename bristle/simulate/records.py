@@ -19,6 +19,7 @@ from ..component.devices import DEVICE_FORCES
 from ..fmu.controller import MEASURED
 from ..physics import damper, structure
 from ..physics.building import MAX_FLOORS
+from ..physics.codegen import Slots
 from ..physics.device import MOST_DEVICES
 from ..physics.signals import PARAMETERS
 
@@ -48,7 +49,7 @@ def source_record() -> np.dtype[np.void]:
     )
 
 
-def damper_record() -> np.dtype[np.void]:
+def damper_record(slots: Slots = damper.LIBRARY.slots) -> np.dtype[np.void]:
     """Return the record of a damper: see `component.damper.Constants`, and what couples it.
 
     smooth, smooth_1, smooth_2 are the force without friction at the ends of the last substeps;
@@ -56,7 +57,7 @@ def damper_record() -> np.dtype[np.void]:
     bring what they push of structure `on_structure` (-1: none) to rest together, each between
     levels `lower` and `upper`; `holding` is the slot of the force that would hold it.
     """
-    size, effects = damper.SLOTS.z_size, len(damper.SLOTS.effects)
+    size, effects = slots.z_size, len(slots.effects)
     states = size + damper_component.REMEMBERED
     forces = ("smooth", "smooth_1", "smooth_2", "found", "tried", "excess")
     return np.dtype(
@@ -68,16 +69,16 @@ def damper_record() -> np.dtype[np.void]:
             *((name, _FLAG) for name in ("measured", "jumps")),
             *_inputs(5),
             *((name, _FLOAT, (states,)) for name in ("state", "new_state")),
-            ("p", _FLOAT, (damper.SLOTS.p_size,)),
-            ("moving", _INT, (size,)),
+            ("p", _FLOAT, (slots.p_size,)),
+            ("moving", _INT, (max(1, size),)),
             ("on", _SWITCH, (max(1, effects),)),
-            ("work", _FLOAT, (damper.work_size(damper_component.REMEMBERED),)),
+            ("work", _FLOAT, (damper.room(states),)),
         ],
         align=True,
     )
 
 
-def structure_record() -> np.dtype[np.void]:
+def structure_record(slots: Slots = structure.SETS.library.slots) -> np.dtype[np.void]:
     """Return the record of a structure: see `component.structure.Constants`, and what couples it.
 
     `forces` are the slots of the inputs behind the first three, those of the `devices`; `friction`,
@@ -87,12 +88,11 @@ def structure_record() -> np.dtype[np.void]:
     each device. It is `followed` by a component that reads more than its motion.
     """
     n, most = LEVELS, MOST_DEVICES
-    slots_of_effects = structure.SLOTS
-    states = 3 * n + 1 + structure.state_size(n)
-    slots = ("first", "friction", "extra_friction")
+    states = 3 * n + 1 + structure.state_size(n, slots)
+    signals = ("first", "friction", "extra_friction")
     return np.dtype(
         [
-            *((name, _INT) for name in ("n", "n_states", "devices", *slots)),
+            *((name, _INT) for name in ("n", "n_states", "devices", *signals)),
             *((name, _FLOAT) for name in ("mass", "h", "smooth0")),
             *((name, _FLAG) for name in ("active", "touches", "isolated", "followed")),
             ("inputs", _INT, (DEVICE_FORCES,)),
@@ -102,9 +102,9 @@ def structure_record() -> np.dtype[np.void]:
             *((name, _FLOAT, (n * n,)) for name in ("m_inverse", "damping", "stiffness")),
             ("phi", _FLOAT, (4 * n * n,)),
             *((name, _FLOAT, (2 * n * (n + 1),)) for name in ("held", "ramp")),
-            ("p", _FLOAT, (max(1, slots_of_effects.p_size),)),
-            ("on", _SWITCH, (max(1, len(slots_of_effects.effects)),)),
-            ("work", _FLOAT, (structure_component.room(n),)),
+            ("p", _FLOAT, (max(1, slots.p_size),)),
+            ("on", _SWITCH, (max(1, len(slots.effects)),)),
+            ("work", _FLOAT, (structure_component.room(n, slots),)),
             ("ends", _INT, (2 * most,)),
             *((name, _INT, (most,)) for name in ("forces", "frictions")),
             ("smooths", _FLOAT, (most,)),
@@ -138,7 +138,7 @@ def sampled_record() -> np.dtype[np.void]:
             *_inputs(m),
             *((name, _FLOAT, (m,)) for name in own),
             *((name, _INT, (m,)) for name in ("length", "ring")),
-            ("p", _FLOAT, (damper.SLOTS.law_parameters,)),
+            ("p", _FLOAT, (damper.LIBRARY.slots.law_parameters,)),
         ],
         align=True,
     )

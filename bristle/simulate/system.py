@@ -13,7 +13,12 @@ from ..data import ground_motion_file
 from ..errors import ScenarioError
 from ..fmu import catalogue
 from ..fmu.slave import Slave
+from ..physics import damper as damper_laws
+from ..physics import structure as structure_laws
+from ..physics.codegen import Functions
 from ..physics.device import GROUND
+from ..physics.effect import effects_of
+from ..physics.laws import LAWS, laws_of
 from ..physics.signals import CONSTANT
 from ..scenario.scenario import Component, Scenario
 from . import records
@@ -33,17 +38,29 @@ KINDS: dict[Any, str] = {
 }
 """What the functions of a component make it in the time loop."""
 
+SITES = {"damper": damper_laws.SETS, "structure": structure_laws.SETS}
+"""Where effects are in the time loop, with the functions that there are."""
+
 
 class System:
     """A scenario's components as configured objects, and the slots of their signals.
 
     Attributes
     ----------
+    dampers, structures : Functions
+        The library's, or where a component has a law or effect that is not in it, those of all
+        that the components have.
     outputs, kinds : dict
         `component.port` to the slot of the signal, and to the kind of the variable.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    offered : bool
+        Whether a component has all effects that it offers, or those that are on.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, offered: bool = False) -> None:
         self.names: dict[str, list[str]] = {
             kind: [] for kind in ("source", "damper", "structure", "sampled")
         }
@@ -65,8 +82,11 @@ class System:
         for component in scenario.components:
             self.names[kind_of(component, scenario)].append(component.name)
         self.slaves: dict[str, Any] = {
-            component.name: configured(component, scenario) for component in scenario.components
+            component.name: instantiated(component, scenario) for component in scenario.components
         }
+        self.dampers, self.structures = self._functions(offered)
+        for component in scenario.components:
+            configure(self.slaves[component.name], component, scenario)
         self.source_of: dict[Port, Port] = {
             (c.target, c.input): (c.source, c.output) for c in scenario.connections
         }
@@ -77,6 +97,30 @@ class System:
         for component in scenario.components:
             self._add_slots(component)
         self.slots.update({end: self.slots[begin] for end, begin in self.source_of.items()})
+
+    def _functions(self, offered: bool) -> tuple[Functions, Functions]:
+        """Let dampers compute with the same functions, and structures."""
+        slaves = {site: [self.slaves[name] for name in self.names[site]] for site in SITES}
+        own = any(one.made is not SITES[site].library for site in SITES for one in slaves[site])
+        found = []
+        for site, sets in SITES.items():
+            laws = {LAWS[one.law].base for one in slaves[site] if site == "damper"}
+            effects = {
+                effect
+                for one in slaves[site]
+                for effect in one._effects
+                if offered or one[effect.name + ".on"]
+            }
+            made = sets.library
+            if own:
+                made = sets.of(
+                    tuple(law for law in laws_of(site) if law in laws),
+                    tuple(effect for effect in effects_of(site) if effect in effects),
+                )
+            for one in slaves[site]:
+                one.take(made)
+            found.append(made)
+        return found[0], found[1]
 
     def _add_slots(self, component: Component) -> None:
         """Give every input and output a slot; hidden outputs stand behind the others."""
@@ -165,7 +209,7 @@ class System:
 
     def _dampers(self) -> Array:
         names = self.names["damper"]
-        found = np.zeros(len(names), records.damper_record())
+        found = np.zeros(len(names), records.damper_record(self.dampers.slots))
         for record, name in zip(found, names, strict=True):
             slave = self.slaves[name]
             lay_damper(record, slave.constants, slave.state, self.wiring(name))
@@ -173,7 +217,7 @@ class System:
 
     def _structures(self, h: float) -> Array:
         names = self.names["structure"]
-        found = np.zeros(len(names), records.structure_record())
+        found = np.zeros(len(names), records.structure_record(self.structures.slots))
         for record, name in zip(found, names, strict=True):
             slave = self.slaves[name]
             lay_structure(record, slave.constants_of(h), slave.state, self.wiring(name))
@@ -240,8 +284,8 @@ def kind_of(component: Component, scenario: Scenario) -> str:
     )
 
 
-def configured(component: Component, scenario: Scenario) -> Slave:
-    """Return the component's Python object with the scenario's values, its model built."""
+def instantiated(component: Component, scenario: Scenario) -> Slave:
+    """Return the component's Python object with the scenario's values."""
     slave = catalogue.instantiate(
         component.made_of(),
         component.building,
@@ -257,6 +301,11 @@ def configured(component: Component, scenario: Scenario) -> Slave:
         index = slave._index[name]
         slave._values[index] = type(slave._values[index])(value)
         slave._set.add(index)
+    return slave
+
+
+def configure(slave: Slave, component: Component, scenario: Scenario) -> None:
+    """Build the model of a component's Python object."""
     try:
         slave._check_parameters()
         slave.configure()
@@ -267,4 +316,3 @@ def configured(component: Component, scenario: Scenario) -> Slave:
             f"{scenario.file} [components.{component.name}]: an effect follows "
             f"{', '.join(following)}, which is not compiled. Run it with the engine fmu."
         )
-    return slave

@@ -331,16 +331,6 @@ def accept(dampers: Any, structures: Any, s: Any) -> None:
         d.smooth = d.found - s[d.first + FRICTION]
 
 
-def idle(sampled: Any, coupled: Any, origin: float, t: float, h: float, s: Any) -> None:
-    """Do nothing, in place of `sample` where nothing has a clock: the loop compiles sooner.
-
-    Parameters
-    ----------
-    sampled, coupled, origin, t, h, s
-        As in `sample`.
-    """
-
-
 def sample(sampled: Any, coupled: Any, origin: float, t: float, h: float, s: Any) -> None:
     """Let the components act whose instant a substep reaches; the forces follow.
 

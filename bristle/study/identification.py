@@ -90,7 +90,7 @@ def identify_study(
         refuse_left_out(study.laws_folder / f"{law}.py")
     present = study.model()
     model = _of_law(model or present, law)
-    compile_ahead(bool(model.effects))
+    compile_ahead(model.law, model.effects)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
     # Before is what the study had: at its defaults another law would be nobody's model.

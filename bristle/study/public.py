@@ -130,7 +130,7 @@ def identify(
     chosen = model_of(model, effects, DEFAULT)
     house = building_from(building, device)
     refuse_in_building(ALL if free else None, house is not None)
-    compile_ahead(bool(chosen.effects))
+    compile_ahead(chosen.law, chosen.effects)
     runs = _runs(given, holdout, channels, house)
     rig = _rig(runs, house)
     drives = [run.drive for run in runs.all if run.drive]

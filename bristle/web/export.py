@@ -77,7 +77,8 @@ def export_web(
     BuildError
         If zig is not installed, or the folder cannot be written.
     """
-    description, wasm = described(Numbers(file, overrides), sliders, shown), module()
+    numbers = Numbers(file, overrides)
+    description, wasm = described(numbers, sliders, shown), module(numbers.system)
     title = description["title"]
     contents: dict[str, str | bytes] = {
         "index.html": page(title, [_HEAD.format(escape(title)), body(wasm, description)], _FOOT),

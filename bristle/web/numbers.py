@@ -64,7 +64,7 @@ class Numbers:
 
     Attributes
     ----------
-    scenario : Scenario
+    scenario, system : Scenario, System
     rows, substeps, h : int, int, float
         Rows behind the first, substeps of each, a substep [s].
     names, units : list of str
@@ -76,7 +76,7 @@ class Numbers:
 
     def __init__(self, file: str | Path, overrides: Mapping[str, object] | None = None) -> None:
         scenario = load_scenario(file, overrides)
-        system = System(scenario)
+        system = self.system = System(scenario)
         self._file, self._overrides = file, dict(overrides or {})
         self.scenario, self.rows = scenario, scenario.steps
         self.substeps = substeps_of(scenario, system)

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bristle.identify import bench
+from bristle import jit
 from bristle.identify.bench import Bench, before_jump, compiled_history
+from bristle.physics.damper import LIBRARY
 from bristle.physics.law import laws_of
 from tests.physics.rigs import force_at
 
@@ -87,10 +88,10 @@ def test_a_mount_finds_its_new_balance_when_the_voltage_jumps(law: str) -> None:
 
 def test_threads_that_ask_at_once_get_one_function_and_leave_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    bench._compiled.cache_clear()
+    jit._compiled.clear()
     x = np.zeros(300)
     with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(lambda _: compiled_history(), range(32)))
+        found = list(pool.map(lambda _: compiled_history(LIBRARY), range(32)))
         list(pool.map(lambda name: Bench("lugre", [name]).force(x, x, x, x, DT, {}), EFFECTS))
     assert len({id(one) for one in found}) == 1
     assert list(tmp_path.iterdir()) == []
@@ -104,7 +105,7 @@ def test_a_law_alone_has_the_force_that_it_has_among_effects_that_are_off(law: s
     rig = Bench(law, [])
     values = {"bristle_deflection_0": 2e-4, "deflection_0": 2e-4}
     alone = rig.force(x, v, a, V, DT, values)
-    rig._history = compiled_history(effects=True)
+    rig._history = compiled_history(LIBRARY)
     assert np.array_equal(alone, rig.force(x, v, a, V, DT, values))
     rig._setup = rig._setup._replace(active=True)  # as if an effect were on
     assert rig.force(x, v, a, V, DT, values) == pytest.approx(alone, abs=1e-12 * np.ptp(alone))

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +14,6 @@ from bristle.errors import BristleError
 from bristle.limit import Limit, limit, problem, search
 from bristle.limit.bound import bound_of, largest_force
 from bristle.limit.case import case_of
-from bristle.limit.horizon import compute
 from bristle.limit.problem import Problem
 from bristle.limit.search import descended, levelled, value_of
 from bristle.resources import scenarios_folder
@@ -51,8 +48,7 @@ parameters = { voltage = 3.0 }
 @pytest.fixture
 def in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute without numba: short responses take less than to compile."""
-    plain: Callable[..., Any] = compute
-    monkeypatch.setattr(problem, "_compiled", lambda *functions: plain)
+    monkeypatch.setattr(problem, "compiled", lambda function: function)
 
 
 def made(stop: float, every: int = 1, output: str = Y, **values: object) -> Problem:

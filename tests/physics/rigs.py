@@ -71,10 +71,14 @@ class Bench:
         effects = list(effects)
         self.model = DamperModel(law, dict(values or {}), effects)
         self.last: tuple[float, float, float] | None = None
-        self._work = [0.0] * damper.work_size()
+        self._step = self.model.functions.link(damper.step)
+        self._work = [0.0] * damper.room(len(self.model.z))
 
     def state(self, name: str) -> float:
-        return self.model.z[damper.SLOTS.states[name] if name != "bristle" else 0]
+        return self.model.z[self.slot(name) if name != "bristle" else 0]
+
+    def slot(self, name: str) -> int:
+        return self.model.functions.slots.states[name]
 
     def move(self, x: float, v: float, V: float, dt: float) -> float:
         """Move on over dt [s] to x, v, V; return the force there."""
@@ -85,7 +89,7 @@ class Bench:
         begin = Inputs(x0, v0, a, V0, dt, 0.0, 0.0, False)
         end = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
         # As one that has effects takes it: without any, all their switches are asked.
-        force, _ = damper.step(m.setup._replace(active=True), begin, end, m.z, z1, self._work)
+        force, _ = self._step(m.setup._replace(active=True), begin, end, m.z, z1, self._work)
         m.z = z1
         self.last = (x, v, V)
         return float(force)

@@ -68,7 +68,8 @@ def damper_run(
     given = Inputs(*(to(channel.tolist()) for channel in motion), dt, 0.0, 0.0, False)
     none = Tracks(np.zeros(0, dtype=np.int64), np.zeros((0, len(t))))
     z, z1, out = to(model.z), to([0.0] * len(model.z)), to([0.0] * len(t))
-    history(setup._replace(active=True), given, none, z, z1, to([0.0] * damper.work_size()), out)
+    work = to([0.0] * damper.room(len(z)))
+    history(setup._replace(active=True), given, none, z, z1, work, out)
     return np.array(out), np.array(z)
 
 
@@ -78,7 +79,7 @@ def damper_run(
 def test_dampers(law: str, effects: list[str]) -> None:
     for exponent, dt in ((0.0, 0.002), (1.0, 0.01), (2.0, 0.0005)):
         plain = damper_run(force_history, law, effects, exponent, dt, list)
-        fast = damper_run(compiled_history(), law, effects, exponent, dt, np.array)
+        fast = damper_run(compiled_history(damper.LIBRARY), law, effects, exponent, dt, np.array)
         assert np.abs(plain[0]).max() > 1.0
         for one, other in zip(plain, fast, strict=True):
             scale = np.maximum(np.abs(one), 1e-3 * np.abs(one).max())
@@ -89,7 +90,7 @@ def held_run(step: Any, law: str, effects: list[str], to: Any) -> np.ndarray:
     """Return force, friction and states of 150 steps whose rod friction may hold."""
     model = damper.DamperModel(law, {"exponent": 1.0}, effects)
     setup = damper.setup_of(law, {"exponent": 1.0}, effects, to, to)._replace(active=True)
-    z, work, found = to(model.z), to([0.0] * damper.work_size()), []
+    z, work, found = to(model.z), to([0.0] * damper.room(len(model.z))), []
     last = (0.0, 0.0, 0.0, 4.0)
     for k in range(1, 151):
         dt, t = (0.002, 0.01, 0.0005)[k % 3], 0.002 * k

@@ -194,12 +194,15 @@ def test_behind_a_stiff_mount_it_is_as_without_one(law: str, effect: str) -> Non
     assert np.sqrt(np.mean(left**2) / np.mean(added[slides] ** 2)) < 0.05
 
 
+SLOTS = structure.SETS.library.slots
+
+
 def test_both_sites_evaluate_one_and_the_same_force() -> None:
     state = [0.008, 0.0, 0.0, 0.02, 0.0, 0.0]
     for effect, values in ((EndStop, SHORT), (Duffing, {"duffing.k_3": 2e6})):
-        on = [one is effect for one in structure.SLOTS.effects]
+        on = [one is effect for one in SLOTS.effects]
         forces = [0.0] * 3
-        p, z = structure.pack(values), structure.start_states(3, values)
+        p, z = structure.pack(values, SLOTS), structure.start_states(3, values, SLOTS)
         arguments = 3, True, [1057.0, 1.0, 1.0], state
         structure.resting_forces(*arguments, z, p, on, forces)
         layer = forces[0] + structure.resting_contact(*arguments, 0.0, z, p, on)
@@ -291,15 +294,12 @@ def test_a_late_effect_of_several_sites_is_generated_for_each() -> None:
             return p.k * q.x
 
     try:
-        damper.regenerate()
-        structure.regenerate()
         inside = force_at("bingham", x=0.01, effects=["second_path"])
         assert inside == pytest.approx(0.5)
-        assert "second_path.k" in structure.SLOTS.parameters
+        assert "second_path.k" in structure.functions_of(["second_path"]).slots.parameters
         assert EFFECTS["second_path@structure"].site == "structure"
         assert SecondPath.key("structure") == "second_path@structure"
     finally:
         del EFFECTS["second_path"]
-        damper.regenerate()
-        structure.regenerate()
-    assert "second_path.k" not in damper.SLOTS.parameters
+    assert "second_path.k" not in damper.LIBRARY.slots.parameters
+    assert "second_path.k" not in SLOTS.parameters

@@ -13,6 +13,7 @@ from rigs import Bench
 from bristle import units
 from bristle.errors import PhysicsError
 from bristle.physics import damper
+from bristle.physics.codegen import generate
 from bristle.physics.command import MOST_KNOTS, chosen_source, rising
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import effects_of
@@ -63,15 +64,15 @@ def test_hooks_and_generated_code_agree_on_the_form(name: str, form: str) -> Non
     values = {key: p.value for key, p in law.parameters.items()}
     for key in law.driven():  # a quarter off the line, all in bounds
         values[key] = 1.25 * values[key] if values[key] else -1e-3 * max(values.values())
-    setup = damper.setup_of(law.name, values, [])
+    setup, slots = damper.setup_of(law.name, values, []), damper.LIBRARY.slots
     assert setup.law % 64 == law_code(name)
     for k, quantity in enumerate(law.command):
         for V in (*LEVELS, 9.0):
-            code = damper.generate(
+            code = generate(
                 "quantity",
                 "def quantity(form, p, V):\n"
-                f"    return {chosen_source('0.0', damper.SLOTS.law_parameters, k, 'V')}",
-                damper.SLOTS,
+                f"    return {chosen_source('0.0', slots.law_parameters, k, 'V')}",
+                slots,
             )
             seen = code(setup.law // 64, setup.p, V)
             if quantity in choosable(law.base):
@@ -198,10 +199,8 @@ forget_law(Own)
 @pytest.fixture
 def own() -> Iterator[type[Law]]:
     LAWS[Own.name] = Own
-    damper.regenerate()
     yield Own
     forget_law(Own)
-    damper.regenerate()
 
 
 def test_a_law_of_ones_own_has_the_forms(own: type[Law]) -> None:

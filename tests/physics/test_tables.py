@@ -88,19 +88,15 @@ def mapped() -> type[Law]:
 @pytest.fixture
 def effect() -> Iterator[type[Effect]]:
     found = sloped()
-    damper.regenerate()
     yield found
     del EFFECTS[found.name]
-    damper.regenerate()
 
 
 @pytest.fixture
 def law() -> Iterator[type[Law]]:
     found = mapped()
-    damper.regenerate()
     yield found
     forget_law(found)
-    damper.regenerate()
 
 
 def motion(count: int = 1500) -> tuple[np.ndarray, ...]:
@@ -260,7 +256,8 @@ def test_a_file_of_a_users_own_may_have_a_table(tmp_path: Path) -> None:
     try:
         found = user.load_effect(path)
         assert found.own
-        assert "curved.curve[3]" in damper.SLOTS.parameters
+        known = damper.functions_of("bingham", ["curved"]).slots.parameters
+        assert "curved.curve[3]" in known
         assert force_at("bingham", x=0.01, effects=["curved"]) == pytest.approx(1.0)
     finally:
         user.unload_effects()

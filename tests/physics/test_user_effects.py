@@ -69,7 +69,7 @@ def test_an_edited_file_replaces_its_effect_and_a_gone_one_takes_it_away(tmp_pat
     file.unlink()
     assert user.load_effects(tmp_path) == []
     assert "seal" not in EFFECTS
-    assert "seal.f_s" not in damper.SLOTS.parameters
+    assert "seal.f_s" not in damper.LIBRARY.slots.parameters
 
 
 def test_of_two_folders_the_one_read_last_stays(tmp_path: Path) -> None:
