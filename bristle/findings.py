@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from typing import Literal, NamedTuple
 
-from .lines import KeyPath
+KeyPath = tuple[str | int, ...]
 
 Level = Literal["error", "warning", "note"]
 LIST_AT_MOST = 12
@@ -26,6 +26,12 @@ class Finding(NamedTuple):
     line: int
     level: Level
     text: str
+
+
+def worded(file: object, finding: Finding) -> str:
+    """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
+    place = f"{file}:{finding.line}" if finding.line else str(file)
+    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
 
 
 class Findings:

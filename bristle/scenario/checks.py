@@ -9,9 +9,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.toml_lines import KeyPath
 from ..errors import BristleError, PhysicsError, TrustError
 from ..findings import Findings, number, unknown, written
-from ..lines import KeyPath
 from .document import COMPONENT_KEYS, LAW_KEYS, MADE_FROM, Document, flatten
 from .laws import choose_law
 from .library import Library

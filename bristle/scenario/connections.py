@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ..core.toml_lines import KeyPath
 from ..errors import UnitError
 from ..findings import Findings, listed, nearest, number, unknown, written
 from ..fmu.description import Variable
 from ..fmu.variables import passes
-from ..lines import KeyPath
 from ..ssp.conversion import SAME
 from ..units import Measure
 from .checks import table

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..core.toml_lines import KeyPath, key_lines, repeated_keys
 from ..errors import ScenarioError
 from ..findings import Finding, Findings, unknown
-from ..lines import KeyPath, key_lines, repeated_keys
 
 MAX_BYTES = 1_000_000
 """A scenario is a page of text; a file larger than this [byte] is something else."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..core.toml_lines import KeyPath
 from ..findings import Findings, command, nearest
 from ..fmu.description import Description, Value, Variable
-from ..lines import KeyPath
 
 ALGORITHMS = ("gauss-seidel", "midpoint", "midpoint-iterated", "jacobi")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .. import resources
 from ..errors import ScenarioError
-from ..findings import Finding, Findings, nearest
+from ..findings import Finding, Findings, nearest, worded
 from ..fmu.description import Description, Value
 from .advice import advise
 from .checks import check_components, check_run, check_steps, check_top
@@ -202,12 +202,6 @@ def check_scenario(
     except ScenarioError as error:
         return [Finding(0, "error", str(error))]
     return _read(path, overrides or {}, library)[1]
-
-
-def worded(file: str | Path, finding: Finding) -> str:
-    """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
-    place = f"{file}:{finding.line}" if finding.line else str(file)
-    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
 
 
 def _read(
