@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -124,6 +124,10 @@ class Key(NamedTuple):
         return BristleError(f"{words}: expected {self.expected()}.")
 
 
+ANY = Key(lambda value: value, None)
+"""A key whose value is taken as it is."""
+
+
 class Spec(NamedTuple):
     """What may stand in a table.
 
@@ -161,6 +165,8 @@ class Document:
     ----------
     data : dict
         The content.
+    lines : dict
+        The line of each key by its path.
     overridden : dict
         For the path of each key that was set from outside, the name that it was set by.
     found : list of Finding
@@ -178,13 +184,14 @@ class Document:
         self.path = path
         self.overridden: dict[KeyPath, str] = {}
         self.found: list[Finding] = []
-        self._raises, self._lines = raises, dict[KeyPath, int]()
+        self._raises = raises
+        self.lines: dict[KeyPath, int] = {}
         if data is not None:
             self.data = dict(data)
             return
         text = read_text(Path(path), raises)
         try:
-            self.data, self._lines = tomllib.loads(text), key_lines(text)
+            self.data, self.lines = tomllib.loads(text), key_lines(text)
         except RecursionError:
             raise _error(raises, path, 0, "not TOML: brackets are nested too deeply.") from None
         except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
@@ -239,7 +246,7 @@ class Document:
                 self.error(keys, f"{_title(keys)} is {written(value)}: expected {right}.")
                 return ()
             return tuple(self.read(spec, (*keys, index), one) for index, one in enumerate(value))
-        if value == "" and spec.default is REQUIRED and spec.kind is str:
+        if spec.default is REQUIRED and isinstance(value, str) and not value:
             return self._missing(spec, keys[:-1], str(keys[-1]))
         try:
             taken = spec.taken(value)
@@ -267,9 +274,9 @@ class Document:
         if keys in self.overridden:
             line, text = 0, f'override "{self.overridden[keys]}": {text}'
         else:
-            while keys and keys not in self._lines:
+            while keys and keys not in self.lines:
                 keys = keys[:-1]
-            line = self._lines.get(keys, 0)
+            line = self.lines.get(keys, 0)
         if (finding := Finding(line, level, text)) not in self.found:
             self.found.append(finding)
 
@@ -293,7 +300,7 @@ class Document:
         """Raise one error with all that must be put right, in the order of the file."""
         wrong = [finding for finding in self.in_order() if finding.level == "error"]
         if wrong:
-            raise _raised(self._raises, self.path, wrong)
+            raise raised(self._raises, self.path, wrong)
 
 
 def read_text(path: Path, raises: type[BristleError]) -> str:
@@ -351,10 +358,10 @@ def json_schema(spec: Key | Spec) -> dict[str, Any]:
         if spec.keys:
             table["properties"] = {name: json_schema(one) for name, one in spec.keys.items()}
         return {"type": "array", "items": table} if spec.many else table
-    if isinstance(spec.kind, list):
-        return {"type": "array", "items": json_schema(Key(spec.kind[0])), **about}
     if spec.unit:
         about = {"description": f"{spec.about} [{spec.unit}]".strip()}
+    if isinstance(spec.kind, list):
+        return {"type": "array", "items": json_schema(Key(spec.kind[0])), **about}
     found: dict[str, Any] = {"type": _TYPES[spec.kind]} if spec.kind in _TYPES else {}
     if spec.choices:
         found = {"enum": list(spec.choices)}
@@ -385,14 +392,15 @@ def _in(keys: KeyPath, mark: str = ":") -> str:
     return f"[{'.'.join(str(key) for key in keys if isinstance(key, str))}]{mark} "
 
 
-def _raised(raises: type[BristleError], path: str | Path, found: Iterable[Finding]) -> BristleError:
+def raised(raises: type[BristleError], path: str | Path, found: Sequence[Finding]) -> BristleError:
+    """Return the error that tells findings in a file, a line each with its place."""
     made = raises("\n  ".join(worded(path, finding) for finding in found))
     made.findings = tuple(found)
     return made
 
 
 def _error(raises: type[BristleError], path: str | Path, line: int, text: str) -> BristleError:
-    return _raised(raises, path, (Finding(line, "error", text),))
+    return raised(raises, path, (Finding(line, "error", text),))
 
 
 def _syntax(text: str, message: str) -> tuple[int, str]:

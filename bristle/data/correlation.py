@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.config import Document, Key, Spec
+from ..core.config import ANY, Document, Key, Spec
 from ..errors import StudyError
 from ..findings import unknown, written
 
@@ -88,7 +88,7 @@ def _names(value: object) -> tuple[str, ...]:
     return tuple(map(str, value))
 
 
-CORRELATION = Spec({"parameters": Key(_names, None), "rows": Key(lambda rows: rows, None)})
+CORRELATION = Spec({"parameters": Key(_names, None), "rows": ANY})
 
 
 def read_correlation(

@@ -29,7 +29,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..core.config import Document, Key, Spec
+from ..core.config import ANY, Document, Key, Spec
 from ..core.toml_lines import KeyPath
 from ..errors import StudyError, UnitError
 from ..findings import unknown, written
@@ -53,8 +53,8 @@ from .study_model import new_model as new_model
 _SPEC = Spec({
     "law": Key(str, about="the name of a law"), **FORM_KEYS, "building": Key(str, ""),
     "drive": Key(str, VOLTAGE.name, choices=DRIVES),
-    "parameters": Spec(each=Key(lambda value: value)),
-    "effects": Spec(each=Spec({"parameters": Spec(each=Key(lambda value: value))})),
+    "parameters": Spec(each=ANY),
+    "effects": Spec(each=Spec({"parameters": Spec(each=ANY)})),
     "correlation": CORRELATION,
 })  # fmt: skip
 
