@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from os import PathLike
+from typing import Any
 
 
 class BristleError(Exception):
@@ -16,6 +17,8 @@ class BristleError(Exception):
     ----------
     exit_code : int
         2 or 1.
+    findings : tuple
+        Of a file that is wrong: what is wrong with it, each with its line.
 
     Examples
     --------
@@ -28,6 +31,7 @@ class BristleError(Exception):
     """
 
     exit_code = 2
+    findings: tuple[Any, ...] = ()
 
 
 class UnitError(BristleError):

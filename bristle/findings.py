@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Literal, NamedTuple
-
-from .lines import KeyPath
 
 Level = Literal["error", "warning", "note"]
 LIST_AT_MOST = 12
@@ -28,41 +26,10 @@ class Finding(NamedTuple):
     text: str
 
 
-class Findings:
-    """Collects findings, each at the line of the key that it is about.
-
-    Parameters
-    ----------
-    place : callable
-        Gives (line, words that go before the text) of a key's path.
-    """
-
-    def __init__(self, place: Callable[[KeyPath], tuple[int, str]]) -> None:
-        self._place = place
-        self.found: list[Finding] = []
-
-    def add(self, level: Level, path: KeyPath, text: str) -> None:
-        """Add a finding at the line of a key, once."""
-        line, before = self._place(path)
-        finding = Finding(line, level, before + text)
-        if finding not in self.found:
-            self.found.append(finding)
-
-    def error(self, path: KeyPath, text: str) -> None:
-        """Add what must be put right."""
-        self.add("error", path, text)
-
-    def warning(self, path: KeyPath, text: str) -> None:
-        """Add what is allowed and probably a mistake."""
-        self.add("warning", path, text)
-
-    def note(self, path: KeyPath, text: str) -> None:
-        """Add what is good to know."""
-        self.add("note", path, text)
-
-    def in_order(self) -> list[Finding]:
-        """Return the findings by line; those of one line in the order in which they were made."""
-        return sorted(self.found, key=lambda finding: finding.line)
+def worded(file: object, finding: Finding) -> str:
+    """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
+    place = f"{file}:{finding.line}" if finding.line else str(file)
+    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
 
 
 def nearest(name: str, names: Iterable[str], count: int = 1) -> list[str]:

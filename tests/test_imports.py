@@ -20,8 +20,9 @@ PACKAGE = ROOT / "bristle"
 # imports from those before it in its list, never from beside it or from behind it.
 BASE = (
     {"errors", "resources", "interrupt", "progress", "snapshots", "version"},
-    {"units", "lines", "quantity", "shown"},
+    {"units", "quantity", "shown"},
     {"physics", "findings"},
+    {"core"},
     {"control", "data", "jit", "trust"},
     {"component"},
     {"draw", "check"},

@@ -37,9 +37,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import resources
+from ..core.toml_lines import KeyPath, key_lines
 from ..errors import BristleError, EnsembleError, PhysicsError, TrustError
 from ..findings import nearest, unknown, written
-from ..lines import KeyPath, key_lines
 from ..scenario.document import FILE_PARAMETERS, MADE_FROM
 from ..scenario.parameters import Wrong, typed
 from ..scenario.scenario import Component, Scenario, load_scenario, resolve_scenario

@@ -10,16 +10,16 @@ deviations of the parameters it is their covariance.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..findings import unknown
-from ..lines import KeyPath
-from .files import Toml
+from ..core.config import ANY, Document, Key, Spec
+from ..errors import StudyError
+from ..findings import unknown, written
 
 Array = NDArray[np.float64]
 
@@ -82,44 +82,51 @@ def covariance_of(
     return whole * np.outer(std, std)
 
 
+def _names(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list) or len({str(name) for name in value}) != len(value):
+        raise StudyError(f"is {written(value)}: expected a list of names, each once.")
+    return tuple(map(str, value))
+
+
+CORRELATION = Spec({"parameters": Key(_names, None), "rows": ANY})
+
+
 def read_correlation(
-    toml: Toml, parameters: Collection[str], uncertain: Collection[str]
-) -> Correlation | None:
-    """Return the correlations of a file, None after an error, which `toml` then has.
+    document: Document, found: Mapping[str, Any], parameters: Collection[str],
+    uncertain: Collection[str],
+) -> Correlation | None:  # fmt: skip
+    """Return the correlations of a file, None after an error, which `document` then has.
 
     Parameters
     ----------
-    toml : the file
+    document, found : takes what is wrong; the table
     parameters, uncertain : names of all parameters, and of those with a standard deviation
     """
-    keys: KeyPath = ("correlation",)
-    table = toml.table((), toml.data, "correlation")
-    toml.known(keys, table, ("parameters", "rows"))
-    names, rows = table.get("parameters"), table.get("rows")
-    if not isinstance(names, list) or len({str(name) for name in names}) != len(names):
-        toml.error((*keys, "parameters"), "a list of names, each once, is right.")
+    names, rows = found["parameters"], found["rows"]
+    here = "correlation", "parameters"
+    if names is None:
+        document.error(here, "[correlation] parameters is missing: expected a list of names.")
         return None
     for name in names:
         if name not in parameters:
-            toml.error((*keys, "parameters"), unknown("parameter", str(name), list(parameters)))
+            document.error(here, unknown("parameter", name, list(parameters)))
         elif name not in uncertain:
-            toml.error((*keys, "parameters"), f"{name} has no std, which its covariance needs.")
-    right = (
-        f"rows has to be the lower triangle for {len(names)} parameters: row i has i numbers of "
-        "-1 to 1, the last one 1."
-    )
-    if not isinstance(rows, list) or not _is_triangle(rows, len(names)):
-        toml.error((*keys, "rows"), right)
+            document.error(here, f"{name} has no std, which its covariance needs.")
+    if not _is_triangle(rows, len(names)):
+        document.error(
+            ("correlation", "rows"),
+            f"[correlation] rows: expected the lower triangle for {len(names)} parameters: row i "
+            "has i numbers of -1 to 1, the last one 1.",
+        )
         return None
-    assert isinstance(rows, list)
-    found = Correlation(tuple(map(str, names)), tuple(tuple(map(float, row)) for row in rows))
-    if names and (least := float(np.linalg.eigvalsh(found.matrix())[0])) < -_SLACK * len(names):
-        toml.error(
-            (*keys, "rows"),
+    made = Correlation(names, tuple(tuple(map(float, row)) for row in rows))
+    if names and (least := float(np.linalg.eigvalsh(made.matrix())[0])) < -_SLACK * len(names):
+        document.error(
+            ("correlation", "rows"),
             f"no errors can correlate like this: the matrix has the eigenvalue {least:.3g}, below "
             "zero. Identify again, or remove the table.",
         )
-    return found
+    return made
 
 
 def _is_triangle(rows: Any, count: int) -> bool:

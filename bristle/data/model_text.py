@@ -10,7 +10,7 @@ from ..physics.drive import VOLTAGE
 from ..physics.forms import split_form
 from .correlation import set_correlation
 from .files import write_whole
-from .model import VALUE_KEYS, StudyModel, Value, table_names
+from .model import VALUE, StudyModel, Value, table_names
 
 
 def write_model(path: Path, model: StudyModel) -> None:
@@ -87,7 +87,7 @@ def _update(
             continue
         if name not in table:
             table[name] = tomlkit.inline_table() if inline else tomlkit.table()
-        for key in VALUE_KEYS:
+        for key in VALUE.keys:
             _set_or_drop(table[name], key, content.get(key, ""))
 
 

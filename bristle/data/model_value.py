@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..core.config import Document, Key, Spec
+from ..core.toml_lines import KeyPath
 from ..errors import TrustError, UnitError
-from ..lines import KeyPath
 from ..physics.user import waiting
 from ..units import canonical
-from .files import Toml
 
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
-VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
+VALUE = Spec({
+    "value": Key(float, None), "unit": Key(str, None), "low": Key(float, None),
+    "high": Key(float, None), "free": Key(bool, None), "std": Key(float, None, least=0.0),
+    "origin": Key(str, "assumed", choices=ORIGINS),
+})  # fmt: skip
+"""What a parameter's table may hold; its bounds are asked for where the parameter is known."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +45,20 @@ def waiting_law(folder: Path, law: str) -> TrustError | None:
     return None
 
 
-def as_written(toml: Toml, keys: KeyPath, given: Any) -> dict[str, Value]:
+def as_written(document: Document, keys: KeyPath, given: Mapping[str, Any]) -> dict[str, Value]:
     """Return values as the file has them, without knowing the law or effect that they belong to."""
     out = {}
-    for own, entry in (given if isinstance(given, dict) else {}).items():
+    for own, entry in given.items():
         if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
             continue  # a table of values, or what only the law or effect can judge
+        found = document.read(VALUE, (*keys, own), entry)
         try:
-            unit = canonical(toml.text((*keys, own), entry, "unit") or "1")
+            unit = canonical(found["unit"] or "1")
         except UnitError as error:
-            toml.error((*keys, own, "unit"), f"{own}: {error}")
+            document.error((*keys, own, "unit"), f"{own}: {error}")
             continue
-        low, high, std = (toml.number((*keys, own), entry, key) for key in ("low", "high", "std"))
-        value = float(entry["value"])
-        out[own] = Value(
-            value, unit, value if low is None else low, value if high is None else high,
-            entry.get("free", True) is True, std,
-            toml.text((*keys, own), entry, "origin", "assumed"),
-        )  # fmt: skip
+        value = found["value"]
+        low, high = (value if found[key] is None else found[key] for key in ("low", "high"))
+        free = found["free"] is not False
+        out[own] = Value(value, unit, low, high, free, found["std"], found["origin"])
     return out

@@ -14,7 +14,7 @@ from .channels import ChannelSpec
 from .noise import SHORTEST
 from .table import Array, Table
 
-RIGHT = '"restart", "rests" or "column TITLE" is right.'
+RIGHT = 'expected "restart", "rests" or "column TITLE".'
 
 STANDS = 0.01
 """Share of the usual top speed below which a rig rests."""

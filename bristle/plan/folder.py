@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.config import Document, Key, Spec
 from ..data.channels import DRIVE, PLAIN, ChannelSpec
-from ..data.files import Toml
 from ..data.measurement import measurements_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import RecordError, StudyError
-from ..findings import written
 from ..quantity import plain
 from ..units import convert
 
@@ -37,8 +36,16 @@ MOTION = {"bench": "displacement", "structure": "ground_acceleration"}
 ROLES = ("train", "holdout")
 _SHOWN_IN = {"displacement": "mm"}
 """Units of the files where they are not those of the SI."""
-_KEYS = ("schema", "rig", "study", "rate", "command", "runs")
-_RUN_KEYS = ("name", "file", "role", "about")
+_SPEC = Spec({
+    "rig": Key(str, choices=MOTION),
+    "study": Key(str, ""),
+    "rate": Key(float, above=0.0, about="samples per second"),
+    "command": Key(str, "", choices=DRIVE),
+    "runs": Spec({
+        "name": Key(str), "file": Key(str), "role": Key(str, ROLES[0], choices=ROLES),
+        "about": Key(str, ""),
+    }, many=True),
+})  # fmt: skip
 NAME = re.compile(r"[A-Za-z0-9][\w.+-]*")
 """Names that runs, and their files, can have."""
 _OFF = 0.01
@@ -115,31 +122,19 @@ def read_plan(path: Path | str) -> PlanFolder:
         raise StudyError(
             f"{folder}: no plan: there is no {FILE}. `bristle plan` writes a folder with it."
         )
-    toml = Toml(folder / FILE)
-    data = toml.data
-    toml.schema()
-    toml.known((), data, _KEYS)
-    rig, command = toml.text((), data, "rig"), toml.text((), data, "command")
-    if rig not in MOTION:
-        toml.error(("rig",), f'rig = "{rig}"; "bench" or "structure" is right.')
-    if command and command not in DRIVE:
-        right = ", ".join(DRIVE)
-        toml.error(("command",), f'command = "{command}"; one of {right} is right.')
-    rate = toml.number((), data, "rate")
-    if rate is None or rate <= 0.0:
-        toml.error(("rate",), "rate is missing or not positive; samples per second are right.")
-    tables = _listed(toml, folder)
-    study = toml.text((), data, "study")
-    toml.check()
-    assert rate is not None
+    document = Document(folder / FILE, StudyError)
+    found = document.read(_SPEC)
+    _check_runs(document, folder, found["runs"])
+    document.check()
+    rig, command, rate = found["rig"], found["command"], found["rate"]
     channels = [MOTION[rig], *([command] if command else [])]
     runs = [
         PlannedRun(one["name"], one["role"], one["about"], *_read(folder / one["file"], channels))
-        for one in tables
+        for one in found["runs"]
     ]
-    for one, run in zip(tables, runs, strict=True):
+    for one, run in zip(found["runs"], runs, strict=True):
         _refuse_other_rate(folder / one["file"], run.time, rate)
-    return PlanFolder(rig, study, rate, tuple(runs))
+    return PlanFolder(rig, found["study"], rate, tuple(runs))
 
 
 def write_plan(
@@ -195,36 +190,24 @@ def refuse_existing(path: Path) -> None:
         raise StudyError(f"{path}: is there already. Take another name, or remove it.")
 
 
-def _listed(toml: Toml, folder: Path) -> list[dict[str, str]]:
-    """Return `[[runs]]` of a plan.toml, noting what is wrong."""
-    listed = toml.data.get("runs", [])
-    if not isinstance(listed, list) or not listed:
-        toml.error(("runs",), 'there are no runs; add [[runs]] with file = "plan_1.csv".')
-        return []
-    out: list[dict[str, str]] = []
-    for index, table in enumerate(listed):
-        keys = ("runs", index)
-        if not isinstance(table, dict):
-            toml.error(keys, f"a run is {written(table)}; a table is right.")
-            continue
-        toml.known(keys, table, _RUN_KEYS)
-        one = {key: toml.text(keys, table, key) for key in _RUN_KEYS}
-        one["role"] = one["role"] or ROLES[0]
-        if not NAME.fullmatch(one["name"]):
-            toml.error(
-                (*keys, "name"),
-                f'name = "{one["name"]}"; letters, digits, _ . + and - are right, as in plan_1.',
-            )
-        elif any(one["name"] == other["name"] for other in out):
-            toml.error((*keys, "name"), f"{one['name']} is listed twice: one of the two must go.")
-        if one["role"] not in ROLES:
-            toml.error((*keys, "role"), f'role = "{one["role"]}"; "train" or "holdout".')
-        if not one["file"] or Path(one["file"]).name != one["file"]:
-            toml.error((*keys, "file"), f"a file beside {FILE} is right, as in plan_1.csv.")
-        elif not (folder / one["file"]).is_file():
-            toml.error((*keys, "file"), f"there is no file {folder / one['file']}.")
-        out.append(one)
-    return out
+def _check_runs(document: Document, folder: Path, runs: Sequence[dict[str, str]]) -> None:
+    """Check what no spec says of `[[runs]]` of a plan.toml."""
+    if not runs:
+        document.error(("runs",), 'there are no runs: expected [[runs]] with file = "plan_1.csv".')
+    names: list[str] = []
+    for index, one in enumerate(runs):
+        keys, name, file = ("runs", index), one["name"], one["file"]
+        if name is not None and not NAME.fullmatch(name):
+            right = "expected letters, digits, _ . + and -, as in plan_1"
+            document.error((*keys, "name"), f'[[runs]] name = "{name}": {right}.')
+        elif name in names:
+            document.error((*keys, "name"), f"{name} is listed twice: one of the two must go.")
+        names.append(name)
+        if file is not None and Path(file).name != file:
+            right = f"expected a file beside {FILE}, as in plan_1.csv"
+            document.error((*keys, "file"), f'[[runs]] file = "{file}": {right}.')
+        elif file is not None and not (folder / file).is_file():
+            document.error((*keys, "file"), f"there is no file {folder / file}.")
 
 
 def _read(path: Path, channels: Sequence[str]) -> tuple[Array, dict[str, Array]]:

@@ -9,15 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..data.files import Toml
+from ..core.config import Document
 from ..diagnose.effect_size import Known as Fitted
 from ..errors import StudyError
-from ..findings import unknown
 from ..identify.fit import identify
 from ..identify.model import REFERENCE, Model, Problem, Run, law_parameters
 from ..identify.smooth import posterior_draws
-from ..physics.drive import DRIVES, VOLTAGE
-from ..physics.laws import DEFAULT, law_names
 from .bench import planned
 from .goal import Measured, Purposes, stated
 from .knowledge import DRAWS, Question
@@ -35,7 +32,7 @@ from .questions import (
     rivals_of,
     sized_rival,
 )
-from .rig_file import limits_given, read_quantity, read_rig
+from .rig_file import limits_given, read_sheet
 from .rig_limits import RigLimits, with_given
 from .search import Planner
 from .wish import Wish, parameters_of
@@ -75,24 +72,17 @@ def read_new_rig(path: Path, given: Mapping[str, Any] | None = None) -> NewRig:
     StudyError
         With every mistake of the file and its line, or if it lacks what a plan needs.
     """
-    toml = Toml(path)
-    damper = toml.table((), toml.data, "damper")
-    toml.known(("damper",), damper, ("max_force", "law", "command"))
-    drive = toml.text(("damper",), damper, "command", VOLTAGE.name)
-    if drive not in DRIVES:
-        toml.error(("damper", "command"), unknown("command", drive, DRIVES))
-        drive = VOLTAGE.name
-    law = toml.text(("damper",), damper, "law", DEFAULT)
-    if law not in law_names():
-        toml.error(("damper", "law"), unknown("law", law, law_names()))
-    force = 0.0
-    if "max_force" not in damper:
-        toml.error(("damper",), '[damper] lacks max_force; max_force = "2 kN" is right.')
-    else:
-        force = _positive(toml, ("damper", "max_force"), damper["max_force"], "N")
-    noise = _noise(toml)
-    toml.check()
-    limits = {**read_rig(path, drive), **limits_given(given or {}, drive)}
+    document = Document(path, StudyError)
+    damper = document.data.get("damper")
+    drive = str(damper.get("command")) if isinstance(damper, dict) else ""
+    found = read_sheet(document, drive)
+    damper = found["damper"]
+    if damper["max_force"] is None and not document.found:
+        document.error(("damper",), '[damper] lacks max_force: expected max_force = "2 kN".')
+    document.check()
+    drive = damper["command"]
+    of_file = {name: value for name, value in found["limits"].items() if value is not None}
+    limits = {**of_file, **limits_given(given or {}, drive)}
     lacking = [name for name in ("stroke", "speed", "command") if name not in limits]
     if lacking == ["command"] and "levels" in limits:
         lacking = []
@@ -101,30 +91,9 @@ def read_new_rig(path: Path, given: Mapping[str, Any] | None = None) -> NewRig:
             f"{path}: [limits] lacks {', '.join(lacking)}: before the first measurement nothing "
             "else says what the rig can do."
         )
-    return NewRig(with_given(RigLimits(1.0, 1.0), limits), force, law, noise, drive)
-
-
-def _positive(toml: Toml, keys: tuple[str, ...], value: Any, unit: str) -> float:
-    try:
-        found = read_quantity(value, unit, keys[-1])
-    except StudyError as error:
-        toml.error(keys, str(error))
-        return 0.0
-    if found <= 0.0:
-        toml.error(keys, f"{keys[-1]} = {found:g} {unit}; more than 0 is right.")
-    return found
-
-
-def _noise(toml: Toml) -> dict[str, float]:
-    """Return the noise [SI] that a rig.toml gives for channels."""
-    units = {"displacement": "m", "velocity": "m/s", "force": "N"}
-    table = toml.table((), toml.data, "noise")
-    toml.known(("noise",), table, units)
-    return {
-        name: _positive(toml, ("noise", name), value, units[name])
-        for name, value in table.items()
-        if name in units
-    }
+    noise = {name: value for name, value in found["noise"].items() if value is not None}
+    rig = with_given(RigLimits(1.0, 1.0), limits)
+    return NewRig(rig, damper["max_force"], damper["law"], noise, drive)
 
 
 def plan_new(

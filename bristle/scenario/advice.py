@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..core.config import Document
 from ..errors import BristleError, PhysicsError
-from ..findings import Findings
 from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, laws_of
@@ -78,7 +78,7 @@ def own_velocity(force: str) -> str:
 
 
 def advise(
-    run: Run, parts: Mapping[str, Part], wires: Sequence[Wire], library: Library, findings: Findings
+    run: Run, parts: Mapping[str, Part], wires: Sequence[Wire], library: Library, document: Document
 ) -> None:
     """Add warnings, notes, and the errors of ports that must be used together.
 
@@ -92,25 +92,25 @@ def advise(
         The connections that could be read.
     library : Library
         Knows masses and designs of what is installed.
-    findings : Findings
+    document : Document
         Takes what is found.
     """
     network = Network(parts, wires)
-    _instances(network, findings)
-    _order(run, network, findings)
-    _rollback(run, network, findings)
-    _loops(network, findings)
-    _designs(network, library, findings)
+    _instances(network, document)
+    _order(run, network, document)
+    _rollback(run, network, document)
+    _loops(network, document)
+    _designs(network, library, document)
     for part in parts.values():
-        check_rod(part, run, findings)
+        check_rod(part, run, document)
     for damper, drive in dampers_of(network):
-        _holding(damper, network, findings)
-        _limits(damper, drive, network, findings)
+        _holding(damper, network, document)
+        _limits(damper, drive, network, document)
     for structure in network.with_ports(_STRUCTURE_PORTS):
-        _coupling(run, structure, network, library, findings)
+        _coupling(run, structure, network, library, document)
 
 
-def _instances(network: Network, findings: Findings) -> None:
+def _instances(network: Network, document: Document) -> None:
     """An FMU that lives once per process cannot be two components."""
     first: dict[object, str] = {}
     for part in network.parts.values():
@@ -119,7 +119,7 @@ def _instances(network: Network, findings: Findings) -> None:
         )
         if part.file and once in ("true", "1"):
             if part.file in first:
-                findings.error(
+                document.error(
                     part.path,
                     f"[components.{part.name}]: {part.file.name} allows one instance per process, "
                     f"and it is already [components.{first[part.file]}].",
@@ -127,14 +127,14 @@ def _instances(network: Network, findings: Findings) -> None:
             first.setdefault(part.file, part.name)
 
 
-def _order(run: Run, network: Network, findings: Findings) -> None:
+def _order(run: Run, network: Network, document: Document) -> None:
     """Unless all step at once the ground motion must have moved on before the structure steps."""
     if run.algorithm == "jacobi":
         return
     for structure in network.with_ports(_STRUCTURE_PORTS):
         ground = network.source(structure, "ground_acceleration")
         if ground and network.order.index(ground[0].name) > network.order.index(structure.name):
-            findings.warning(
+            document.warning(
                 ground[0].path,
                 f"[components.{ground[0].name}] comes after [components.{structure.name}], which "
                 "then gets the ground acceleration one step late; put it first, because components "
@@ -142,7 +142,7 @@ def _order(run: Run, network: Network, findings: Findings) -> None:
             )
 
 
-def _rollback(run: Run, network: Network, findings: Findings) -> None:
+def _rollback(run: Run, network: Network, document: Document) -> None:
     """What is to step again must go back first: each FMU of a loop needs its state in and out."""
     if run.algorithm != "midpoint-iterated":
         return
@@ -158,7 +158,7 @@ def _rollback(run: Run, network: Network, findings: Findings) -> None:
                 queue += feeds[name]
         able = part.description.capabilities.get("canGetAndSetFMUstate")
         if part.name in reached and able not in ("true", "1"):
-            findings.error(
+            document.error(
                 ("run", "algorithm"),
                 f"[run] algorithm: midpoint-iterated lets the components of a loop step twice, and "
                 f"[components.{part.name}] cannot go back: {part.file.name} declares no "
@@ -166,7 +166,7 @@ def _rollback(run: Run, network: Network, findings: Findings) -> None:
             )
 
 
-def _loops(network: Network, findings: Findings) -> None:
+def _loops(network: Network, document: Document) -> None:
     """Note cycles of outputs that follow their inputs at once: the master does not iterate."""
     follows: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for part in network.parts.values():
@@ -181,14 +181,14 @@ def _loops(network: Network, findings: Findings) -> None:
     cycle = _cycle(follows)
     if cycle:
         words = " <- ".join(f"{part}.{port}" for part, port in [*cycle, cycle[0]])
-        findings.note(
+        document.note(
             network.parts[cycle[0][0]].path,
             f"algebraic loop {words}: each follows the next without delay. Nothing iterates; the "
             "loop is closed with values one step old.",
         )
 
 
-def _designs(network: Network, library: Library, findings: Findings) -> None:
+def _designs(network: Network, library: Library, document: Document) -> None:
     """A designed controller belongs to one building: that whose floor it measures."""
     for part in network.parts.values():
         structure = network.measured_by(part)
@@ -203,7 +203,7 @@ def _designs(network: Network, library: Library, findings: Findings) -> None:
             continue  # the building is no building: its own check has said so
         except BristleError as error:
             path = (*part.path, "controller") if part.controller else part.path
-            findings.error(path, f"[components.{part.name}]: {error}")
+            document.error(path, f"[components.{part.name}]: {error}")
 
 
 def _cycle(follows: Mapping[tuple[str, str], list[tuple[str, str]]]) -> list[tuple[str, str]]:
@@ -225,7 +225,7 @@ def _cycle(follows: Mapping[tuple[str, str], list[tuple[str, str]]]) -> list[tup
     return []
 
 
-def _holding(damper: Part, network: Network, findings: Findings) -> None:
+def _holding(damper: Part, network: Network, document: Document) -> None:
     """holding_force and moving_mass work together or not at all."""
     if not {"holding_force", "moving_mass"} <= damper.variables.keys():
         return
@@ -234,13 +234,13 @@ def _holding(damper: Part, network: Network, findings: Findings) -> None:
     mass = damper.real("moving_mass") or 0.0
     where = f"[components.{damper.name}]"
     if fed and mass == 0.0:
-        findings.error(
+        document.error(
             wire.path if wire else damper.places["holding_force"],
             f'{where}: holding_force is connected while moving_mass is 0; set "moving_mass" to the '
             "mass that the damper holds, in kg, or leave holding_force unconnected.",
         )
     elif not fed and mass != 0.0:
-        findings.error(
+        document.error(
             damper.places.get("moving_mass", damper.path),
             f"{where}: moving_mass = {mass:g} kg without holding_force; connect "
             f'"{damper.name}.holding_force" to the structure\'s holding_force, or leave '
@@ -272,7 +272,7 @@ def asked_range(damper: Part, drive: Drive, network: Network) -> tuple[float, fl
     return level, level
 
 
-def _limits(damper: Part, drive: Drive, network: Network, findings: Findings) -> None:
+def _limits(damper: Part, drive: Drive, network: Network, document: Document) -> None:
     asked, most = asked_range(damper, drive, network), damper.real(drive.limit)
     if asked is None or most is None or 0.0 <= asked[0] <= asked[1] <= most:
         return
@@ -280,7 +280,7 @@ def _limits(damper: Part, drive: Drive, network: Network, findings: Findings) ->
     path = damper.places.get(drive.name, damper.path)
     if source:
         path = source[0].places.get("level", source[0].path)
-    findings.warning(
+    document.warning(
         path,
         f"{damper.name}.{drive.name} = {asked[0]:g} {drive.unit} lies outside 0 to {most:g} "
         f"{drive.unit} ({drive.limit}): the damper saturates and feels "
@@ -302,7 +302,7 @@ def slopes(damper: Part, level: float) -> tuple[float, float]:
 
 
 def _coupling(
-    run: Run, structure: Part, network: Network, library: Library, findings: Findings
+    run: Run, structure: Part, network: Network, library: Library, document: Document
 ) -> None:
     """Warn where a damper's mass terms or the step make the explicit coupling unstable.
 
@@ -313,7 +313,7 @@ def _coupling(
         pushed = network.driven_by(damper)
         if pushed and pushed[0] is structure:
             port = pushed[1]
-            _other_motion(damper, structure, port, network, findings)
+            _other_motion(damper, structure, port, network, document)
             driven.setdefault(_FORCES[0] if port in _FORCES else port, []).append((damper, drive))
     if structure.fmu != "Structure":
         return  # the mass behind the ports of another structure is not known
@@ -323,17 +323,17 @@ def _coupling(
             mass = library.driven_mass(structure.building, port, attached)
         except BristleError:
             return  # the component's own check has said what is wrong with the building
-        _stability(run, structure, dampers, mass, network, findings)
+        _stability(run, structure, dampers, mass, network, document)
 
 
 def _other_motion(
-    damper: Part, structure: Part, port: str, network: Network, findings: Findings
+    damper: Part, structure: Part, port: str, network: Network, document: Document
 ) -> None:
     """Warn where a damper feels another motion than that of the device whose force it gives."""
     wire = network.feeding[damper.name, "velocity"]
     right = own_velocity(port)
     if port not in _FORCES and wire.output != right:
-        findings.warning(
+        document.warning(
             wire.path,
             f"{damper.name} feels {structure.name}.{wire.output} and pushes "
             f"{structure.name}.{port}; the motion there is {structure.name}.{right}.",
@@ -342,13 +342,13 @@ def _other_motion(
 
 def _stability(
     run: Run, structure: Part, dampers: list[tuple[Part, Drive]], mass: float, network: Network,
-    findings: Findings,
+    document: Document,
 ) -> None:  # fmt: skip
     """Warn where dampers that drive one mass [kg] make the coupling unstable at the run's step."""
     c, k = 0.0, 0.0
     for damper, drive in dampers:
         over_velocity, over_travel = _scaled(damper, structure, network)
-        _mass_terms(damper, mass / over_velocity if over_velocity > 0.0 else mass, findings)
+        _mass_terms(damper, mass / over_velocity if over_velocity > 0.0 else mass, document)
         most = damper.real(drive.limit) or 0.0
         asked = asked_range(damper, drive, network)
         each = slopes(damper, min(max(asked[1], 0.0), most) if asked else most)
@@ -359,7 +359,7 @@ def _stability(
     algorithm = "gauss-seidel" if rough and run.algorithm != "jacobi" else run.algorithm
     limit = longest_step(algorithm, mass, c, k)
     if run.step >= limit:
-        findings.warning(
+        document.warning(
             ("run", "step"),
             f"[run] step = {1e3 * run.step:g} ms lies above about {1e3 * limit:.3g} ms, where the "
             f"{run.algorithm} coupling of {', '.join(damper.name for damper, _ in dampers)} with "
@@ -389,11 +389,11 @@ def _jumps(damper: Part, network: Network) -> bool:
     )
 
 
-def _mass_terms(damper: Part, mass: float, findings: Findings) -> None:
+def _mass_terms(damper: Part, mass: float, document: Document) -> None:
     """Compare the masses that a damper was given with the mass it moves."""
     held = damper.real("moving_mass") or 0.0
     if held and abs(held - mass) > _RELATIVE * mass:
-        findings.warning(
+        document.warning(
             damper.places.get("moving_mass", damper.path),
             f"{damper.name}.moving_mass = {held:.6g} kg; the mass that it moves is {mass:.6g} kg "
             "(attached_mass included).",
@@ -404,7 +404,7 @@ def _mass_terms(damper: Part, mass: float, findings: Findings) -> None:
         if name.partition(".")[0] not in carried or variable.unit != "kg" or value is None:
             continue
         if value >= 0.5 * mass:
-            findings.warning(
+            document.warning(
                 damper.places.get(name, damper.path),
                 f"{damper.name}.{name} = {value:.4g} kg is half or more of the moving mass of "
                 f"{mass:.4g} kg: from velocity differences the run diverges near the whole of it; "

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+from ..core.config import Document
+from ..core.toml_lines import KeyPath
 from ..errors import UnitError
-from ..findings import Findings, listed, nearest, number, unknown, written
+from ..findings import listed, nearest, number, unknown, written
 from ..fmu.description import Variable
 from ..fmu.variables import passes
-from ..lines import KeyPath
 from ..ssp.conversion import SAME
 from ..units import Measure
-from .checks import table
-from .document import Document, flatten
+from .document import flatten
 from .parameters import shown_items
 from .parts import Part
 
@@ -45,36 +46,35 @@ class Wire:
 
 
 def check_connections(
-    document: Document, parts: Mapping[str, Part], findings: Findings
+    document: Document, connections: Mapping[str, Any], parts: Mapping[str, Part]
 ) -> list[Wire]:
     """Check every connection and that every input has exactly one source."""
     wires: dict[str, Wire] = {}
     claimed: set[str] = set()  # inputs whose connection stands in the file, right or wrong
-    data = table(findings, document.data, ("connections",))
-    if data is None:
-        return []
-    for target, source, path in flatten(data, ("connections",), whole=_is_transformed):
+    if not isinstance(document.data.get("connections", {}), dict):
+        return []  # without asking for a source of every input
+    for target, source, path in flatten(connections, ("connections",), whole=_is_transformed):
         if target in claimed:
-            findings.error(path, f'"{target}" has two sources; one connection per input is right.')
+            document.error(path, f'"{target}" has two sources; one connection per input is right.')
             continue
         claimed.add(target)
         if isinstance(source, list):
-            findings.error(
+            document.error(
                 path,
                 f'"{target}" is fed by a list; an input has one source, one text in quotes. To add '
                 "forces up use a second input, such as structure.extra_force.",
             )
         elif not isinstance(source, str | dict):
-            findings.error(
+            document.error(
                 path, f'"{target}" is fed by {written(source)}; "component.output" is right.'
             )
         else:
-            wire = _check_wire(target, source, path, parts, findings)
+            wire = _check_wire(target, source, path, parts, document)
             if wire:
                 wires[target] = wire
             else:
                 claimed |= _meant(target, source, parts) if isinstance(source, str) else set()
-    _check_inputs(parts, wires, claimed, findings)
+    _check_inputs(parts, wires, claimed, document)
     return list(wires.values())
 
 
@@ -84,13 +84,13 @@ def _is_transformed(name: str, table: Mapping[str, object]) -> bool:
 
 
 def _transformation(
-    target: str, table: Mapping[str, object], path: KeyPath, findings: Findings
+    target: str, table: Mapping[str, object], path: KeyPath, document: Document
 ) -> tuple[float, float] | None:
     """Return factor and offset of a connection; None after saying what is wrong with them."""
     found = [number(table.get(key, usual)) for key, usual in ((FACTOR, 1.0), (OFFSET, 0.0))]
     for key, value in zip((FACTOR, OFFSET), found, strict=True):
         if isinstance(value, str):
-            findings.error((*path, key), f'"{target}": {key} {value}; a number is right.')
+            document.error((*path, key), f'"{target}": {key} {value}; a number is right.')
     factor, offset = found
     return None if isinstance(factor, str) or isinstance(offset, str) else (factor, offset)
 
@@ -100,27 +100,27 @@ def _check_wire(
     said: str | dict[str, object],
     path: KeyPath,
     parts: Mapping[str, Part],
-    findings: Findings,
+    document: Document,
 ) -> Wire | None:
     source = said[FROM] if isinstance(said, dict) else said
     if not isinstance(source, str):
-        findings.error(
+        document.error(
             (*path, FROM), f'"{target}" is fed by {written(source)}; "component.output" is right.'
         )
         return None
     transformation = (1.0, 0.0)
     if isinstance(said, dict):
-        found = _transformation(target, said, path, findings)
+        found = _transformation(target, said, path, document)
         if found is None:
             return None
         transformation = found
-    into = _end(target, path, "input", parts, findings)
-    out = _end(source, path, "output", parts, findings)
+    into = _end(target, path, "input", parts, document)
+    out = _end(source, path, "output", parts, document)
     if into is None or out is None:
         return None
     (to, entry), (origin, exit_) = into, out
     if (entry.causality, exit_.causality) == ("output", "input"):
-        findings.error(
+        document.error(
             path,
             f'"{target}" is an output and "{source}" an input: the wrong way round. Input = '
             f'output is right: "{source}" = "{target}".',
@@ -132,15 +132,15 @@ def _check_wire(
         (source, origin, exit_, "output"),
     ):
         if variable.causality != wanted:
-            findings.error(path, _wrong_end(end, part, variable, wanted))
+            document.error(path, _wrong_end(end, part, variable, wanted))
             right = False
     if not right:
         return None
-    _check_kinds(target, entry, source, exit_, path, isinstance(said, dict), findings)
+    _check_kinds(target, entry, source, exit_, path, isinstance(said, dict), document)
     if entry.kind == "Real" and passes(exit_.kind, "Real") and isinstance(said, str):
-        _check_units(target, entry.measure, source, exit_.measure, path, findings)
+        _check_units(target, entry.measure, source, exit_.measure, path, document)
     if entry.name in to.places:
-        findings.error(
+        document.error(
             path,
             f'"{target}" is connected here and set in the parameters of {to.name} too; '
             "one of them must go.",
@@ -159,23 +159,23 @@ def _meant(target: str, source: str, parts: Mapping[str, Part]) -> set[str]:
 
 
 def _end(
-    text: str, path: KeyPath, wanted: str, parts: Mapping[str, Part], findings: Findings
+    text: str, path: KeyPath, wanted: str, parts: Mapping[str, Part], document: Document
 ) -> tuple[Part, Variable] | None:
     """Return the component and variable that one end of a connection names."""
     name, dot, port = text.partition(".")
     if not dot or not port:
-        findings.error(path, f'"{text}" is no port; "component.{wanted}" is right.')
+        document.error(path, f'"{text}" is no port; "component.{wanted}" is right.')
         return None
     part = parts.get(name)
     if part is None:
-        findings.error(path, f'"{text}": {unknown("component", name, parts)}')
+        document.error(path, f'"{text}": {unknown("component", name, parts)}')
         return None
     if part.description is None:
         return None  # what is wrong with the component has been said
     if port not in part.variables:
         names = [variable.name for variable in part.description.of(wanted)]
         words = unknown(wanted, port, names, part.ports_command)
-        findings.error(path, f'"{text}": {part.fmu}: {words}')
+        document.error(path, f'"{text}": {part.fmu}: {words}')
         return None
     return part, part.variables[port]
 
@@ -203,27 +203,27 @@ def _check_kinds(
     exit_: Variable,
     path: KeyPath,
     transformed: bool,
-    findings: Findings,
+    document: Document,
 ) -> None:
     """Check that values can be passed on: whole numbers feed reals and enumerations too."""
     ends = f'"{target}" is {entry.kind} and "{source}" is {exit_.kind}'
     if entry.kind == exit_.kind == "String":
         text = "texts are set in parameters, only numbers and Booleans are passed on."
-        findings.error(path, f"{ends}: {text}")
+        document.error(path, f"{ends}: {text}")
     elif not passes(exit_.kind, entry.kind):
-        findings.error(path, f"{ends}; both must be alike.")
+        document.error(path, f"{ends}; both must be alike.")
     elif transformed and entry.kind != "Real":
         text = f'"{target}" is {entry.kind}: only Real has a factor and an offset.'
-        findings.error(path, text)
+        document.error(path, text)
     elif entry.items:
         strange = [name for name, value in exit_.items.items() if value not in entry.items.values()]
         right = f"it takes {shown_items(entry)}"
         if strange:
             text = f'"{source}" may be {", ".join(strange)}'
-            findings.warning(path, f'{text}, which "{target}" does not know: {right}.')
+            document.warning(path, f'{text}, which "{target}" does not know: {right}.')
         elif not exit_.items:
             text = f'{ends}: {right}, and nothing checks that "{source}" gives no other'
-            findings.note(path, f"{text} value.")
+            document.note(path, f"{text} value.")
 
 
 def _check_units(
@@ -232,18 +232,18 @@ def _check_units(
     source: str,
     given: Measure | None,
     path: KeyPath,
-    findings: Findings,
+    document: Document,
 ) -> None:
     if wanted is None and given is None:
         return
     if given is None:
         assert wanted is not None
         text = f'"{source}" has no unit; "{target}" takes its values as {wanted.shown}.'
-        findings.note(path, text)
+        document.note(path, text)
         return
     if wanted is None:
         text = f'"{target}" names no unit; it takes "{source}" in {given.shown} as it comes.'
-        findings.note(path, text)
+        document.note(path, text)
         return
     ends = f'"{target}" {wanted.shown} is fed by "{source}" {given.shown}'
     into, out = wanted.unit, given.unit
@@ -252,10 +252,10 @@ def _check_units(
     except UnitError:
         if into is not None and out is not None:
             text = f"{ends}: another quantity. An output in [{wanted.name}] is right."
-            findings.error(path, text)
+            document.error(path, text)
             return
         strange = wanted if into is None else given
-        findings.warning(
+        document.warning(
             path,
             f'{ends}; the unit "{strange.name}" is not known here, so whether they agree is for '
             "you to see.",
@@ -263,17 +263,17 @@ def _check_units(
         return
     if (factor, offset) != SAME:
         shift = f", offset = {offset:.9g}" if offset else ""
-        findings.error(
+        document.error(
             path,
             f"{ends}: the same quantity in another unit, and nothing converts it. An output in "
             f'[{wanted.name}] is right, or {{ from = "{source}", factor = {factor:.9g}{shift} }}.',
         )
     elif into is not None and out is not None and into.dimension != out.dimension:
-        findings.note(path, f"{ends}: one of them counts an angle as a dimension.")
+        document.note(path, f"{ends}: one of them counts an angle as a dimension.")
 
 
 def _check_inputs(
-    parts: Mapping[str, Part], wires: Mapping[str, Wire], claimed: set[str], findings: Findings
+    parts: Mapping[str, Part], wires: Mapping[str, Wire], claimed: set[str], document: Document
 ) -> None:
     """Report every input that nothing feeds."""
     for part in parts.values():
@@ -284,7 +284,7 @@ def _check_inputs(
             if variable.optional or name in claimed or variable.name in part.places:
                 continue
             unit = f" [{variable.unit}]" if variable.unit else ""
-            findings.error(
+            document.error(
                 part.path,
                 f'"{name}"{unit} has no source: connect it{_candidates(part, variable, parts)} '
                 f"or set it in the parameters of {part.name}.",

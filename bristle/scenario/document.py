@@ -1,121 +1,77 @@
-"""A scenario file as text: read with care, lines kept, overrides laid over it."""
+"""What may stand in a scenario file, and overrides that are laid over it."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..component import OVER_STEP
+from ..core.config import ANY, Document, Key, Spec
+from ..core.toml_lines import KeyPath
 from ..errors import ScenarioError
-from ..findings import Finding, Findings, unknown
-from ..lines import KeyPath, key_lines, repeated_keys
-
-MAX_BYTES = 1_000_000
-"""A scenario is a page of text; a file larger than this [byte] is something else."""
+from ..findings import unknown, written
+from ..physics.forms import FORMS
+from .parts import ALGORITHMS
 
 LAW_KEYS = ("law", "command", "command_knots")
 """Those that say which law a damper has, and how the command enters it."""
-COMPONENT_KEYS = (
-    *("fmu", *LAW_KEYS, "building", "controller", "effects", "step", "over_step", "parameters"),
-)
 INSTEAD = {"law": "fmu", "fmu": "law"}
-"""Which of them takes the place of which: a component has one."""
+"""Which key takes the place of which: a component has one."""
 LISTS = ("command_knots", "effects")
-"""Those whose value is a list."""
+"""Keys whose value is a list."""
 MADE_FROM = ("building", "controller")
-"""Those of them that name a file which a component is made from."""
+"""Keys that name a file which a component is made from."""
 FILE_PARAMETERS = ("record", "file")
 """Parameters that may name a file, relative to the scenario's folder."""
 
-_POSITION = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 _SHORT = re.compile(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 """Numbers that TOML does not know: .5 and 5."""
-_HINTS = (
-    ("Invalid value", 'text needs quotes, numbers have a decimal point: 0.5, "text", true'),
-    ("Invalid initial character for a key", "an inline table { ... } stays on one line"),
-    ("Unclosed", "every bracket and quote needs its partner"),
-    ("Expected '='", "a line reads: key = value"),
-    ("Unescaped", "write backslashes in 'single quotes'"),
-    ("Expected newline", "one key = value per line"),
-)
 
 
-@dataclass
-class Document:
-    """The content of a scenario file, with the place of every key.
-
-    `overridden` gives, for each path that an override has set, the override's own name; `changed`
-    holds those paths that had another value before.
-    """
-
-    file: Path
-    data: dict[str, Any]
-    lines: dict[KeyPath, int]
-    overridden: dict[KeyPath, str] = field(default_factory=dict)
-    changed: set[KeyPath] = field(default_factory=set)
-
-    def place(self, path: KeyPath) -> tuple[int, str]:
-        """Return the line of a key and the words before a finding about it.
-
-        A key that is not in the file has the line of the nearest table around it.
-        """
-        if path in self.overridden:
-            return 0, f'override "{self.overridden[path]}": '
-        while path and path not in self.lines:
-            path = path[:-1]
-        return self.lines.get(path, 0), ""
+def _files(value: object) -> tuple[str, ...]:
+    files = value if isinstance(value, list) else [value]
+    if not files or not all(isinstance(file, str) for file in files):
+        raise ScenarioError(f'is {written(value)}: expected "FILE.py", or a list of them.')
+    return tuple(files)
 
 
-def read_document(file: Path) -> Document | Finding:
-    """Return the file's content, or the one finding that says why there is none."""
-    try:
-        if not file.is_file():
-            wrong = "is a folder" if file.is_dir() else "there is no such file"
-            return Finding(0, "error", f"{wrong}; a scenario is a TOML file.")
-        with file.open("rb") as stream:
-            raw = stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        return Finding(0, "error", f"cannot be read: {error.strerror or error}.")
-    if len(raw) > MAX_BYTES:
-        return Finding(
-            0, "error", f"is larger than {MAX_BYTES // 1000} kB: a scenario is a page of text."
-        )
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        return Finding(line, "error", "is not UTF-8 text: save the file in the encoding UTF-8.")
-    try:
-        return Document(file, tomllib.loads(text), key_lines(text))
-    except RecursionError:
-        return Finding(0, "error", "brackets are nested too deeply for a scenario.")
-    except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
-        return _syntax(text, str(error))
-
-
-def _syntax(text: str, message: str) -> Finding:
-    """Return the finding for a text that is not TOML."""
-    rows = text.splitlines() or [""]
-    repeated = repeated_keys(text)
-    if re.match(r"Cannot (overwrite|declare|mutate)|Duplicate", message) and repeated:
-        path, line, first = repeated[0]
-        name = ".".join(str(part) for part in path)
-        return Finding(
-            line, "error", f'"{name}" is written twice, first in line {first}: one of them must go.'
-        )
-    position = _POSITION.search(message)
-    line = int(position[1]) if position and position[1] else len(rows)
-    what = _POSITION.sub("", message)
-    column = f" in column {position[2]}" if position and position[2] else " at the end"
-    row = rows[min(line, len(rows)) - 1]
-    hint = next((f"; {words}" for start, words in _HINTS if what.startswith(start)), "")
-    at = row[int(position[2]) - 1 :][:1] if position and position[2] else ""
-    if at.isalpha() and not at.isascii() and what.startswith("Expected"):
-        hint = f'; a name with "{at}" needs quotes'
-    return Finding(line, "error", f"not TOML: {what}{column} of `{row.strip()[:80]}`{hint}.")
+COMPONENT = Spec({
+    "fmu": Key(str, None, about="a built-in name, or a path relative to this file"),
+    "law": Key(
+        str, None, about="a damper's law in place of fmu: its name, or a file of your own"
+    ),
+    "command": Key(str, None, choices=FORMS, about="how the command enters the law"),
+    "command_knots": Key([float], None, "V", about="knots of a table over the command"),
+    "building": Key(str, None, about="data file of another building"),
+    "controller": Key(
+        str, None, about="controller file of bristle design, for a designed controller"
+    ),
+    "effects": Key(
+        _files, None,
+        about="files with effects of your own, for a built-in damper or Structure",
+    ),
+    "step": Key(float, None, "s", above=0.0, about="the run's step divided by a whole number"),
+    "over_step": Spec(
+        each=Key(str, None, choices=OVER_STEP),
+        about="how a foreign FMU takes its inputs over a step; an output that stands between "
+        "instants is sampled",
+    ),
+    "parameters": Spec(each=ANY),
+})  # fmt: skip
+"""`[components.NAME]`."""
+SCENARIO = Spec({
+    "title": Key(str, None, about="title of figures and tables"),
+    "run": Spec({
+        "stop": Key(float, unit="s", above=0.0, about="end of the run, a whole number of steps"),
+        "step": Key(float, unit="s", above=0.0, about="communication step"),
+        "algorithm": Key(str, ALGORITHMS[0], choices=ALGORITHMS),
+    }),
+    "components": Spec(each=ANY, about="they step in this order, but for jacobi"),
+    "connections": Spec(each=ANY, about='"component.input" = "component.output"'),
+})  # fmt: skip
 
 
 def flatten(
@@ -143,14 +99,16 @@ def flatten(
             yield name, value, (*path, key)
 
 
-def apply_overrides(
-    document: Document, overrides: Mapping[str, object], findings: Findings
-) -> None:
-    """Lay overrides over the document; a name that leads nowhere becomes a finding."""
+def apply_overrides(document: Document, overrides: Mapping[str, object]) -> set[KeyPath]:
+    """Lay overrides over the document; return the paths of those that had another value before.
+
+    A name that leads nowhere becomes a finding.
+    """
+    changed: set[KeyPath] = set()
     for name, value in overrides.items():
         target = _target(document.data, str(name))
         if isinstance(target, str):
-            findings.found.append(Finding(0, "error", f'override "{name}": {target}'))
+            document.error((), f'override "{name}": {target}')
             continue
         *tables, key = target
         table = document.data
@@ -167,7 +125,8 @@ def apply_overrides(
                 table.pop(other, None)
             document.overridden[target] = str(name)
             if key not in before or before[key] != table[key]:
-                document.changed.add(target)
+                changed.add(target)
+    return changed
 
 
 def _target(data: Mapping[str, Any], name: str) -> tuple[str, ...] | str:
@@ -187,7 +146,7 @@ def _target(data: Mapping[str, Any], name: str) -> tuple[str, ...] | str:
         return first, rest
     if rest.startswith("over_step."):
         return "components", first, "over_step", rest.removeprefix("over_step.")
-    if rest in COMPONENT_KEYS[:-1]:
+    if rest in COMPONENT.keys and rest != "parameters":
         return "components", first, rest
     return "components", first, "parameters", rest.removeprefix("parameters.")
 

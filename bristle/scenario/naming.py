@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..lines import KeyPath
+from ..core.toml_lines import KeyPath
 from .document import FILE_PARAMETERS, MADE_FROM
 
 if TYPE_CHECKING:

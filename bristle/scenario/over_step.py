@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..component import OVER_STEP, SAMPLED
-from ..findings import Findings, unknown, written
+from ..component import SAMPLED
+from ..core.config import Document
+from ..findings import unknown
 from ..fmu.description import Variable
 from ..physics.signals import KINDS, STEPS
 from .parts import Part
@@ -16,41 +17,36 @@ if TYPE_CHECKING:
     from .scenario import Component
 
 
-def choose_over_step(part: Part, settings: Mapping[str, Any], findings: Findings) -> None:
+def choose_over_step(
+    part: Part, settings: Mapping[str, Any], told: Mapping[str, str | None], document: Document
+) -> None:
     """Read `over_step` of a component, port by port.
 
     Parameters
     ----------
     part : Part
         Its `over_step` is filled.
-    settings : mapping
-        The component's table in the scenario.
-    findings : Findings
+    settings, told : mapping
+        The component's table in the scenario; the words by port, None for one that is none.
+    document : Document
         Takes what is found.
     """
-    if "over_step" not in settings:
-        return
-    path, said = (*part.path, "over_step"), settings["over_step"]
-    where = f"[components.{part.name}] over_step"
-    if not isinstance(said, dict):
-        findings.error(path, f'{where} is {written(said)}; a table {{ input = "held" }} is right.')
+    path, where = (*part.path, "over_step"), f"[components.{part.name}] over_step"
+    if not isinstance(settings.get("over_step"), dict):
         return
     if part.file is None:
-        findings.error(
+        document.error(
             path, f"{where}: built-in components say it themselves, foreign FMUs do not."
         )
         return
     ports = {name: v for name, v in part.variables.items() if v.causality in ("input", "output")}
-    for name, word in said.items():
+    for name, word in told.items():
         if part.description and name not in ports:
-            findings.error((*path, name), f"{where}: {unknown('port', name, ports)}")
-        elif not isinstance(word, str) or word not in OVER_STEP:
-            words = ", ".join(OVER_STEP)
-            findings.error(
-                (*path, name), f"{where}: {name} = {written(word)}; one of {words} is right."
-            )
+            document.error((*path, name), f"{where}: {unknown('port', name, ports)}")
+        elif word is None:
+            continue  # which is said already
         elif name in ports and ports[name].causality == "output" and word != SAMPLED:
-            findings.error(
+            document.error(
                 (*path, name),
                 f'{where}: {name} is an output: "{SAMPLED}" is right, if it stands between '
                 "instants of its own.",

@@ -6,8 +6,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..core.config import Document
 from ..errors import RecordError
-from ..findings import LIST_AT_MOST, Findings, number, unknown, written
+from ..findings import LIST_AT_MOST, number, unknown, written
 from ..fmu.description import Value, Variable
 from .document import FILE_PARAMETERS
 from .library import Library
@@ -19,7 +20,7 @@ _CHOICES = re.compile(r"\bone of:? ((?:[\w-]+, )*[\w-]+)")
 
 
 def check_parameter(
-    part: Part, name: str, value: object, folder: Path, library: Library, findings: Findings
+    part: Part, name: str, value: object, folder: Path, library: Library, document: Document
 ) -> None:
     """Check one parameter, and keep its value in `part.parameters` if it is right.
 
@@ -33,7 +34,7 @@ def check_parameter(
         The scenario's; relative names of files begin there.
     library : Library
         Reads ground motions.
-    findings : Findings
+    document : Document
         Takes what is found.
     """
     where, place = f"{part.name}.{name}", part.places[name]
@@ -41,21 +42,21 @@ def check_parameter(
     if variable is None:
         settable = [v.name for v in part.variables.values() if v.causality == "parameter"]
         words = unknown("parameter", name, settable, part.ports_command)
-        findings.error(place, f"[components.{part.name}]: {words}")
+        document.error(place, f"[components.{part.name}]: {words}")
         return
     if variable.causality not in ("parameter", "input"):
         kind = {"output": "an output", "local": "internal"}.get(
             variable.causality, f"a {variable.causality}"
         )
-        findings.error(place, f"{where} is {kind}; only parameters and inputs can be set.")
+        document.error(place, f"{where} is {kind}; only parameters and inputs can be set.")
         return
     checked = typed(variable, value)
     if isinstance(checked, Wrong):
-        findings.error(place, f"{where} {checked.words}")
+        document.error(place, f"{where} {checked.words}")
         return
     part.parameters[name] = checked
     if variable.kind == "String" and name in FILE_PARAMETERS:
-        _check_file(part, name, str(checked), folder, library, findings)
+        _check_file(part, name, str(checked), folder, library, document)
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ def _text(variable: Variable, value: object) -> Value | Wrong:
 
 
 def _check_file(
-    part: Part, name: str, value: str, folder: Path, library: Library, findings: Findings
+    part: Part, name: str, value: str, folder: Path, library: Library, document: Document
 ) -> None:
     """Check a file that a parameter names: a ground motion is read as the run will read it."""
     if part.fmu != "GroundMotion" or name != "record":
@@ -141,16 +142,16 @@ def _check_file(
     try:
         library.read_record(value, folder)
     except RecordError as error:
-        findings.error(part.places[name], f"{part.name}.{name}: {error}")
+        document.error(part.places[name], f"{part.name}.{name}: {error}")
 
 
-def check_together(part: Part, folder: Path, findings: Findings) -> None:
+def check_together(part: Part, folder: Path, document: Document) -> None:
     """Check parameters that need one another: switches of effects, kinds of signals."""
     for name in part.parameters:
         switch = f"{name.rpartition('.')[0]}.on"
         if name != switch and switch in part.variables and part.value(switch) is not True:
-            findings.warning(
+            document.warning(
                 part.places[name],
                 f"{part.name}.{name} does nothing while {part.name}.{switch} is false.",
             )
-    check_signal(part, folder, findings)
+    check_signal(part, folder, document)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..findings import Findings, command, nearest
+from ..core.config import Document
+from ..core.toml_lines import KeyPath
+from ..findings import command, nearest
 from ..fmu.description import Description, Value, Variable
-from ..lines import KeyPath
 
 ALGORITHMS = ("gauss-seidel", "midpoint", "midpoint-iterated", "jacobi")
 
@@ -79,7 +80,7 @@ class Part:
 
 
 def existing_file(
-    value: str, folder: Path, path: KeyPath, where: str, findings: Findings
+    value: str, folder: Path, path: KeyPath, where: str, document: Document
 ) -> Path | None:
     """Return the absolute path of a file; None, and an error, where there is none.
 
@@ -93,11 +94,11 @@ def existing_file(
         Keys from the top of the document to the value.
     where : str
         Words that begin the message.
-    findings : Findings
+    document : Document
         Takes what is found.
     """
     if "\0" in value:
-        findings.error(path, f"{where}: no file can have a null character in its name.")
+        document.error(path, f"{where}: no file can have a null character in its name.")
         return None
     file = (folder / value).absolute()
     try:
@@ -109,5 +110,5 @@ def existing_file(
         beside = {}
     close = nearest(file.stem, beside)
     hint = f' Did you mean "{Path(value).parent / beside[close[0]]}"?' if close else ""
-    findings.error(path, f'{where}: there is no file "{value}" (looked for {file}).{hint}')
+    document.error(path, f'{where}: there is no file "{value}" (looked for {file}).{hint}')
     return None

@@ -10,25 +10,26 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from .. import resources
+from ..core.config import Document, raised
 from ..errors import ScenarioError
-from ..findings import Finding, Findings, nearest
+from ..findings import Finding, nearest, worded
 from ..fmu.description import Description, Value
 from .advice import advise
-from .checks import check_components, check_run, check_steps, check_top
+from .checks import check_components, check_steps
 from .connections import check_connections
 from .document import (
     FILE_PARAMETERS,
+    SCENARIO,
     apply_overrides,
     exists,
     parse_override,
     parse_overrides,
     plain,
-    read_document,
 )
 from .import_ssp import Note, unpacked
 from .library import Library, installed
 from .naming import changed_title, needs_title
-from .parts import DamperLaw
+from .parts import DamperLaw, Run
 
 __all__ = [
     "Component",
@@ -163,10 +164,7 @@ def load_scenario(
     scenario, findings = _read(path, overrides or {}, library)
     errors = [finding for finding in findings if finding.level == "error"]
     if errors or scenario is None:
-        lines = [worded(file, finding) for finding in errors]
-        if len(lines) == 1:
-            raise ScenarioError(lines[0])
-        raise ScenarioError("\n  ".join([f"{file}: {len(lines)} mistakes", *lines]))
+        raise raised(ScenarioError, file, errors)
     return scenario
 
 
@@ -204,12 +202,6 @@ def check_scenario(
     return _read(path, overrides or {}, library)[1]
 
 
-def worded(file: str | Path, finding: Finding) -> str:
-    """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
-    place = f"{file}:{finding.line}" if finding.line else str(file)
-    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
-
-
 def _read(
     path: Path, overrides: Mapping[str, object], library: Library | None
 ) -> tuple[Scenario | None, list[Finding]]:
@@ -221,24 +213,24 @@ def _read(
         except ScenarioError as error:
             return None, [Finding(0, "error", str(error))]
         path, notes = made.scenario, made.notes
-    document = read_document(path)
-    if isinstance(document, Finding):
-        return None, [document]
-    if package is not None:
-        document.lines.clear()  # of a file that the user does not have
+    try:
+        document = Document(path, ScenarioError)
+        if package is not None:
+            document.lines.clear()  # of a file that the user does not have
+        changed = apply_overrides(document, overrides)
+        read = document.read(SCENARIO)
+    except ScenarioError as error:
+        return None, list(error.findings)
     library = library or installed()
-    findings = Findings(document.place)
-    apply_overrides(document, overrides, findings)
     for note in notes:
         if ("run", note.key) not in document.overridden:
-            findings.note((), note.text)
-    title = check_top(document, findings)
-    run = check_run(document, findings)
-    parts = check_components(document, library, findings)
-    check_steps(run, parts.values(), findings)
-    wires = check_connections(document, parts, findings)
-    advise(run, parts, wires, library, findings)
-    found = findings.in_order()
+            document.note((), note.text)
+    run, title = Run(**read["run"]), read["title"]
+    parts = check_components(document, read["components"], library)
+    check_steps(run, parts.values(), document)
+    wires = check_connections(document, read["connections"], parts)
+    advise(run, parts, wires, library, document)
+    found = document.in_order()
     if any(finding.level == "error" for finding in found):
         return None, found
     # Without an error every part has been read in full.
@@ -261,8 +253,9 @@ def _read(
         for part in parts.values()
         if (description := part.description) is not None
     )
-    if ("title",) not in document.overridden and needs_title(document.changed):
-        title = changed_title(components, document.changed)
+    title = path.stem if title is None else title
+    if ("title",) not in document.overridden and needs_title(changed):
+        title = changed_title(components, changed)
     connections = tuple(
         Connection(w.target, w.input, w.source, w.output, w.factor, w.offset, w.transformed)
         for w in wires

@@ -9,17 +9,14 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from ..component import OVER_STEP
+from ..core.config import SCHEMA, json_schema
 from ..fmu.description import Description, Variable
-from ..physics.forms import FORMS
-from .checks import SCHEMA
 from .connections import FACTOR, FROM, OFFSET
+from .document import COMPONENT, SCENARIO
 from .library import Library, installed
 from .parameters import choices
-from .parts import ALGORITHMS
 
 _TYPES = {"Real": "number", "Boolean": "boolean", "String": "string"}
-_TIME = {"type": "number", "exclusiveMinimum": 0}
 _PORT = r"^[^.]+\.."
 
 
@@ -32,37 +29,26 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
     """Return the JSON schema (draft 7) of a scenario file."""
     library = library or installed()
     names = list(library.names())
-    definitions = {name: _parameters(library.describe(name, None, None)) for name in names}
-    return {
-        "$schema": "http://json-schema.org/draft-07/schema#",
-        "title": "bristle scenario",
-        "type": "object",
-        "required": ["schema", "run", "components"],
-        "additionalProperties": False,
-        "properties": {
-            "schema": {"const": SCHEMA, "description": "version of this format"},
-            "title": {"type": "string", "description": "title of figures and tables"},
-            "run": _run(),
-            "components": {
-                "type": "object",
-                "description": "they step in this order, but for jacobi",
-                "minProperties": 1,
-                "additionalProperties": _component(names),
-            },
-            "connections": {
-                "type": "object",
-                "description": '"component.input" = "component.output"',
-                "additionalProperties": {
-                    "anyOf": [
-                        {"type": "string", "pattern": _PORT},
-                        _transformed(),
-                        {"type": "object", "additionalProperties": {"type": ["string", "object"]}},
-                    ]
-                },
-            },
-        },
-        "definitions": definitions,
+    whole = json_schema(SCENARIO)
+    whole["required"] = ["schema", "run", "components"]
+    tables = whole["properties"]
+    tables["components"] |= {"minProperties": 1, "additionalProperties": _component(names)}
+    tables["connections"]["additionalProperties"] = {
+        "anyOf": [
+            {"type": "string", "pattern": _PORT},
+            _transformed(),
+            {"type": "object", "additionalProperties": {"type": ["string", "object"]}},
+        ]
     }
+    whole["properties"] = {
+        "schema": {"const": SCHEMA, "description": "version of this format"}, **tables
+    }  # fmt: skip
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#", "title": "bristle scenario", **whole,
+        "definitions": {
+            name: _parameters(library.describe(name, None, None)) for name in names
+        },
+    }  # fmt: skip
 
 
 def _transformed() -> dict[str, Any]:
@@ -74,19 +60,6 @@ def _transformed() -> dict[str, Any]:
         "required": [FROM],
         "additionalProperties": False,
         "properties": {FROM: {"type": "string", "pattern": _PORT}, **numbers},
-    }
-
-
-def _run() -> dict[str, Any]:
-    return {
-        "type": "object",
-        "required": ["stop", "step"],
-        "additionalProperties": False,
-        "properties": {
-            "stop": {**_TIME, "description": "end of the run, a whole number of steps [s]"},
-            "step": {**_TIME, "description": "communication step [s]"},
-            "algorithm": {"enum": list(ALGORITHMS), "default": ALGORITHMS[0]},
-        },
     }
 
 
@@ -107,45 +80,17 @@ def _component(names: list[str]) -> dict[str, Any]:
         "if": {"required": ["building"]},
         "then": {"properties": {"fmu": {"const": "Structure"}}},
     }
-    return {
-        "type": "object",
-        "oneOf": [{"required": ["fmu"]}, {"required": ["law"]}],
-        "additionalProperties": False,
-        "properties": {
-            "fmu": {
-                "description": "a built-in name, or a path relative to this file",
-                "anyOf": [{"enum": names}, {"type": "string", "pattern": r"(\.[fF][mM][uU]|/|\\)"}],
-            },
-            "law": {
-                "type": "string",
-                "description": "a damper's law in place of fmu: its name, or a file of your own",
-            },
-            "command": {"enum": list(FORMS), "description": "how the command enters the law"},
-            "command_knots": {
-                "type": "array",
-                "items": {"type": "number"},
-                "description": "knots of a table over the command [V]",
-            },
-            "building": {"type": "string", "description": "data file of another building"},
-            "effects": {
-                "description": "files with effects of your own, for a built-in damper or Structure",
-                "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
-            },
-            "controller": {
-                "type": "string",
-                "description": "controller file of bristle design, for a designed controller",
-            },
-            "step": {**_TIME, "description": "the run's step divided by a whole number [s]"},
-            "over_step": {
-                "type": "object",
-                "description": "how a foreign FMU takes its inputs over a step; an output that "
-                "stands between instants is sampled",
-                "additionalProperties": {"enum": list(OVER_STEP)},
-            },
-            "parameters": {"type": "object"},
-        },
-        "allOf": [*each, only],
-    }
+    whole = json_schema(COMPONENT)
+    whole["oneOf"] = [{"required": ["fmu"]}, {"required": ["law"]}]
+    own = {"type": "string", "pattern": r"(\.[fF][mM][uU]|/|\\)"}
+    for key, either in (
+        ("fmu", [{"enum": names}, own]),
+        ("effects", [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]),
+    ):
+        about = whole["properties"][key]["description"]
+        whole["properties"][key] = {"description": about, "anyOf": either}
+    whole["properties"]["parameters"] = {"type": "object"}
+    return {**whole, "allOf": [*each, only]}
 
 
 def _parameters(description: Description) -> dict[str, Any]:

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from math import pi, sin
 from pathlib import Path
 
+from ..core.config import Document
 from ..errors import PhysicsError
-from ..findings import Findings
 from ..physics.record import read_two_column
 from ..physics.signals import KINDS, PARAMETERS, TAKEN, read_steps
 from .parts import Part, Run, existing_file
@@ -16,7 +16,7 @@ _SMALL_JUMP = 1e-3
 """Share of the amplitude [1] below which a jump of the displacement is not worth a word."""
 
 
-def check_signal(part: Part, folder: Path, findings: Findings) -> None:
+def check_signal(part: Part, folder: Path, document: Document) -> None:
     """Check the samples of a signal, and that its kind takes all parameters that are set.
 
     Parameters
@@ -25,49 +25,49 @@ def check_signal(part: Part, folder: Path, findings: Findings) -> None:
         Any component; one without a `kind` of signal is passed over.
     folder : Path
         The scenario's; relative names of files begin there.
-    findings : Findings
+    document : Document
         Takes what is found.
     """
     kind = part.value("kind")
     if part.file is not None or not isinstance(kind, str) or kind not in KINDS:
         return
     if kind == "csv" and "file" in part.variables:
-        _check_csv(part, folder, findings)
+        _check_csv(part, folder, document)
     if kind == "steps" and "steps" in part.variables:
-        _check_steps(part, findings)
+        _check_steps(part, document)
     taken = TAKEN[kind]
     for name in (*PARAMETERS, "steps", "file"):
         if name in part.parameters and name not in taken:
-            findings.warning(
+            document.warning(
                 part.places[name],
                 f'{part.name}.{name} does nothing while {part.name}.kind is "{kind}", which takes '
                 f"{', '.join(taken)}.",
             )
 
 
-def _check_csv(part: Part, folder: Path, findings: Findings) -> None:
+def _check_csv(part: Part, folder: Path, document: Document) -> None:
     path = part.places.get("file") or part.places.get("kind", part.path)
     value, where = part.value("file"), f"{part.name}.file"
     if not value:
-        findings.error(path, f'{where} is missing: kind = "csv" reads a file.')
+        document.error(path, f'{where} is missing: kind = "csv" reads a file.')
         return
-    file = existing_file(str(value), folder, path, where, findings)
+    file = existing_file(str(value), folder, path, where, document)
     if file:
         try:
             read_two_column(file, header=None)
         except PhysicsError as error:
-            findings.error(path, f"{where}: {error}")
+            document.error(path, f"{where}: {error}")
 
 
-def _check_steps(part: Part, findings: Findings) -> None:
+def _check_steps(part: Part, document: Document) -> None:
     try:
         read_steps(str(part.value("steps") or ""))
     except PhysicsError as error:
         path = part.places.get("steps") or part.places.get("kind", part.path)
-        findings.error(path, f"{part.name}.{error}")
+        document.error(path, f"{part.name}.{error}")
 
 
-def check_rod(part: Part, run: Run, findings: Findings) -> None:
+def check_rod(part: Part, run: Run, document: Document) -> None:
     """Warn of a prescribed motion that jumps: its velocity shows nothing of it.
 
     Parameters
@@ -76,13 +76,13 @@ def check_rod(part: Part, run: Run, findings: Findings) -> None:
         Any component; one that is no built-in motion of a rod is passed over.
     run : Run
         Its stop says what is reached.
-    findings : Findings
+    document : Document
         Takes what is found.
     """
     if part.file is not None or not {"displacement", "kind"} <= part.variables.keys():
         return
     for name, text in _jumps(part, run.stop or 0.0):
-        findings.warning(part.places.get(name) or part.places.get("kind", part.path), text)
+        document.warning(part.places.get(name) or part.places.get("kind", part.path), text)
 
 
 def _jumps(part: Part, stop: float) -> Iterator[tuple[str, str]]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..core.config import Document
 from ..errors import PhysicsError
-from ..findings import Findings
 from ..physics.building import ROUNDING, Building, read_building
 from ..physics.effect import EFFECTS
 from .parts import Part
 
 
-def check_storeys(part: Part, findings: Findings) -> None:
+def check_storeys(part: Part, document: Document) -> None:
     """Warn of storeys without a positive stiffness; refuse them where an effect needs it.
 
     Matrices that were condensed may have such entries. But an effect that takes a share of the
@@ -21,7 +21,7 @@ def check_storeys(part: Part, findings: Findings) -> None:
     ----------
     part : Part
         Any component; one without a building of its own is passed over.
-    findings : Findings
+    document : Document
         Takes what is found.
     """
     if part.building is None:
@@ -43,11 +43,11 @@ def check_storeys(part: Part, findings: Findings) -> None:
         needing = list(_needing(part, building, i))
         for name in needing:
             place = part.places.get(f"{name}.on", path)
-            findings.error(
+            document.error(
                 place, f"{part.name}.{name} needs the stiffness below each level: {text}"
             )
         if not needing:
-            findings.warning(path, f"{where}: {text}")
+            document.warning(path, f"{where}: {text}")
 
 
 def _right(i: int) -> str:

@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from ..data.files import other_schema, read_json, write_json
+from ..core.config import other_schema
+from ..data.files import read_json, write_json
 from ..data.run_names import names_of_files
 from ..errors import StudyError
 from ..findings import command, listed

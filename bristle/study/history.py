@@ -15,7 +15,8 @@ from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
 
-from ..data.files import other_schema, read_json, write_json, write_whole
+from ..core.config import other_schema
+from ..data.files import read_json, write_json, write_whole
 from ..errors import StudyError
 from ..version import __version__
 from .set_aside import free_number, kept_folder, set_aside

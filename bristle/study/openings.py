@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from ..data.files import other_schema, read_json, write_json
+from ..core.config import other_schema
+from ..data.files import read_json, write_json
 from ..errors import StudyError
 from .run_file import TEST
 from .runs import Runs, refuse_seen, usable

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..core.config import Document, Key, Spec
+from ..core.toml_lines import KeyPath
 from ..data.channels import DRIVE, PLAIN, ChannelSpec, device_channel, is_channel
 from ..data.command_limits import LIMITS
 from ..data.corrections import FAULTS, Correction, wrong_value
-from ..data.files import Toml
 from ..data.labels import UNITS, Label
+from ..errors import StudyError
 from ..findings import unknown, written
-from ..lines import KeyPath
 
 TEST = "test"
 """The role of runs that no choice sees: neither a fit nor a verdict reads them."""
@@ -23,9 +24,6 @@ ROLES = ("train", "holdout", TEST)
 
 EXCLUDE = "exclude"
 """The role of runs that are left out: nothing reads them."""
-
-_RUN_KEYS = ("file", "piece", "role", *DRIVE, *UNITS, "labels", "correct")
-_CORRECTION_KEYS = Correction._fields
 
 
 @dataclass(frozen=True)
@@ -50,120 +48,108 @@ class RunFile:
         return f"{self.file}, run {self.piece}" if self.piece else self.file
 
 
-def read_runs(toml: Toml, folder: Path, split: bool) -> tuple[RunFile, ...]:
-    """Return the runs of a study.toml, noting what is wrong with them.
+def read_runs(
+    document: Document, runs: Sequence[Mapping[str, Any]], folder: Path, split: bool
+) -> tuple[RunFile, ...]:
+    """Return the runs of a study.toml; what no spec says of them is checked.
 
     Parameters
     ----------
-    toml : the file
+    document, runs : takes what is wrong; the tables
     folder : where the files of runs are
     split : whether a file holds several runs
     """
-    listed = toml.data.get("runs", [])
-    if not isinstance(listed, list) or not listed:
-        toml.error(("runs",), 'there are no runs; add [[runs]] with file = "data/run_1.csv".')
-        return ()
+    if not runs:
+        words = 'there are no runs: expected [[runs]] with file = "data/run_1.csv".'
+        document.error(("runs",), words)
     out: list[RunFile] = []
-    for index, table in enumerate(listed):
-        keys = ("runs", index)
-        if not isinstance(table, dict):
-            toml.error(keys, f"a run is {written(table)}; a table is right.")
-            continue
-        toml.known(keys, table, _RUN_KEYS)
-        file, role = toml.text(keys, table, "file"), toml.text(keys, table, "role", "train")
-        if role not in (*ROLES, EXCLUDE):
-            right = ", ".join(f'"{one}"' for one in ROLES)
-            toml.error((*keys, "role"), f'role = "{role}"; {right} or "{EXCLUDE}" is right.')
-        if not file:
-            toml.error(keys, 'a run has no file; file = "data/run_1.csv" is right.')
-        elif not (folder / file).is_file():
-            toml.error((*keys, "file"), f"there is no file {folder / file}.")
+    for index, table in enumerate(runs):
+        keys, file, piece = ("runs", index), table["file"], table["piece"]
+        if file and not (folder / file).is_file():
+            document.error((*keys, "file"), f"there is no file {folder / file}.")
+        if split != bool(piece):
+            right = "piece = 1 is its first run" if split else 'split = "restart" must stand above'
+            document.error(keys, f"split and piece go together: {right}.")
+        labels = {name: table[name] for name in UNITS if table[name] is not None}
         made = RunFile(
-            file, role, _levels(toml, keys, table), _labels(toml, keys, table),
-            _piece(toml, keys, table, split), _corrections(toml, keys, table),
+            file or "", table["role"],
+            {name: table[name] for name in DRIVE if table[name] is not None},
+            {**labels, **_labels(document, keys, table)}, piece,
+            _corrections(document, keys, table),
         )  # fmt: skip
         if any(made.name == run.name for run in out):
-            toml.error((*keys, "file"), f"{made.name} is listed twice: one of the two must go.")
+            words = f"{made.name} is listed twice: one of the two must go."
+            document.error((*keys, "file"), words)
         out.append(made)
     return tuple(out)
 
 
-def _levels(toml: Toml, keys: KeyPath, table: Mapping[str, Any]) -> dict[str, float]:
-    """Return the levels of the command that a run's table gives."""
-    found = {name: toml.number(keys, table, name) for name in DRIVE if name in table}
-    return {name: level for name, level in found.items() if level is not None}
+def _label(value: object) -> Label:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise StudyError(f"= {written(value)}: expected a number or a word.")
+    return float(value)
 
 
-def _labels(toml: Toml, keys: KeyPath, table: Mapping[str, Any]) -> dict[str, Label]:
-    """Return the labels that a run's table gives, those of its table `labels` included."""
-    found: dict[str, Label] = {}
-    for name in UNITS:
-        value = toml.number(keys, table, name)
-        if value is not None:
-            found[name] = value
-    for name, value in toml.table(keys, table, "labels").items():
-        here = (*keys, "labels", name)
-        if name in (*DRIVE, *UNITS):
-            toml.error(here, f"{name} stands beside file and role, not in labels.")
-        elif isinstance(value, bool) or not isinstance(value, int | float | str):
-            toml.error(here, f"{name} = {written(value)}; a number or a word is right.")
-        else:
-            found[name] = value if isinstance(value, str) else float(value)
-    return found
+RUNS = Spec({
+    "file": Key(str, about='as in file = "data/run_1.csv"'),
+    "piece": Key(int, 0, least=1, about="1 is a file's first run"),
+    "role": Key(str, "train", choices=(*ROLES, EXCLUDE)),
+    **{name: Key(float, None, PLAIN[name]) for name in DRIVE},
+    **{name: Key(float, None, unit) for name, unit in UNITS.items()},
+    "labels": Spec(each=Key(_label, "")),
+    "correct": Spec({
+        "channel": Key(str), "fault": Key(str, choices=FAULTS), "value": Key(float, None),
+    }, many=True, about='[{ channel = "force", fault = "gain", value = 1.25 }]'),
+}, many=True)  # fmt: skip
+"""`[[runs]]` of study.toml."""
 
 
-def _piece(toml: Toml, keys: KeyPath, table: Mapping[str, Any], split: bool) -> int:
-    """Return the number of a run in its file, 0 where files hold one run each."""
-    piece = table.get("piece", 0)
-    if isinstance(piece, bool) or not isinstance(piece, int) or piece < bool("piece" in table):
-        toml.error((*keys, "piece"), f"piece = {written(piece)}; 1 is a file's first run.")
-    elif split != bool(piece):
-        right = "piece = 1 is its first run" if split else 'split = "restart" must stand above'
-        toml.error(keys, f"split and piece go together: {right}.")
-    return piece if isinstance(piece, int) else 0
+def _labels(document: Document, keys: KeyPath, table: Mapping[str, Any]) -> dict[str, Label]:
+    """Return the labels in a run's table `labels`."""
+    for name in {*DRIVE, *UNITS} & set(table["labels"]):
+        words = f"{name} stands beside file and role, not in labels."
+        document.error((*keys, "labels", name), words)
+    return dict(table["labels"])
 
 
-def _corrections(toml: Toml, keys: KeyPath, table: Mapping[str, Any]) -> tuple[Correction, ...]:
+def _corrections(
+    document: Document, keys: KeyPath, table: Mapping[str, Any]
+) -> tuple[Correction, ...]:
     """Return what a run's table sets right in its channels."""
-    listed = table.get("correct", [])
-    right = '[{ channel = "force", fault = "gain", value = 1.25 }]'
-    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
-        toml.error((*keys, "correct"), f"correct = {written(listed)}; {right} is right.")
-        return ()
     out = []
-    for index, one in enumerate(listed):
-        here = (*keys, "correct", index)
-        toml.known(here, one, _CORRECTION_KEYS)
-        channel, fault = toml.text(here, one, "channel"), toml.text(here, one, "fault")
-        value = toml.number(here, one, "value")
+    for index, one in enumerate(table["correct"]):
+        here, (channel, fault, value) = (*keys, "correct", index), one.values()
+        if channel is None or fault is None:
+            continue  # which is said already
         if not (is_channel(channel) or device_channel(channel)):
-            toml.error(here, unknown("channel", channel, PLAIN))
-        elif fault not in FAULTS:
-            toml.error(here, unknown("fault", fault, FAULTS))
+            document.error(here, unknown("channel", channel, PLAIN))
         elif value is None:
-            toml.error(here, f"{fault} has no value: {FAULTS[fault]}.")
+            document.error(here, f"{fault} has no value: expected {FAULTS[fault]}.")
         elif fault in LIMITS and channel not in DRIVE:
-            toml.error(here, f"{fault} is of a command ({', '.join(DRIVE)}), not of {channel}.")
+            words = f"{fault} is of a command ({', '.join(DRIVE)}), not of {channel}."
+            document.error(here, words)
         elif wrong := wrong_value(fault, value):
-            toml.error(here, f"{fault} = {written(value)}: {wrong}")
+            document.error(here, f"{fault} = {written(value)}: {wrong}")
         else:
             out.append(Correction(channel, fault, value))
     return tuple(out)
 
 
 def check_levels(
-    toml: Toml, runs: tuple[RunFile, ...], channels: Mapping[str, ChannelSpec]
+    document: Document, runs: tuple[RunFile, ...], channels: Mapping[str, ChannelSpec]
 ) -> None:
     """Note levels that a channel gives as well, and that some runs lack."""
     for name in dict.fromkeys(name for run in runs for name in run.levels):
         if name in channels:
-            toml.error(
+            document.error(
                 ("channels", name),
                 f"{name} is a channel and a level of runs: one of the two must go.",
             )
         lacking = [run.name for run in runs if name not in run.levels]
         if lacking:
-            toml.error(("runs",), f"{', '.join(lacking)}: no {name}, which other runs have.")
+            document.error(("runs",), f"{', '.join(lacking)}: no {name}, which other runs have.")
 
 
 def run_as_toml(run: RunFile) -> Any:

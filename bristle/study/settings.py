@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
+from ..core.config import Document, Key, Spec, content
 from ..data.channels import DRIVE, ChannelSpec, at_device
-from ..data.files import Toml, write_whole
+from ..data.files import write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
 from ..errors import PhysicsError, StudyError
 from ..findings import listed, written
 from ..physics.building import read_building
-from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
+from .channel_file import CHANNELS, EXTRA, channel_as_toml, read_channels, read_extra
 from .run_file import (
     EXCLUDE,
+    RUNS,
     TEST,
     RunFile,
     check_levels,
@@ -29,10 +30,6 @@ from .run_file import (
 RIGS = ("bench", "structure")
 CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
-_KEYS = (
-    "schema", "title", "notes", "rig", "device", "law", "cut_off", "rate", "mask", "split", "runs",
-    "channels", "extra",
-)  # fmt: skip
 ALL = "all"
 """The word for all laws."""
 
@@ -114,47 +111,55 @@ def read_settings(path: Path) -> Settings:
     StudyError
         With every mistake of the file and its line.
     """
-    toml = Toml(path)
-    data = toml.data
-    toml.schema()
-    toml.known((), data, _KEYS)
-    rig = toml.text((), data, "rig", "bench")
-    if rig not in RIGS:
-        toml.error(("rig",), f'rig = "{rig}"; "bench" or "structure" is right.')
-    device = toml.text((), data, "device")
+    document = Document(path, StudyError)
+    found = document.read(_SPEC)
+    rig, device = found.pop("rig"), found.pop("device")
     if device and rig == RIGS[0]:
-        toml.error(("device",), 'device goes with rig = "structure": it is one of a building\'s.')
-    law, cut_off, rate = _law(toml), _hertz(toml, "cut_off"), _hertz(toml, "rate")
-    mask = data.get("mask", False)
-    if not isinstance(mask, bool):
-        toml.error(("mask",), f"mask = {written(mask)}; true or false is right.")
-    split = toml.text((), data, "split")
-    if split and (wrong := wrong_split(split)):
-        toml.error(("split",), f"split = {written(split)}; {wrong}")
-    listed = read_runs(toml, path.parent, bool(split))
-    runs = tuple(run for run in listed if run.role != EXCLUDE)
-    excluded = tuple(run for run in listed if run.role == EXCLUDE)
-    if listed and not runs:
-        toml.error(("runs",), f'every run has role = "{EXCLUDE}": some for training are needed.')
-    channels = {
-        name: read_channel(toml, name, table)
-        for name, table in toml.table((), data, "channels").items()
-        if is_right_channel(toml, name, table, of_devices=rig != RIGS[0])
-    }
+        words = 'device goes with rig = "structure": it is one of a building\'s.'
+        document.error(("device",), words)
+    every = read_runs(document, found.pop("runs"), path.parent, bool(found["split"]))
+    runs = tuple(run for run in every if run.role != EXCLUDE)
+    excluded = tuple(run for run in every if run.role == EXCLUDE)
+    if every and not runs:
+        words = f'every run has role = "{EXCLUDE}": some for training are needed.'
+        document.error(("runs",), words)
+    channels = read_channels(document, found.pop("channels"), devices=rig != RIGS[0])
     if rig != RIGS[0] and not device:
         device = only_device(path.parent)
-    channels = _at_device(toml, channels, device)
-    extra = {
-        name: read_extra(toml, name, table) for name, table in toml.table((), data, "extra").items()
-    }
-    title, notes = toml.text((), data, "title", path.parent.name), toml.text((), data, "notes")
-    check_levels(toml, runs, channels)
-    toml.check()
+    channels = _at_device(document, channels, device)
+    extra = read_extra(document, found.pop("extra"))
+    check_levels(document, runs, channels)
+    document.check()
+    found["title"] = path.parent.name if found["title"] is None else found["title"]
+    del found["schema"]
     return Settings(
-        title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off,
-        rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded, extra=extra,
-        device=device,
+        rig=rig, runs=runs, channels=channels, excluded=excluded, extra=extra, device=device,
+        **found,
     )  # fmt: skip
+
+
+def _law(value: object) -> str:
+    if value not in ("", ALL):
+        right = f'"{ALL}", which seeks the law; without this line that of model.toml is kept'
+        raise StudyError(f"= {written(value)}: expected {right}.")
+    return str(value)
+
+
+def _split(value: object) -> str:
+    if value != "" and (wrong := wrong_split(str(value))):
+        raise StudyError(f"= {written(value)}: {wrong}")
+    return str(value)
+
+
+_SPEC = Spec({
+    "title": Key(str, None), "notes": Key(str, ""), "rig": Key(str, RIGS[0], choices=RIGS),
+    "device": Key(str, ""),
+    "law": Key(_law, ""),
+    "cut_off": Key(float, CUT_OFF, "Hz", least=0.0, about="0 for none"),
+    "rate": Key(float, 0.0, "Hz", least=0.0, about="0 for none"),
+    "mask": Key(bool, False), "split": Key(_split, ""),
+    "runs": RUNS, "channels": CHANNELS, "extra": EXTRA,
+})  # fmt: skip
 
 
 def read_draft(draft: Path, path: Path) -> Settings:
@@ -171,24 +176,6 @@ def read_draft(draft: Path, path: Path) -> Settings:
         raise StudyError(str(error).replace(str(draft), str(path))) from None
 
 
-def _law(toml: Toml) -> str:
-    law: str = toml.text((), toml.data, "law")
-    if law not in ("", ALL):
-        toml.error(
-            ("law",),
-            f'law = "{law}"; "all" seeks the law. Without this line that of model.toml is kept.',
-        )
-    return law
-
-
-def _hertz(toml: Toml, key: str) -> float | None:
-    """Return a frequency, None if it is not given."""
-    given: float | None = toml.number((), toml.data, key)
-    if given is not None and given < 0.0:
-        toml.error((key,), f"{key} = {given} Hz; 0 for none, or a positive number.")
-    return given
-
-
 def only_device(folder: Path) -> str:
     """Return the device of a study's building where it has one alone, else "".
 
@@ -197,22 +184,22 @@ def only_device(folder: Path) -> str:
     folder : the study's; what is wrong with its model or building is told where they are asked for
     """
     try:
-        model = tomllib.loads((folder / "model.toml").read_text(encoding="utf-8-sig"))
-        devices = read_building(folder / str(model.get("building"))).devices
-    except (OSError, ValueError, PhysicsError):
+        building = content(folder / "model.toml").get("building")
+        devices = read_building(folder / str(building)).devices
+    except PhysicsError:
         return ""
     return devices[0].name if len(devices) == 1 else ""
 
 
 def _at_device(
-    toml: Toml, channels: Mapping[str, ChannelSpec], device: str
+    document: Document, channels: Mapping[str, ChannelSpec], device: str
 ) -> dict[str, ChannelSpec]:
     """Return the channels with those of the study's device by the names of the one damper."""
     out: dict[str, ChannelSpec] = {}
     for name, spec in channels.items():
         other = at_device(name, device)
         if other in out or (other != name and other in channels):
-            toml.error(
+            document.error(
                 ("channels", name),
                 f"{name} and {other} are both of the device {device!r}, which the study is about: "
                 "one of the two must go.",

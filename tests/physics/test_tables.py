@@ -218,7 +218,7 @@ def test_a_model_file_may_give_plain_numbers(effect: type[Effect], tmp_path: Pat
     values = read_model(path).values()
     assert [values[f"sloped.curve[{k}]"] for k in range(1, 5)] == [-1.0, 0.0, 0.5, 2.5]
     path.write_text(head + "{ curve = [-1.0, 0.0] }\n")
-    with pytest.raises(StudyError, match=r"line 5.*\n?.*a list of 4 values"):
+    with pytest.raises(StudyError, match=r":5: .*a list of 4 values"):
         read_model(path)
     path.write_text(head + "{ curve = [-1.0, 0.0, 99.0, 2.5] }\n")
     with pytest.raises(StudyError, match=r"curve\[3\] = 99 is outside -50 to 50"):

@@ -225,7 +225,7 @@ def test_a_file_named_by_an_override_is_looked_for_in_the_current_folder(
         ({"run": 0.003}, ['a dotted name is right, as in "run.step"']),
         ({"damper.voltage": 3.0}, ["is connected here and set in the parameters"]),
         ({"connections.damper.voltage": "voltage.level"}, ["is a parameter; an output belongs"]),
-        ({"title": 3}, ["title is 3; a text in quotes is right"]),
+        ({"title": 3}, ["title is 3: expected a text in quotes"]),
         ({"damper.fmu": "LuGre"}, ['Did you mean "LuGreDamper"?']),
     ],
 )

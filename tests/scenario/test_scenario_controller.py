@@ -168,7 +168,7 @@ def test_only_designed_controllers_take_a_file(scenario: Path, fmu: str) -> None
 
 
 def test_a_controller_that_is_no_text_is_a_mistake(scenario: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"controller is 3; the path"):
+    with pytest.raises(ScenarioError, match=r"controller is 3: expected a text"):
         load_scenario(scenario, {"controller.controller": 3})
 
 

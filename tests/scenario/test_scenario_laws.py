@@ -168,7 +168,7 @@ def test_a_law_that_gives_nan_is_refused_with_its_line(house: Path) -> None:
         ('law = "bingham_standard"', "bingham_standard"),
         ("law = 3", "law is 3"),
         ('law = "bingham"\nfmu = "BinghamDamper"', "one of them must go"),
-        ('law = "bingham"\ncommand = "cubic"', "form of the command"),
+        ('law = "bingham"\ncommand = "cubic"', "no command .cubic"),
         ('law = "bingham"\ncommand = 3', "command is 3"),
         ('law = "bingham"\ncommand = "table"', "command_knots"),
         ('law = "bingham"\ncommand_knots = [0.0, 1.0]', "command_knots"),

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bristle.core.toml_lines import key_lines, repeated_keys
 from bristle.errors import ScenarioError
-from bristle.lines import key_lines, repeated_keys
 
 TEXTS = {
     "plain": "a = 1\n\n# c\nb = 'x' # [d]\n",

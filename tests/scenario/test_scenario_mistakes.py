@@ -36,22 +36,22 @@ def where(text, mark):
 # (what, text of the valid file, what stands there instead, the mark of the line, words)
 MISTAKES = [
     # the file's own keys
-    ("schema missing", "schema = 1\n", "", None, ["write schema = 1"]),
-    ("schema of the future", "schema = 1", "schema = 2", "schema", ["reads schema = 1"]),
+    ("schema missing", "schema = 1\n", "", None, ["expected schema = 1"]),
+    ("schema of the future", "schema = 1", "schema = 2", "schema", ["another version"]),
     ("schema true", "schema = 1", "schema = true", "schema", ["schema is true"]),
     ("title a number", 'title = "El Centro, LuGre damper at 4 V"', "title = 4", "title",
-     ["title is 4; a text in quotes is right"]),
+     ["title is 4: expected a text in quotes"]),
     ("unknown table", "[run]", "[runn]", "[runn]", ['no key "runn"', 'Did you mean "run"?']),
     ("run missing", "[run]\nstop = 35.0\nstep = 0.002\nalgorithm = \"gauss-seidel\"\n", "", None,
-     ["[run] is missing"]),
+     ["[run] stop is missing"]),
     ("run no table", "[run]\nstop = 35.0\nstep = 0.002\nalgorithm = \"gauss-seidel\"", "run = 3",
-     "run = 3", ["[run] is 3, not a table"]),
+     "run = 3", ["run is 3: expected a table"]),
     ("unknown key of the run", "step = 0.002", "step = 0.002\ntolerance = 1", "tolerance",
      ['[run]: there is no key "tolerance"', "stop, step, algorithm"]),
     # times
     ("stop missing", "stop = 35.0\n", "", "[run]", ["[run] stop is missing"]),
     ("step missing", "step = 0.002\n", "", "[run]", ["[run] step is missing"]),
-    ("stop zero", "stop = 35.0", "stop = 0.0", "stop", ["stop = 0 s", "above 0 s is right"]),
+    ("stop zero", "stop = 35.0", "stop = 0.0", "stop", ["stop = 0 s", "above 0 s"]),
     ("stop negative", "stop = 35.0", "stop = -1", "stop", ["stop = -1 s"]),
     ("stop nan", "stop = 35.0", "stop = nan", "stop", ["nan, not a finite number"]),
     ("stop inf", "stop = 35.0", "stop = +inf", "stop", ["inf, not a finite number"]),
@@ -77,14 +77,14 @@ MISTAKES = [
     ("algorithm unlike any", '"gauss-seidel"', '"euler"', "algorithm",
      ["There are: gauss-seidel, midpoint, midpoint-iterated, jacobi."]),
     ("algorithm a number", '"gauss-seidel"', "1", "algorithm",
-     ["in quotes", "gauss-seidel, midpoint, midpoint-iterated, jacobi"]),
+     ["algorithm is 1: expected", "gauss-seidel"]),
     # components
     ("components no table", VALID[VALID.index("[components.ground]"):], "[[components]]\n",
-     "components", ["is a list, not a table"]),
+     "components", ["is a list: expected a table"]),
     ("no components", VALID[VALID.index("[components.ground]"):], "[components]\n", "components",
      ["no components", "[components.NAME]"]),
     ("component no table", "[connections]", "[components]\nx = 1\n[connections]", "x = 1",
-     ["[components.x] is 1, not a table"]),
+     ["x is 1: expected a table"]),
     ("component with a dot", "[connections]",
      '[components."a.b"]\nfmu = "Structure"\nparameters = { ground_acceleration = 0, '
      "damper_force = 0 }\n[connections]", '"a.b"', ["cannot be called so"]),
@@ -104,13 +104,13 @@ MISTAKES = [
      ['no key "stepp"', 'Did you mean "step"?']),
     ("parameter beside its table", DAMPER, f"{DAMPER}\nsigma_1 = 4.0", "sigma_1",
      ['"sigma_1" belongs into its parameters']),
-    ("parameters no table", PARAMETERS, "parameters = 3", "parameters = 3", ["not a table"]),
+    ("parameters no table", PARAMETERS, "parameters = 3", "parameters = 3", ["expected a table"]),
     ("building of a damper", DAMPER, f'{DAMPER}\nbuilding = "my.toml"', "building",
      ['only the built-in "Structure"']),
     ("building not there", 'fmu = "Structure"', 'fmu = "Structure"\nbuilding = "hous.toml"',
      "building", ['no file "hous.toml"']),
     ("building a number", 'fmu = "Structure"', 'fmu = "Structure"\nbuilding = 2', "building",
-     ["building is 2; the path of a TOML file"]),
+     ["building is 2: expected a text"]),
     # a component's own step
     ("component step does not divide", DAMPER, f"{DAMPER}\nstep = 0.0015", "0.0015",
      ["does not divide", "0.002 or 0.001"]),
@@ -149,7 +149,7 @@ MISTAKES = [
      ["set twice, with and without quotes"]),
     # connections
     ("connections no table", VALID[VALID.index("[connections]"):], "[[connections]]\n",
-     "connections", ["is a list, not a table"]),
+     "connections", ["is a list: expected a table"]),
     ("source misspelt", "damper.force", "damper.forc", "damper.forc",
      ['no output "forc"', 'Did you mean "force"?']),
     ("target misspelt", '"damper.velocity" =', '"damper.velocty" =', "velocty",
@@ -239,7 +239,7 @@ def test_a_mistake_is_found_on_its_line_with_what_would_be_right(findings, old, 
         (VALID.replace("El Centro", "Él Centro").encode("latin-1"), 2, "not UTF-8"),
         (b"\0" * 100, 1, "not TOML"),
         (b"", 0, "schema is missing"),
-        (VALID.encode() + b"\n# " + b"x" * 10_000_000, 0, "larger than 1000 kB"),
+        (VALID.encode() + b"\n# " + b"x" * 10_000_000, 0, "larger than 4 MB"),
         (b"a = " + b"[" * 100_000, 0, "nested too deeply"),
         (b"a = " + b"9" * 5_000, 1, "not TOML"),
         (VALID.replace("\n", "\r").encode(), 1, "not TOML"),
@@ -269,7 +269,7 @@ def test_a_file_that_may_not_be_read_is_a_finding(tmp_path, monkeypatch):
 
     monkeypatch.setattr("pathlib.Path.open", refuse)  # root may read anything: chmod is no test
     (finding,) = check_scenario(file, library=FAKE)
-    assert finding == (0, "error", "cannot be read: Permission denied.")
+    assert finding == (0, "error", "cannot be read (Permission denied).")
 
 
 def test_all_mistakes_of_a_file_are_told_at_once(tmp_path):
@@ -290,8 +290,7 @@ def test_all_mistakes_of_a_file_are_told_at_once(tmp_path):
     file.write_text(text)
     with pytest.raises(ScenarioError) as raised:
         load_scenario(file, library=FAKE)
-    head, *told = str(raised.value).splitlines()
-    assert head == f"{file}: 8 mistakes"
+    told = str(raised.value).splitlines()
     words = [
         "stop = -1",
         "gaus-seidel",
@@ -346,7 +345,7 @@ def test_what_follows_from_a_mistake_is_not_told_again(findings, text):
 
 def test_connections_that_are_no_table_are_told_once(findings):
     assert [error.text for error in findings(WITHOUT_CONNECTIONS)] == [
-        "[connections] is 1, not a table."
+        "connections is 1: expected a table."
     ]
 
 

@@ -189,12 +189,12 @@ def test_from_form_to_form_the_quantities_stay() -> None:
 @pytest.mark.parametrize(
     ("lines", "text"),
     [
-        ('command = "cubic"', "form of the command"),
+        ('command = "cubic"', "no command .cubic"),
         ('command = "table"', "2 to 6 knots"),
         ('command = "table"\ncommand_knots = [0.0, 2.0, 1.0]', "ascending"),
         ('command = "table"\ncommand_knots = [0.0, "a"]', "a list of numbers"),
-        ('command = "quadratic"\ncommand_knots = [0.0, 1.0]', "beside command"),
-        ("command_knots = [0.0, 1.0]", "beside command"),
+        ('command = "quadratic"\ncommand_knots = [0.0, 1.0]', "beside them"),
+        ("command_knots = [0.0, 1.0]", "beside them"),
         ("command = 3", "command"),
     ],
 )

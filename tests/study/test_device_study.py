@@ -173,7 +173,7 @@ def test_what_is_wrong_with_a_device_is_named(tmp_path):
     with pytest.raises(bristle.errors.RecordError, match='roof_force: there is no device "roof"'):
         bristle.identify(Study(study.folder))
     file.write_text(text.replace("[channels.tie_force]", "[channels.force]"))
-    with pytest.raises(StudyError, match=r"line \d+: brace_force and force are both of the device"):
+    with pytest.raises(StudyError, match=r"toml:\d+: brace_force and force are both of the device"):
         Study(study.folder)
     file.write_text(text.replace('rig = "structure"', 'rig = "bench"'))
     with pytest.raises(StudyError, match='device goes with rig = "structure"'):

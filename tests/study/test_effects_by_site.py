@@ -84,7 +84,7 @@ def test_a_file_of_before_means_what_it_meant(tmp_path: Path) -> None:
 def test_a_site_that_an_effect_has_not_is_refused_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     path.write_text('schema = 1\nlaw = "lugre"\n\n[effects."end_stop@roof"]\n')
-    with pytest.raises(StudyError, match=r"line 4.*end_stop@roof"):
+    with pytest.raises(StudyError, match=r":4: .*end_stop@roof"):
         read_model(path)
 
 

@@ -63,7 +63,7 @@ def test_settings_of_another_version(rig: Path, capsys: pytest.CaptureFixture[st
     changed(rig / "study.toml", "schema = 1", 'schema = 2\nfuture = "key"')
     text = refused(rig, capsys, *COMMANDS)
     assert len(text.splitlines()) == 1
-    assert "study.toml, line 1: schema is 2, of another version" in text
+    assert "study.toml:1: schema is 2, of another version" in text
     assert __version__ in text
     assert "future" not in text
 
@@ -72,7 +72,7 @@ def test_a_model_of_another_version(rig: Path, capsys: pytest.CaptureFixture[str
     changed(rig / "model.toml", "schema = 1", 'schema = 3\nkind = "new"')
     text = refused(rig, capsys, "identify", "compare", "diagnose", "report", "export")
     assert len(text.splitlines()) == 1
-    assert "model.toml, line 1: schema is 3" in text
+    assert "model.toml:1: schema is 3" in text
     assert main(["study", "check", str(rig)]) == 0  # the data can be read
 
 

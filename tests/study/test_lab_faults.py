@@ -288,5 +288,5 @@ def test_wrong_corrections_are_told_with_their_line(folder):
     with pytest.raises(StudyError, match="gian"):
         Study(folder)
     path.write_text(text.replace("role", "correct = 3\nrole", 1), encoding="utf-8")
-    with pytest.raises(StudyError, match="correct = 3"):
+    with pytest.raises(StudyError, match=r"correct is 3: expected a list of tables, as .*gain"):
         Study(folder)

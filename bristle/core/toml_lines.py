@@ -8,7 +8,7 @@ from bisect import bisect_right
 from contextlib import suppress
 from typing import NamedTuple
 
-from .errors import ScenarioError
+from ..errors import ScenarioError
 
 KeyPath = tuple[str | int, ...]
 """Keys from the top of a document down to one; whole numbers count the items of an array."""

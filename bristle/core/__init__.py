@@ -1,0 +1,1 @@
+"""Files and their configuration, with what is wrong in them; no physics."""
