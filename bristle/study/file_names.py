@@ -31,7 +31,7 @@ SPELLED = {"pct": "%", "percent": "%", "C": "degC"}
 
 _LETTERS = "xXdD'~=;"  # of these, which hardly part numbers
 _SURE = r"(?:[.,]|[pP][tT]?|point|dot)"  # "1p5" stands for 1.5 where a point would end a name
-_UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
+_UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|degF|C"
 SIGN = r"(?:(?<![^_= ])-)?"
 """T=-10C and cold_-10C have one; in run-10C the minus parts words."""
 _SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s1 is none

@@ -135,8 +135,8 @@ def _instants(groups: dict[str, Channels]) -> Iterator[np.datetime64]:
 def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
     """Return a group's channels by their times, in s since `zero` where they tell an instant.
 
-    A channel that is a time counts for all of its length; `wf_increment` is then often a 1 that
-    nobody set.
+    A channel that is a time counts for all of its length, `wf_increment` is then often a 1 that
+    nobody set; what began later than it is later by that.
     """
     times = [key for key, one in channels.items() if _is_time(key, one.array, one.unit)]
     found: dict[Any, Series] = {}
@@ -147,9 +147,10 @@ def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
         size = len(one.array)
         own = next((other for other in times if len(channels[other].array) == size), None)
         if own is not None:
-            clock: Any = own
+            late = 0.0 if key == own else _late(one, own, channels)
+            clock: Any = own, late
             if clock not in found and (time := _time_in(channels[own], zero)) is not None:
-                found[clock] = Series(time, {})
+                found[clock] = Series(time + late, {})
         elif one.step and size > 1:
             start = one.start if one.start is not None else min(starts, default=zero)
             since = 0.0 if start is None else _since(zero, start)
@@ -166,6 +167,21 @@ def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
             untimed[key] = one.array
     series, untimed = by_length(untimed, list(found.values()))
     return _Clocks(series, untimed, made, times)
+
+
+def _late(one: _Channel, own: str, channels: Channels) -> float:
+    """Return how much later [s] a channel began than the time that was recorded with it.
+
+    Where that time tells no start, its start is that of most channels of its length.
+    """
+    beside = [other for other in channels.values() if len(other.array) == len(one.array)]
+    begins = [(other.start, other.offset) for other in beside if other.start is not None]
+    if one.start is None or not begins:
+        return 0.0
+    time = channels[own]
+    usual = Counter(begins).most_common(1)[0][0]
+    first = usual if time.start is None else (time.start, time.offset)
+    return float(_since(first[0], one.start)) + one.offset - first[1]
 
 
 def _assumed(channels: Channels) -> list[str]:
