@@ -100,7 +100,7 @@ def _of_lines(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Fi
 
 
 def _origin(line: SpectralLine, run: Measurement, mains: str) -> str:
-    """Return where a line is from, as far as its frequency tells; `mains` where it may be of two."""
+    """Return where a line is from, as far as its frequency tells: `mains` is of either, or ""."""
     if not line.mains:
         return "on this channel alone"
     whole = f"the mains of {mains or f'{line.mains:g} Hz'}"
