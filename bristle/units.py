@@ -137,6 +137,7 @@ _PLAIN: dict[str, tuple[float, Exponents]] = {
     "deg": (pi / 180.0, _dimension(rad=1)),
     "min": (60.0, _dimension(s=1)),
     "h": (3600.0, _dimension(s=1)),
+    "day": (86400.0, _dimension(s=1)),
     "g": (STANDARD_GRAVITY, _ACCELERATION),
     # Exact by definition: the inch of 1959, the pound of 1959 under standard gravity.
     "in": (0.0254, _LENGTH),

@@ -232,7 +232,8 @@ def unit_or_none(text: str) -> Unit | None:
     """Return a unit, or None where the text spells none."""
     if not text.strip():
         return None
-    for spelled in (text, _RENAMED.get(text.strip().lower(), text)):
+    bare = text.strip().rstrip(".")  # "in.", "lbs.", "sec."
+    for spelled in (text, _RENAMED.get(bare.lower(), bare)):
         try:
             return parse_unit(spelled)
         except UnitError:
@@ -265,13 +266,11 @@ _RENAMED = {
     "newton": "N",
     "newtons": "N",
     "sec": "s",
-    "sec.": "s",
     "secs": "s",
     "second": "s",
     "seconds": "s",
     "msec": "ms",
     "msecs": "ms",
-    "msec.": "ms",
     "millisecond": "ms",
     "milliseconds": "ms",
     "millisekunden": "ms",
@@ -286,6 +285,8 @@ _RENAMED = {
     "lbs": "lbf",
     "lb": "lbf",
     "kips": "kip",
+    "klbf": "kip",
+    "klbs": "kip",
     "inch": "in",
     "g's": "g",
     "sekunden": "s",

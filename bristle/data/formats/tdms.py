@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,7 +56,7 @@ def read(content: bytes, name: str) -> Table:
     tdms = library("nptdms", name, "TDMS")
     try:
         file = tdms.TdmsFile.read(io.BytesIO(content))
-        groups = {group.name: _channels(group) for group in file.groups()}
+        groups = {group.name: _channels(group, file.properties) for group in file.groups()}
     # A damaged file surfaces as any of these from the library's own parsing.
     except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError,
             MemoryError, RuntimeError, ArithmeticError) as error:  # fmt: skip
@@ -95,7 +95,8 @@ class _Clocks(NamedTuple):
     times: list[str]
 
 
-def _channels(group: Any) -> Channels:
+def _channels(group: Any, of_file: Mapping[str, Any]) -> Channels:
+    """Return a group's channels; what they do not tell of their waveform, group or file may."""
     out: Channels = {}
     for channel in group.channels():
         array = np.asarray(channel[:])
@@ -104,6 +105,7 @@ def _channels(group: Any) -> Channels:
         given = channel.properties
         stated = next((given[key] for key in _UNITS if key in given), "")
         unit = unit_or_none(str(stated))
+        given = {**of_file, **group.properties, **given}
         start = given.get("wf_start_time")
         known = isinstance(start, np.datetime64) and not np.isnat(start) and start > _UNSET
         step, offset = (_seconds(given, key) for key in ("wf_increment", "wf_start_offset"))
