@@ -154,15 +154,15 @@ def _unit(titles: list[str], name: str) -> Unit:
         if not found:
             continue
         unit = _read_unit(found[1].rstrip("."), f"{name}, line {line}")
-        other = re.search("VELOCITY|DISPLACEMENT", title.upper())
-        if other and "ACC" not in title.upper():
-            raise PhysicsError(
-                f"{name}, line {line}: the values are a {other[0].lower()}. "
-                "Take the AT2 file of the record, not VT2 or DT2."
-            )
         if unit.dimension != parse_unit("m/s2").dimension:
             raise PhysicsError(
                 f"{name}, line {line}: the values are in {found[1]}, which is no acceleration. "
+                "Take the AT2 file of the record, not VT2 or DT2."
+            )
+        other = re.search("VELOCITY|DISPLACEMENT", title.upper())
+        if other and "ACC" not in title.upper():
+            raise PhysicsError(
+                f"{name}, line {line}: the values are a {other[0].lower()} in {found[1]}. "
                 "Take the AT2 file of the record, not VT2 or DT2."
             )
         return unit
