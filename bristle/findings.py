@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from typing import Literal, NamedTuple
 
@@ -60,22 +60,32 @@ def listed(names: Iterable[str], most: int = LIST_AT_MOST) -> str:
     return ", ".join(shown) + (f" and {rest} more" if rest else "")
 
 
-def cut_short(text: str) -> str:
+def cut_short(text: str, beside: Sequence[str] = (), way: str = "") -> str:
     """Return a message of `LINES` lines and `CHARACTERS` at most, with a count of what is left out.
 
     The last guard: who lists what a file holds uses `listed`.
+
+    Parameters
+    ----------
+    text : the message
+    beside : lines that are printed with it, and count as well
+    way : how to see all, such as "--json"
     """
+    end = f"; all:  {way}" if way else "."
     lines = text.split("\n")
-    kept = lines if len(lines) <= LINES else lines[: LINES - 1]
-    room = CHARACTERS - 60  # what is said of the rest takes the others
-    if len("\n".join(kept)) > (CHARACTERS if kept is lines else room):
+    most = LINES - len(beside)
+    kept = lines if len(lines) <= most else lines[: most - 1]
+    size = CHARACTERS - sum(len(one) + 1 for one in beside)
+    room = size - 60  # what is said of the rest takes the others
+    if len("\n".join(kept)) > (size if kept is lines else room):
         while len(kept) > 1 and len("\n".join(kept)) > room:
             kept = kept[:-1]
         if len(kept[0]) > room:
             rest = len(text) - room
-            return f"{kept[0][:room]} ... and {rest:,} more characters."
+            return f"{kept[0][:room]} ... and {rest:,} more characters{end}"
     rest = len(lines) - len(kept)
-    return "\n".join([*kept, *([f"  ... and {rest:,} more line{'s' * (rest > 1)}."] * bool(rest))])
+    told = [f"  ... and {rest:,} more line{'s' * (rest > 1)}{end}"] if rest else []
+    return "\n".join([*kept, *told])
 
 
 def unknown(what: str, name: str, names: Iterable[str], more: str = "") -> str:

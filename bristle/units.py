@@ -137,6 +137,7 @@ _PLAIN: dict[str, tuple[float, Exponents]] = {
     "deg": (pi / 180.0, _dimension(rad=1)),
     "min": (60.0, _dimension(s=1)),
     "h": (3600.0, _dimension(s=1)),
+    "day": (86400.0, _dimension(s=1)),
     "g": (STANDARD_GRAVITY, _ACCELERATION),
     # Exact by definition: the inch of 1959, the pound of 1959 under standard gravity.
     "in": (0.0254, _LENGTH),
@@ -149,8 +150,14 @@ _PLAIN: dict[str, tuple[float, Exponents]] = {
     "bar": (1e5, _PRESSURE),
 }
 _PREFIXES = {"n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9}
-_ALIASES = {"sec": "s", "ohm": "Ohm", "Ω": "Ohm", "°": "deg", "°C": "degC"}
-_CELSIUS = Unit("degC", 1.0, _dimension(K=1), 273.15)
+_ALIASES = {"sec": "s", "ohm": "Ohm", "Ω": "Ohm", "°": "deg", "°C": "degC", "°F": "degF"}
+_WITH_OFFSET = {
+    one.name: one
+    for one in (
+        Unit("degC", 1.0, _dimension(K=1), 273.15),
+        Unit("degF", 5.0 / 9.0, _dimension(K=1), 459.67 * 5.0 / 9.0),
+    )
+}
 _LONGEST = 80  # characters
 _DIGITS = 1e-6  # how far [1] two ways to write one factor may lie apart
 _COMMON = ("m/s2", "m/s", "N/m", "N.s/m", "N.s/(m.V)", "rad/s", "degC")
@@ -199,7 +206,7 @@ def parse(text: str) -> Unit:
     Returns
     -------
     Unit
-        Canonical name, factor to SI, dimension and, for degC alone, offset.
+        Canonical name, factor to SI, dimension and, for degC and degF alone, offset.
 
     Raises
     ------
@@ -211,8 +218,8 @@ def parse(text: str) -> Unit:
     plain = text.replace("**", "^").translate(_PLAIN_TEXT).strip()
     if plain in ("", "-"):
         plain = "1"
-    if _ALIASES.get(plain, plain) == _CELSIUS.name:
-        return _CELSIUS
+    if (alone := _WITH_OFFSET.get(_ALIASES.get(plain, plain))) is not None:
+        return alone
     tokens = _tokens(text, plain)
     factors, end = _product(text, tokens, 0)
     if end < len(tokens):
@@ -469,9 +476,10 @@ def _lookup(text: str, symbol: str) -> tuple[float, Exponents, int]:
     if known and symbol[0] in _PREFIXES:
         return (*known, _PREFIXES[symbol[0]])
     within = "" if symbol == text else f' in "{text}"'
-    if symbol == _CELSIUS.name:
+    if symbol in _WITH_OFFSET:
         raise UnitError(
-            f"degC{within}: its zero is not that of K, so it stands alone. In a product write K."
+            f"{symbol}{within}: its zero is not that of K, so it stands alone. In a product write "
+            "K."
         )
     if _GRAM.fullmatch(symbol):
         raise UnitError(

@@ -11,9 +11,11 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..findings import cut_short
 from ._common import add_overrides
 from ._consent import add_trust
 
@@ -84,19 +86,37 @@ def _print_json(found: dict[str, list[Finding]]) -> None:
     print(json.dumps({"files": answer}, indent=2))
 
 
-def print_findings(file: str, findings: list[Finding]) -> None:
-    """Print one line per finding, `FILE:LINE: level: text`, which editors make clickable."""
+def print_findings(file: str, findings: list[Finding], around: Sequence[str] = ()) -> None:
+    """Print one line per finding, `FILE:LINE: level: text`, which editors make clickable.
+
+    Of many the errors come first, as many as a message holds, with a count of the rest.
+
+    Parameters
+    ----------
+    file : its name
+    findings : in the order of their lines
+    around : lines that the command prints about it besides, which take their room
+    """
     colour = sys.stdout.isatty()
-    for line, level, text in findings:
-        place = f"{file}:{line}" if line else file
-        word = f"\033[{_COLOURS[level]}m{level}\033[0m" if colour else level
-        print(f"{place}: {word}: {text}")
     counts = {level: sum(finding.level == level for finding in findings) for level in _COLOURS}
     counted = ", ".join(f"{n} {level}{'s' * (n > 1)}" for level, n in counts.items() if n)
-    if counts["error"]:
-        print(f"{file}: {counted}")
-    else:
-        print(f"{file}: ok{', ' + counted if counted else ''}")
+    last = f"{file}: {counted}"
+    if not counts["error"]:
+        last = f"{file}: ok{', ' + counted if counted else ''}"
+    lines = [_line(file, finding, colour=colour) for finding in findings]
+    text, others = "\n".join(lines), [*around, last]
+    if cut_short(text, others) != text:
+        first = sorted(range(len(lines)), key=lambda k: list(_COLOURS).index(findings[k].level))
+        text = cut_short("\n".join(lines[k] for k in first), others, "--json")
+    if lines:
+        print(text)
+    print(last)
+
+
+def _line(file: str, finding: Finding, *, colour: bool) -> str:
+    line, level, text = finding
+    word = f"\033[{_COLOURS[level]}m{level}\033[0m" if colour else level
+    return f"{file}:{line}: {word}: {text}" if line else f"{file}: {word}: {text}"
 
 
 def _own(file: Path, as_json: bool) -> int:

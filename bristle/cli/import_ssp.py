@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..findings import command
+from ..findings import command, cut_short
 
 HELP = "convert an SSP package of another tool to a scenario"
 
@@ -44,11 +44,14 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print(json.dumps(answer, indent=2))
         return 2 if wrong else 0
-    print(f"{made.scenario}: a scenario of {len(made.fmus)} FMUs.")
-    for note in made.notes:
-        print(note.text)
+    begin = f"{made.scenario}: a scenario of {len(made.fmus)} FMUs."
+    end = "" if wrong else f"Run it:  {command('run', made.scenario)}"
+    room = [" " * 100] * 4 if findings else []  # what a check finds keeps four lines
+    notes = cut_short("\n".join(note.text for note in made.notes), [begin, end, *room], "--json")
+    around = [begin, *notes.splitlines(), *([end] if end else [])]
+    print("\n".join(around[: len(around) - bool(end)]))
     if findings:
-        print_findings(str(made.scenario), findings)
-    if not wrong:
-        print(f"Run it:  {command('run', made.scenario)}")
+        print_findings(str(made.scenario), findings, around)
+    if end:
+        print(end)
     return 2 if wrong else 0

@@ -12,7 +12,7 @@ from typing import Any
 from ..findings import listed
 from ..fmu.archive import library_member
 from ..fmu.description import Value, Variable
-from .native import DISCARD, OK, STATUS, WARNING, BlackBox, Instance, Library
+from .native import DISCARD, OK, STATUS, WARNING, BlackBox, Instance, Library, told
 from .native_fmi3 import LibraryFmi3
 from .plan import Plan
 from .registry import UnexpectedError
@@ -20,7 +20,6 @@ from .registry import UnexpectedError
 Values = list[Value]
 GOOD = (OK, WARNING)
 NAME = "bench"
-_MOST_SAID = 400  # characters
 
 
 class Bench:
@@ -62,7 +61,7 @@ class Bench:
     def said(self) -> str:
         """Return what the FMU said of its failure, "" for nothing."""
         texts = () if self._library is None else self._library.said()
-        return told(" / ".join(" ".join(text.split()) for text in texts))
+        return told(" / ".join(texts))
 
     def ready(
         self, instance: Instance | None = None, *, drive: bool | None = None, stop: bool = False
@@ -191,11 +190,6 @@ class Bench:
             * max((abs(row[i]) for row in rows if isinstance(row[i], float)), default=0.0)
             for i in range(len(self.observed))
         ]
-
-
-def told(text: str) -> str:
-    """Return what an FMU said, cut to a length that a row holds."""
-    return text if len(text) <= _MOST_SAID else f"{text[:_MOST_SAID]} ..."
 
 
 def good(status: int, function: str) -> None:

@@ -26,6 +26,7 @@ STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 _DO_STEP_STATUS, _TERMINATED = 0, 3
 _MOST_MESSAGES = 1000
 _LAST = 3  # messages that are told of a failure
+_MOST_SAID = 270  # characters: a report says them twice
 
 _LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 _ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
@@ -49,6 +50,13 @@ class FatalAnswerError(Exception):
 
 class MissingFunctionError(Exception):
     """The library does not export a function."""
+
+
+def told(text: str) -> str:
+    """Return what an FMU said in one line, cut to a length that a row holds."""
+    text = " ".join(text.split())
+    rest = len(text) - _MOST_SAID
+    return f"{text[:_MOST_SAID]} ... and {rest:,} more characters" if rest > 0 else text
 
 
 class BlackBox:
@@ -82,7 +90,7 @@ class BlackBox:
 
     def hear(self, text: str) -> None:
         """Write what the FMU says meanwhile."""
-        said = text.encode()[: self.SAID].ljust(self.SAID, b"\0")
+        said = told(text).encode()[: self.SAID].ljust(self.SAID, b"\0")
         self._map[self.SIZE + self.COUNT :] = said
         self._heard = True
 

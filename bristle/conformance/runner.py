@@ -21,7 +21,6 @@ from ..fmu.description import NATIVE, describe, read_description, read_root
 from ..fmu.description_fmi3 import check_ports
 from ..progress import Count
 from ._probe import BOX, FINDING, PLAN
-from .bench import told
 from .native import BlackBox
 from .plan import Plan
 from .probes import PROBES
@@ -314,7 +313,6 @@ class _Session:
 def _finding(work: Path, code: int | None, timeout: float) -> Finding:
     """Turn what a process left behind into a finding."""
     under_way, heard = BlackBox.read(work / BOX)
-    said = told(" ".join(heard.split()))
     where = f" in {under_way}" if under_way else ""
     file = work / FINDING
     found: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
@@ -328,4 +326,4 @@ def _finding(work: Path, code: int | None, timeout: float) -> Finding:
         ended = failed(f"left the process{where} with exit code {code}{after}", ended=True)
     else:
         return Finding(found["verdict"], found["seen"], found["data"], found["rule"], found["said"])
-    return replace(ended, said=said)
+    return replace(ended, said=heard)

@@ -32,7 +32,10 @@ _BOTH_BEFORE = re.compile(rf"^\s*{_WHOLE}\s+{_NUMBER}\s+NPTS\b.*\bDT\b{_SPELLED}
 _SIGN_INSIDE = re.compile(r"(?<=[0-9.])(?=[-+])")
 """Where a column ends and the next begins, in rows of a fixed width that leaves no blank."""
 _VALUE = re.compile(r"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:E[-+]?[0-9]+)?")
-_UNITS = re.compile(r"UNITS?\s*(?:OF|[:=])\s*([A-Z/0-9^*.]+)", re.IGNORECASE)
+_UNITS = re.compile(
+    r"UNITS?\s*(?:OF|[:=])\s*([A-Z/0-9^*.]+(?:\s*[X*/]\s*[0-9.^]+)?)", re.IGNORECASE
+)
+"""With a factor behind it, as in G x 1000."""
 
 
 def looks_like(text: str) -> bool:
@@ -96,10 +99,12 @@ def _lines(text: str) -> list[str]:
 
 def _fields(row: str) -> Iterator[str]:
     """Yield the numbers of a row; a minus sign may be all that parts two of them."""
-    for field in row.upper().replace("D", "E").split():
-        parts = _SIGN_INSIDE.split(field)
+    for field in row.split():
+        plain = field.upper().replace("D", "E")
+        parts = _SIGN_INSIDE.split(plain)
         # Of 1.5-101 no one can say whether it is two numbers, or one without its E.
-        yield from parts if all(map(_VALUE.fullmatch, parts)) else (field,)
+        whole = plain if plain[-1].isdigit() else field  # words are told as they are written
+        yield from parts if all(map(_VALUE.fullmatch, parts)) else (whole,)
 
 
 def _count_and_step(row: str, name: str, line: int) -> tuple[int, float]:
@@ -152,6 +157,12 @@ def _unit(titles: list[str], name: str) -> Unit:
         if unit.dimension != parse_unit("m/s2").dimension:
             raise PhysicsError(
                 f"{name}, line {line}: the values are in {found[1]}, which is no acceleration. "
+                "Take the AT2 file of the record, not VT2 or DT2."
+            )
+        other = re.search("VELOCITY|DISPLACEMENT", title.upper())
+        if other and "ACC" not in title.upper():
+            raise PhysicsError(
+                f"{name}, line {line}: the values are a {other[0].lower()} in {found[1]}. "
                 "Take the AT2 file of the record, not VT2 or DT2."
             )
         return unit

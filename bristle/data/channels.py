@@ -150,8 +150,10 @@ _PLACES = {
     "sensed": "temperature temp temperatur temperatura thermocouple thermoelement termopar tc "
     "pt100 pressure druck pression presion pressao torque drehmoment strain dehnung humidity "
     "feuchte accelerometer gauge dms",  # commands nothing, whatever unit its signal has
+    "commanding": "coil damper mr mrf cmd command setpoint soll ref reference desired target drive "
+    "supply",
 }
-_GROUND, _BASE, _FLOOR, _DAMPER, _OTHER, _SENSED = (
+_GROUND, _BASE, _FLOOR, _DAMPER, _OTHER, _SENSED, _COMMANDING = (
     frozenset(ws.split()) for ws in _PLACES.values()
 )
 _KNOWN = frozenset().union(_BY_WORD, _GROUND, _BASE, _FLOOR, _DAMPER, _OTHER)
@@ -186,6 +188,11 @@ def meaning(name: str, unit: str | None) -> Meaning | None:
 def of_a_sensor(name: str) -> bool:
     """Return whether a column is called by what is measured and commands nothing, as a pressure."""
     return bool(_SENSED & set(_words(name)))
+
+
+def of_a_drive(name: str) -> bool:
+    """Return whether a column is called by what commands a damper, in no words of a quantity."""
+    return bool(_COMMANDING & set(_words(name)))
 
 
 def quantity_of_unit(unit: str | None) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+
+_CODES = (-9999.0, 9999.0, -99999.0, 99999.0, -999999.0, 999999.0, -7999.0)
+"""Numbers that loggers write where nothing was measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,27 @@ class Table:
     def where(self, row: int) -> str:
         """Return the place of a sample in words: "line 12"."""
         return f"{self.place} {self.lines[row]}"
+
+
+def without_codes(table: Table) -> Table:
+    """Return a table without the numbers that a logger writes where nothing was measured.
+
+    Such as -9999: no other value of the column comes near it.
+    """
+    values, remarks = dict(table.values), list(table.remarks)
+    for key, own in table.values.items():
+        size = np.abs(own)
+        for code in _CODES:
+            is_code = own == code
+            others = size[~is_code & np.isfinite(own)]
+            if is_code.any() and others.size and float(others.max()) < 0.5 * abs(code):
+                values[key] = np.where(is_code, np.nan, own)
+                remarks.append(
+                    f'"{key}" is {code:g} in {is_code.sum()} places, and else within '
+                    f"{others.max():.4g}: taken as missing there"
+                )
+                break
+    return replace(table, values=values, remarks=tuple(remarks))
 
 
 def table_from_frame(frame: pd.DataFrame, name: str = "frame") -> Table:

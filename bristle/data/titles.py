@@ -16,8 +16,8 @@ _PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<un
 _BRACKET = re.compile(r".*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]")
 _BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
 _WHOLE = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
-_DEGREES = re.compile(r"(?:deg(?:rees?|\.)?|grad|[°º])? ?[cC](?:elsius)?")
-_CELSIUS = re.compile(
+_DEGREES = re.compile(r"(?:deg(?:rees?|\.)?|grad|[°º])? ?(?:[cC](?:elsius)?|[fF](?:ahrenheit)?)")
+_TEMPERATURE = re.compile(
     rf"(?P<name>.*?\S)\s*(?:[\[(]\s*(?:{_DEGREES.pattern})\s*[\])]|[_/] ?(?:{_DEGREES.pattern})"
     rf"|(?:,| in) (?:{_DEGREES.pattern}))\s*"
 )
@@ -35,8 +35,8 @@ def title(index: int, text: str) -> Column:
         Its title in the file.
     """
     found = column(index, text)
-    if found.unit is None and (celsius := _celsius(found)) is not None:
-        return celsius
+    if found.unit is None and (degrees := _degrees(found)) is not None:
+        return degrees
     if found.unit is None and found.problem:
         bracket = _BRACKET.fullmatch(found.text)
         unit = unit_or_none(bracket["unit"]) if bracket else None  # "(amp)" is no unit, but meant
@@ -50,16 +50,22 @@ def title(index: int, text: str) -> Column:
     return found
 
 
-def _celsius(column: Column, spelled: str = "") -> Column | None:
-    """Return a column in degrees Celsius that are written "C"; None for another quantity."""
-    match = _CELSIUS.fullmatch(column.text) if not spelled else None
-    name = match["name"] if match else column.name
-    meant = meaning(name, None)
-    if (match is None and not _DEGREES.fullmatch(spelled)) or (
-        meant is not None and meant.quantity != "time" and not of_a_sensor(name)
-    ):
+def _degrees(column: Column, spelled: str = "") -> Column | None:
+    """Return a column in degrees that are written "C" or "F"; None for another quantity.
+
+    F alone is mostly a force: it is that of Fahrenheit where the name is one of a temperature.
+    """
+    match = _TEMPERATURE.fullmatch(column.text) if not spelled else None
+    if match is None and not _DEGREES.fullmatch(spelled):
         return None
-    return replace(column, name=name, unit=parse_unit("degC"), problem="", written="")
+    name = match["name"] if match else column.name
+    spelled = column.text[match.end("name") :].strip("[]() ,/_") if match else spelled
+    meant = meaning(name, None)
+    told = of_a_sensor(name) or (meant is not None and meant.quantity == "time")
+    if not told and (meant is not None or spelled.lower() == "f"):
+        return None
+    unit = parse_unit("degF" if "f" in spelled.lower() else "degC")
+    return replace(column, name=name, unit=unit, problem="", written="")
 
 
 def _by_slash(column: Column) -> Column:
@@ -104,8 +110,8 @@ def titles(
 def _in_unit(column: Column, text: str) -> Column:
     """Return a column in the unit that a row of units says; in none where its title denies it."""
     unit = row_unit(text)
-    if unit is None and (celsius := _celsius(column, text.strip("[]() "))) is not None:
-        return celsius
+    if unit is None and (degrees := _degrees(column, text.strip("[]() "))) is not None:
+        return degrees
     if unit is not None and _differs(column, unit):
         assert column.unit is not None
         problem = f"the title says {column.unit.name}, and the row of units {unit.name}."
@@ -216,6 +222,7 @@ def is_unit_row(fields: Sequence[str]) -> bool:
     some = [field for field in some if field.lower() not in _NOTHING]
     other = [field for field in some if row_unit(field) is None]
     known = len(some) - len(other)
+    other = [field for field in other if not _DEGREES.fullmatch(field)]
     if not known or all(_WHOLE.fullmatch(field) for field in other):
         return known > 0
     return known > len(other) and all(meaning(field, None) is None for field in other)
@@ -225,7 +232,8 @@ def unit_or_none(text: str) -> Unit | None:
     """Return a unit, or None where the text spells none."""
     if not text.strip():
         return None
-    for spelled in (text, _RENAMED.get(text.strip().lower(), text)):
+    bare = text.strip().rstrip(".")  # "in.", "lbs.", "sec."
+    for spelled in (text, _RENAMED.get(bare.lower(), bare)):
         try:
             return parse_unit(spelled)
         except UnitError:
@@ -258,13 +266,11 @@ _RENAMED = {
     "newton": "N",
     "newtons": "N",
     "sec": "s",
-    "sec.": "s",
     "secs": "s",
     "second": "s",
     "seconds": "s",
     "msec": "ms",
     "msecs": "ms",
-    "msec.": "ms",
     "millisecond": "ms",
     "milliseconds": "ms",
     "millisekunden": "ms",
@@ -279,6 +285,8 @@ _RENAMED = {
     "lbs": "lbf",
     "lb": "lbf",
     "kips": "kip",
+    "klbf": "kip",
+    "klbs": "kip",
     "inch": "in",
     "g's": "g",
     "sekunden": "s",

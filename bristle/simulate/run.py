@@ -176,8 +176,8 @@ def execute(
             output.show(line)
         if len(remarks) >= LINES:
             name = scenario.package
-            again = command("import-ssp", name) if name else command("check", scenario.file)
-            output.show(f"and {len(remarks) - LINES + 1} more; all:  {again}")
+            again = ["import-ssp", name] if name else ["check", scenario.file]
+            output.show(f"and {len(remarks) - LINES + 1} more; all:  {command(*again, '--json')}")
         job = _Job(scenario, engine, output, ensure)
         if engine == "compiled":
             if coupling_error:

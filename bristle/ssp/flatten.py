@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from ..errors import ScenarioError, UnitError
-from ..fmu.description import Description, Value
+from ..findings import listed
+from ..fmu.description import Description, Value, Variable
 from ..fmu.variables import passes
 from ..units import Measure
 from .conversion import SAME, Change, after, convert
@@ -114,7 +115,7 @@ class _Flattener:
                 if value is None and source != target:
                     value = self._value(target, SAME)
                 if value is not None:
-                    values[target] = value
+                    values[target] = self._item(variable, value, (source, target))
         return FlatSystem(self.fmus, self.descriptions, tuple(connections), values)
 
     def _note_unused(self) -> None:
@@ -282,6 +283,16 @@ class _Flattener:
         if isinstance(value, bool | str):
             raise self.package.error(given.where, "only a number has a unit or a transformation.")
         return factor * value + offset
+
+    def _item(self, variable: Variable, value: Value, ports: tuple[Port, Port]) -> Value:
+        """Return a value as an FMU takes it: the number of an item that is given by its name."""
+        if variable.kind != "Enumeration" or not isinstance(value, str):
+            return value
+        if value not in variable.items:
+            where = next(self.net.given[port].where for port in ports if port in self.net.given)
+            right = listed(f"{name} = {number}" for name, number in variable.items.items())
+            raise self.package.error(where, f'"{value}" is no item; {right} are right.')
+        return variable.items[value]
 
 
 def _meant(told: Measure, own: Measure | None) -> Measure:

@@ -110,7 +110,9 @@ def _value(
         try:
             return int(text)
         except ValueError:
-            raise package.error(where, f'"{text}" is no whole number, and no item.') from None
+            if kind == "Enumeration":
+                return text  # an item of the FMU's own type
+            raise package.error(where, f'"{text}" is no whole number.') from None
     raise package.error(where, f'<{kind} value="{text}"> is not read.')
 
 

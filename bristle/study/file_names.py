@@ -31,7 +31,7 @@ SPELLED = {"pct": "%", "percent": "%", "C": "degC"}
 
 _LETTERS = "xXdD'~=;"  # of these, which hardly part numbers
 _SURE = r"(?:[.,]|[pP][tT]?|point|dot)"  # "1p5" stands for 1.5 where a point would end a name
-_UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
+_UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|degF|C"
 SIGN = r"(?:(?<![^_= ])-)?"
 """T=-10C and cold_-10C have one; in run-10C the minus parts words."""
 _SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s1 is none
@@ -160,6 +160,7 @@ def reading_of(files: Sequence[Path], tones: Sequence[Tone | None]) -> Reading:
         for name in differ:
             if said[name] > 0 or (seen == 0 and said[name] == 0):
                 open_[name] = _open_text(name, plain, with_mark)
+    open_ |= _with_and_without([tokens_of(file, Reading(tuple(marks))) for file in files])
     digits, by_digits, doubts = _digits(plain, tones) if not marks else ({}, [], {})
     return Reading(tuple(marks), digits, open_, doubts, (*why, *by_digits))
 
@@ -243,6 +244,21 @@ def _open_text(
         f'"{told.text}" and the like in the names may be {one} or {other}, and nothing settles '
         f"it: no {name} is taken. --runs FILE, a table with a row per file, says it"
     )
+
+
+def _with_and_without(tokens: Sequence[Mapping[str, Token]]) -> dict[str, str]:
+    """Return what is said of a command whose levels are 050 in some names and 0.50 in others."""
+    out = {}
+    for name in DRIVE:
+        numbers = [one[name].number.lstrip("-") for one in tokens if name in one]
+        marked = next((one for one in numbers if not one.isdigit()), "")
+        bare = next((one for one in numbers if re.fullmatch(r"0+[1-9]\d*", one)), "")
+        if marked and bare:
+            out[name] = (
+                f'"{bare}" stands beside "{marked}" in the names, and may lack its decimal mark: '
+                f"no {name} is taken. --runs FILE, a table with a row per file, says it"
+            )
+    return out
 
 
 def _text(tokens: Mapping[str, Token], name: str) -> str:

@@ -35,8 +35,9 @@ def doubts(runs: list[Measurement]) -> list[str]:
         if share > _SATURATED:
             raise StudyError(
                 f"{run.name}: {share:.0%} of the force's samples are at its extremes: the load "
-                "cell or its amplifier is saturated. Measure with a wider range, or leave the run "
-                "out in study.toml."
+                "cell or its amplifier is saturated, or this is a friction without noise that "
+                "nothing changes, and no law is told by it. Measure with a wider range or with "
+                "other motions, or leave the run out in study.toml."
             )
         if share > 0.0:
             notes.append(f"{run.name}: {share:.1%} of the force's samples are at its extremes.")

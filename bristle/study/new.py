@@ -328,7 +328,7 @@ def _refuse_incomplete(
     wrong = []
     if "time" not in there:
         why = too_few_rows(table) or "no column can be the time"
-        wrong.append(f"{why}: --channel time=COLUMN@s, or --step 0.002")
+        wrong.append(f"{why}: --channel time=COLUMN@s, or --step S, the sampling step in s")
     if rig == "bench":
         if not there & {"displacement", "velocity"}:
             wrong.append(
@@ -355,10 +355,11 @@ def _refuse_incomplete(
                 if problem
                 else (f'the unit of "{guess.column}" is not given')
             )
-            wrong.append(
-                f"{guess.channel}: {why}: "
-                f'--channel "{guess.channel}={guess.column}@{right}", or what it is in'
-            )
+            # Who takes the advice must not turn counts or inches into metres.
+            unit = "UNIT" if problem else right
+            says = f'--channel "{guess.channel}={guess.column}@{unit}"'
+            says += f", where UNIT is {right} or the like" if problem else ", or what it is in"
+            wrong.append(f"{guess.channel}: {why}: {says}")
     if wrong:
         seen = "".join(f"\n    {guess}" for guess in guesses)
         unused = [

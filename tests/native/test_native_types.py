@@ -1,4 +1,4 @@
-"""Numbers that are got as those of another type: both forms of an FMU answer, and warn."""
+"""Values that are got as those of another type: both forms of an FMU answer, and warn."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ CASES: list[tuple[str, str, Any]] = [
     ("gas_spring.on", "Integer", 1),
     ("voltage", "Integer", -2),  # rounded toward 0, as int() does
     ("voltage", "Boolean", True),
+    ("voltage", "String", "-2.75"),
+    ("gas_spring.on", "String", "True"),
 ]
-NAMES = {"Real": "float", "Integer": "int", "Boolean": "bool"}
-OF_FMI3 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+NAMES = {"Real": "float", "Integer": "int", "Boolean": "bool", "String": "str"}
+OF_FMI3 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
 
 
 @pytest.mark.parametrize(("name", "kind", "value"), CASES)
@@ -58,4 +60,16 @@ def test_a_number_that_fits_no_integer_is_none() -> None:
     pair.said()
     assert pair.one.get("Integer", [index])[0] == ERROR
     assert any("voltage is not of type int." in text for text in pair.said()[1])
+    pair.one.free()
+
+
+@pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean"])
+def test_a_string_is_no_number_and_both_answer_0(kind: str) -> None:
+    pair = both("GroundMotion")
+    pair.said()
+    index = pair.slave._index["record"]
+    assert getattr(pair.slave, f"get_{kind.lower()}")([index]) == [0]
+    assert pair.one.get(kind, [index]) == (WARNING, [0])
+    for said in pair.said():
+        assert said == [f"one: record is not of type {NAMES[kind]}: its value is converted."]
     pair.one.free()

@@ -109,11 +109,13 @@ def _clipped(
         ends = [end for end in ends if _moves_at(end[1], values, velocity)]
     if not ends:
         return
+    friction = channel.endswith("force") and _is_at_ends(ends)
+    other = ", or a friction without noise that nothing changes" if friction else ""
     yield Finding(
         "clipping",
         "warning",
         f"{channel} stays at exactly {_ends_text(ends, run.units[channel])}: it is cut off by its "
-        "instrument or amplifier.",
+        f"instrument or amplifier{other}.",
         "Repeat the run with a larger range, or leave it out: saturated samples are lost.",
         run.name,
         channel,

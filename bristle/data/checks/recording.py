@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -25,13 +26,15 @@ def check_recording(runs: Sequence[Measurement]) -> Iterator[Finding]:
     """
     found = [spectral_lines(run.channels, run.step) for run in runs]
     found = of_one_mains(found, [run.step for run in runs], [len(run.time) for run in runs])
+    # 300 Hz is a harmonic of either mains: only another line tells which.
+    of_either = not any(one.mains and one.order * one.mains % 300.0 for one in chain(*found))
     for run, lines in zip(runs, found, strict=True):
-        yield from _of_run(run, lines)
+        yield from _of_run(run, lines, "50 or 60 Hz" if of_either else "")
 
 
-def _of_run(run: Measurement, lines: Sequence[SpectralLine]) -> Iterator[Finding]:
+def _of_run(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Iterator[Finding]:
     for channel in dict.fromkeys(line.channel for line in lines):
-        yield _of_lines(run, [line for line in lines if line.channel == channel])
+        yield _of_lines(run, [line for line in lines if line.channel == channel], mains)
     if run.sampling.resampled:
         return  # its samples are means of others
     yield from _interpolated(run)
@@ -71,14 +74,14 @@ def _interpolated(run: Measurement) -> Iterator[Finding]:
             )
 
 
-def _of_lines(run: Measurement, lines: Sequence[SpectralLine]) -> Finding:
+def _of_lines(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Finding:
     """Return the finding of all lines on one channel, the largest first."""
     ordered = sorted(lines, key=lambda one: -one.amplitude)
     channel, unit = ordered[0].channel, run.units[ordered[0].channel]
     rms = float(np.std(run[channel])) or 1.0
     told = [
         f"{plain(one.frequency, 4)} Hz of {quantity(one.amplitude, unit, 2, fine=True)} "
-        f"({_origin(one, run)})"
+        f"({_origin(one, run, mains)})"
         for one in ordered
     ]
     what = "a line at" if len(told) == 1 else "lines at"
@@ -96,11 +99,11 @@ def _of_lines(run: Measurement, lines: Sequence[SpectralLine]) -> Finding:
     )
 
 
-def _origin(line: SpectralLine, run: Measurement) -> str:
-    """Return where a line is from, as far as its frequency tells."""
+def _origin(line: SpectralLine, run: Measurement, mains: str) -> str:
+    """Return where a line is from, as far as its frequency tells: `mains` is of either, or ""."""
     if not line.mains:
         return "on this channel alone"
-    whole = f"the mains of {line.mains:g} Hz"
+    whole = f"the mains of {mains or f'{line.mains:g} Hz'}"
     if line.order > 1:
         whole = f"{plain(line.order * line.mains, 4)} Hz of {whole}"
     if line.folded:

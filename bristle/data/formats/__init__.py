@@ -15,7 +15,7 @@ from functools import cache
 from importlib import import_module
 from types import ModuleType
 
-from ..table import Table
+from ..table import Table, without_codes
 
 
 @cache
@@ -42,4 +42,4 @@ def read(content: bytes, suffix: str, name: str) -> Table:
     """
     module = next(one for one in formats() if one.recognises(content, suffix))
     table: Table = module.read(content, name)
-    return table
+    return without_codes(table)

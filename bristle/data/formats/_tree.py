@@ -352,11 +352,11 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
         if _is_time_name(one) and len(array) not in own and _rises(array):
             own[len(array)] = {}
             found.clocks.append((found.free(paths[one], long[one]), array, own[len(array)]))
-            _state(found, found.clocks[-1][0], fields[one])
+            _note_unit(found, found.clocks[-1][0], _unit_beside(fields, one))
             continue
         called = found.free(paths[one], long[one])
         found.loose[called] = array
-        _state(found, called, fields[one])
+        _note_unit(found, called, _unit_beside(fields, one))
     for array_name in [name for name in found.loose if name in {*paths.values(), *long.values()}]:
         size = len(found.loose[array_name])
         if size in own and any(found.loose[array_name] is one for one in vectors.values()):
@@ -437,10 +437,9 @@ def _named_all(node: Mapping[str, Any]) -> bool:
 def _name_and_data(node: Mapping[str, Any]) -> tuple[str, AnyArray, str] | None:
     """Return name, vector and unit of a signal, None where it has no name or no vector."""
     text, array = _get(node, _NAMES), _vector(_get(node, _VALUES))
-    unit = _get(node, _UNITS)
     if not isinstance(text, str) or not text.strip() or array is None:
         return None
-    return text.strip().strip('"'), array, unit if isinstance(unit, str) else ""
+    return text.strip().strip('"'), array, _unit_of(node)
 
 
 def _add_dspace(found: _Found, key: str, node: Mapping[str, Any]) -> None:
@@ -488,8 +487,7 @@ def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
         if value is None:
             _scope(found, key, node)
             return
-        stated = _get(node, _UNITS)
-        array, unit = vectors[value], stated if isinstance(stated, str) else node[value].unit
+        array, unit = vectors[value], _unit_of(node) or node[value].unit
         short = value if isinstance(node, Bare) else f"{key}.{value}"
         called = found.free(key if value.lower() in _VALUES else short, f"{key}.{value}")
     _note_unit(found, called, unit)
@@ -537,7 +535,7 @@ def _matrix(
         called.append(name)
         _note_unit(found, name, units[k] if units else "")
         if not units:
-            _state(found, name, node)
+            _note_unit(found, name, node.unit)
     data = dict(zip(called, columns, strict=True))
     by_name = next((name for name in called if _is_time_name(name) and _rises(data[name])), None)
     time = by_name or (called[0] if first_rises else None)
@@ -622,9 +620,22 @@ def _short(key: str) -> str:
     return key.rpartition(".")[2].lower()
 
 
-def _state(found: _Found, key: str, node: object) -> None:
-    if isinstance(node, Leaf):
-        _note_unit(found, key, node.unit)
+def _unit_beside(fields: Mapping[str, Any], key: str) -> str:
+    """Return a vector's unit: its own, one in a structure of units, or a text named after it."""
+    every = [one for name, one in fields.items() if _TELLS_UNITS.search(name)]
+    texts = [
+        getattr(fields[key], "unit", ""),
+        *(one.get(key) for one in every if isinstance(one, dict)),
+        *(fields.get(f"{key}{ending}") for ending in ("_unit", "_units", "Unit")),
+    ]
+    return next((text for text in texts if isinstance(text, str) and text), "")
+
+
+def _unit_of(node: Mapping[str, Any]) -> str:
+    """Return the unit that a signal states, itself or in the DataInfo of a time series."""
+    info = _get(node, ("datainfo",))
+    texts = (_get(one, _UNITS) for one in (node, info) if isinstance(one, dict))
+    return next((text for text in texts if isinstance(text, str)), "")
 
 
 def _note_unit(found: _Found, key: str, text: str) -> None:

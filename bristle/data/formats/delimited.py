@@ -334,9 +334,8 @@ def _without_repeated(lines: list[str], first: int, layout: Layout, notes: list[
 def _title_fields(line: str, layout: Layout, wide: int) -> list[str]:
     """Return the titles in a line; there may be one less or more than numbers, left empty."""
     stripped = line.strip("\n\r ")
-    if layout.delimiter:
-        fields = layout.split(stripped)
-    else:
+    fields = layout.split(stripped) if layout.delimiter else []
+    if len(fields) < 2:  # blanks may part titles above a table of tabs
         fields = re.split(r"\s{2,}|\t", stripped)  # titles of several words stand further apart
         fields = fields if len(fields) == wide else _TOKEN.findall(stripped)
     if len(fields) == wide - 1 and layout.delimiter:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,7 +56,7 @@ def read(content: bytes, name: str) -> Table:
     tdms = library("nptdms", name, "TDMS")
     try:
         file = tdms.TdmsFile.read(io.BytesIO(content))
-        groups = {group.name: _channels(group) for group in file.groups()}
+        groups = {group.name: _channels(group, file.properties) for group in file.groups()}
     # A damaged file surfaces as any of these from the library's own parsing.
     except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError,
             MemoryError, RuntimeError, ArithmeticError) as error:  # fmt: skip
@@ -95,7 +95,8 @@ class _Clocks(NamedTuple):
     times: list[str]
 
 
-def _channels(group: Any) -> Channels:
+def _channels(group: Any, of_file: Mapping[str, Any]) -> Channels:
+    """Return a group's channels; what they do not tell of their waveform, group or file may."""
     out: Channels = {}
     for channel in group.channels():
         array = np.asarray(channel[:])
@@ -104,6 +105,7 @@ def _channels(group: Any) -> Channels:
         given = channel.properties
         stated = next((given[key] for key in _UNITS if key in given), "")
         unit = unit_or_none(str(stated))
+        given = {**of_file, **group.properties, **given}
         start = given.get("wf_start_time")
         known = isinstance(start, np.datetime64) and not np.isnat(start) and start > _UNSET
         step, offset = (_seconds(given, key) for key in ("wf_increment", "wf_start_offset"))
@@ -135,8 +137,8 @@ def _instants(groups: dict[str, Channels]) -> Iterator[np.datetime64]:
 def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
     """Return a group's channels by their times, in s since `zero` where they tell an instant.
 
-    A channel that is a time counts for all of its length; `wf_increment` is then often a 1 that
-    nobody set.
+    A channel that is a time counts for all of its length, `wf_increment` is then often a 1 that
+    nobody set; what began later than it is later by that.
     """
     times = [key for key, one in channels.items() if _is_time(key, one.array, one.unit)]
     found: dict[Any, Series] = {}
@@ -147,9 +149,10 @@ def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
         size = len(one.array)
         own = next((other for other in times if len(channels[other].array) == size), None)
         if own is not None:
-            clock: Any = own
+            late = 0.0 if key == own else _late(one, own, channels)
+            clock: Any = own, late
             if clock not in found and (time := _time_in(channels[own], zero)) is not None:
-                found[clock] = Series(time, {})
+                found[clock] = Series(time + late, {})
         elif one.step and size > 1:
             start = one.start if one.start is not None else min(starts, default=zero)
             since = 0.0 if start is None else _since(zero, start)
@@ -166,6 +169,21 @@ def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
             untimed[key] = one.array
     series, untimed = by_length(untimed, list(found.values()))
     return _Clocks(series, untimed, made, times)
+
+
+def _late(one: _Channel, own: str, channels: Channels) -> float:
+    """Return how much later [s] a channel began than the time that was recorded with it.
+
+    Where that time tells no start, its start is that of most channels of its length.
+    """
+    beside = [other for other in channels.values() if len(other.array) == len(one.array)]
+    begins = [(other.start, other.offset) for other in beside if other.start is not None]
+    if one.start is None or not begins:
+        return 0.0
+    time = channels[own]
+    usual = Counter(begins).most_common(1)[0][0]
+    first = usual if time.start is None else (time.start, time.offset)
+    return float(_since(first[0], one.start)) + one.offset - first[1]
 
 
 def _assumed(channels: Channels) -> list[str]:

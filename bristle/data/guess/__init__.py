@@ -31,6 +31,9 @@ _AT_DAMPER = frozenset({"damper", "oil", "fluid", "mrf", "mr", "housing"})
 _PLAIN_NAME = re.compile(r"[\W\d_]+")
 _SAME_TIME = 0.02  # of a step, by which times that are the same may differ
 
+_IN_DAYS = 2e-6
+"""Spacing below which a time from 30,000 on is in days: in s, it would be above 500 kHz."""
+
 FEWEST = 10
 """Rows of numbers below which no column is taken for the time."""
 
@@ -167,11 +170,11 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
         if unit and not timed:
             continue
         reason = "its name" if named else "its unit" if timed else "the first column, and it rises"
-        assumed, doubt = _assumed_unit(column, float(np.median(spacing)))
+        assumed, doubt = _assumed_unit(column, float(np.median(spacing)), float(good[0]))
         score = 4 * named + 2 * timed + rising
         guess = Guess("time", column.text, unit or assumed, 1, reason, doubt)
         if best is None or score > best[0]:
-            best = score, guess, float(np.median(spacing)) * parse_unit(unit or "s").factor
+            best = score, guess, float(np.median(spacing)) * parse_unit(guess.unit or "s").factor
     if best is None:
         return None, 0.0
     doubt = joined(best[1].doubt, _other_times(table, best[1].column))
@@ -185,7 +188,12 @@ def _other_times(table: Table, chosen: str) -> str:
     """
     own = table.find(chosen)
     for column in table.columns:
-        alike = _PLAIN_NAME.sub("", column.name) == _PLAIN_NAME.sub("", own.name)
+        meant = meaning(column.name, "s")
+        alike = _PLAIN_NAME.sub("", column.name) == _PLAIN_NAME.sub("", own.name) or (
+            meant is not None
+            and meant.quantity == "time"
+            and float(np.mean(np.diff(table.values[column.text]) > 0.0)) > 0.98
+        )
         if column.text == chosen or not alike or column.unit != own.unit:
             continue
         apart = table.values[column.text] - table.values[chosen]
@@ -201,10 +209,11 @@ def _other_times(table: Table, chosen: str) -> str:
     return ""
 
 
-def _assumed_unit(column: Column, spacing: float) -> tuple[str, str]:
+def _assumed_unit(column: Column, spacing: float, first: float) -> tuple[str, str]:
     """Return the unit of a time that tells none, and the doubt; "" where it tells an unknown one.
 
-    What stands in round brackets may be a word, as in "time (from start)".
+    What stands in round brackets may be a word, as in "time (from start)". Days of a calendar, as
+    spreadsheets and datenum have them, and small parts of a second since 1970 tell their unit.
     """
     if column.unit is not None:
         return column.unit.name, ""
@@ -212,4 +221,13 @@ def _assumed_unit(column: Column, spacing: float) -> tuple[str, str]:
     if told and "(" not in column.text:
         return "", f'its unit, "{told}", is not known'
     told = f'"{told}" is no unit that is known' if told else "no unit is given"
+    if 3e4 < first < 1e6 and spacing < _IN_DAYS:
+        return (
+            "day",
+            f"{told}, and its values are days of a calendar: {1.0 / 86400 / spacing:.4g} Hz",
+        )
+    for unit, size in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+        if 1e9 * size < first < 4e9 * size:
+            since = f"{told}, and its values are {unit} since 1970"
+            return unit, f"{since}: {size / spacing:.4g} Hz"
     return "s", f"{told}, s is assumed: {1.0 / spacing:.4g} Hz"

@@ -12,7 +12,7 @@ from ..columns import Column
 from ..noise import is_switched
 from ..relation import derivative_relation, power_factor
 from ..table import Array
-from .candidates import Candidate, Search, usable, velocity_of
+from .candidates import Candidate, Search, joined, usable, velocity_of
 
 _SHOWN = 3  # columns of many that are told
 _ALIKE = 0.05  # shares of dissipated power that differ by less are of like forces
@@ -39,7 +39,7 @@ def _best(fitting: list[Candidate]) -> Candidate:
     best = max(fitting, key=lambda one: one.rank)
     rivals = [one.column.text for one in fitting if one.rank == best.rank and one is not best]
     if rivals:
-        best = replace(best, doubt=f"so could be {_listed(rivals)}")
+        best = replace(best, doubt=joined(f"so could be {_listed(rivals)}", best.doubt))
     return best
 
 

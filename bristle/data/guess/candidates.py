@@ -13,6 +13,7 @@ from ..channels import (
     channel_unit,
     is_channel,
     meaning,
+    of_a_drive,
     of_a_sensor,
     quantity_of_unit,
 )
@@ -75,15 +76,26 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
             return None
         if by_unit in DRIVE and of_a_sensor(column.name):  # a signal that is not yet calibrated
             return None
-        return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")
+        return _by_unit(column, str(by_unit), unit)
     return _by_name(column, meant, unit, by_unit)
+
+
+def _by_unit(column: Column, quantity: str, unit: str) -> Candidate:
+    """Return what a column can be by its unit alone: volts may be those of any sensor."""
+    doubt = ""
+    if quantity in DRIVE and not of_a_drive(column.name):
+        doubt = (
+            f"its name tells no command, and {unit} may be of a raw signal: `study channels FOLDER "
+            f"--without {quantity}` leaves it out"
+        )
+    return Candidate(column, quantity, unit, 1, f"its unit, {unit}", doubt=doubt)
 
 
 def _by_name(column: Column, meant: Meaning, unit: str, by_unit: str | None) -> Candidate | None:
     quantity, doubt = meant.quantity, ""
     wanted = "displacement" if quantity == "drift" else quantity
     if unit and by_unit not in (wanted, None, "time", "duty") and len(column.name) == 1:
-        return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")  # a letter says little
+        return _by_unit(column, str(by_unit), unit)  # a letter says little
     if unit and by_unit != wanted:
         if "[" in column.text or "(" in column.text or by_unit is None:
             return None  # a force in V is a force not yet calibrated

@@ -6,13 +6,6 @@
 
 #include "slave.h"
 
-static char *copy_of(const char *text) {
-    size_t size = strlen(text) + 1;
-    char *copy = malloc(size);
-    if (copy) memcpy(copy, text, size);
-    return copy;
-}
-
 static void free_texts(Slave *slave) {
     if (!slave->texts) return;
     for (int i = 0; i < component.count; i++) free(slave->texts[i]);
@@ -23,8 +16,8 @@ Slave *slave_new(const char *name, const char *resources) {
     Slave *slave = calloc(1, sizeof *slave);
     if (!slave) return 0;
     size_t count = (size_t)component.count;
-    slave->name = copy_of(name);
-    slave->resources = copy_of(resources);
+    slave->name = text_copy(name);
+    slave->resources = text_copy(resources);
     slave->values = calloc(count, sizeof *slave->values);
     slave->texts = calloc(count, sizeof *slave->texts);
     slave->given = calloc(count, 1);
@@ -57,7 +50,7 @@ int slave_reset(Slave *slave) {
         const Variable *v = &component.variables[i];
         slave->values[i] = v->start;
         slave->given[i] = (unsigned char)v->given;
-        if (v->kind == STRING && !(slave->texts[i] = copy_of(v->text))) return 0;
+        if (v->kind == STRING && !(slave->texts[i] = text_copy(v->text))) return 0;
     }
     slave->mode = INSTANTIATED;
     slave->stale = slave->unbuilt = 1;

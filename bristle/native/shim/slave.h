@@ -29,7 +29,7 @@ typedef struct Slave {
 
     double *held;         /* room for the Real outputs */
     double *values;       /* of all variables but Strings, by value reference */
-    char **texts;         /* of Strings */
+    char **texts;         /* of Strings, and of what was got as one */
     unsigned char *given; /* whether the host has set it, or the build this input */
     double *slopes;       /* of the inputs over the next steps, in their unit per second */
     int sloping;          /* whether one of them is not 0 */
@@ -56,7 +56,7 @@ Status slave_step(Slave *slave, double time, double dt);
 void slave_follow(Slave *slave, int final);
 
 /* values.c: values in and out. What was asked of a variable that is none, or set of another type, is
-   answered with FAILED; a number that is got as one of another type with WARNED. */
+   answered with FAILED; what is got as another type with WARNED, a String that is no number as 0. */
 Status slave_get(Slave *slave, unsigned reference, int kind, double *value);
 Status slave_get_text(Slave *slave, unsigned reference, const char **value);
 Status slave_set(Slave *slave, unsigned reference, int kind, double value);

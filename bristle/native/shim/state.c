@@ -85,7 +85,7 @@ static void put_all(const Slave *slave, Bytes *to) {
     put_whole(to, (uint64_t)slave->warnings);
     for (int i = 0; i < slave->warnings; i++) put_whole(to, slave->warned[i]);
     for (int i = 0; i < component.count; i++) {
-        if (!slave->texts[i]) continue;
+        if (component.variables[i].kind != STRING) continue;
         size_t size = strlen(slave->texts[i]);
         put_whole(to, size);
         put_bytes(to, slave->texts[i], size);

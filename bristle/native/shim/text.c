@@ -7,6 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+char *text_copy(const char *text) {
+    size_t size = strlen(text) + 1;
+    char *copy = malloc(size);
+    if (copy) memcpy(copy, text, size);
+    return copy;
+}
+
 void text_clear(Text *text) {
     text->used = 0;
     text->at[0] = 0;

@@ -16,6 +16,7 @@ void text_whole(Text *text, long long value);
 void text_repr(Text *text, double value);              /* shortest text that reads back equal */
 void text_general(Text *text, double value);           /* six digits, as %g */
 void text_quoted(Text *text, const char *value);       /* a text in quotes, as repr */
+char *text_copy(const char *text);                      /* on the heap; 0: out of memory */
 int read_number(const char *at, const char *end, double *value); /* 1: all of it is a number */
 
 #endif

@@ -29,17 +29,10 @@ static int known(Slave *slave, unsigned reference, int kind) {
 }
 
 /* Hosts read Integers as Reals, and the like: such a value is converted, and a warning says so. */
-static Status converted(Slave *slave, unsigned reference, int kind, double *value) {
-    const Variable *v = &component.variables[reference];
-    double found = slave->values[reference];
+static Status converted(Slave *slave, unsigned reference, int kind) {
     Text text;
-    if (v->kind == STRING || (kind == INTEGER && !(fabs(found) < 2147483648.0))) {
-        known(slave, reference, kind);
-        return FAILED;
-    }
-    *value = kind == BOOLEAN ? found != 0.0 : kind == INTEGER ? trunc(found) : found;
     text_clear(&text);
-    text_add(&text, v->name);
+    text_add(&text, component.variables[reference].name);
     text_add(&text, " is not of type ");
     text_add(&text, TYPES[kind]);
     text_add(&text, ": its value is converted.");
@@ -47,20 +40,48 @@ static Status converted(Slave *slave, unsigned reference, int kind, double *valu
     return WARNED;
 }
 
+/* Add a value that is no String, as Python writes it. */
+static void add_value(Text *text, const Slave *slave, unsigned reference) {
+    double value = slave->values[reference];
+    int kind = component.variables[reference].kind;
+    if (kind == REAL)
+        text_repr(text, value);
+    else if (kind == INTEGER)
+        text_whole(text, (long long)value);
+    else
+        text_add(text, value != 0.0 ? "True" : "False");
+}
+
 Status slave_get(Slave *slave, unsigned reference, int kind, double *value) {
     int there = reference < (unsigned)component.count;
     int own = there ? component.variables[reference].kind : kind;
     if (slave->stale && own != BOOLEAN) slave_follow(slave, 0);
-    if (there && own != kind) return converted(slave, reference, kind, value);
-    if (!known(slave, reference, kind)) return FAILED;
-    *value = slave->values[reference];
-    return DONE;
+    double found = there && own != STRING ? slave->values[reference] : 0.0; /* no number is 0 */
+    int fits = own == kind || kind != INTEGER || fabs(found) < 2147483648.0;
+    if (!there || !fits) {
+        known(slave, reference, kind);
+        return FAILED;
+    }
+    *value = own == kind || kind == REAL ? found : kind == BOOLEAN ? found != 0.0 : trunc(found);
+    return own == kind ? DONE : converted(slave, reference, kind);
 }
 
 Status slave_get_text(Slave *slave, unsigned reference, const char **value) {
-    if (!known(slave, reference, STRING)) return FAILED;
+    if (reference >= (unsigned)component.count) {
+        known(slave, reference, STRING);
+        return FAILED;
+    }
+    int own = component.variables[reference].kind;
+    if (own != STRING) {
+        if (slave->stale && own != BOOLEAN) slave_follow(slave, 0);
+        Text text;
+        text_clear(&text);
+        add_value(&text, slave, reference);
+        free(slave->texts[reference]);
+        if (!(slave->texts[reference] = text_copy(text.at))) return FAILED;
+    }
     *value = slave->texts[reference];
-    return DONE;
+    return own == STRING ? DONE : converted(slave, reference, STRING);
 }
 
 /* Return whether a variable takes a value now, and what the host is answered. */
@@ -85,12 +106,8 @@ static int may_be_set(Slave *slave, unsigned reference, int changes, Status *ans
     text_add(&text, " keeps ");
     if (v->kind == STRING)
         text_quoted(&text, slave->texts[reference]);
-    else if (v->kind == REAL)
-        text_repr(&text, slave->values[reference]);
-    else if (v->kind == INTEGER)
-        text_whole(&text, (long long)slave->values[reference]);
     else
-        text_add(&text, slave->values[reference] != 0.0 ? "True" : "False");
+        add_value(&text, slave, reference);
     text_add(&text, ": it is fixed after initialisation.");
     slave_warn(slave, text.at);
     *answer = WARNED;
@@ -112,10 +129,8 @@ Status slave_set_text(Slave *slave, unsigned reference, const char *value) {
     Status answer;
     int changes = strcmp(value, slave->texts[reference]) != 0;
     if (!may_be_set(slave, reference, changes, &answer)) return answer;
-    size_t size = strlen(value) + 1;
-    char *copy = malloc(size);
+    char *copy = text_copy(value);
     if (!copy) return FAILED;
-    memcpy(copy, value, size);
     free(slave->texts[reference]);
     slave->texts[reference] = copy;
     slave->given[reference] = 1;

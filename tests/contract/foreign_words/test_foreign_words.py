@@ -99,3 +99,9 @@ def test_the_failing_row_holds_the_words_of_the_fmu(case: str, ask: Ask) -> None
 def test_an_fmu_that_says_nothing_and_one_that_passes_have_no_words(ask: Ask) -> None:
     assert "said" not in ask("", "False")["seen"]
     assert "said" not in ask("", f"self.log({WORDS!r}, Fmi2Status.warning) is None")["seen"]
+
+
+def test_a_long_message_is_cut_with_a_count_of_the_rest(ask: Ask) -> None:
+    row = ask("", f"bool(self.log({'x' * 8192!r}, Fmi2Status.error))")
+    assert "more characters" in row["seen"]
+    assert len("".join(row.values())) + len(row["seen"]) < 1000  # a report says them twice

@@ -90,3 +90,25 @@ def test_a_sign_that_the_study_turns_is_a_note_and_no_fault(tmp_path) -> None:
     verdict = verdict_of(Study(tmp_path / "rig"), Diagnosis("none", (), (), {}))
     assert not verdict["sensors"]
     assert any("study.toml reverses it" in note for note in verdict["notes"])
+
+
+def test_a_friction_without_noise_is_not_blamed_on_the_load_cell_alone(tmp_path, capsys) -> None:
+    turn = (0.75 * T + 0.25) % 1.0
+    columns = {"time [s]": T, "x [mm]": 10.0 * np.abs(4.0 * turn - 2.0) - 10.0,
+               "F [N]": np.where(turn < 0.5, -300.0, 300.0)}  # fmt: skip
+    study = str(tmp_path / "rig")
+    assert main(["study", "new", study, "--data", str(written(tmp_path / "a.csv", columns))]) == 0
+    main(["study", "check", study])
+    assert "or a friction without noise that nothing changes" in capsys.readouterr().out
+
+
+def test_a_line_of_300_hz_alone_is_of_either_mains(tmp_path, capsys) -> None:
+    t = np.arange(8000) / 1000.0
+    hum = 3.0 * np.sin(2.0 * np.pi * 300.0 * t)
+    noise = np.random.default_rng(5).normal(0.0, 1.0, t.size)
+    columns = {"time [s]": t, "x [mm]": 5.0 * np.sin(9.0 * t),
+               "F [N]": 900.0 * np.cos(9.0 * t) + hum + noise}  # fmt: skip
+    study = str(tmp_path / "rig")
+    assert main(["study", "new", study, "--data", str(written(tmp_path / "a.csv", columns))]) == 0
+    main(["study", "check", study])
+    assert "(300 Hz of the mains of 50 or 60 Hz)" in capsys.readouterr().out

@@ -117,6 +117,14 @@ def test_two_names_of_one_level_that_may_be_two_are_not_taken(tmp_path, capsys) 
     assert {level for _, level in runs(tmp_path / "rig").values()} == {None}
 
 
+@pytest.mark.parametrize("other", ["0_50V", "0.50V_b", "1p50V"])
+def test_a_number_with_a_mark_beside_one_that_may_lack_it_is_not_taken(tmp_path, capsys, other):
+    data = made(tmp_path / "lab", {"1Hz_050V": (1.0, 0.5), f"2Hz_{other}": (2.0, 1.5)})
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert "no voltage is taken. --runs FILE" in capsys.readouterr().out
+    assert {level for _, level in runs(tmp_path / "rig").values()} == {None}
+
+
 def test_a_pattern_takes_a_number_whole_where_it_fits_no_other_way(tmp_path) -> None:
     data = made(tmp_path / "lab", {"run_0_5A": (1.0, 0.5), "run_1_5A": (2.0, 1.5)})
     study = str(tmp_path / "rig")

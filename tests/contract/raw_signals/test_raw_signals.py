@@ -63,3 +63,23 @@ def test_raw_volts_beside_each_calibrated_column(tmp_path, capsys) -> None:
 def test_what_commands_and_what_is_measured(tmp_path, columns, more) -> None:
     found = channels(tmp_path, {"Time (s)": T, "Disp (mm)": X, "Force (N)": F, **columns})
     assert found == PLAIN | more
+
+
+@pytest.mark.parametrize(
+    ("name", "doubted"),
+    [("Ch1 (V)", True), ("AO0 (A)", True), ("Coil (V)", False), ("Setpoint (V)", False)],
+)
+def test_a_command_by_its_unit_alone_is_doubted(tmp_path, capsys, name, doubted) -> None:
+    columns = {"Time (s)": T, "Disp (mm)": X, "Force (N)": F, name: U}
+    found = channels(tmp_path, columns)
+    assert name in (found.get("voltage", "") + found.get("current", ""))
+    assert ("its name tells no command" in capsys.readouterr().out) is doubted
+
+
+@pytest.mark.parametrize("title", ["Temperature (F)", "Oil temp [°F]", "T_degF"])
+def test_degrees_fahrenheit(tmp_path, capsys, title) -> None:
+    found = channels(tmp_path, {"Time (s)": T, "Disp (mm)": X, "Force (N)": F, title: 70.0 + WARM})
+    assert found["temperature"] == f"{title} in degF"
+    assert main(["study", "check", str(tmp_path / "rig")]) == 0
+    mean = float(np.mean(38.0 + WARM)) / 1.8
+    assert f"temperature: {mean:.1f} °C, the mean of the run" in capsys.readouterr().out

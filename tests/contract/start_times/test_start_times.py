@@ -68,6 +68,20 @@ def test_a_force_that_begins_later_is_put_on_the_time_of_the_motion(tmp_path, ca
     assert "only the part that all channels have is read: 0.084 s to 5.998 s" in said
 
 
+def test_a_force_that_begins_later_than_the_time_that_is_a_channel(tmp_path: Path) -> None:
+    seconds = 0.002 * np.arange(3000)
+    instants = BEGAN + np.round(1e6 * seconds).astype("timedelta64[us]")
+    for own in (
+        channel("Time", lambda t: t, "s"),
+        ChannelObject("log", "Time", seconds, properties={"unit_string": "s"}),
+        ChannelObject("log", "Stamp", instants),
+    ):
+        late = channel("force", force, "N", start=0.05, offset=0.034)
+        file = tdms(tmp_path / "run.tdms", own, MOTION, late)
+        assert len(measured(file).time) == 3000 - 42
+        assert '"force" begins 84 ms later than "displacement"' in read_table(file).remarks[0]
+
+
 def test_between_samples_it_is_interpolated_and_said(tmp_path: Path) -> None:
     file = tdms(tmp_path / "run.tdms", MOTION, channel("force", force, "N", start=0.0837))
     measured(file, 1e-3)
