@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.error import ForceError, force_error
+from ..identify.error import ForceError, errors_by_run, force_error, pooled
 from ..identify.fit import Model, Problem
 from ..identify.residuals import EXPLAINS, Expected, excess_of, in_noises, residuals
 from ..identify.search import loss, losses, mean_loss, z_of, z_scale
@@ -54,8 +54,10 @@ class Trial:
 
     `train`, `z` the robust RMS of residual over expected noise there; `losses` (n,) the robust loss
     per held-out sample, by the weights of the fit; `residual` (n,) the residuals over the noise;
-    `rms` [N] the error there, that of `error`, which is None where nobody asked. `refined` is
-    False where the first, short search already showed that it gains too little.
+    `rms` [N] the error over the samples that decide: where a law of dry friction is at rest its
+    force may be any, and no effect is judged by that. `error` is that over all samples, None where
+    nobody asked. `refined` is False where the first, short search already showed that it gains too
+    little.
     """
 
     model: Model
@@ -89,10 +91,10 @@ def judge(
     r = residuals(held_out, model, expected)
     z = in_noises(held_out, r, expected)
     own = in_noises(train, residuals(train, model, fitted), fitted)
-    error = force_error([(held_out, model)])
+    decides = pooled(errors_by_run(held_out, model, entire=False))
     return Trial(
-        model, z_scale(own), z_of(mean_loss(losses(z))), error.rms, losses(r), z, noise is None,
-        error,
+        model, z_scale(own), z_of(mean_loss(losses(z))), decides.rms, losses(r), z, noise is None,
+        force_error([(held_out, model)]),
     )  # fmt: skip
 
 

@@ -182,9 +182,15 @@ def force_error(pairs: Iterable[tuple[Problem, Model]]) -> ForceError:
     return pooled(error for problem, model in pairs for error in errors_by_run(problem, model))
 
 
-def errors_by_run(problem: Problem, model: Model) -> list[ForceError]:
-    """Return the error of a model on each run of a problem, whatever its fit left out."""
-    runs = [run.entire() for run in problem.runs]
+def errors_by_run(problem: Problem, model: Model, entire: bool = True) -> list[ForceError]:
+    """Return the error of a model on each run of a problem, whatever its fit left out.
+
+    Parameters
+    ----------
+    problem, model : the runs, and what predicts them
+    entire : False for the error over those samples alone that a fit takes
+    """
+    runs = [run.entire() if entire else run for run in problem.runs]
     zero = zero_on(problem, model)
     return [error_on(run, problem.predict(model, run) + zero) for run in runs]
 
