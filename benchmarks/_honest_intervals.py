@@ -24,6 +24,8 @@ from ._rows import Row
 
 SEED = 4117
 """Of the plan of the cases."""
+TOGETHER = 100
+"""Cases that share a process: a law is all that is compiled."""
 LOW, HIGH = 0.93, 0.97
 """Shares of the intervals between which they are right."""
 
@@ -35,7 +37,7 @@ def run() -> list[Row]:
 
 def main(given: list[str]) -> int:
     """Make what is missing of the figure, print it."""
-    return ask("intervals", __doc__, ("clean",), answered, rows, given)
+    return ask("intervals", __doc__, ("clean",), answered, rows, given, together=TOGETHER)
 
 
 def answered(_kind: str, number: int) -> Answer:
