@@ -31,6 +31,7 @@ def ask(
     rows: Callable[[dict[str, Answer]], list[Row]],
     given: Sequence[str],
     also: Sequence[str] = (),
+    together: int = TOGETHER,
 ) -> int:
     """Make what is missing of a benchmark's figures, print them; return 0.
 
@@ -42,13 +43,14 @@ def ask(
     rows : returns the figures of all answers
     given : options as typed
     also : packages of bristle that the answers rest on, beside those of a diagnosis
+    together : cases that share a process
     """
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks {name}", description=text)
     for kind in kinds:
         parser.add_argument(f"--{kind}", type=int, default=0, metavar="CASES")
     chosen = parser.parse_args(given)
     jobs = ((kind, k) for kind in kinds for k in range(getattr(chosen, kind)))
-    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=TOGETHER) as pool:
+    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=together) as pool:
         found = Answers(name, also).complete(jobs, lambda *job: pool.submit(answer, *job).result())
     for row in rows(found):
         goal = f" (goal {row.goal})" if row.goal else ""

@@ -1,8 +1,8 @@
 """Run the exported FMU on the held-out runs in plain FMPy: `python check.py`.
 
-Needs fmpy and numpy, not bristle. The force of the FMU goes through the filter of a decimated
-record and gets the zero of the load cell; the effects of instruments, if proof.json names any, are
-not applied here.
+Needs fmpy and numpy, not bristle. The force of the FMU goes through the load cell and its recorder,
+as far as the model has effects of them, then through the filter of a decimated record, and gets the
+zero of the load cell. Those of the velocity are in the inputs.
 """
 
 import json
@@ -35,6 +35,9 @@ def force_of(proof: dict[str, Any], run: str, parts: int) -> Any:
     time = columns(FOLDER / f"{run}_force.csv")["time"]
     moments = np.linspace(time[0], time[-1], (len(time) - 1) * parts + 1)
     force = np.interp(moments, found["time"], found["force"])
+    pulse = np.array(proof["pulse_response"][run])  # of the load cell; before, the force was held
+    begun = np.concatenate([np.full(len(pulse) - 1, force[0]), force])
+    force = np.convolve(begun, pulse, "valid")
     half = parts - 1  # a Hann window as long as two samples; it goes on point-symmetrically
     taps = np.hanning(2 * parts + 1)[1:-1]
     begin, end = 2 * force[0] - force[half:0:-1], 2 * force[-1] - force[-2 : -half - 2 : -1]
@@ -56,8 +59,8 @@ def main() -> None:
     print(f"FMU in FMPy: {error:.5g} N, {100.0 * error / force:.3g} % of the force")
     rms, signal = told["rms_counted"], told["signal_counted"]
     print(f"bristle compare: {rms:.5g} N, {100.0 * rms / signal:.3g} %")
-    if proof["instruments"]:
-        print(f"Not applied here: {', '.join(proof['instruments'])}")
+    if proof["not_applied"]:
+        print(f"Not applied here, not linear: {', '.join(proof['not_applied'])}")
 
 
 if __name__ == "__main__":

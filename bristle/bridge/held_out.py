@@ -25,6 +25,7 @@ from ..fmu.damper import input_of
 from ..identify.assigned import at_site
 from ..identify.bench import before_jump
 from ..identify.error import ForceError, error_on, pooled, reasons_of, zero_on
+from ..identify.instruments import sensors, shown_force
 from ..identify.model import Fed, Model, Moments, Problem, Run, of_one_site
 from ..identify.rig import DAMPER, Rig
 from ..identify.run_labels import following
@@ -43,6 +44,8 @@ FINEST = 2e-5
 """Shortest step [s] that is tried."""
 MOST = 120_000
 """Steps of an FMU for its proof: where the runs need more, the begin of each is taken."""
+FADED = 1e-6
+"""Share of its largest value below which the response of an instrument has ended."""
 FOLDER, CHECK = "held_out", "check.py"
 
 
@@ -295,10 +298,17 @@ def write_proof(proof: Proof, held: HeldOut, fmu: Path, folder: Path) -> list[Pa
     fmu : the exported file
     folder : where the inputs are
     """
+    pulses = [_pulse_response(held, fed) for fed in held.fed]
+    linear = all(one is not None for one in pulses)
+    instruments = [effect.name for effect in sensors(held.model.effects, "force")]
     data = {
         "fmu": fmu.name, **proof.as_dict(),
         "load_cell_zero": held.zero,
-        "instruments": [n for n in held.model.effects if EFFECTS[n].site == "sensor"],
+        "not_applied": [] if linear else instruments,
+        "pulse_response": {
+            run.name: one.tolist() if linear and one is not None else [1.0]
+            for run, one in zip(held.runs, pulses, strict=True)
+        },
         "moments_per_sample": {
             run.name: run.finer.parts if run.finer else 1 for run in held.runs
         },
@@ -313,6 +323,23 @@ def write_proof(proof: Proof, held: HeldOut, fmu: Path, folder: Path) -> list[Pa
         path,
         Path(copyfile(Path(__file__).with_name("check_held_out.py"), folder / "check.py")),
     ]
+
+
+def _pulse_response(held: HeldOut, fed: Fed) -> Array | None:
+    """Return what the instruments of the force show of a pulse of 1 N, moment by moment (k,) [N].
+
+    None where that does not tell what they show of a force, as of one that saturates.
+    """
+    effects, dt = held.model.effects, fed.moments.dt
+    pulse = np.zeros(1 + len(fed.moments.x))
+    pulse[1] = 1.0  # not at the first moment, with which some states start
+    response = shown_force(effects, fed.values, pulse, dt)[1:]
+    there = np.flatnonzero(np.abs(response) > FADED * np.max(np.abs(response), initial=0.0))
+    response = response[: 1 + int(there[-1])] if len(there) else response[:1]
+    force = held.force(fed.moments, fed)
+    begun = np.concatenate([np.full(len(response) - 1, force[0]), force])
+    off = np.convolve(begun, response, "valid") - shown_force(effects, fed.values, force, dt)
+    return response if np.max(np.abs(off)) <= OF_FORCE * np.std(force) else None
 
 
 def _inputs(damper: StudyModel, run: Run, fed: Fed) -> dict[str, tuple[str, Array]]:
