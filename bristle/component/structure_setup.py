@@ -5,20 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from ..physics import structure as laws
 from ..physics.building import Building
 from ..physics.codegen import Slots
 from ..physics.device import GROUND
 from ..physics.linear import Row, copy, invert
 from ..physics.rows import open_row, packed, place, row
-from ..physics.structure import (
-    EFFECT_STEP,
-    fill_size,
-    fill_step,
-    functions_of,
-    pack,
-    state_size,
-    work_size,
-)
+from ..physics.structure import EFFECT_STEP, fill_size, fill_step, work_size
 from .devices import PER_DEVICE, PER_LEVEL
 
 
@@ -97,14 +90,14 @@ def bake(building: Building, names: Sequence[str], slots: Slots) -> list[float]:
     contacts = [effect.contact for effect in slots.effects]
     states = [at.get(f"{name}_0", -1) for name in slots.states]
     return packed(
-        sizes, *matrices, building.stiffnesses, ends, pack({}, slots), into_p, switches, contacts,
-        states,
+        sizes, *matrices, building.stiffnesses, ends, laws.pack({}, slots), into_p, switches,
+        contacts, states,
     )  # fmt: skip
 
 
 def room(n: int, slots: Slots) -> int:
     """Return the size of work of a structure of n levels."""
-    return work_size(n) + 4 * n + 2 * state_size(n, slots)
+    return work_size(n) + 4 * n + 2 * laws.state_size(n, slots)
 
 
 def sizes(values: Row, baked: Row, counts: Row) -> int:
@@ -274,7 +267,7 @@ def laid_down(
     """Return store, state and work of a structure from values by name, for its `functions_of`."""
     names = [*values, *(f"{effect}.on" for effect in effects)]
     numbers = [*values.values(), *(1.0 for _ in effects)]
-    baked, counts = bake(building, names, functions_of(effects).slots), [0.0] * 4
+    baked, counts = bake(building, names, laws.functions_of(effects).slots), [0.0] * 4
     sizes(numbers, baked, counts)
     store, state, _, work = ([0.0] * int(count) for count in counts)
     setup(numbers, [], baked, store, state)

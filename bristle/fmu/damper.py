@@ -39,7 +39,7 @@ class DamperSlave(ComponentSlave):
 
     def declare(self) -> None:
         drive = self.drive = drive_named(self.baked.get("drive", ""))
-        self.take(laws.SETS.offering((LAWS[self.law].base,), self.offered("damper", self.law)))
+        self.take(laws.SETS.offering(LAWS[self.law].base, *self.offered("damper", self.law)))
         self.description = text_for(self.description or "", drive)
         self.add_input("displacement", "m", "displacement of the rod", over_step=HELD)
         self.add_input("velocity", "m/s", "velocity of the rod", over_step=HELD)

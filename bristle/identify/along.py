@@ -7,14 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.structure import (
-    advance_effects,
-    contact_force,
-    effect_forces,
-    functions_of,
-    pack,
-    start_states,
-)
+from ..physics import structure
+from ..physics.structure import advance_effects, contact_force, effect_forces
 
 Array = NDArray[np.float64]
 
@@ -85,7 +79,7 @@ class Along:
     def __init__(self, effects: list[str], storey: int) -> None:
         from ..jit import compiled
 
-        functions = functions_of(effects)
+        functions = structure.functions_of(effects)
         self._slots = functions.slots
         self.on = np.array([e.name in effects for e in self._slots.effects], dtype=np.bool_)
         self.active = bool(self.on.any())
@@ -107,9 +101,9 @@ class Along:
         out = np.zeros(len(x))
         if not self.active:
             return out
-        p = np.array(pack(values, self._slots) or [0.0])
+        p = np.array(structure.pack(values, self._slots) or [0.0])
         n = max(1, self._storey)
-        z = np.array(start_states(n, values, self._slots) or [0.0])
+        z = np.array(structure.start_states(n, values, self._slots) or [0.0])
         chain = Chain(
             n, np.full(n, stiffness), self._storey == 0, dt, np.zeros(2 * n), np.zeros(n),
             np.zeros_like(z),

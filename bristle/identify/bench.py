@@ -151,8 +151,8 @@ def compile_ahead(law: str = "", effects: Collection[str] = ()) -> None:
     from ..jit import digest, kept
 
     if not law:
-        damper.SETS.of(laws_of("damper"), effects_of("damper"))
-        structure.SETS.of((), effects_of("structure"))
+        damper.SETS.of(*laws_of("damper"), *effects_of("damper"))
+        structure.SETS.of(*effects_of("structure"))
     elif functions_of(law, effects) is not LIBRARY:
         return
     for one in (force_history, law_history) if effects or not law else (law_history,):

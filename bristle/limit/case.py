@@ -243,7 +243,7 @@ class _Tried:
     """A linear structure, one state or one input of which is 1 and all else 0."""
 
     def __init__(self, slave: Any, h: float) -> None:
-        self._slave, self._h = slave, h
+        self._slave, self._h, self._work = slave, h, [0.0] * len(slave._work)
         self._c: StructureConstants = slave.constants_of(h)._replace(linear=True)
         self.states = 2 * self._c.n
 
@@ -256,10 +256,7 @@ class _Tried:
             begin[state] = 1.0
         else:
             given[end][at] = 1.0
-        outputs, work = (
-            [0.0] * len(self._slave._outputs),
-            [0.0] * len(self._slave._work),
-        )
+        outputs, work = [0.0] * len(self._slave._outputs), self._work
         step, clock = self._slave.functions.step, (0.0, self._h, 0)
         step(clock, given[0], given[1], c, begin, after, outputs, work)
         return np.array(after[: self.states])
@@ -272,10 +269,7 @@ class _Tried:
             begin[state] = 1.0
         else:
             given[at] = 1.0
-        outputs, work = (
-            [0.0] * len(self._slave._outputs),
-            [0.0] * len(self._slave._work),
-        )
+        outputs, work = [0.0] * len(self._slave._outputs), self._work
         self._slave.functions.settle(c, begin, work)
         structure.show_motion(c, begin, outputs)
         self._slave.functions.output(0.0, given, c, begin, outputs, work)

@@ -1,8 +1,4 @@
-"""What Python knows of a component that is to run without it: its tables, its functions.
-
-Slots of laws and effects follow from all that are registered. So a process that has loaded effects
-or laws of a user's own which a plan does not name leaves the work to a fresh one.
-"""
+"""What Python knows of a component that is to run without it: its tables, its functions."""
 
 from __future__ import annotations
 
@@ -22,7 +18,6 @@ from ..fmu.controller import SampledSlave
 from ..fmu.own_controller import COMPILED_MAY_USE, OwnController
 from ..fmu.plan import PACKAGE, Plan
 from ..jit import digest
-from ..physics.user import own_effects, own_laws
 from . import entrance
 from .description import description
 from .description_fmi3 import description_fmi3
@@ -66,11 +61,13 @@ def prepare(what: Plan, fmi: int = 2) -> Prepared:
     BuildError
         If it is not made of flat functions, or its tables cannot be.
     """
-    named = {path.resolve() for path in (*what.effects, *what.laws)}
-    loaded = {path.resolve() for path in (*own_effects().values(), *own_laws().values())}
-    if loaded <= named:
-        return _prepare_here(what, fmi)
-    return Prepared(*json.loads(_in_fresh_process(what, {"do": "prepare", "fmi": fmi})))
+    slave = component_of(what)
+    try:
+        made = tables(slave, GUID)
+    except ValueError as error:  # what a component says of a design that it cannot take
+        raise BuildError(f"{what.name}: {error}") from error
+    about = description_fmi3 if fmi == 3 else description
+    return Prepared(about(slave, GUID), made, _digest_of(slave))
 
 
 def compile_functions(what: Plan, functions: str, target: Path) -> None:
@@ -88,8 +85,13 @@ def compile_functions(what: Plan, functions: str, target: Path) -> None:
     BuildError
         If the compiler refuses a function.
     """
-    order = {"do": "compile", "functions": functions, "target": str(target)}
-    _in_fresh_process(what, order)
+    order = {
+        "functions": functions, "target": str(target), "name": what.name,
+        "component": str(what.component), "baked": dict(what.baked),
+        "files": {name: str(path) for name, path in what.files.items()},
+        "effects": [str(path) for path in what.effects], "laws": [str(path) for path in what.laws],
+    }  # fmt: skip
+    answer_of("bristle.native.prepare", order, what.name)
 
 
 def component_of(what: Plan) -> ComponentSlave:
@@ -114,16 +116,6 @@ def component_of(what: Plan) -> ComponentSlave:
     return slave
 
 
-def _prepare_here(what: Plan, fmi: int) -> Prepared:
-    slave = component_of(what)
-    try:
-        made = tables(slave, GUID)
-    except ValueError as error:  # what a component says of a design that it cannot take
-        raise BuildError(f"{what.name}: {error}") from error
-    about = description_fmi3 if fmi == 3 else description
-    return Prepared(about(slave, GUID), made, _digest_of(slave))
-
-
 def _digest_of(slave: ComponentSlave) -> str:
     """Return the digest of a component's functions and of how they become text."""
     return text_digest(entrance_of(slave.flat_functions(), isinstance(slave, SampledSlave)))
@@ -135,20 +127,6 @@ def text_digest(function: Callable[..., Any]) -> str:
     files = [own, *sorted(own.parent.glob("c_*.py"))]
     how = b"".join(file.read_bytes() for file in files) + repr(COMPILER).encode()
     return hashlib.sha256(digest(function).encode() + how).hexdigest()[:16]
-
-
-def _in_fresh_process(what: Plan, given: Mapping[str, Any]) -> str:
-    """Return what `serve` answers in a process of its own."""
-    order = {
-        **given,
-        "name": what.name,
-        "component": str(what.component),
-        "baked": dict(what.baked),
-        "files": {name: str(path) for name, path in what.files.items()},
-        "effects": [str(path) for path in what.effects],
-        "laws": [str(path) for path in what.laws],
-    }
-    return answer_of("bristle.native.prepare", order, what.name)
 
 
 def answer_of(module: str, order: Mapping[str, Any], about: str) -> str:
@@ -190,15 +168,12 @@ def _text(slave: ComponentSlave, files: Sequence[Path]) -> str:
 
 
 def serve() -> None:
-    """Do what stands on the standard input; the other end of `_in_fresh_process`."""
+    """Do what stands on the standard input; the other end of `compile_functions`."""
     order: dict[str, Any] = json.load(sys.stdin)
     files = {name: Path(path) for name, path in order["files"].items()}
     effects, laws = (tuple(Path(path) for path in order[key]) for key in ("effects", "laws"))
     what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
     try:
-        if order["do"] == "prepare":
-            json.dump(_prepare_here(what, order["fmi"]), sys.stdout)
-            return
         slave = component_of(what)
         if _digest_of(slave) != order["functions"]:
             raise BuildError("its functions have changed meanwhile; build it again.")

@@ -12,10 +12,10 @@ by name, which never change; `Link` makes copies that call those of another set.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from types import FunctionType, SimpleNamespace
-from typing import Any
+from typing import Any, Union
 
 from .command import MOST_KNOTS, entered, rising
 from .effect import Effect, Q
@@ -24,8 +24,7 @@ from .law import Law
 from .parameter import climb
 from .tuples import listed, made, record
 
-Laws = tuple[type[Law], ...]
-Effects = tuple[type[Effect], ...]
+Owner = Union[type[Law], type[Effect]]
 
 
 class Slots:
@@ -48,7 +47,7 @@ class Slots:
         Source of what is added to a state's index: where the states of one of several places begin.
     """
 
-    def __init__(self, laws: Laws, effects: Effects) -> None:
+    def __init__(self, laws: tuple[type[Law], ...], effects: tuple[type[Effect], ...]) -> None:
         self.laws, self.effects = laws, effects
         self.parameters: dict[str, int] = {}
         self.states: dict[str, int] = {}
@@ -71,20 +70,19 @@ class Slots:
 
     def only(self, keep: Callable[[type[Effect]], bool]) -> Slots:
         """Return the same slots with those effects alone that are to be kept."""
-        part = copy(self)
-        part.effects = tuple(effect for effect in self.effects if keep(effect))
-        return part
+        return self._with(effects=tuple(effect for effect in self.effects if keep(effect)))
 
     def reading(self, elsewhere: dict[str, str]) -> Slots:
         """Return the same slots with states that are read from variables: name to variable."""
-        part = copy(self)
-        part.elsewhere = elsewhere
-        return part
+        return self._with(elsewhere=elsewhere)
 
     def at(self, block: str) -> Slots:
         """Return the same slots with every state's index further by what `block` says."""
+        return self._with(block=block)
+
+    def _with(self, **changed: Any) -> Slots:
         part = copy(self)
-        part.block = block
+        vars(part).update(changed)
         return part
 
     def places(self, effect: type[Effect]) -> list[str]:
@@ -103,6 +101,9 @@ class Slots:
             for name, place in zip(effect.states, self.places(effect))
         ]
         return made(f"{effect.name}_Z", sources)
+
+
+Texts = Mapping[str, Callable[[Slots], str]]
 
 
 def call(effect: type[Effect], hook: str, slots: Slots, q: str) -> str:
@@ -167,7 +168,7 @@ def generate(name: str, source: str, slots: Slots) -> Any:
     namespace: dict[str, Any] = {"Q": Q, "Inputs": Inputs, "record": record}
     namespace.update(climb=climb, rising=rising, entered=entered)
     namespace["__name__"] = __name__
-    owners: tuple[type[Law] | type[Effect], ...] = (*slots.laws, *slots.effects)
+    owners: tuple[Owner, ...] = (*slots.laws, *slots.effects)
     for owner in owners:
         namespace[owner.name + "_P"] = owner.Values
         namespace[owner.name + "_Z"] = owner.State
@@ -191,14 +192,14 @@ class Functions:
         Puts them in place of the library's.
     """
 
-    def __init__(self, slots: Slots, texts: Mapping[str, Callable[[Slots], str]]) -> None:
+    def __init__(self, slots: Slots, texts: Texts) -> None:
         self.slots = slots
         self.made = {name: generate(name, text(slots), slots) for name, text in texts.items()}
         self.link = Link(self.made)
 
-    def have(self, laws: Laws, effects: Effects) -> bool:
-        """Return whether these laws and effects are in the set."""
-        return {*laws}.issubset(self.slots.laws) and {*effects}.issubset(self.slots.effects)
+    def have(self, *owners: Owner) -> bool:
+        """Return whether laws and effects are in the set."""
+        return {*owners}.issubset((*self.slots.laws, *self.slots.effects))
 
 
 class Sets:
@@ -208,35 +209,36 @@ class Sets:
     ----------
     texts : mapping
         Name of a function to what returns its source.
-    laws, effects : tuples of classes
+    owners : classes
         Laws in the order of their codes, effects by name; those in this package are the library's.
     """
 
-    def __init__(
-        self, texts: Mapping[str, Callable[[Slots], str]], laws: Laws, effects: Effects
-    ) -> None:
-        self._texts = texts
-        self._made: dict[tuple[Laws, Effects], Functions] = {}
-        here = __name__.rpartition(".")[0]
-        self.library = self.of(
-            tuple(law for law in laws if law.__module__.startswith(here)),
-            tuple(effect for effect in effects if effect.__module__.startswith(here)),
-        )
+    def __init__(self, texts: Texts, *owners: Owner) -> None:
+        self._texts, here = texts, __name__.rpartition(".")[0]
+        self._made: dict[frozenset[Owner], Functions] = {}
+        self.library = self._add([one for one in owners if one.__module__.startswith(here)])
 
-    def of(self, laws: Laws, effects: Effects) -> Functions:
+    def _add(self, owners: Sequence[Owner]) -> Functions:
+        laws = tuple(one for one in owners if issubclass(one, Law))
+        effects = tuple(one for one in owners if issubclass(one, Effect))
+        found = self._made[frozenset(owners)] = Functions(Slots(laws, effects), self._texts)
+        return found
+
+    def of(self, *owners: Owner) -> Functions:
         """Return the functions of these laws and effects alone."""
-        if (laws, effects) not in self._made:
-            self._made[laws, effects] = Functions(Slots(laws, effects), self._texts)
-        return self._made[laws, effects]
+        known = self._made.get(frozenset(owners))
+        return known or self._add(sorted({*owners}, key=lambda one: one.name))
 
-    def offering(self, laws: Laws, effects: Effects) -> Functions:
+    def offering(self, *owners: Owner) -> Functions:
         """Return the functions of the library, or of these alone where it lacks one."""
-        return self.library if self.library.have(laws, effects) else self.of(laws, effects)
+        return self.library if self.library.have(*owners) else self.of(*owners)
 
-    def serving(self, laws: Laws, effects: Effects) -> Functions:
+    def serving(self, *owners: Owner) -> Functions:
         """Return the first set that has these: what it has besides is switched off."""
-        known = [one for one in [*self._made.values()] if one.have(laws, effects)]
-        return known[0] if known else self.of(laws, effects)
+        for one in [*self._made.values()]:
+            if one.have(*owners):
+                return one
+        return self.of(*owners)
 
 
 class Link:

@@ -6,7 +6,7 @@ the motion, then the factors, then the forces, then what the states make of all 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .codegen import Functions, Sets, Slots, switched, switched_laws
@@ -22,48 +22,28 @@ _MORE_THAN_ANY = "1e30"  # N, which no friction is: what would stop a motion tha
 _BY_SIGN = f"({_MORE_THAN_ANY} if v > 0.0 else -{_MORE_THAN_ANY} if v < 0.0 else 0.0)"
 _LEFT = f"halt - force if halts else {_BY_SIGN}"
 _ROD = ["    rod_x = x", "    rod_v = v"]
+_Q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
+
+
+def _of_motion(head: str, lines: list[str], result: str) -> str:
+    """Return the source of a function of setup, motion and states, before the law has its say."""
+    begin = [f"def {head}(setup, now, z):", "    p, on = setup.p, setup.on", _NOW, *_ROD]
+    return "\n".join([*begin, *lines, f"    return {result}"])
 
 
 def motion_source(slots: Slots) -> str:
     """Return `inner_motion`: the motion across the fluid, behind what gives way."""
-    q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
-    lines = [
-        "def inner_motion(setup, now, z):",
-        "    p, on = setup.p, setup.on",
-        _NOW,
-        *_ROD,
-        *switched(slots, "motion", "x, v = {call}", **q),
-        "    return x, v",
-    ]
-    return "\n".join(lines)
+    return _of_motion("inner_motion", switched(slots, "motion", "x, v = {call}", **_Q), "x, v")
 
 
 def voltage_source(slots: Slots) -> str:
     """Return `felt_voltage`: the voltage that the fluid feels."""
-    q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
-    lines = [
-        "def felt_voltage(setup, now, z):",
-        "    p, on = setup.p, setup.on",
-        _NOW,
-        *_ROD,
-        *switched(slots, "voltage", "V = {call}", **q),
-        "    return V",
-    ]
-    return "\n".join(lines)
+    return _of_motion("felt_voltage", switched(slots, "voltage", "V = {call}", **_Q), "V")
 
 
 def law_factors_source(slots: Slots) -> str:
     """Return `law_factors`: what effects make of the law's `FACTORS` at a motion."""
-    q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
-    lines = [
-        "def law_factors(setup, now, z):",
-        "    p, on = setup.p, setup.on",
-        _NOW,
-        *_ROD,
-        *_factors(slots, q),
-        f"    return {', '.join(FACTORS)}",
-    ]
-    return "\n".join(lines)
+    return _of_motion("law_factors", _factors(slots, {**_Q}), ", ".join(FACTORS))
 
 
 def series_source(slots: Slots) -> str:
@@ -145,8 +125,13 @@ def law_force_source(slots: Slots) -> str:
         ]
         return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
 
+    return _of_law(slots, "def law_force(law, p, q, z):", own)
+
+
+def _of_law(slots: Slots, head: str, own: Callable[[type[Law]], list[str]]) -> str:
+    """Return the source of a function that gives force and friction of the law alone."""
     lines = [
-        "def law_force(law, p, q, z):",
+        head,
         "    v, V, halt, halts = q.v, q.V, q.stick_force, q.sticks",
         FORM_OF_LAW,
         "    friction = 0.0",
@@ -186,22 +171,12 @@ def _law_steps(slots: Slots, head: str, middle: str) -> str:
         lines += [f"s = {law_state(law).replace('z[', 'z1[')}", f"rest = {_forces(law, False)}"]
         return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
 
-    lines = [
-        head,
-        "    v, V, halt, halts = q.v, q.V, q.stick_force, q.sticks",
-        FORM_OF_LAW,
-        "    friction = 0.0",
-        "    rest = 0.0",
-        *switched_laws(slots, own),
-        "    return friction + rest, friction",
-    ]
-    return "\n".join(lines)
+    return _of_law(slots, head, own)
 
 
 def evaluate_source(slots: Slots) -> str:
     """Return `evaluate`: force, friction and the rates of the states."""
-    signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt")
-    q = {name: name for name in signals}
+    q = {**_Q, "force": "force", "halt": "halt"}
 
     def own(law: type[Law]) -> list[str]:
         lines = [
@@ -293,8 +268,7 @@ def net_force_source(slots: Slots) -> str:
     series = [effect for effect in slots.effects if effect.joint]
     names = [f"{effect.name}.{state}" for effect in series for state in effect.joint]
     slots = slots.reading({name: ("deflection", "speed")[i % 2] for i, name in enumerate(names)})
-    signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v")
-    q = {name: name for name in signals}
+    q = {**_Q, "force": "force"}
 
     def own(law: type[Law]) -> list[str]:
         lines = [f"s = {law_state(law)}"]
@@ -355,8 +329,8 @@ SETS = Sets(
         "series_element": series_source,
         "step_law": step_law_source,
     },
-    laws_of("damper"),
-    effects_of("damper"),
+    *laws_of("damper"),
+    *effects_of("damper"),
 )
 LIBRARY = SETS.library
 (
@@ -368,4 +342,4 @@ LIBRARY = SETS.library
 def functions_of(law: str, effects: Collection[str]) -> Functions:
     """Return functions of a law with effects: the library's, if it has them."""
     wanted = tuple(effect for effect in effects_of("damper") if effect.name in effects)
-    return SETS.serving((LAWS[law].base,), wanted)
+    return SETS.serving(LAWS[law].base, *wanted)

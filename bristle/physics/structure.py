@@ -203,15 +203,14 @@ SETS = Sets(
         "contact_force": contact_source,
         "advance_effects": advance_source,
     },
-    (),
-    effects_of("structure"),
+    *effects_of("structure"),
 )
 effect_forces, contact_force, advance_effects = SETS.library.made.values()
 
 
 def functions_of(effects: Collection[str]) -> Functions:
     """Return functions of effects: the library's, if it has them."""
-    return SETS.serving((), tuple(e for e in effects_of("structure") if e.name in effects))
+    return SETS.serving(*(e for e in effects_of("structure") if e.name in effects))
 
 
 class Setup(NamedTuple):

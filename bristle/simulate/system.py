@@ -15,10 +15,9 @@ from ..fmu import catalogue
 from ..fmu.slave import Slave
 from ..physics import damper as damper_laws
 from ..physics import structure as structure_laws
-from ..physics.codegen import Functions
+from ..physics.codegen import Functions, Owner
 from ..physics.device import GROUND
-from ..physics.effect import effects_of
-from ..physics.laws import LAWS, laws_of
+from ..physics.laws import LAWS
 from ..physics.signals import CONSTANT
 from ..scenario.scenario import Component, Scenario
 from . import records
@@ -104,22 +103,12 @@ class System:
         own = any(one.made is not SITES[site].library for site in SITES for one in slaves[site])
         found = []
         for site, sets in SITES.items():
-            laws = {LAWS[one.law].base for one in slaves[site] if site == "damper"}
-            effects = {
-                effect
-                for one in slaves[site]
-                for effect in one._effects
-                if offered or one[effect.name + ".on"]
-            }
-            made = sets.library
-            if own:
-                made = sets.of(
-                    tuple(law for law in laws_of(site) if law in laws),
-                    tuple(effect for effect in effects_of(site) if effect in effects),
-                )
+            owners: set[Owner] = {LAWS[one.law].base for one in slaves[site] if site == "damper"}
             for one in slaves[site]:
-                one.take(made)
-            found.append(made)
+                owners |= {e for e in one._effects if offered or one[e.name + ".on"]}
+            found.append(sets.of(*owners) if own else sets.library)
+            for one in slaves[site]:
+                one.take(found[-1])
         return found[0], found[1]
 
     def _add_slots(self, component: Component) -> None:

@@ -67,7 +67,7 @@ def module(system: System | None = None) -> bytes:
         order = {
             "own": _own(),
             "sets": [
-                [[one.name for one in kind] for kind in (made.slots.laws, made.slots.effects)]
+                [[law.name for law in made.slots.laws], [e.name for e in made.slots.effects]]
                 for made in sets
             ],
             "functions": functions,
@@ -104,7 +104,7 @@ def serve() -> None:
         for file in files:
             load_file(Path(file), kind)
     sets = [
-        site.of(tuple(LAWS[name] for name in laws), tuple(EFFECTS[name] for name in effects))
+        site.of(*(LAWS[name] for name in laws), *(EFFECTS[name] for name in effects))
         for site, (laws, effects) in zip(SITES.values(), given["sets"], strict=True)
     ]
     try:

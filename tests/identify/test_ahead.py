@@ -49,7 +49,7 @@ def test_another_process_keeps_what_fits_need(
 ) -> None:
     monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path))
     monkeypatch.setattr(bench, "_ahead", {})
-    bench.compile_ahead(effects=False)
+    bench.compile_ahead("lugre")
     bench._ahead["law_history"].wait()
     assert jit.kept(bench.law_history)
     assert not jit.kept(bench.force_history)

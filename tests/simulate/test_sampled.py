@@ -11,7 +11,6 @@ import pytest
 from bristle.fmu import catalogue
 from bristle.fmu.controller import MEASURED
 from bristle.scenario.scenario import load_scenario
-from bristle.simulate import coupled
 from bristle.simulate.coupled import simulate
 from bristle.simulate.run import run
 
@@ -225,13 +224,3 @@ def test_filtered_velocity_is_the_rate_of_the_low_passed_displacement(tmp_path: 
     ratio = own[loud] / spectrum[loud]
     expected = 1.0 / (1.0 + 1j * f[loud] / 18.0)
     assert np.abs(ratio - expected).max() < 0.1
-
-
-def test_the_loop_with_clocks_gives_the_same_without_any(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = load_scenario("half_sine_pulse", {"run.stop": 1.0})
-    runs = []
-    for has_clocks in (False, True):
-        monkeypatch.setattr(coupled, "_has_clocks", has_clocks)
-        runs.append(simulate(scenario))
-    for name, values in runs[0].items():
-        assert np.array_equal(values, runs[1][name]), name
