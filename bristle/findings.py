@@ -140,7 +140,7 @@ def number(value: object) -> float | str:
             float(value)
         except ValueError:
             return f"is {written(value)}, not a number"
-        return f"is {written(value)}: a number needs no quotes"
+        return f"is {written(value)}, and a number needs no quotes"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"is {written(value)}, not a number"
     try:

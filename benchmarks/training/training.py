@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import isfinite
@@ -12,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from bristle.control.controller import POLICY
+from bristle.core.config import ANY, Document, Spec
 from bristle.data.motion import GroundMotion, read_ground_motion
-from bristle.design.file import task_from_data
+from bristle.design.file import task_of
 from bristle.design.task import Task
 from bristle.errors import DesignError, RecordError
 
@@ -147,26 +147,21 @@ def read_policy_task(path: Path) -> PolicyTask:
     DesignError, PhysicsError
         Naming the file and what was expected.
     """
+    document = Document(path, DesignError)
+    data = document.data
+    if data.get("kind") != POLICY or "lqg" in data:
+        document.error(("kind",), f'expected kind = "{POLICY}" and a table [motions].')
+    elif not isinstance(data.get("motions"), Mapping):
+        document.error(("motions",), "a policy is trained on motions: expected a table [motions].")
+    document.check()
+    every = {one.name: ANY._replace(default=one.default) for one in fields(Training)[:-1]}
+    found = document.read(Spec(every), ("motions",), data.pop("motions"))
+    document.check()
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path}: not valid TOML: {error}.") from error
-    if data.pop("kind", None) != POLICY or "lqg" in data:
-        raise DesignError(f'{path}: expected kind = "{POLICY}" and a table [motions].')
-    table = data.pop("motions", None)
-    if not isinstance(table, Mapping):
-        raise DesignError(f"{path}: a policy is trained on motions: expected a table [motions].")
-    known = {f.name for f in fields(Training)} - {"folder"}
-    unknown = sorted(set(table) - known)
-    if unknown:
-        raise DesignError(
-            f"{path} [motions]: unknown key {unknown[0]!r}; there are {', '.join(sorted(known))}."
-        )
-    try:
-        motions = Training(**table, folder=path.parent)
+        motions = Training(**found, folder=path.parent)
     except DesignError as error:
-        raise DesignError(f"{path}: {error}") from None
-    task = task_from_data({**data, "kind": "lqg"}, path.parent, str(path))
-    return PolicyTask(**vars(task), motions=motions)
+        document.error(("motions", str(error).split()[1]), str(error))
+        document.check()
+        raise
+    data["kind"] = "lqg"
+    return PolicyTask(**vars(task_of(document, path.parent)), motions=motions)

@@ -26,18 +26,16 @@ seed = 1
 model = "my_rig"
 """
 
-# Longer than 300 lines: half of it are messages that say what would be right.
-
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 from .. import resources
-from ..core.toml_lines import KeyPath, key_lines
+from ..core.config import ANY, Document, Key, Spec
+from ..core.toml_lines import KeyPath
 from ..errors import BristleError, EnsembleError, PhysicsError, TrustError
 from ..findings import nearest, unknown, written
 from ..scenario.document import FILE_PARAMETERS, MADE_FROM
@@ -48,27 +46,38 @@ from ..simulate.forms import FORMS
 from ..simulate.rows import make_columns
 from . import buildings
 from .distributions import KINDS, Distribution, Value
-from .identified import Identified, read_identified, refuse_few
+from .identified import IDENTIFIED, Identified, read_identified, refuse_few
 from .plan import STATISTICS, Output, Plan, Varied
 
-SCHEMA = 1
-LARGEST = 4 * 1024**2
-"""Largest ensemble file [bytes]."""
 MOST_RUNS = 10_000_000
-_KEYS = (
-    "schema",
-    "title",
-    "scenario",
-    "engine",
-    "fmus",
-    "runs",
-    "seed",
-    "set",
-    "vary",
-    "outputs",
-    "identified",
-)
 _FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
+
+
+def _values(value: object) -> tuple[Any, ...]:
+    if not isinstance(value, list):
+        raise EnsembleError(f"is {written(value)}: expected a list.")
+    return tuple(value)
+
+
+def _numbers(value: object) -> tuple[Any, ...]:
+    if not all(isinstance(one, int | float) for one in _values(value)):
+        raise EnsembleError("holds more than numbers: expected a list of numbers.")
+    return _values(value)
+
+
+_SPEC = Spec({
+    "title": Key(str, ""), "scenario": Key(str, about="the base: a stock scenario or a file"),
+    "engine": Key(str, "compiled", choices=("compiled", "fmu")),
+    "fmus": Key(str, "python", choices=FORMS),
+    "runs": Key(int, 100, least=1, most=MOST_RUNS), "seed": Key(int, 1, least=0, most=2**62),
+    "set": Spec(each=ANY),
+    "vary": Spec(each=Spec({
+        **dict.fromkeys(KINDS, Key(_values, None)), "within": Key(_numbers, None),
+        "weights": Key(_numbers, ()),
+    })),
+    "outputs": Spec(each=Key([str], (), about=", ".join(STATISTICS))),
+    "identified": IDENTIFIED,
+})  # fmt: skip
 
 
 def stock_ensembles() -> list[Path]:
@@ -124,89 +133,59 @@ class _Reader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.wrong: list[str] = []
-        try:
-            if path.stat().st_size > LARGEST:
-                raise EnsembleError(f"{path}: larger than {LARGEST // 1024**2} MB: no ensemble.")
-            text = path.read_text(encoding="utf-8-sig")
-            self.data: dict[str, Any] = tomllib.loads(text)
-        except OSError as error:
-            raise EnsembleError(f"{path}: cannot be read ({error.strerror or error}).") from None
-        except (ValueError, RecursionError) as error:  # not UTF-8, not TOML
-            raise EnsembleError(f"{path}: not TOML: {error}.") from None
-        self.lines = key_lines(text)
-
-    def error(self, keys: KeyPath, text: str) -> None:
-        while keys and keys not in self.lines:
-            keys = keys[:-1]
-        line = self.lines.get(keys, 0)
-        self.wrong.append(f"{self.path}{f':{line}' if line else ''}: {text}")
-
-    def check(self) -> None:
-        if self.wrong:
-            raise EnsembleError("\n  ".join(dict.fromkeys(self.wrong)))
+        self.document = Document(path, EnsembleError)
+        self.error = self.document.error
+        self.given = self.document.read(_SPEC)
 
     def plan(self, runs: int | None, with_limits: bool = False) -> Plan:
-        if self.data.get("schema") != SCHEMA:
-            found = written(self.data["schema"]) if "schema" in self.data else "missing"
-            self.error(("schema",), f"schema is {found}; this version reads {SCHEMA}.")
-        for key in self.data:
-            if key not in _KEYS:
-                self.error((key,), unknown("key", key, _KEYS))
-        asked = self._whole("runs", 100, 1, MOST_RUNS)
-        seed = self._whole("seed", 1, 0, 2**62)
-        engine = self.data.get("engine", "compiled")
-        if engine not in ("compiled", "fmu"):
-            self.error(("engine",), f"engine = {written(engine)}; compiled or fmu is right.")
-        fmus = self.data.get("fmus", "python")
-        if fmus not in FORMS:
-            self.error(("fmus",), f"fmus = {written(fmus)}; {' or '.join(FORMS)} is right.")
-        elif fmus == "native" and engine != "fmu":
+        given, engine = self.given, str(self.given["engine"])
+        if given["fmus"] == "native" and engine != "fmu":
             self.error(("fmus",), 'fmus = "native" needs engine = "fmu": no other steps FMUs.')
         if runs is not None and not 1 <= runs <= MOST_RUNS:
-            raise EnsembleError(f"--runs {runs}: 1 to {MOST_RUNS} is right.")
-        fixed = {name: self._found(name, v) for name, v in self._table("set").items()}
+            raise EnsembleError(f"--runs {runs}: expected 1 to {MOST_RUNS}.")
+        fixed = {name: self._found(name, v) for name, v in given["set"].items()}
+        if given["scenario"] is None:
+            self.document.check()
         base = self._scenario(fixed)
-        if base is None:
-            self.check()
-        assert base is not None
         identified = self._identified(base, with_limits)
         if identified is not None:
             fixed = {**identified.fixed, **fixed}
-            base = self._scenario(fixed) or base
+            base = self._scenario(fixed)
         varied = tuple(
             one
-            for name, table in self._table("vary").items()
-            if (one := self._varied(name, table, base, str(engine))) is not None
+            for name, table in given["vary"].items()
+            if (one := self._varied(name, table, base, engine)) is not None
         )
         varied = self._all_varied(varied, identified)
-        if not varied and not self.wrong:
+        if not varied and not self.document.found:
             self.error(("vary",), "nothing varies: [vary] names what does, and within what.")
         outputs = self._outputs(base)
-        self.check()
+        self.document.check()
         content = hashlib.sha256(scenario_text(base).encode())
         for file in _files_read(base, varied):
             content.update(file.read_bytes())
-        title = str(self.data.get("title", "") or base.title)
         plan = Plan(
-            self.path, title, base.file, str(engine), runs or asked, seed, varied, outputs, fixed,
-            content.hexdigest()[:16], identified, str(fmus),
+            self.path, given["title"] or base.title, base.file, engine, runs or given["runs"],
+            given["seed"], varied, outputs, fixed, content.hexdigest()[:16], identified,
+            given["fmus"],
         )  # fmt: skip
         refuse_few(plan)
         return plan
 
     def _identified(self, base: Scenario, with_limits: bool) -> Identified | None:
         """Return what `[identified]` says, None where there is none or it is wrong."""
-        if "identified" not in self.data:
+        if "identified" not in self.document.data:
             if with_limits:
                 raise EnsembleError(
                     f"{self.path}: --with-limits needs [identified], with the study whose verdict "
                     "has the limits."
                 )
             return None
+        if self.document.found:
+            return None
         try:
             return read_identified(
-                self._table("identified"), self.path.parent, base, with_limits=with_limits
+                self.given["identified"], self.path.parent, base, with_limits=with_limits
             )
         except EnsembleError as error:
             self.error(("identified",), f"[identified]: {error}")
@@ -219,7 +198,7 @@ class _Reader:
         joint = identified.varied() if identified is not None else ()
         drawn = {one.name for one in joint}
         for table in ("vary", "set"):
-            for name in self._table(table):
+            for name in self.given[table]:
                 if plain_target(name) in drawn:
                     self.error(
                         (table, name),
@@ -228,25 +207,8 @@ class _Reader:
                     )
         return (*joint, *varied)
 
-    def _whole(self, key: str, default: int, low: int, high: int) -> int:
-        value = self.data.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            self.error((key,), f"{key} = {written(value)}; a whole number from {low} is right.")
-            return default
-        return value
-
-    def _table(self, key: str) -> dict[str, Any]:
-        value = self.data.get(key, {})
-        if not isinstance(value, dict):
-            self.error((key,), f"{key} is {written(value)}; a table, [{key}], is right.")
-            return {}
-        return value
-
-    def _scenario(self, fixed: Mapping[str, Value]) -> Scenario | None:
-        name = self.data.get("scenario")
-        if not isinstance(name, str) or not name:
-            self.error(("scenario",), "scenario names the base: a stock scenario or a file.")
-            return None
+    def _scenario(self, fixed: Mapping[str, Value]) -> Scenario:
+        name = self.given["scenario"]
         beside = self.path.parent / name
         return load_scenario(resolve_scenario(beside if beside.is_file() else name), fixed)
 
@@ -257,18 +219,17 @@ class _Reader:
             return str(beside) if beside.is_file() else value
         return value
 
-    def _varied(self, name: str, table: Any, base: Scenario, engine: str) -> Varied | None:
+    def _varied(
+        self, name: str, table: dict[str, Any], base: Scenario, engine: str
+    ) -> Varied | None:
         keys: KeyPath = ("vary", name)
-        if not isinstance(table, dict):
-            self.error(keys, f'"{name}" must be a table such as {{ uniform = [1.0, 2.0] }}.')
-            return None
         distribution = self._distribution(keys, name, table)
         if distribution is None:
             return None
         try:
             varied = Varied(name, distribution, place_of(name, base, engine))
             mistake = self._repeated(name) or _try(varied, base)
-            mistake = mistake or _idle(varied, base, self._table("vary"))
+            mistake = mistake or _idle(varied, base, self.given["vary"])
         except EnsembleError as error:
             mistake = str(error)
         if mistake:
@@ -278,47 +239,33 @@ class _Reader:
 
     def _repeated(self, name: str) -> str:
         """Return the words for a name that varies twice or is set as well; "" if it is neither."""
-        names = list(self._table("vary"))
+        names = list(self.given["vary"])
         before = names[: names.index(name)]
         twin = next((one for one in before if plain_target(one) == plain_target(name)), "")
         if twin:
             return f'"{name}" is "{twin}" once more; one of them must go.'
-        if plain_target(name) in map(plain_target, self._table("set")):
+        if plain_target(name) in map(plain_target, self.given["set"]):
             return f'"{name}" is in [set] as well, where it would do nothing; one must go.'
         return ""
 
     def _distribution(self, keys: KeyPath, name: str, table: dict[str, Any]) -> Distribution | None:
-        kinds = [key for key in table if key in KINDS]
-        others = [key for key in table if key not in (*KINDS, "within", "weights")]
-        for key in others:
-            self.error((*keys, key), f'"{name}": {unknown("distribution", key, KINDS)}')
+        if not isinstance(written_keys := self.document.data["vary"][name], dict):
+            return None
+        kinds = [key for key in KINDS if table[key] is not None]
         if len(kinds) != 1:
-            if not others:
+            if not {*written_keys} - {"within", "weights"} or len(kinds) > 1:
                 self.error(keys, f'"{name}" needs one of {", ".join(KINDS)}.')
             return None
-        kind = kinds[0]
-        lists = {}
-        for key in (kind, "within", "weights"):
-            value = table.get(key, [])
-            if not isinstance(value, list):
-                self.error((*keys, key), f'"{name}": {key} is {written(value)}; a list is right.')
-                return None
-            lists[key] = tuple(self._found(name, item) for item in value)
+        kind, within, weights = kinds[0], table["within"], table["weights"]
+        values = tuple(self._found(name, item) for item in table[kind])
         wrong = ""
-        for key, owner, size in (("within", "normal", 2), ("weights", "choice", 0)):
-            if key in table and kind != owner:
+        for key, owner in (("within", "normal"), ("weights", "choice")):
+            if key in written_keys and kind != owner:
                 wrong = f"{key} goes with {owner}, not with {kind}."
-            elif not all(isinstance(v, int | float) for v in lists[key]):
-                wrong = f"{key} holds numbers."
-            elif key in table and size and len(lists[key]) != size:
-                wrong = f"{key} needs {size} numbers."
+        if within is not None and len(within) != 2:
+            wrong = wrong or "within needs 2 numbers."
         if not wrong:
-            distribution = Distribution(
-                kind,
-                lists[kind],
-                lists["within"] or None,
-                lists["weights"],
-            )
+            distribution = Distribution(kind, values, within, weights)
             wrong = distribution.mistake()
         if wrong:
             self.error(keys, f'"{name}": {wrong}')
@@ -330,21 +277,21 @@ class _Reader:
             c.name: c for c in make_columns(base, {p.name: p.description for p in base.components})
         }
         outputs = []
-        for name, statistics in self._table("outputs").items():
+        for name, statistics in self.given["outputs"].items():
             keys: KeyPath = ("outputs", name)
             if name not in columns:
                 self.error(keys, unknown("output", name, columns))
                 continue
-            if not isinstance(statistics, list) or not statistics:
+            if not statistics and not self.document.found:
                 self.error(keys, f'"{name}" needs a list of {", ".join(STATISTICS)}.')
                 continue
             for statistic in statistics:
                 if statistic not in STATISTICS:
-                    text = unknown("statistic", str(statistic), STATISTICS)
+                    text = unknown("statistic", statistic, STATISTICS)
                     self.error(keys, f'"{name}": {text}')
                 else:
                     outputs.append(Output(name, statistic, columns[name].unit or ""))
-        if not outputs and not self.wrong:
+        if not outputs and not self.document.found:
             self.error(("outputs",), "nothing is kept: [outputs] names columns and statistics.")
         return tuple(dict.fromkeys(outputs))
 

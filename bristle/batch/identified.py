@@ -16,18 +16,23 @@ from typing import Any
 
 import numpy as np
 
+from ..core.config import Key, Spec
 from ..data.files import read_json
 from ..data.model import StudyModel, read_model
 from ..data.model_draws import has_covariance, joint_errors
 from ..data.open_effects import OpenEffect, left_open
 from ..errors import EnsembleError
-from ..findings import command, unknown, written
+from ..findings import command, unknown
 from ..physics.effect import EFFECTS, plain_name
 from ..scenario.scenario import Scenario
 from .distributions import Distribution, Value, share
 from .plan import Plan, Varied
 
-KEYS = ("model", "component", "structure")
+IDENTIFIED = Spec({
+    "model": Key(str, "", about="the folder of a study"), "component": Key(str, "damper"),
+    "structure": Key(str, "structure"),
+})  # fmt: skip
+"""`[identified]` of an ensemble file."""
 LEAST = 4
 """Runs per effect that --with-limits needs at least."""
 _DRAW, _JOINT = "left open", "identified"
@@ -170,8 +175,7 @@ def read_identified(
         If the model, or its verdict, cannot be read.
     """
     folder, model = _model_of(table, beside)
-    damper = str(table.get("component", "damper"))
-    structure = str(table.get("structure", "structure"))
+    damper, structure = table["component"], table["structure"]
     there = {one.name for one in base.components}
     mass = f"{structure}.attached_mass" if structure in there else ""
     places = Places(damper, structure, not model.building, mass)
@@ -200,14 +204,10 @@ def read_identified(
 
 def _model_of(table: Mapping[str, Any], beside: Path) -> tuple[Path, StudyModel]:
     """Return the folder of the study that a table names, and its model."""
-    for key, value in table.items():
-        if key not in KEYS:
-            raise EnsembleError(unknown("key", key, KEYS))
-        if not isinstance(value, str):
-            raise EnsembleError(f"{key} = {written(value)}; a text is right.")
-    if not table.get("model"):
-        raise EnsembleError('model is missing: the folder of a study, as in model = "my_rig".')
-    path = beside / str(table["model"])
+    if not table["model"]:
+        words = 'model is missing: expected the folder of a study, as in model = "my_rig".'
+        raise EnsembleError(words)
+    path = beside / table["model"]
     folder = path if path.is_dir() else path.parent
     return folder, read_model(folder / "model.toml" if path.is_dir() else path)
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import tempfile
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from ..control.controller import Controller, building_digest, read_controller
-from ..design import design, task_from_data
-from ..design.file import SCHEMA
+from ..core.config import SCHEMA, Document
+from ..design import design
+from ..design.file import task_of
 from ..design.task import check_sample_period
 from ..errors import BuildError, DesignError, FmuError, ScenarioError
 from ..findings import nearest
@@ -114,14 +114,12 @@ class Maker:
     def _of_design(self, choice: Choice, name: str) -> Entry:
         """Design what a design file asks for; building and damper are these unless it names one."""
         file = Path(choice.what)
-        try:
-            data = tomllib.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise DesignError(f"{file}: cannot be read as a design file: {error}.") from None
+        document = Document(file, DesignError)
+        document.data.setdefault("schema", SCHEMA)
         place = self.site.building, self.site.device.name
-        task = task_from_data({"schema": SCHEMA, **data}, file.parent, str(file), place)
+        task = task_of(document, file.parent, place)
         known = self.damper.for_design()
-        if "damper" not in data and known is not None:
+        if "damper" not in document.data and known is not None:
             task = replace(task, damper=known)
         found = design(task).controller
         kept = self._save(found, file.stem)

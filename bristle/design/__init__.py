@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from ..control.controller import Controller, read_controller
+from ..core.config import SCHEMA
 from ..errors import DesignError
 from ..findings import written
-from .file import SCHEMA, damper_from_model, read_task, task_from_data
+from .file import damper_from_model, read_task, task_from_data
 from .plausible import implausible
 from .result import DesignResult
 from .sliding import Damper

@@ -32,17 +32,15 @@ force = 0.2
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import fields
-from difflib import get_close_matches
-from functools import partial
-from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from ..core.config import Document, Key, Spec
+from ..core.toml_lines import KeyPath
 from ..data.model import read_model
 from ..errors import BristleError, DesignError, StudyError
+from ..findings import written
 from ..physics.building import Building, paper_building, read_building
 from ..physics.laws import DEFAULT_OF_DESIGN
 from .passive import Share
@@ -50,20 +48,56 @@ from .sliding import Damper
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
 
-T = TypeVar("T")
-
-SCHEMA = 1
-_TABLES = {"hinf": {"weights", "damper"}, "lpv": {"weights", "damper", "scheduling"}}
-_TABLES["lqg"] = {"lqg", "damper"}
-_NO_NUMBERS = ("grid", "rows", "varies")
-_TOP = {"schema", "kind", "title", "building", "device", "sample_period", "tau", "order", "passive"}
+_TABLES = {"hinf": ("weights",), "lpv": ("weights", "scheduling"), "lqg": ("lqg",)}
 _WEIGHT_FORMS: dict[frozenset[str], Callable[..., Weight]] = {
     frozenset({"gain", "corner"}): Weight.low_pass,
     frozenset({"gain", "zero", "pole"}): Weight.lead,
-    frozenset({"numerator", "denominator"}): lambda numerator, denominator: Weight(
-        tuple(numerator), tuple(denominator)
-    ),
+    frozenset({"numerator", "denominator"}): Weight,
 }
+
+
+def _weight(value: object) -> Weight:
+    form = _WEIGHT_FORMS.get(frozenset(value)) if isinstance(value, Mapping) else None
+    if form is None or not isinstance(value, Mapping):
+        forms = "; ".join("{ " + ", ".join(sorted(keys)) + " }" for keys in _WEIGHT_FORMS)
+        raise DesignError(f"is {written(value)}: expected a weight, one of {forms}.")
+    kinds: dict[str, Any] = {"numerator": [float], "denominator": [float]}
+    values = {}
+    for name, one in value.items():
+        try:
+            values[name] = Key(kinds.get(name, float)).taken(one)
+        except BristleError as error:
+            raise DesignError(f"is wrong: {name} {error}") from None
+    try:
+        return form(**values)
+    except DesignError as error:
+        raise DesignError(f"is wrong: {error}") from None
+
+
+_NUMBER = Key(float, None)
+_SPECS: dict[str, Spec] = {
+    "weights": Spec({
+        "acceleration": Key(_weight, None), "command": Key(_weight, None), "noise": _NUMBER,
+    }),
+    "scheduling": Spec({
+        "grid": Key([float], None, "m/s"), "varies": Key(str, None), "rows": Key(int, None),
+        **dict.fromkeys(("rate", "eps", "balance_at"), _NUMBER),
+    }),
+    "lqg": Spec(dict.fromkeys(LqgWeights.__dataclass_fields__, _NUMBER)),
+}  # fmt: skip
+_SPEC: dict[str, Key | Spec] = {
+    "kind": Key(str, choices=_TABLES), "title": Key(str, ""), "building": Key(str, ""),
+    "device": Key(str, ""), "sample_period": Key(float, None, "s"), "tau": _NUMBER,
+    "order": Key(int, None),
+    "damper": Spec({
+        "law": Key(str, DEFAULT_OF_DESIGN), "parameters": Spec(each=Key(float, 0.0)),
+        "effects": Key([str], ()), "model": Key(str, ""), "v_max": Key(float, None, "V"),
+        "known_to": Key(float, None, "m/s"),
+    }),
+    "passive": Spec(each=Spec({
+        "damping": Key(float, 0.0, "N.s/m"), "stiffness": Key(float, 0.0, "N/m"),
+    })),
+}  # fmt: skip
 
 
 def read_task(path: str | Path) -> Task:
@@ -72,70 +106,67 @@ def read_task(path: str | Path) -> Task:
     Raises
     ------
     DesignError
-        Naming the file, the table and what would be right.
+        With every mistake of the file and its line.
     PhysicsError
         If the building's file is wrong.
     """
-    path = Path(path)
-    try:
-        with path.open("rb") as file:
-            data = tomllib.load(file)
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path}: not valid TOML: {error}.") from error
-    return task_from_data(data, path.parent, str(path))
+    return task_of(Document(path, DesignError), Path(path).parent)
 
 
-def task_from_data(
-    data: Mapping[str, Any], folder: Path, where: str = "design",
-    place: tuple[Building, str] | None = None,
-) -> Task:  # fmt: skip
-    """Return the task that the content of a design file describes; paths are from `folder`.
+def task_from_data(data: Mapping[str, Any], folder: Path, where: str = "design") -> Task:
+    """Return the task that the content of a design file describes.
 
     Parameters
     ----------
     data, folder, where
         The content, the folder of its paths, what messages call it.
-    place : building and device where the content names none; else the paper's building
 
     Raises
     ------
     DesignError, PhysicsError
         As `read_task`.
     """
-    if data.get("schema") != SCHEMA:
-        raise DesignError(f"{where}: schema = {data.get('schema')!r}; this version reads {SCHEMA}.")
-    kind = data.get("kind")
-    if not isinstance(kind, str) or kind not in _TABLES:
-        raise DesignError(f"{where}: kind = {kind!r}; there are {', '.join(_TABLES)}.")
-    _known(data, _TOP | _TABLES[kind], where)
+    return task_of(Document(where, DesignError, data), folder)
+
+
+def task_of(document: Document, folder: Path, place: tuple[Building, str] | None = None) -> Task:
+    """Return the task of a design file that is open; paths are from `folder`.
+
+    Parameters
+    ----------
+    document, folder
+        The file, the folder of its paths.
+    place : building and device where the file names none; else the paper's building
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        As `read_task`.
+    """
+    kind = document.data.get("kind")
+    tables = _TABLES[kind] if isinstance(kind, str) and kind in _TABLES else tuple(_SPECS)
+    found = document.read(Spec(_SPEC | {name: _SPECS[name] for name in tables}))
     for key in ("tau", "order"):
-        if kind == "lqg" and key in data:
-            raise DesignError(f"{where}: {key} is of hinf and lpv designs; lqg has none.")
-    given: dict[str, Any] = {"kind": kind, "title": _text(data, "title", where)}
-    for key in ("sample_period", "tau"):
-        if key in data:
-            given[key] = _number(data[key], key, where)
-    if "order" in data:
-        given["order"] = _whole(data["order"], "order", where)
+        if kind == "lqg" and found[key] is not None:
+            document.error((key,), f"{key} is of hinf and lpv designs; lqg has none.")
+    document.check()
     building, usual = place or (paper_building(), "")
-    if name := _text(data, "building", where):
-        building, usual = read_building(folder / name), ""
-    given["building"], given["device"] = building, _text(data, "device", where) or usual
-    readers: dict[str, Callable[[Mapping[str, Any], str], Any]] = {
-        "weights": _weights,
-        "damper": lambda table, at: _damper(table, folder, at),
-        "scheduling": _scheduling,
-        "lqg": lambda table, at: _plain(LqgWeights, table, at),
-        "passive": _passive,
-    }
-    for name in sorted((_TABLES[kind] | {"passive"}) & set(data)):
-        if not isinstance(data[name], dict):
-            raise DesignError(f"{where}: {name} must be a table, [{name}].")
-        at = f"{where} [{name}]"
-        given[name] = _located(partial(readers[name], data[name], at), at)
-    return _located(lambda: Task(**given), where)
+    if found["building"]:
+        building, usual = read_building(folder / found["building"]), ""
+    keys = ("sample_period", "tau", "order")
+    given = {key: found[key] for key in keys if found[key] is not None}
+    given |= {"kind": kind, "title": found["title"], "building": building}
+    given |= {"device": found["device"] or usual}
+    given["passive"] = {name: Share(**share) for name, share in found["passive"].items()}
+    kinds = {"weights": Weights, "scheduling": Scheduling, "lqg": LqgWeights}
+    for name in tables:
+        values = {key: value for key, value in found[name].items() if value is not None}
+        given[name] = _made(document, (name,), kinds[name], **values)
+    given["damper"] = _damper(document, found["damper"], folder)
+    document.check()
+    task: Task = _made(document, (), Task, **given)
+    document.check()
+    return task
 
 
 def damper_from_model(
@@ -159,125 +190,33 @@ def damper_from_model(
     except StudyError as error:
         raise DesignError(str(error)) from None
     inside = model.at("damper", bench=not model.building)
-    on = tuple(inside.effects)
-    return _located(lambda: Damper(model.law, inside.values(), on, v_max, known_to), str(path))
-
-
-def _weights(table: Mapping[str, Any], where: str) -> Weights:
-    _known(table, {"acceleration", "command", "noise"}, where)
-    given: dict[str, Any] = {
-        name: _weight(table[name], f"{where} {name}")
-        for name in ("acceleration", "command")
-        if name in table
-    }
-    if "noise" in table:
-        given["noise"] = _number(table["noise"], "noise", where)
-    return Weights(**given)
-
-
-def _weight(table: Any, where: str) -> Weight:
-    form = _WEIGHT_FORMS.get(frozenset(table)) if isinstance(table, dict) else None
-    if form is None:
-        forms = "; ".join("{ " + ", ".join(sorted(keys)) + " }" for keys in _WEIGHT_FORMS)
-        raise DesignError(f"{where}: a weight is one of {forms}.")
-    values: dict[str, Any] = {}
-    for name, value in table.items():
-        if name in ("numerator", "denominator"):
-            if not isinstance(value, list):
-                raise DesignError(f"{where}: {name} must be a list, highest power of s first.")
-            values[name] = [_number(v, name, where) for v in value]
-        else:
-            values[name] = _number(value, name, where)
-    return form(**values)
-
-
-def _damper(table: Mapping[str, Any], folder: Path, where: str) -> Damper:
-    _known(table, {"law", "parameters", "effects", "model", "v_max", "known_to"}, where)
-    limits = {
-        name: _number(table[name], name, where) for name in ("v_max", "known_to") if name in table
-    }
-    if "model" in table:
-        if {"law", "parameters", "effects"} & set(table):
-            raise DesignError(f"{where}: give either model or law, parameters, effects.")
-        return damper_from_model(folder / _text(table, "model", where), **limits)
-    parameters, effects = table.get("parameters", {}), table.get("effects", [])
-    if not isinstance(parameters, dict) or not isinstance(effects, list):
-        raise DesignError(
-            f"{where}: parameters must be a table of numbers, effects a list of names."
-        )
-    values = {str(name): _number(value, str(name), where) for name, value in parameters.items()}
-    law = _text(table, "law", where) or DEFAULT_OF_DESIGN
-    return Damper(law, values, tuple(map(str, effects)), **limits)
-
-
-def _passive(table: Mapping[str, Any], where: str) -> dict[str, Share]:
-    shares = {}
-    for name, share in table.items():
-        if not isinstance(share, dict):
-            raise DesignError(f"{where}: {name} must be {{ damping = ..., stiffness = ... }}.")
-        _known(share, set(Share._fields), f"{where} {name}")
-        shares[name] = Share(
-            **{key: _number(value, key, f"{where} {name}") for key, value in share.items()}
-        )
-    return shares
-
-
-def _scheduling(table: Mapping[str, Any], where: str) -> Scheduling:
-    given = dict(table)
-    if "grid" in given:
-        if not isinstance(given["grid"], list):
-            raise DesignError(f"{where}: grid must be a list of speeds [m/s].")
-        given["grid"] = tuple(_number(value, "grid", where) for value in given["grid"])
-    if "rows" in given:
-        given["rows"] = _whole(given["rows"], "rows", where)
-    return _plain(Scheduling, given, where)
-
-
-def _plain(kind: type[T], table: Mapping[str, Any], where: str) -> T:
-    """Return a dataclass of numbers; what is not a number there is taken as it is."""
-    _known(table, {f.name for f in fields(kind)}, where)  # type: ignore[arg-type]
-    return kind(
-        **{
-            name: value if name in _NO_NUMBERS else _number(value, name, where)
-            for name, value in table.items()
-        }
-    )
-
-
-def _located(make: Callable[[], T], where: str) -> T:
-    """Return what `make` makes; put the place in front of a design error that lacks it."""
     try:
-        return make()
-    except BristleError as error:
-        if not isinstance(error, DesignError) or str(error).startswith(where.split(" [")[0]):
-            raise
-        raise DesignError(f"{where}: {error}") from None
+        return Damper(model.law, inside.values(), tuple(inside.effects), v_max, known_to)
+    except DesignError as error:
+        raise DesignError(f"{path}: {error}") from None
 
 
-def _known(table: Mapping[str, Any], known: set[str], where: str) -> None:
-    for key in table:
-        if key not in known:
-            close = get_close_matches(key, known, n=1)
-            hint = f' Did you mean "{close[0]}"?' if close else ""
-            raise DesignError(
-                f"{where}: unknown key {key!r}; there are {', '.join(sorted(known))}.{hint}"
-            )
+def _damper(document: Document, found: Mapping[str, Any], folder: Path) -> Any:
+    table, model = document.data.get("damper", {}), found["model"]
+    limits = {name: found[name] for name in ("v_max", "known_to") if found[name] is not None}
+    if not model:
+        values = found["law"], found["parameters"], found["effects"]
+        return _made(document, ("damper",), Damper, *values, **limits)
+    if {"law", "parameters", "effects"} & set(table):
+        words = "[damper]: give either model or law, parameters, effects."
+        document.error(("damper", "model"), words)
+        return None
+    return _made(document, ("damper",), damper_from_model, folder / model, **limits)
 
 
-def _number(value: Any, key: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        raise DesignError(f"{where}: {key} must be a finite number, found {value!r}.")
-    return float(value)
-
-
-def _whole(value: Any, key: str, where: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise DesignError(f"{where}: {key} must be a whole number, found {value!r}.")
-    return value
-
-
-def _text(table: Mapping[str, Any], key: str, where: str) -> str:
-    value = table.get(key, "")
-    if not isinstance(value, str):
-        raise DesignError(f"{where}: {key} must be a text, found {value!r}.")
-    return value
+def _made(
+    document: Document, keys: KeyPath, make: Callable[..., Any], *args: Any, **given: Any
+) -> Any:
+    """Return what `make` makes, None after a mistake: its text begins with the key it is about."""
+    try:
+        return make(*args, **given)
+    except DesignError as error:
+        text = str(error).removeprefix(f"{keys[0]}: ") if keys else str(error)
+        word = text.split()[0].rstrip(":")
+        document.error((*keys, word), f"[{keys[0]}] {text}" if keys else text)
+        return None

@@ -31,7 +31,7 @@ class Weight:
         coefficients = (*self.numerator, *self.denominator)
         if not self.numerator or not self.denominator or not all(map(isfinite, coefficients)):
             raise DesignError(f"weight {self}: coefficients must be finite numbers.")
-        if self.denominator[0] == 0.0 or not any(self.numerator):
+        if not any(self.denominator[:1]) or not any(self.numerator):
             raise DesignError(f"weight {self}: zero, or its denominator begins with zero.")
         if len(np.trim_zeros(self.numerator, "f")) > len(self.denominator):
             raise DesignError(

@@ -256,7 +256,7 @@ def test_the_command_tells_the_parts_and_continues(
     ("change", "words"),
     [
         (('model = "my_rig"', ""), "model is missing"),
-        (('model = "my_rig"', "model = 3"), "model = 3; a text is right"),
+        (('model = "my_rig"', "model = 3"), "model is 3: expected a text"),
         (('model = "my_rig"', 'modell = "my_rig"'), 'no key "modell"'),
         (('model = "my_rig"', 'model = "nothing"'), "there is no such file"),
         (('"my_rig"', '"my_rig"\ncomponent = "dampr"'), 'no component "dampr"'),

@@ -81,7 +81,7 @@ def test_a_motion_is_known_by_its_shape() -> None:
         ('kind = "policy"', "trained on motions"),
         ('kind = "policy"\n[motions]', "none to train on"),
         ('kind = "policy"\n[motions]\nsynthetic = 2.5', "whole number"),
-        ('kind = "policy"\n[motions]\nsinthetic = 2', "unknown key 'sinthetic'"),
+        ('kind = "policy"\n[motions]\nsinthetic = 2', 'no key "sinthetic"'),
         ('kind = "policy"\n[motions]\nrecords = 3', "list of names"),
         (f'kind = "policy"\n{SEEN}', "el_centro_1940_ns is trained on and"),
         (f'kind = "policy"\n{MOTIONS}[damper]\nv_max = 0.0', "nothing to control"),
