@@ -16,6 +16,7 @@ from ..data.channels import (
     ChannelSpec,
     at_device,
     channel_unit,
+    in_unit,
     meaning,
     no_device,
 )
@@ -348,18 +349,13 @@ def _refuse_incomplete(
         )
     for guess in guesses:
         if not guess.unit:
-            right = channel_unit(guess.channel)
             problem = table.find(guess.column).problem.removesuffix(".")
             why = (
                 f'"{guess.column}": {problem}'
                 if problem
                 else (f'the unit of "{guess.column}" is not given')
             )
-            # Who takes the advice must not turn counts or inches into metres.
-            unit = "UNIT" if problem else right
-            says = f'--channel "{guess.channel}={guess.column}@{unit}"'
-            says += f", where UNIT is {right} or the like" if problem else ", or what it is in"
-            wrong.append(f"{guess.channel}: {why}: {says}")
+            wrong.append(f"{guess.channel}: {why}: {in_unit(guess.channel, guess.column)}")
     if wrong:
         seen = "".join(f"\n    {guess}" for guess in guesses)
         unused = [

@@ -142,4 +142,4 @@ def test_the_advice_for_an_unknown_unit_names_none_that_would_be_wrong(tmp_path,
     file = made(tmp_path, "Time [s],Disp [counts],Coil [V],Load [N]")
     assert main(["study", "new", str(tmp_path / "rig"), "--data", str(file)]) == 2
     said = capsys.readouterr().err
-    assert '--channel "displacement=Disp [counts]@UNIT", where UNIT is m or the like' in said
+    assert '--channel "displacement=Disp [counts]@UNIT", where UNIT is what it is in' in said
