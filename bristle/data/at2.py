@@ -103,7 +103,7 @@ def _fields(row: str) -> Iterator[str]:
         plain = field.upper().replace("D", "E")
         parts = _SIGN_INSIDE.split(plain)
         # Of 1.5-101 no one can say whether it is two numbers, or one without its E.
-        whole = plain if plain[-1].isdigit() else field  # words are told as they are written
+        whole = plain if plain[-1].isdigit() else field.upper()  # END is no ENE
         yield from parts if all(map(_VALUE.fullmatch, parts)) else (whole,)
 
 

@@ -111,6 +111,12 @@ def channel_unit(channel: str) -> str:
     raise RecordError(f'there is no channel "{channel}".{hint} There are: {", ".join(names)}, ...')
 
 
+def in_unit(channel: str, column: str) -> str:
+    """Return the option that tells the unit of a column; it names none, which may be wrong."""
+    right = channel_unit(channel)
+    return f'--channel "{channel}={column}@UNIT", where UNIT is what it is in, such as {right}'
+
+
 class Meaning(NamedTuple):
     """What a column's name says: a quantity such as "force" and the words it is told by.
 

@@ -432,7 +432,7 @@ def _in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
     if not unit:
         raise RecordError(
             f'{table.source}: column "{column.text}" ({channel}) has no unit. Say '
-            f'unit = "{channel_unit(channel)}" in [channels.{channel}], or what it is in.'
+            f"unit = what it is in, such as {channel_unit(channel)}, in [channels.{channel}]."
         )
     if spec.sign not in (1, -1):
         raise RecordError(f"[channels.{channel}]: sign = {spec.sign!r}; 1 or -1 is right.")

@@ -12,6 +12,7 @@ from ..data.channels import (
     at_device,
     channel_unit,
     device_channel,
+    in_unit,
     is_channel,
     no_device,
 )
@@ -155,8 +156,7 @@ def _resolved(
     right = channel_unit(name)
     if not unit:
         raise StudyError(
-            f'{name}: the unit of "{column.text}" is not given: '
-            f'--channel "{name}={column.text}@{right}", or what it is in'
+            f'{name}: the unit of "{column.text}" is not given: {in_unit(name, column.text)}'
         )
     if not same_dimension(unit, right):
         raise StudyError(

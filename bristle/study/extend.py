@@ -76,12 +76,14 @@ def extend_study(
     paths, choices = [Path(file) for file in files], choices or RunChoices()
     _refuse_names(study, paths)
     tables = [read_table(path) for path in counted(paths, "reading file")]
-    _refuse_other_columns(study, tables)
+    first, columns = _columns(study)
+    for table in tables:
+        refuse_other_columns(table, columns, first)
     about, notes = facts_of(
         paths, choices, bool({*DRIVE} & {*study.settings.channels}), _tones(study, tables),
         [Path(run.file) for run in (*study.settings.runs, *study.settings.excluded)],
     )  # fmt: skip
-    notes += remarks_on([path.name for path in paths], tables)
+    notes += remarks_on([path.name for path in paths], tables, columns, first)
     assigned, said = _roles(paths, roles or {}, holdout)
     split = study.settings.split
     runs = tuple(
@@ -120,16 +122,14 @@ def _refuse_names(study: Study, paths: Sequence[Path]) -> None:
         )
 
 
-def _refuse_other_columns(study: Study, tables: Sequence[Table]) -> None:
-    """Refuse files whose columns or units are not those of the study's first run."""
+def _columns(study: Study) -> tuple[Table, list[Guess]]:
+    """Return the table of the study's first run, and the columns that the study reads."""
     first = read_table(study.folder / study.settings.runs[0].file)
-    columns = [
+    return first, [
         Guess(name, first.find(spec.column).text, spec.unit, spec.sign, "")
         for name, spec in study.settings.channels.items()
         if spec.step is None
     ]
-    for table in tables:
-        refuse_other_columns(table, columns, first)
 
 
 def _roles(

@@ -16,6 +16,7 @@ from ..data.channels import (
     ChannelSpec,
     at_device,
     channel_unit,
+    in_unit,
     meaning,
     no_device,
 )
@@ -119,7 +120,7 @@ def make_folder(
         [Path(file) for file in files], choices, _commanded(specs, studied),
         _tones(names, found, is_test),
     )  # fmt: skip
-    notes += remarks_on(names, tables)
+    notes += remarks_on(names, tables, guesses, first)
     of_file = dict(zip(names, about, strict=True))
     copies = _copies(found, is_test)
     kept = [one for one in found if one not in copies]
@@ -168,17 +169,25 @@ class _Part:
         return f"{self.file}, run {self.piece}" if self.piece else self.file
 
 
-def remarks_on(names: Sequence[str], tables: Sequence[Table]) -> list[str]:
+def remarks_on(
+    names: Sequence[str], tables: Sequence[Table], columns: Iterable[Guess], first: Table
+) -> list[str]:
     """Return what is to be known at once of files: each remark once, with the file it is of.
 
     Parameters
     ----------
     names : of the files
     tables : what is read of each
+    columns : those that are used, whose units a file may lack
+    first : the table of the first run
     """
     of: dict[str, list[str]] = {}
+    told = [one for one in columns if first.find(one.column).unit is not None]
     for name, table in zip(names, tables, strict=True):
-        for remark in table.remarks:
+        bare = [one for one in told if table.find(one.column).unit is None]
+        assumed = ", ".join(f'{one.unit} for "{one.column}"' for one in bare)
+        lacking = f"no units: {assumed} are taken, as in {Path(first.source).name}"
+        for remark in (*table.remarks, *([lacking] if bare else [])):
             of.setdefault(remark, []).append(name)
     said = [
         f"{files[0]}{f' and {len(files) - 1} more' if len(files) > 1 else ''}: {remark}"
@@ -348,18 +357,13 @@ def _refuse_incomplete(
         )
     for guess in guesses:
         if not guess.unit:
-            right = channel_unit(guess.channel)
             problem = table.find(guess.column).problem.removesuffix(".")
             why = (
                 f'"{guess.column}": {problem}'
                 if problem
                 else (f'the unit of "{guess.column}" is not given')
             )
-            # Who takes the advice must not turn counts or inches into metres.
-            unit = "UNIT" if problem else right
-            says = f'--channel "{guess.channel}={guess.column}@{unit}"'
-            says += f", where UNIT is {right} or the like" if problem else ", or what it is in"
-            wrong.append(f"{guess.channel}: {why}: {says}")
+            wrong.append(f"{guess.channel}: {why}: {in_unit(guess.channel, guess.column)}")
     if wrong:
         seen = "".join(f"\n    {guess}" for guess in guesses)
         unused = [
@@ -413,7 +417,13 @@ def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -
                 "numbers tell it. Write all files without groups of thousands."
             )
         stated, unit = there[guess.column].unit, guess.unit
-        if stated is not None and first.find(guess.column).unit is not None:
+        problem = there[guess.column].problem
+        if problem and first.find(guess.column).unit is not None:
+            raise StudyError(
+                f'{table.source}: "{guess.column}": {problem} In {first.source} it is in {unit}; '
+                "all runs of a study have the same units."
+            )
+        if stated is not None:
             try:
                 same = stated.name == canonical(unit) or first.find(guess.column).unit == stated
             except UnitError:

@@ -52,7 +52,9 @@ def test_names_and_units_tell_the_channels(names: str) -> None:
         names.split(";")
     )
     assert all(guess.sign == 1 and guess.reason for guess in found.values())
-    assert not any(guess.doubt for guess in found.values())
+    # Volts of a column that says nothing may be of any sensor.
+    doubted = {channel for channel, guess in found.items() if guess.doubt}
+    assert doubted == ({"voltage"} if names.startswith("a [s]") else set())
 
 
 def test_units_that_lack_are_told_by_derivatives() -> None:

@@ -259,13 +259,20 @@ def test_a_table_of_runs_in_the_words_of_the_lab(tmp_path, encoding) -> None:
 
 @pytest.mark.parametrize(
     ("title", "right"),
-    [("current [mAmp]", "current [A]"), ("temperature [°F]", "temperature [degC]")],
+    [("current [mAmp]", "current [A]"), ("temperature [°R]", "temperature [degC]")],
 )
 def test_a_table_of_runs_in_a_unit_that_is_not_known_is_refused(tmp_path, title, right) -> None:
     table = tmp_path / "runs.csv"
     table.write_text(f"file,{title}\na.csv,500\n", encoding="utf-8")
     with pytest.raises(StudyError, match=re.escape(f"{right} is right")):
         rows_of_table(table, [Path("a.csv")])
+
+
+def test_a_table_of_runs_in_fahrenheit(tmp_path) -> None:
+    table = tmp_path / "runs.csv"
+    table.write_text("file,temperature [°F]\na.csv,77\n", encoding="utf-8")
+    (found,) = rows_of_table(table, [Path("a.csv")])
+    assert found.labels == {"temperature": pytest.approx(25.0)}
 
 
 def test_a_speed_in_the_name_of_a_file_is_no_amplitude() -> None:

@@ -247,7 +247,9 @@ def test_bad_beginnings_leave_nothing_behind(tmp_path: Path) -> None:
     )
     with pytest.raises(StudyError, match=r"same measurement.*nothing can be held out"):
         create_study(tmp_path / "rig", [files[0], same])
-    with pytest.raises(StudyError, match='unit of "Kraft" is not given: --channel "force=Kraft@N"'):
+    with pytest.raises(
+        StudyError, match='unit of "Kraft" is not given: --channel "force=Kraft@UNIT"'
+    ):
         create_study(tmp_path / "rig", [no_unit])
     with pytest.raises(StudyError, match=r"no column can be a displacement(.|\n)*--channel force="):
         create_study(tmp_path / "rig", [still])

@@ -251,15 +251,16 @@ def _header(
         ]
         rest = [fields for row, (_, fields) in enumerate(block) if row != at]
         return titles(names, None if of_units is None else block[of_units][1], rest)
-    in_comment = [
-        fields
-        for line in above[-1:]
-        if is_comment(line)
-        for fields in [_title_fields(line.strip().lstrip("#% "), layout, wide)]
-        if len(fields) == wide
-    ]
+    in_comment: list[list[str]] = []
+    for line in reversed(above[-HEADER:]):
+        fields = _title_fields(line.strip().lstrip("#% "), layout, wide)
+        if not is_comment(line) or len(fields) != wide:
+            break
+        in_comment.insert(0, fields)
     if in_comment:
-        return titles(in_comment[0])
+        at, of_units = title_rows(in_comment)
+        rest = [fields for row, fields in enumerate(in_comment) if row != at]
+        return titles(in_comment[at], None if of_units is None else in_comment[of_units], rest)
     notes.append("no titles: columns are called column 1, column 2, ... and have no units")
     return titles([""] * wide)
 

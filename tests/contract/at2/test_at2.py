@@ -86,3 +86,24 @@ def test_the_advice_for_several_columns_keeps_their_unit(tmp_path: Path) -> None
     (tmp_path / "a.csv").write_text(f"Time (s),ground_acceleration [g],Acc EW (g)\n{rows}")
     found = read_ground_motion("a.csv", tmp_path)
     np.testing.assert_allclose(found.acceleration, 9.80665 * VALUES, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("title", "said"),
+    [
+        ("ACCELERATION TIME SERIES IN UNITS OF G x 1000", 'the unit "G x 1000" is not known'),
+        ("ACCELERATION TIME SERIES IN UNITS OF G*1000", r'the unit "G\*1000" is not known'),
+        ("ACCELERATION TIME SERIES IN UNITS OF G / 10", 'the unit "G / 10" is not known'),
+        ("VELOCITY TIME SERIES IN UNITS OF G", "the values are a velocity in G"),
+    ],
+)
+def test_a_factor_and_another_quantity_are_refused(tmp_path: Path, title: str, said: str) -> None:
+    text = f"PEER NGA\nSomewhere\n{title}\nNPTS= 4, DT= .01 SEC\n .1 .2 .3 .4\n"
+    (tmp_path / "a.AT2").write_text(text)
+    with pytest.raises(RecordError, match=f"line 3: {said}"):
+        read_ground_motion("a.AT2", tmp_path)
+
+
+def test_a_word_among_the_values_is_told_as_it_is_written(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match='"END" is not a number'):
+        at2(tmp_path, end="\nEND OF RECORD\n")

@@ -241,3 +241,29 @@ def test_an_integer_runs_into_an_enumeration_and_through_systems_into_a_real(
         counts = frame["a.count"].to_numpy()
         assert counts[-1] >= 10
         assert frame["rig_gain.y"].tolist() == (2.0 * counts).tolist()
+
+
+@pytest.mark.parametrize(("item", "number"), [("fast", 5), ("quick", None)])
+def test_an_item_that_a_package_gives_by_its_name(tmp_path, capsys, item, number) -> None:
+    ports = port(0, "mode", "parameter", "Enumeration", 'declaredType="Speed" start="2"')
+    types = f'<SimpleType name="Speed"><Enumeration>{SPEEDS}</Enumeration></SimpleType>'
+    fmu = write_fmu(
+        tmp_path / "a.fmu",
+        ports.replace('"parameter"', '"parameter" variability="fixed"'), types=types,
+    )  # fmt: skip
+    value = f'<v:Parameter name="mode"><v:Enumeration value="{item}"/></v:Parameter>'
+    inner = (
+        "<d:ParameterBindings><d:ParameterBinding><d:ParameterValues><v:ParameterSet>"
+        f"<v:Parameters>{value}</v:Parameters></v:ParameterSet></d:ParameterValues>"
+        "</d:ParameterBinding></d:ParameterBindings>"
+    )
+    body = f"<d:Elements>{component('a', inner)}</d:Elements>"
+    package = write_ssp(tmp_path / "p.ssp", body, {"a": fmu})
+    code = main(["import-ssp", str(package), "-o", str(tmp_path / "out")])
+    if number is None:
+        assert code == 2
+        said = capsys.readouterr().err
+        assert '<Parameter "mode">: "quick" is no item; slow = 2, fast = 5 are right.' in said
+    else:
+        assert code == 0
+        assert f"mode = {number}" in (tmp_path / "out" / "p.toml").read_text()

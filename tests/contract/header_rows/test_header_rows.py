@@ -120,3 +120,26 @@ def test_numbers_that_begin_as_a_count_are_numbers(tmp_path) -> None:
     from bristle.data.read import read_table
 
     assert read_table(tmp_path / "count.csv").rows == 60
+
+
+def test_titles_that_blanks_part_above_a_table_of_tabs(tmp_path: Path) -> None:
+    file = made(tmp_path, "Time[s] Disp[mm] Coil[V] Load[N]", sep="\t", comma=True)
+    read = channels(tmp_path, file)
+    assert {name: (one["column"], one["unit"]) for name, one in read.items()} == {
+        "time": ("Time[s]", "s"), "displacement": ("Disp[mm]", "mm"),
+        "voltage": ("Coil[V]", "V"), "force": ("Load[N]", "N"),
+    }  # fmt: skip
+
+
+def test_units_with_a_full_stop_and_fahrenheit_in_a_row_of_units(tmp_path: Path) -> None:
+    read = channels(tmp_path, made(tmp_path, "Time,Disp,Oil temperature,Load", "sec.,in.,F,lbs."))
+    assert {name: one["unit"] for name, one in read.items()} == {
+        "time": "s", "displacement": "in", "temperature": "degF", "force": "lbf",
+    }  # fmt: skip
+
+
+def test_the_advice_for_an_unknown_unit_names_none_that_would_be_wrong(tmp_path, capsys) -> None:
+    file = made(tmp_path, "Time [s],Disp [counts],Coil [V],Load [N]")
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", str(file)]) == 2
+    said = capsys.readouterr().err
+    assert '--channel "displacement=Disp [counts]@UNIT", where UNIT is what it is in' in said

@@ -188,3 +188,18 @@ def test_a_list_of_names_that_does_not_fit_is_said(tmp_path: Path) -> None:
     savemat(tmp_path / "run.mat", {"data": TABLE, "names": cell("a", "b")})
     remarks = read_table(tmp_path / "run.mat").remarks
     assert remarks == ("names has 2 texts, and data 4 columns: it is not used",)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"test": {"time": T, "x": X, "F": F, "units": {"time": "s", "x": "mm", "F": "kN"}}},
+        {"time": T, "x": X, "F": F, "x_unit": "mm", "F_unit": "kN"},
+        {"x": {"Time": T, "Data": X, "DataInfo": {"Units": "mm"}},
+         "F": {"Time": T, "Data": F, "DataInfo": {"Units": "kN"}}},
+    ],
+)  # fmt: skip
+def test_units_that_stand_beside_vectors(tmp_path: Path, content: dict[str, Any]) -> None:
+    savemat(tmp_path / "run.mat", content)
+    found = {one.channel: one.unit for one in guess_channels(read_table(tmp_path / "run.mat"))}
+    assert found == {"time": "s", "displacement": "mm", "force": "kN"}

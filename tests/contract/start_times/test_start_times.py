@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from nptdms import ChannelObject, TdmsWriter
+from nptdms import ChannelObject, GroupObject, TdmsWriter
 
 from bristle.cli import main
 from bristle.data.measurement import Measurement, measurements_of
 from bristle.data.read import read_table
+from bristle.study.study import Study
 
 BEGAN = np.datetime64("2024-05-06T09:10:11")
 
@@ -170,3 +171,54 @@ def test_labview_by_x0_by_the_clock_and_by_delta_x(
     (tmp_path / "run.lvm").write_text(text)
     measured(tmp_path / "run.lvm", 1e-5 if step == 0.002 else 5e-2)
     assert read_table(tmp_path / "run.lvm").remarks
+
+
+def test_the_waveform_of_a_group_is_that_of_its_channels(tmp_path: Path) -> None:
+    t = 0.002 * np.arange(3000)
+    group = GroupObject("log", {"wf_increment": 0.002, "wf_start_time": BEGAN})
+    bare = [
+        ChannelObject("log", name, values, properties={"unit_string": unit})
+        for name, values, unit in (("displacement", path(t), "mm"), ("force", force(t), "N"))
+    ]
+    assert measured(tdms(tmp_path / "run.tdms", group, *bare)).step == pytest.approx(0.002)
+
+
+def test_no_time_is_told_and_no_step_that_would_spoil_the_record(tmp_path, capsys) -> None:
+    bare = [ChannelObject("log", name, path(0.002 * np.arange(300)), properties={"unit_string": u})
+            for name, u in (("displacement", "mm"), ("force", "N"))]  # fmt: skip
+    file = tdms(tmp_path / "run.tdms", *bare)
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file), "--quiet"]) == 2
+    assert "or --step S, the sampling step in s" in capsys.readouterr().err
+
+
+def test_two_times_in_one_table_are_doubted(tmp_path: Path, capsys) -> None:
+    t = 0.002 * np.arange(3000)
+    data = {"Data1_time_x [s]": t, "x [mm]": path(t), "Data1_time_F [s]": t + 0.084,
+            "F [N]": force(t + 0.084)}  # fmt: skip
+    file = tmp_path / "run.csv"
+    rows = (",".join(f"{v:.4f}" for v in row) for row in zip(*data.values(), strict=True))
+    file.write_text("\n".join([",".join(data), *rows, ""]))
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 0
+    assert "up to 0.084 s apart" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("scale", "zero", "text"),
+    [
+        (1 / 86400, 45418.4, "days of a calendar"),
+        (1 / 86400, 739378.4, "days of a calendar"),
+        (1e3, 1.714986611e12, "ms since 1970"),
+        (1e6, 1.714986611e15, "us since 1970"),
+    ],
+)
+def test_a_time_without_a_unit_that_is_an_instant(tmp_path, capsys, scale, zero, text) -> None:
+    t = 0.002 * np.arange(3000)
+    rows = (f"{zero + scale * a:.10f},{b:.6f},{c:.4f}"
+            for a, b, c in zip(t, path(t), force(t), strict=True))  # fmt: skip
+    file = tmp_path / "run.csv"
+    file.write_text("\n".join(["Time,x [mm],F [N]", *rows, ""]))
+    study = str(tmp_path / "s")
+    assert main(["study", "new", study, "--data", str(file)]) == 0
+    assert f"its values are {text}: " in capsys.readouterr().out
+    (run,) = Study(study).read()
+    assert run.step == pytest.approx(0.002, rel=1e-3)
