@@ -196,6 +196,7 @@ def _one(
         _coordinates(piece, signal, ports), predicted - coarser, name, unit, skip=SETTLED,
         known=None if piece.measured.all() else piece.measured,
         held=error_of(measured, predicted, {MISSING: ~piece.measured, SETTLING: early}),
+        noise_known=signal not in piece.untold,
     )  # fmt: skip
 
 

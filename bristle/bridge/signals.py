@@ -31,8 +31,8 @@ class Signals:
     """One piece of a measurement as an FMU is fed: values (n,) in SI, smoothed where they can be.
 
     `errors` name to (d, n): draws of what is left uncertain; `raw` the channels as measured, with
-    their noise; `rates` name to that of the signal whose derivative is known; `measured` (n,) where
-    nothing was filled in.
+    their noise, which is not known of those `untold`; `rates` name to that of the signal whose
+    derivative is known; `measured` (n,) where nothing was filled in.
     """
 
     name: str
@@ -44,6 +44,7 @@ class Signals:
     noise: dict[str, float]
     rates: dict[str, str] = field(default_factory=dict)
     derived: tuple[str, ...] = ()
+    untold: tuple[str, ...] = ()
     measured: NDArray[np.bool_] = field(default_factory=lambda: np.ones(0, dtype=np.bool_))
 
 
@@ -129,7 +130,9 @@ def _signals(
     n, unit = len(next(iter(raw.values()))), dict(unit)
     generator = np.random.default_rng(seed)
     given = {k: s.noise for k, s in channels.items() if s.noise is not None}
-    noise = {k: given[k] if k in given else estimate_noise(y).std for k, y in raw.items()}
+    facts = {k: estimate_noise(y) for k, y in raw.items() if k not in given}
+    noise = {**given, **{k: one.std for k, one in facts.items()}}
+    untold = tuple(k for k, one in facts.items() if not one.known)
     values, errors, derived = dict(raw), {}, []
     rates: dict[str, str] = {}
     for prefix in ("", "base_"):
@@ -156,7 +159,7 @@ def _signals(
         if one not in errors:
             errors[one] = generator.standard_normal((DRAWS, n)) * noise.get(one, 0.0)
     kept = {a: b for a, b in rates.items() if a in values and b in values}
-    return Signals(name, dt, values, unit, errors, raw, noise, kept, tuple(derived))
+    return Signals(name, dt, values, unit, errors, raw, noise, kept, tuple(derived), untold)
 
 
 def kind_of(name: str) -> str:

@@ -128,11 +128,15 @@ def _error(verdict: Verdict) -> list[str]:
 
 def _trials(verdict: Verdict) -> list[str]:
     """Return the table of the effects tried at the site whose model errs the most."""
-    at = max(verdict["findings"], key=lambda found: found["z_holdout_before"], default=None)
+    # A site whose noise is not known has no z: what effects gain there is told first.
+    blind = (found for found in verdict["findings"] if found["z_holdout_before"] is None)
+    at = next(blind, None) or max(
+        verdict["findings"], key=lambda found: found["z_holdout_before"], default=None
+    )
     rows = [row for row in verdict["ranking"] if at is not None and row["site"] == at["site"]]
     if at is None or not rows or "z_train_before" not in at:
         return []
-    if not verdict.get("noise_known", True):
+    if at["z_holdout_before"] is None:
         return _gains(rows)
     lines = ["", f"  {'error / noise (z) of the model':34} {'training':>12} {'held out':>12}"]
     before = at["z_train_before"], at["z_holdout_before"]

@@ -26,6 +26,7 @@ from .errors import (
     run_error,
     total_error,
     with_failures,
+    without_z,
 )
 from .labels import LabelError, label_errors
 from .patterns import FLIPS, Finder, ResidualPattern
@@ -128,6 +129,8 @@ class Comparison:
     @property
     def right(self) -> bool:
         """Whether noise explains the error; of a building's site, with all sites looked at."""
+        if not self.noise_known:
+            return False
         if self.sites:
             return not next(one.fails for one in self.sites if one.site == self.site)
         return self.z <= CLOSE
@@ -273,14 +276,12 @@ def compare_predictions(
 def _without_z(comparison: Comparison) -> Comparison:
     """Return a comparison whose noise is not known: nothing says how much of an error it is."""
     none = float("nan")
-
-    def blind(run: RunError) -> RunError:
-        return replace(run, z=none, numerical_z=none, noise=none, noise_own=none)
-
-    bands = tuple(replace(one, z=none) for one in comparison.spectrum.bands)
+    bands = tuple(replace(one, z=none, share=none, p=none) for one in comparison.spectrum.bands)
+    patterns = tuple(replace(one, of_excess=none) for one in comparison.patterns)
     return replace(
-        comparison, total=blind(comparison.total), runs=tuple(map(blind, comparison.runs)),
-        z_interval=(none, none), spectrum=replace(comparison.spectrum, bands=bands),
+        comparison, total=without_z(comparison.total), runs=tuple(map(without_z, comparison.runs)),
+        z_interval=(none, none), patterns=patterns,
+        spectrum=replace(comparison.spectrum, bands=bands),
         regimes=tuple(replace(one, z=none) for one in comparison.regimes),
         labels=tuple(replace(one, z=none) for one in comparison.labels),
     )  # fmt: skip

@@ -100,8 +100,15 @@ class SiteError:
 
     @property
     def identifiable(self) -> bool:
-        """Whether there are samples to tell it by: a base that hardly slides leaves too few."""
+        """Whether z tells it: there are samples, and their noise is known."""
         return self.z == self.z
+
+    @property
+    def why_not(self) -> str:
+        """Why z tells nothing, "" where it does; a base that hardly slides leaves few samples."""
+        if self.identifiable:
+            return ""
+        return "noise not known" if self.total.samples else "too few samples"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the error as JSON has it."""
@@ -139,6 +146,12 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
                 f"{one.name}: the noise of the {one.quantity} is zero, so no error can be "
                 f"judged. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
             )
+
+
+def without_z(run: RunError) -> RunError:
+    """Return an error whose noise is not known: nothing says how much of it is noise."""
+    none = float("nan")
+    return replace(run, z=none, numerical_z=none, noise=none, noise_own=none)
 
 
 def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:

@@ -88,8 +88,10 @@ def _elsewhere(comparison: Comparison) -> str:
         span = f"z = {right[0].z:.2f}" if len(right) == 1 else span
         are = "is right within its noise" if len(right) == 1 else "are right within their noise"
         text += f"; {site_names([one.site for one in right])} {are} ({span})"
-    hidden = [one.site for one in others if not one.identifiable]
-    return text + (f"; {site_names(hidden)}: too few samples for a statement" if hidden else "")
+    for why in dict.fromkeys(one.why_not for one in others if one.why_not):
+        hidden = [one.site for one in others if one.why_not == why]
+        text += f"; {site_names(hidden)}: {why}, no statement"
+    return text
 
 
 def _where(comparison: Comparison, finder: Finder) -> str:
@@ -165,7 +167,7 @@ def _beside(one: Regime, best: Regime) -> bool:
 
 def _loudest(comparison: Comparison) -> str:
     """Return which frequencies hold most of what exceeds the noise, "" where none stands out."""
-    bands = [band for band in comparison.spectrum.bands if band.p < 0.001]
+    bands = [band for band in comparison.spectrum.bands if band.p < 0.001]  # none without noise
     chosen: list[int] = []
     for band in sorted(bands, key=lambda band: -band.share):
         if sum(comparison.spectrum.bands[i].share for i in chosen) > 0.7 or len(chosen) == 3:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from .comparison import Comparison, compare_predictions
 from .errors import (
@@ -13,6 +14,7 @@ from .errors import (
     run_error,
     total_error,
     with_failures,
+    without_z,
 )
 from .patterns import Finder
 from .prediction import RunPrediction
@@ -81,4 +83,7 @@ def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteError
     found = finder.ranked(finder.normalised)
     pattern = found[0] if found and found[0].significant else None
     interval = interval_of_z(normalised, finder)
+    if not first.noise_known:
+        total, runs, interval = without_z(total), tuple(map(without_z, runs)), (nothing, nothing)
+        pattern = replace(pattern, of_excess=nothing) if pattern else None
     return SiteError(first.site, first.quantity, first.unit, runs, total, interval, pattern)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 Table = tuple[str, list[str], list[list[str]]]
 
+EXCESS = "of what exceeds noise"
+"""The column that a table has where the noise is known."""
 _SHOWN = 6  # coordinates in a table
 
 
@@ -34,23 +36,23 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
 
 def site_table(comparison: Comparison) -> Table:
     """Return the error at each site of a building, the worst first."""
-    known = [one.total.signal for one in comparison.sites if one.identifiable]
+    known = [one.total.signal for one in comparison.sites if one.total.samples]
     factor, unit = scale("N", max(known, default=0.0))
     header = ["site", "z", "95 %", f"error [{unit}]", "of RMS", f"noise [{unit}]", "depends on"]
-    return "Error at every site, each over its own noise (z); RMS at all frequencies", header, [
-        _site(one, factor) for one in comparison.sites
-    ]  # fmt: skip
+    title = "Error at every site, each over its own noise (z); RMS at all frequencies"
+    return title, header, [_site(one, factor) for one in comparison.sites]
 
 
 def _site(one: SiteError, factor: float) -> list[str]:
     name = site_name(one.site).removeprefix("the ")
-    if not one.identifiable:
-        return [name, "-", "too few samples", "-", "-", "-", "-"]
+    if not one.total.samples:
+        return [name, "-", one.why_not, "-", "-", "-", "-"]
     (low, high), total, pattern = one.z_interval, one.total, one.pattern
     worth = pattern is not None and pattern.share >= FAINT
     return [
-        name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", plain(factor * total.rms, 4),
-        percent(total.share), plain(factor * total.noise),
+        name, short_z(one.z), one.why_not or f"{short_z(low)} - {short_z(high)}",
+        plain(factor * total.rms, 4), percent(total.share),
+        "-" if one.why_not else plain(factor * total.noise),
         name_of(pattern.coordinate, one.site) if pattern is not None and worth else "-",
     ]  # fmt: skip
 
@@ -96,9 +98,10 @@ def _run(run: RunError, factor: float) -> list[str]:
 
 def pattern_table(comparison: Comparison) -> Table:
     """Return the coordinates by how much of the error's power each carries."""
-    header = ["coordinate", "of the error", "of what exceeds noise", "chance"]
+    header = ["coordinate", "of the error", EXCESS, "chance"]
     rows = [_pattern(one, comparison.site) for one in comparison.patterns[:_SHOWN]]
-    return "Where the error occurs: the share of its power along each coordinate", header, rows
+    title = "Where the error occurs: the share of its power along each coordinate"
+    return title, *_as_known(comparison, header, rows)
 
 
 def _pattern(pattern: ResidualPattern, site: str) -> list[str]:
@@ -112,7 +115,7 @@ def _pattern(pattern: ResidualPattern, site: str) -> list[str]:
 def band_table(comparison: Comparison) -> Table:
     """Return the error in octaves against the noise in each."""
     factor, unit = scale(comparison.unit, comparison.total.signal)
-    header = ["band [Hz]", "z", f"error [{unit}]", "of what exceeds noise", "coherence"]
+    header = ["band [Hz]", "z", f"error [{unit}]", EXCESS, "coherence"]
     rows = [
         [
             f"{plain(band.low)} - {plain(band.high)}", short_z(band.z), plain(factor * band.rms, 2),
@@ -120,4 +123,15 @@ def band_table(comparison: Comparison) -> Table:
         ]
         for band in comparison.spectrum.bands
     ]  # fmt: skip
-    return "In frequency; coherence of the error with the prediction", header, rows
+    title = "In frequency; coherence of the error with the prediction"
+    return title, *_as_known(comparison, header, rows)
+
+
+def _as_known(
+    comparison: Comparison, header: list[str], rows: list[list[str]]
+) -> tuple[list[str], list[list[str]]]:
+    """Return a table without what only a known noise tells."""
+    if comparison.noise_known:
+        return header, rows
+    kept = [k for k, name in enumerate(header) if name not in ("z", EXCESS)]
+    return [header[k] for k in kept], [[row[k] for k in kept] for row in rows]

@@ -139,14 +139,17 @@ def _beside_what_is_found(parts: Sequence[Finding], rule: DecisionRule = SITE) -
     Where an effect is found, another site may show a trace of it, of the instruments, or of what
     the file has wrong. That takes nothing from the name, and adds none.
     """
-    found = [part for part in parts if part.kind in ("effect", "ambiguous")]
+    found = [part for part in parts if part.kind in ("effect", "ambiguous") and part.noise_known]
     if not found:
         return list(parts)
     clear = max(found, key=lambda part: part.z_before)
     little = max(rule.excess(rule.beside), rule.trace * rule.excess(clear.z_before))
     return [
         replace(part, kind="none", effects=(), reasons=(f"{LITTLE} {' '.join(part.reasons)}",))
-        if part is not clear and part.kind != "none" and rule.excess(part.z_before) <= little
+        if part is not clear
+        and part.kind != "none"
+        and part.noise_known
+        and rule.excess(part.z_before) <= little
         else part
         for part in parts
     ]
@@ -229,9 +232,10 @@ def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
     for finding in findings.values():
         if _is_gain(finding):
             gain = float(finding.coordinate)
-            text = (
-                f"The load cell shows {gain:.4g} times the force that equilibrium requires "
-                f"({Z} {finding.z_before:.3g} before, {finding.z_after:.3g} with that corrected)."
-            )
+            text = f"The load cell shows {gain:.4g} times the force that equilibrium requires"
+            if finding.noise_known:
+                before, after = finding.z_before, finding.z_after
+                text += f" ({Z} {before:.3g} before, {after:.3g} with that corrected)"
+            text += "."
             out.append(SensorFault("force", "gain", gain, float("nan"), text))
     return out

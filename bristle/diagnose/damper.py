@@ -12,7 +12,7 @@ from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
 from .by_gains import decide_by_gains
 from .candidates import Trial, judge, missed_by
-from .decision import Decision, Z, as_noise, decide, gained
+from .decision import Decision, Z, as_noise, decide, force_in, gained
 from .finding import Finding, of_decision
 from .opening import Opening, Progress, silent
 from .rule import BENCH, SITE, DecisionRule
@@ -68,7 +68,7 @@ def look_at_damper(
         sensors = tuple(filter(None, (zero_fault(opened.problem, decision),)))
     else:
         sensors = renewed_zero(opened, decision)
-    if not decision.effects:
+    if not decision.effects and opened.held_out.noise_known:
         decision = _rare(before, made.single, rule) or decision
     found = of_decision(decision, before, tuple(made.single))
     best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
@@ -80,7 +80,8 @@ def look_at_damper(
 def noise_is_all(opened: Opening) -> bool:
     """Return whether a model leaves nothing that an effect could lower, and none is ranked then."""
     before = opened.before
-    return not opened.scope.rank_all and max(before.z, before.train) <= opened.rule.quiet
+    known = opened.held_out.noise_known
+    return known and not opened.scope.rank_all and max(before.z, before.train) <= opened.rule.quiet
 
 
 def _decided(
@@ -94,7 +95,8 @@ def _decided(
     if organised:
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)
     grow, reduce = (made.grow, made.reduce) if pairs else (_no_pairs, None)
-    return made, decide(opened.before, made.single, grow, organised, reduce, rule)
+    where = force_in(opened.held_out)
+    return made, decide(opened.before, made.single, grow, organised, reduce, rule, where)
 
 
 def _no_pairs(_first: Trial) -> list[Trial]:

@@ -10,6 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..identify.model import Problem
+from ..identify.rig import DAMPER
+from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
 from .candidates import Trial
 from .evidence import paired
@@ -18,7 +23,26 @@ from .rule import BENCH, DecisionRule
 Z = "error / noise (z)"
 """How z is introduced in a sentence."""
 
+TOLD = 3
+"""Runs that a sentence names one by one."""
+
 OTHER_FORM = "A residual remains: the effect in the rig has a different functional form."
+
+
+def in_runs(names: Sequence[str], samples: int) -> str:
+    """Return where something is: "in a, b, c and 2 more (9,000 samples)"."""
+    more = f" and {len(names) - TOLD} more" if len(names) > TOLD else ""
+    return f"in {', '.join(names[:TOLD])}{more} ({samples:,} samples)"
+
+
+def force_in(problem: Problem, site: str = DAMPER) -> str:
+    """Return which force was judged, and in which runs and how many samples of them."""
+    measured = not isinstance(problem, StructureProblem) or (
+        site == DAMPER and not problem.reconstructed
+    )
+    samples = sum(int(np.count_nonzero(run.judged)) for run in problem.runs)
+    what = "the force" if measured else "the force that equilibrium gives"
+    return f"{what} {in_runs([run.name for run in problem.runs], samples)}"
 
 
 @dataclass(frozen=True)
@@ -44,6 +68,7 @@ def decide(
     organised: bool = False,
     reduce: Callable[[Trial], list[Trial]] | None = None,
     rule: DecisionRule = BENCH,
+    where: str = "the force",
 ) -> Decision:
     """Return the decision that the trials of single effects lead to.
 
@@ -57,13 +82,14 @@ def decide(
     reduce : returns the trials of a pair's members alone, searched from the pair's values: a search
         of their own may have ended in a lesser minimum
     rule : the numbers that decide
+    where : which force was judged, and in which runs
     """
     ranked = sorted(trials, key=lambda trial: trial.z)
     if not ranked or not missing(before, ranked[0], rule):
         return _without_effect(before, ranked, organised, rule)
     best = ranked[0]
     if before.z < rule.loud:
-        return _too_loud(before, best)
+        return _too_loud(before, best, where)
     explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
     if best.z > rule.adequate:
         pair = _pair(before, ranked, grow, rule)
@@ -71,7 +97,9 @@ def decide(
             alone = min(reduce(pair.best), key=lambda trial: trial.z)
             if alone.z < best.z:
                 rest = [trial for trial in ranked if trial.effects != alone.effects]
-                again = decide(before, [alone, *rest], lambda _first: [], organised, rule=rule)
+                again = decide(
+                    before, [alone, *rest], lambda _first: [], organised, rule=rule, where=where
+                )
                 if not _needed(alone, pair.best, rule):
                     return again
         if pair is not None:
@@ -146,15 +174,15 @@ def gained(name: str, before: Trial, best: Trial, explained: float) -> str:
     )
 
 
-def _too_loud(before: Trial, best: Trial) -> Decision:
+def _too_loud(before: Trial, best: Trial, where: str) -> Decision:
     return Decision(
         "insufficient", (), before, 0.0,
         (
-            f"On held-out runs {Z} = {before.z:.2f}: the noise was estimated too high, as happens "
-            "where a force turns within a few samples. "
+            f"On held-out runs {Z} = {before.z:.2f}: the noise of {where} was estimated too high, "
+            "as happens where a force turns within a few samples. "
             f"{_new(best, before)[0].capitalize()} lowers the error further, but this noise "
-            "estimate cannot decide. State the noise of the channels in study.toml, or sample "
-            "faster.",
+            "estimate cannot decide. State it in study.toml, noise = ... in [channels.NAME] of "
+            "what was measured, or sample faster.",
         ),
     )  # fmt: skip
 

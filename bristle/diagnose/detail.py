@@ -67,13 +67,14 @@ def _with_limits(found: Finding, opened: Opening, profile: bool) -> Finding:
     if found.kind == "ambiguous" and opened.scope.choose_motion:
         members = [t.model for t in found.trials if set(t.effects) & set(found.effects)]
         experiment = separating(members, opened.problem)
-    found = replace(found, detectable=visible, untestable=tuple(hidden), experiment=experiment)
+    seen = visible if found.noise_known else float("nan")
+    found = replace(found, detectable=seen, untestable=tuple(hidden), experiment=experiment)
     return replace(found, limits=_limits(found, opened, profile))
 
 
 def _limits(found: Finding, opened: Opening, profile: bool) -> tuple[EffectLimit, ...]:
     """Return how large each further effect may be beside the model that a finding names."""
-    if found.kind == "insufficient" or found.after is None:
+    if found.kind == "insufficient" or found.after is None or not found.noise_known:
         return ()
     model = (found.after if found.kind == "effect" else opened.before).model
     known = opened.known(model)

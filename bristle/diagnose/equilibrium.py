@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from ..data.measurement import Measurement
+from ..errors import StudyError
 from ..identify.assigned import at_site, corrected_for_delay, linear_storeys
 from ..identify.model import Model
 from ..identify.response import responses
@@ -92,6 +94,11 @@ class BuildingRuns:
     def _made(self, building: Building) -> dict[str, Pair]:
         law = ANY_LAW if self._free else self._present.law
         return problems_of(self._train, self._holdout, building, law, self._straight)
+
+    def refuse_lacking(self, folder: Path) -> None:
+        """Raise StudyError where the runs carry no verdict, and nothing that rests on one."""
+        if self.lacking is not None:
+            raise StudyError(f"{folder}: {' '.join(self.lacking.reasons)}")
 
     def lines(self) -> dict[str, Pair]:
         """Return the sites beside the damper, each with its runs for training and held out."""

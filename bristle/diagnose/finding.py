@@ -100,7 +100,17 @@ class Finding:
             out["limits"] = [one.as_dict() for one in self.limits]
         if self.experiment is not None:
             out["separate_by"] = self.experiment.sentence()
-        return out
+        return out if self.noise_known else without_z(out)
+
+
+def without_z(value: Any) -> Any:
+    """Return what json holds with each z as None: nobody knows the noise."""
+    if isinstance(value, dict):
+        return {
+            name: None if name.startswith("z_") or name == "interval95" else without_z(one)
+            for name, one in value.items()
+        }
+    return [without_z(one) for one in value] if isinstance(value, list) else value
 
 
 def of_decision(

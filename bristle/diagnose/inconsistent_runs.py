@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain
 
 from ..data.corrections import LEFT_OUT
 from ..identify.fit import Model, Problem, fit, identify
@@ -14,15 +13,16 @@ from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
 from .candidates import Trial
 from .clocks import clock_faults
-from .decision import OTHER_FORM, Z
+from .decision import OTHER_FORM, Z, force_in
 from .finding import Finding
 from .odd_run import odd_run, other_gain, other_zero
 from .opening import Opening
 from .rule import BENCH, DecisionRule
 
 HELD_OUT_DIFFER = (
-    "The model explains the training runs. The held-out runs differ from them in something that "
-    "no channel shows."
+    "The model explains the training runs. Held out, {force} differs from them in something that "
+    "no channel shows. Note in study.toml what was changed between them, or train on some of them: "
+    'role = "train" in their [[runs]].'
 )
 
 
@@ -49,8 +49,9 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
         told = groups(before.model, *runs, opened.scope.restart)
         return replace(found, kind="insufficient", reasons=(told,)) if told else found
     if found.kind == "unknown":
+        differ = HELD_OUT_DIFFER.format(force=force_in(opened.held_out, found.site))
         worst = inconsistent_runs(before.model, *runs, at_damper)
-        told = " ".join(filter(None, [*found.reasons, HELD_OUT_DIFFER, worst]))
+        told = " ".join(filter(None, [*found.reasons, differ, worst]))
         return replace(found, kind=kind, reasons=(told,))
     if kind == found.kind:
         return found
@@ -91,7 +92,8 @@ def _but_for_clocks(found: Finding, opened: Opening) -> Finding:
         clocks = clock_faults(trial, opened.problem, opened.held_out) if added else None
         if clocks is not None:
             told = " ".join(fault.words for fault in clocks.faults)
-            return _with_reason(found, trial, f"With {' and '.join(added)}: {told}")
+            seen = f"Told from {force_in(opened.problem)}."
+            return _with_reason(found, trial, f"With {' and '.join(added)}: {told} {seen}")
     return found
 
 
@@ -167,7 +169,8 @@ def inconsistent_runs(
     good = [name for name in z if name not in bad]
     if not bad:
         return ""
-    worst = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
+    count = {run.name: len(run.force) for one in (train, held_out) for run in one.runs}
+    worst = ", ".join(f"{name} ({z[name]:.3g}, {count[name]:,} samples)" for name in bad)
     shifted = [
         other_zero(model, problem.of([run]), rule) or other_gain(model, problem.of([run]), rule)
         for problem in (train, held_out)
@@ -175,8 +178,8 @@ def inconsistent_runs(
         if zeros and run.name in bad
     ]
     return " ".join([
-        f"One model does not explain all runs: its {Z} is largest in {worst}, while it explains "
-        f"{_list(good)}.",
+        f"One model does not explain the force of all runs: its {Z} is largest in {worst}, while "
+        f"it explains {_list(good)}.",
         *filter(None, shifted),
         "Were they taken on one rig, with one setting? If a run does not belong, "
         f"{LEFT_OUT}.",
@@ -204,7 +207,8 @@ def groups(
         alone: rigs may differ in size
     """
     found: list[list[Run]] = []
-    for run in chain(train.runs, held_out.runs):
+    runs = [*train.runs, *held_out.runs]
+    for run in runs:
         for group in found:
             if _explains(model, train, [*group, run], rule, restart):
                 group.append(run)
@@ -217,9 +221,9 @@ def groups(
         return ""
     named = "; ".join(_list([run.name for run in group]) for group in found)
     return (
-        "One model does not explain all runs together. With separate values it explains "
-        f"each of these groups: {named}. Were they taken on one rig, with one setting? If a run "
-        f"does not belong, {LEFT_OUT}."
+        f"One model does not explain all runs together, {force_in(train.of(runs))}. With separate "
+        f"values it explains each of these groups: {named}. Were they taken on one rig, with one "
+        f"setting? If a run does not belong, {LEFT_OUT}."
     )
 
 

@@ -69,7 +69,7 @@ def load_cell(
     right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))
     faulty = replace(
         finding, site="force", kind="effect", effects=(name,), z_before=layer.z_before, share=share,
-        coordinate=f"{delay:.3g} s" if delay else f"{gain:.4g}",
+        coordinate=f"{delay:.3g} s" if delay else f"{gain:.4g}", noise_known=layer.noise_known,
     )  # fmt: skip
     return faulty, right  # type: ignore[return-value]
 

@@ -98,8 +98,9 @@ def other_zero(model: Model, one: Problem, rule: DecisionRule) -> str:
         return ""
     way = "more" if zero > 0.0 else "less"
     return (
-        f"In {run.name} the force shows {plain(abs(zero), 3)} N {way} throughout, and nothing else "
-        "is wrong there: its zero is another one. Set it right in study.toml: correct = "
+        f"In {run.name} the force shows {plain(abs(zero), 3)} N {way} throughout its "
+        f"{len(run.force):,} samples, and nothing else is wrong there: its zero is another one. "
+        "Set it right in study.toml: correct = "
         f'[{{channel = "force", fault = "bias", value = {zero:.3g}}}].'
     )
 
@@ -117,8 +118,8 @@ def other_gain(model: Model, one: Problem, rule: DecisionRule) -> str:
     if gain <= 0.0 or remaining > rule.misfit:
         return ""
     return (
-        f"In {run.name} the force is {plain(gain, 3)} times what the model says throughout, and "
-        "nothing else is wrong there: another range of the load cell, or another temperature. If "
-        "the range was another one, set it right in study.toml: "
+        f"In {run.name} the force is {plain(gain, 3)} times what the model says throughout its "
+        f"{len(run.force):,} samples, and nothing else is wrong there: another range of the load "
+        "cell, or another temperature. If the range was another one, set it right in study.toml: "
         f'correct = [{{channel = "force", fault = "gain", value = {gain:.4g}}}].'
     )

@@ -21,6 +21,7 @@ from ..quantity import plain
 from .candidates import Trial, judge
 from .clocks import clock_faults
 from .corrected import corrected
+from .decision import TOLD, in_runs
 from .effect_size import Known
 from .faults import SensorFault, words_of
 from .limited_drive import limited_drive
@@ -36,9 +37,6 @@ MANY = 150_000
 
 ENOUGH, FEWEST = 75_000, 8
 """Samples, about, of that part, for a search takes as long as they are; and its runs."""
-
-TOLD = 3
-"""Runs that a sentence names one by one."""
 
 Progress = Callable[[str], None]
 
@@ -309,10 +307,7 @@ def lacking_in_building(
 def _where(runs: Sequence[Measurement], names: Sequence[str] = ()) -> str:
     """Return which runs something is in, by name or all, and how many samples they have."""
     own = [run for run in runs if run.name in names] or list(runs)
-    listed = ", ".join(run.name for run in own[:TOLD])
-    more = f" and {len(own) - TOLD} more" if len(own) > TOLD else ""
-    count = sum(len(run.time) for run in own)
-    return f"in {listed}{more} ({count:,} samples)"
+    return in_runs([run.name for run in own], sum(len(run.time) for run in own))
 
 
 def median_noise(runs: Sequence[Measurement]) -> dict[str, float]:
@@ -352,7 +347,12 @@ def _lacking(
                 f"The {channel} does not change {where}: without motion no damper shows anything. "
                 "Look at its column:  bristle study channels ; or measure with motion."
             )
-    out += [fault.words for fault in faults if fault.fault == "unrelated"]
+    out += [
+        f"{fault.words} That is so {where}. Look at the two columns:  bristle study channels ; or "
+        "leave one of them out."
+        for fault in faults
+        if fault.fault == "unrelated"
+    ]
     return [*out, *_saturated(runs, faults, rule)]
 
 

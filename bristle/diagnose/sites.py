@@ -23,6 +23,7 @@ from ..identify.structure import (
 )
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
+from .by_gains import decide_by_gains
 from .candidates import Trial, judge
 from .decision import OTHER_FORM, Decision, as_noise, gained, in_part, unexplained
 from .evidence import paired
@@ -50,6 +51,11 @@ def look_at(
     """
     before = present_at(site, train, held_out, present)
     names = joinable_at(site, before.model)
+    if not held_out.noise_known:
+        trials = [try_effect(name, before.model, train, held_out) for name in names]
+        trials.sort(key=lambda trial: trial.rms)
+        decision = decide_by_gains(before, trials, held_out, rule)
+        return replace(of_decision(decision, before, tuple(trials), site), noise_known=False)
     if before.z <= rule.clean and before.train <= rule.clean:
         # Masses, springs and instruments leave so much; only a stop that few samples meet hides in
         # it. Friction acts in all of them, and its name is not made of so little.

@@ -19,7 +19,7 @@ from .candidates import Trial
 from .effect_limits import EffectLimit
 from .experiments import Experiment
 from .faults import SensorFault
-from .finding import Finding
+from .finding import Finding, without_z
 from .gains import gains_of
 from .law_verdict import LawVerdict
 from .verdict_file import SCHEMA
@@ -254,13 +254,14 @@ class Diagnosis:
         if self.coordinate:
             out["coordinate"] = self.coordinate
         if self.laws is not None:
-            out |= self.laws.as_dict()
+            laws = self.laws.as_dict()
+            out |= laws if self.noise_known else without_z(laws)
         if refined := self.refined:
             out["refined"] = refined
         if self.worst is not None and (gains := gains_of(self.worst)):
             out["gains"] = gains
         if not self.noise_known:
-            out = {**_without_z(out), "noise_known": False}
+            out["noise_known"] = False
         return out | {"words": " ".join(verdict_text.sentences(out))}
 
     @property
@@ -270,26 +271,18 @@ class Diagnosis:
 
     def _ranking(self) -> list[dict[str, Any]]:
         """Return one row per trial of all sites, the largest gain first."""
-        rows = [
-            {
-                "effect": trial.effects[-1], "site": found.site, "z_holdout": round(trial.z, 4),
-                "z_train": round(trial.train, 4), "gain": round(found.gain(trial), 4),
-                "refined": trial.refined,
-            }
-            for found in self.findings.values()
-            for trial in found.trials
-        ]  # fmt: skip
+        rows: list[dict[str, Any]] = []
+        for found in self.findings.values():
+            own = [
+                {
+                    "effect": trial.effects[-1], "site": found.site, "z_holdout": round(trial.z, 4),
+                    "z_train": round(trial.train, 4), "gain": round(found.gain(trial), 4),
+                    "refined": trial.refined,
+                }
+                for trial in found.trials
+            ]  # fmt: skip
+            rows += own if found.noise_known else without_z(own)
         return sorted(rows, key=lambda row: -row["gain"])
-
-
-def _without_z(value: Any) -> Any:
-    """Return what json holds with each z as None: nobody knows the noise."""
-    if isinstance(value, dict):
-        return {
-            name: None if name.startswith("z_") or name == "interval95" else _without_z(one)
-            for name, one in value.items()
-        }
-    return [_without_z(one) for one in value] if isinstance(value, list) else value
 
 
 def _in_a_storey(name: str) -> bool:

@@ -71,8 +71,8 @@ class Run:
     besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
     was not measured and follows from the motion, beside `noise` and each with its draw of `draws`;
     `finer` how models are evaluated between the samples of a decimated run, None for others;
-    `noise_known` is False where the force's noise cannot be told from its signal: `noise` is then
-    a lower limit.
+    `untold` names the channels of the force whose noise cannot be told from their signal: `noise`
+    is then a lower limit.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Run:
     extra: Mapping[str, Extra] = field(default_factory=dict)
     force_draws: Array | None = None
     finer: Finer | None = None
-    noise_known: bool = True
+    untold: tuple[str, ...] = ()
 
     @cached_property
     def smoothed(self) -> Moments:
@@ -220,7 +220,7 @@ class Problem:
     @property
     def noise_known(self) -> bool:
         """Whether the force's noise is known in most runs, so that z says something."""
-        return 2 * sum(run.noise_known for run in self.runs) >= len(self.runs)
+        return 2 * sum(not run.untold for run in self.runs) >= len(self.runs)
 
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""

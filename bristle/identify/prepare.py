@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.corrections import LEFT_OUT
 from ..data.derived import derived_velocity
 from ..data.measurement import Measurement
 from ..errors import RecordError
@@ -65,12 +66,11 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     needed = ("force", drive, *(alone if len(alone) == 1 else ()))
     force = measurement["force"]
     begin = begin_of(motion.x, force, dt)
-    facts = measurement.noise_facts.get("force")
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, begin.first, measurement.left_out(*needed),
         drive or VOLTAGE.name, measurement.labels, begin.rest, measurement.extra,
-        finer=measurement.finer, noise_known=facts is None or facts.known,
+        finer=measurement.finer, untold=untold(measurement, ("force",)),
     )  # fmt: skip
 
 
@@ -89,6 +89,12 @@ def _noise_of(measurement: Measurement, channel: str) -> float:
     return max(measurement.noise.get(channel, 0.0), least)
 
 
+def untold(measurement: Measurement, channels: Iterable[str]) -> tuple[str, ...]:
+    """Return those of some channels whose noise nobody knows, neither stated nor to be told."""
+    facts = {name: measurement.noise_facts.get(name) for name in channels}
+    return tuple(name for name, one in facts.items() if one is not None and not one.known)
+
+
 def _noise_of_force(measurement: Measurement) -> float:
     """Return the force's noise [N]; one without any gets what rounding leaves."""
     noise = measurement.noise.get("force", 0.0)
@@ -100,8 +106,7 @@ def refuse_short(measurement: Measurement) -> None:
     if len(measurement.time) < SHORTEST:
         raise RecordError(
             f"{measurement.name}: {len(measurement.time)} samples; a fit needs {SHORTEST} or more "
-            "without a gap. Record longer runs without gaps, or leave this one out with  bristle "
-            f'study roles STUDY --exclude "{Path(measurement.source).name or measurement.name}"'
+            f"without a gap. Record longer runs without gaps, or {LEFT_OUT}."
         )
 
 

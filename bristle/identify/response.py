@@ -29,7 +29,7 @@ from .anchored import SLOW, Load, anchored, deflected
 from .device_motion import DeviceMotion, measured_across
 from .drive import smooth_steps
 from .level import corrected, level_draws, smoothed_level
-from .prepare import refuse_short
+from .prepare import refuse_short, untold
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -70,7 +70,8 @@ class Response:
     of that error; `V_left` the noise left on V; `drive` the channel that V holds, in its own unit,
     "" where none was measured; `labels` what is known of the whole run; `extra` its channels
     besides those that bristle knows. `known` says where all that was measured, and not filled in;
-    `known_but` by reason where it would be, but for that one; `finer` is that of `Run`.
+    `known_but` by reason where it would be, but for that one; `finer` is that of `Run`; `untold`
+    names the channels whose noise cannot be told from their signal.
     """
 
     name: str
@@ -97,6 +98,7 @@ class Response:
     known: KnownSamples | None = None
     finer: Finer | None = None
     known_but: Mapping[str, KnownSamples] = field(default_factory=dict)
+    untold: tuple[str, ...] = ()
 
     @property
     def damped(self) -> bool:
@@ -352,7 +354,7 @@ def _response(
         m.noise.get("force", 0.0), m.noise.get("ground_acceleration", 0.0), np.array(own),
         np.array([level["std"] for level in levels]),
         np.array([error[:, :n] for error in errors]), left, drive, m.labels, m.extra,
-        finer=m.finer,
+        finer=m.finer, untold=untold(m, m.channels),
     )  # fmt: skip
 
 

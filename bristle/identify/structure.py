@@ -182,7 +182,7 @@ class StructureProblem(Problem):
 def structure_run(
     name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
     draws: Array, keep: NDArray[np.bool_] | None = None, drawn: Array | None = None,
-    left_out: Mapping[str, Flags] | None = None,
+    left_out: Mapping[str, Flags] | None = None, untold: tuple[str, ...] = (),
 ) -> StructureRun:  # fmt: skip
     """Return a run of the samples that count; the first ones are the smoother's and skipped.
 
@@ -195,9 +195,12 @@ def structure_run(
     keep : (n,) which samples count; None for all
     drawn : (d, n) draws of the error of a force that follows from the motion [N]; None for none
     left_out : by reason (n,) True where a sample says nothing; None for nowhere
+    untold : the channels of the force whose noise is not known
     """
     left_out = left_out or {}
-    whole = Run(name, dt, *motion, force, noise, draws, left_out=left_out, force_draws=drawn)
+    whole = Run(
+        name, dt, *motion, force, noise, draws, left_out=left_out, force_draws=drawn, untold=untold
+    )
     if keep is None:
         index, skip = np.arange(len(force)), whole.skip
     else:
@@ -206,7 +209,7 @@ def structure_run(
     return StructureRun(
         name, dt, x, v, a, V, force[index], noise, draws[:, index], skip, whole=whole, keep=index,
         left_out={reason: where[index] for reason, where in left_out.items()},
-        force_draws=None if drawn is None else drawn[:, index],
+        force_draws=None if drawn is None else drawn[:, index], untold=untold,
     )  # fmt: skip
 
 
@@ -252,6 +255,7 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
     made = structure_run(
         response.name, response.dt, motion, force, noise, error,
         left_out=_left_out(response, level, response.device.crosses(level)),
+        untold=_untold(response, building, level),
     )  # fmt: skip
     return _of(response, made)
 
@@ -267,6 +271,14 @@ def _left_out(response: Response, level: int, loaded: bool) -> dict[str, Flags]:
         for reason, known in response.known_but.items()
     }
     return occurring(found)
+
+
+def _untold(response: Response, building: Building, level: int) -> tuple[str, ...]:
+    """Return the channels of a level's equilibrium whose noise is not known."""
+    used = [f"{one}_acceleration_absolute" for one in building.levels()[level:]]
+    used += [f"{one.device.name}_force" for one in response.others if one.device.crosses(level)]
+    used += ["force"] if response.device.crosses(level) else []
+    return tuple(name for name in used if name in response.untold)
 
 
 def layer_run(response: Response, building: Building) -> StructureRun:
@@ -287,6 +299,7 @@ def layer_run(response: Response, building: Building) -> StructureRun:
     made = structure_run(
         response.name, response.dt, (x, v, a, response.V), force, noise, _error(response, 0),
         sliding(response), left_out=_left_out(response, 0, response.device.crosses(0)),
+        untold=_untold(response, building, 0),
     )  # fmt: skip
     return _of(response, made)
 
@@ -336,7 +349,9 @@ def damper_run(
     drawn = None
     if response.force is not None:
         force, noise = response.force, response.noise_force
+        untold = tuple(name for name in response.untold if name == "force")
     else:
+        untold = _untold(response, building, response.device.upper)
         found = reconstructed(response, building, linear_storeys)
         force, noise = found.force, found.noise
         if len(found.error):
@@ -344,7 +359,7 @@ def damper_run(
     keep = moving(v, std) if blind_at_rest(law) else None
     made = structure_run(
         response.name, response.dt, motion, force, noise, error, keep, drawn,
-        _left_out_across(response),
+        _left_out_across(response), untold,
     )  # fmt: skip
     return _of(response, made)
 

@@ -91,7 +91,9 @@ def shown(verdict: Mapping[str, Any]) -> dict[str, Any]:
         "sentences": sentences(verdict), "effects": list(verdict.get("effects") or []),
         "about": {str(one): about(str(one), drive) for one in verdict.get("effects") or []},
         "alternatives": list(verdict.get("alternatives") or []),
-        "before": max((one["z_holdout_before"] for one in findings), default=None),
+        "before": max(
+            (z for one in findings if (z := one["z_holdout_before"]) is not None), default=None
+        ),
         "sites": [
             {
                 "name": site_name(one["site"]), "kind": one.get("kind"),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..diagnose.bench import BenchRuns
+from ..diagnose.by_gains import refuse_unknown_noise
 from ..diagnose.opening import Opening
 from ..errors import StudyError
 from ..identify.model import Run
@@ -92,6 +93,7 @@ def _opened(study: Study) -> Opening:
     opened = BenchRuns(runs.train, runs.holdout, as_model(model), identified, tell).open_damper()
     if not isinstance(opened, Opening):
         raise StudyError(f"{study.folder}: {' '.join(opened.reasons)}")
+    refuse_unknown_noise(study.folder, opened.held_out)
     return opened
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..bridge.in_building import House
 from ..compare.names import site_name
+from ..diagnose.by_gains import refuse_unknown_noise
 from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.opening import Opening, median_noise
 from ..errors import StudyError
@@ -147,12 +148,15 @@ def _refuse_devices(building: Building) -> None:
 
 def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
     """Return the models of the sites, fitted."""
+    found.refuse_lacking(study.folder)
     sites = {}
     for site in found.sites():
         tell(f"fitting {site}")
         opened = found.open_site(site)
         if opened is not None and opened.held_out.runs:
             sites[site] = opened
+    for opened in sites.values():
+        refuse_unknown_noise(study.folder, opened.held_out)
     if not sites:
         raise StudyError(f"{study.folder}: no site of this building has runs that are held out.")
     if DAMPER not in sites:

@@ -11,6 +11,7 @@ from keyword import iskeyword
 
 from ..data.files import write_whole
 from ..diagnose.bench import BenchRuns
+from ..diagnose.by_gains import noise_not_known
 from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.learned.closed import closed_forms
 from ..diagnose.learned.closed_fit import close
@@ -131,16 +132,20 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
 def _opened(study: Study, at: str) -> tuple[str, Opening]:
     """Return the site to learn at, and what is known there."""
     rig = _rig(study)
+    if isinstance(rig, BuildingRuns):
+        rig.refuse_lacking(study.folder)
     there = rig.sites()
     if at and at not in there:
         raise StudyError(
             f"--at: these runs do not show the site {at}; they show {', '.join(there)}."
         )
     openings = [(site, rig.open_site(site)) for site in ([at] if at else _wanted(study, there))]
-    able = [(site, one) for site, one in openings if isinstance(one, Opening)]
+    opened = [(site, one) for site, one in openings if isinstance(one, Opening)]
+    able = [(site, one) for site, one in opened if one.held_out.noise_known]
     if not able:
         why = [" ".join(one.reasons) for _, one in openings if isinstance(one, Insufficient)]
-        raise StudyError("the data carry no verdict: " + " ".join(why))
+        why += list(dict.fromkeys(noise_not_known(one.held_out) for _, one in opened))
+        raise StudyError(f"{study.folder}: nothing can be learned from these runs. {' '.join(why)}")
     return max(able, key=lambda pair: pair[1].before.z)
 
 
