@@ -25,6 +25,7 @@ BASE = (
     {"control", "data", "jit", "trust"},
     {"component"},
     {"draw", "check"},
+    {"view"},
 )
 SIMULATE = (
     {"fmu"},
