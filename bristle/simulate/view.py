@@ -46,7 +46,7 @@ def run_view(frame: pd.DataFrame) -> View:
     made = frame.attrs.get("made", {})
     title = str(made.get("title") or made.get("file") or "results")
     state = "" if frame.attrs.get("complete", True) else "; INCOMPLETE"
-    took = f" in {made['wall_time']:.2f} s" if "wall_time" in made else ""
+    took = f" in {made['wall_time']:.2f} s," if "wall_time" in made else ""
     found = summarise(frame)
     rows = [
         [
@@ -57,7 +57,7 @@ def run_view(frame: pd.DataFrame) -> View:
     ]  # fmt: skip
     first, last = float(frame.index[0]), float(frame.index[-1])
     more = len(frame.columns) - len(rows)
-    said = f"{len(frame)} rows from {first:g} to {last:g} s{took}{state}."
+    said = f"{len(frame)} rows{took} from {first:g} to {last:g} s{state}."
     if more > 0:
         said += f" {more} more columns."
     energy = made.get("energy_residual", {}) if "coupling_error" not in frame.attrs else {}
