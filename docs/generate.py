@@ -96,8 +96,8 @@ def on_post_build(config: MkDocsConfig) -> None:
 
     With DOCS_WITHOUT_LIVE in the environment nothing is compiled for them.
     """
-    from bristle.draw.html import page
     from bristle.errors import BuildError
+    from bristle.view.html import page
     from bristle.web.export import export_web
 
     for name, (scenario, sliders) in LIVE.items():

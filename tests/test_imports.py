@@ -26,6 +26,7 @@ BASE = (
     {"control", "data", "jit", "trust"},
     {"component"},
     {"draw", "check"},
+    {"view"},
 )
 SIMULATE = (
     {"fmu"},

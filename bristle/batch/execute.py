@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from ..errors import EnsembleError, RunError
 from ..findings import written
 from ..progress import Progress
-from ..shown import shown
+from ..view import Viewable
 from .file import read_ensemble
 from .plan import Outcome, Plan
 from .quantiles import Failure, failures, notes, parts, quantiles
@@ -22,15 +22,14 @@ from .worker import prepare
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 
 class EnsembleInterrupted(KeyboardInterrupt):
     """An ensemble that Ctrl-C has stopped; what is done is in its folder."""
 
 
-@dataclass(frozen=True)
-class Ensemble:
+@dataclass(frozen=True, repr=False)
+class Ensemble(Viewable):
     """What an ensemble has found.
 
     Attributes
@@ -70,32 +69,6 @@ class Ensemble:
     def notes(self) -> list[str]:
         """What is left out of the quantiles that limits leave open, and why; empty without."""
         return notes(self.plan, self.runs)
-
-    def plot(self) -> Figure:
-        """Return the figure: how each output is spread, and what moves it.
-
-        Raises
-        ------
-        RunError
-            If fewer than two runs are done.
-        """
-        from .picture import draw_ensemble
-
-        if (self.runs["status"] == "done").sum() < 2:
-            raise RunError("an ensemble is drawn from two runs on that are done.")
-        return draw_ensemble(self).figure
-
-    def __repr__(self) -> str:
-        done = int((self.runs["status"] == "done").sum())
-        failed = [f"{one.count} failed: {one.reason}" for one in self.failures]
-        about = f"{self.plan.title}, {done} of {self.plan.runs} runs done"
-        table = self.quantiles.to_string(float_format="%.4g").splitlines()
-        return shown(self, about, [*table, *failed, *self.notes])
-
-    def _repr_html_(self) -> str:
-        from .notebook import ensemble_html
-
-        return ensemble_html(self)
 
 
 def ensemble(

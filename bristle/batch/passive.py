@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,8 @@ from ..progress import Progress
 from ..quantity import plain
 from ..scenario.scenario import Component, Scenario, load_scenario
 from ..simulate.rows import make_columns
+from ..view import Viewable
 from .file import plain_target
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -68,8 +66,8 @@ class Optimum:
     value: float
 
 
-@dataclass(frozen=True)
-class Passive:
+@dataclass(frozen=True, repr=False)
+class Passive(Viewable):
     """The best constant voltages.
 
     Attributes
@@ -118,17 +116,6 @@ class Passive:
             said = excess if goal == "regret" else plain(value, 4)
             found.append((text, self.goals[goal].voltage, said))
         return found
-
-    def plot(self) -> Figure:
-        """Return the figure: the output over the voltage, the least of each motion marked."""
-        from .passive_picture import draw_passive
-
-        return draw_passive(self).figure
-
-    def _repr_html_(self) -> str:
-        from .notebook import passive_html
-
-        return passive_html(self)
 
 
 def optimise_passive(

@@ -94,7 +94,7 @@ def closed_loop_of(arguments: argparse.Namespace) -> ClosedLoop:
 
 def print_closed_loop(found: ClosedLoop) -> None:
     """Print sentences, tables and notes."""
-    from ._table import print_tables
+    from ..view.terminal import print_tables
 
     print("\n".join(found.sentences()))
     print_tables(found.tables())

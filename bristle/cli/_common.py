@@ -30,6 +30,13 @@ def add_overrides(
     )
 
 
+def add_details(parser: argparse.ArgumentParser) -> None:
+    """Add --details to a command whose answer has some."""
+    parser.add_argument(
+        "--details", action="store_true", help="print the evidence below the answer: all tables"
+    )
+
+
 def _add(parser: argparse.ArgumentParser, default: object) -> None:
     text = "print no progress"
     parser.add_argument("--quiet", action="store_true", default=default, help=text)

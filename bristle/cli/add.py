@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..findings import command
-from ..quantity import plain
+from ..view.blocks import Next, Text, View
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -46,26 +46,20 @@ def main(arguments: argparse.Namespace) -> int:
 
 def text(added: Added, folder: Path) -> str:
     """Return what adding did, as text."""
+    from ..study.fit_view import error_table, parameter_table, z_text
     from ..study.laws import law_command
-    from .identify import error_lines
+    from ..view import terminal
 
-    found = added.identified
-    after = found.after
-    lines = [f"Step {added.step.number}: {added.step.what} ({added.step.why})", ""]
-    lines += error_lines(found)
-    lines.append("")
-    for row in found.parameters():
-        if row["name"].partition(".")[0] in added.effects:
-            half = row["interval95"]
-            interval = f"+- {plain(half, 2)}" if half is not None else row["how"]
-            value = plain(row["value"], 5)
-            lines.append(f"  {row['name']:28} {value:>12} {row['unit']:10} {interval}")
+    found, then = added.identified, [Next(command("diagnose", folder))]
+    said = [Text(z_text(found))]
     if added.other_law:
-        lines += [
-            "", f"The verdict is about the law {added.other_law}; this model has "
-            f"{found.model.law}. To take that law:  {law_command(folder, added.other_law)}",
-        ]  # fmt: skip
+        told = f"The verdict is about the law {added.other_law}; this model has {found.model.law}."
+        said.append(Text(told))
+        then.append(Next(law_command(folder, added.other_law), "takes that law"))
     before = found.before.get("z_holdout")
-    if before is not None and after["z_holdout"] >= before:
-        lines += ["", "The error on runs not seen did not fall:  " + command("undo", folder)]
-    return "\n".join([*lines, "", f"Next:  {command('diagnose', folder)}"])
+    if before is not None and found.after["z_holdout"] >= before:
+        said.append(Text("The error on runs not seen did not fall."))
+        then.insert(0, Next(command("undo", folder)))
+    title = f"Step {added.step.number}: {added.step.what} ({added.step.why})"
+    tables = (error_table(found), parameter_table(found, added.effects))
+    return terminal.text(View(title, (*tables, *said, *then)))

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..findings import command
+from ..view.blocks import Block, Next, Text
 from ._closed_loop import (
     add_closed_loop,
     closed_loop_of,
     print_closed_loop,
     refuse_alone,
 )
+from ._common import add_details
 from ._consent import add_trust
 from ._files import channels_of
-from ._table import print_tables
 
 if TYPE_CHECKING:
     from ..bridge.fmu import FmuComparison
@@ -48,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_closed_loop(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
     add_trust(parser)
+    add_details(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
@@ -125,7 +127,7 @@ def _in_closed_loop(arguments: argparse.Namespace) -> int:
 
 
 def _of_study(arguments: argparse.Namespace) -> int:
-    from ..compare.picture import draw_comparison
+    from ..compare.view import draw_comparison
     from ..draw.style import png
     from ..progress import tell
     from ..study.comparison import compare_study
@@ -149,10 +151,11 @@ def _of_study(arguments: argparse.Namespace) -> int:
             }
         )  # fmt: skip
         return 0
-    _print(comparison)
-    for note in notes:
-        print(note)
-    print(f"\nPicture: {picture}")
+    then = Next(command("diagnose", study.folder), "finds what is missing")
+    blocks: tuple[Block, ...] = (*(Text(note, "note") for note in notes), then)
+    elsewhere = command("report", study.folder)
+    print(_text(comparison, arguments.details, blocks, elsewhere))
+    print(f"Picture: {picture}")
     return 0
 
 
@@ -169,7 +172,7 @@ def _opened(study: Study) -> dict[str, Any]:
 
 def _of_fmu(arguments: argparse.Namespace) -> int:
     from ..bridge.fmu import compare_fmu
-    from ..compare.picture import draw_comparison
+    from ..compare.view import draw_comparison
 
     found: FmuComparison = compare_fmu(
         arguments.fmu,
@@ -188,7 +191,7 @@ def _of_fmu(arguments: argparse.Namespace) -> int:
     print("\n".join(found.mapping_lines()))
     for one in found.outputs:
         print(f"\n{one.quantity} [{one.unit}]")
-        _print(one)
+        print(_text(one, arguments.details))
     print(f"\nPicture: {picture}")
     return 0
 
@@ -224,12 +227,12 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def _print(comparison: Comparison) -> None:
-    """Print the sentences, then the error per run, along coordinates and in bands."""
-    import textwrap
+def _text(
+    comparison: Comparison, details: bool, more: tuple[Block, ...] = (), elsewhere: str = ""
+) -> str:
+    """Return a comparison as text, with more blocks below its answer."""
+    from ..view import terminal
 
-    from ..compare.tables import comparison_tables
-
-    for sentence in comparison.sentences:
-        print(textwrap.fill(sentence, 96) if sys.stdout.isatty() else sentence)
-    print_tables(comparison_tables(comparison))
+    view = comparison.view()
+    view = view._replace(blocks=(*view.blocks, *more))
+    return terminal.text(view, details=details, elsewhere=elsewhere)

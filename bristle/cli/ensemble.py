@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..view import terminal
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
             f"{files['quantiles']}: cannot be written: {error.strerror or error}."
         ) from error
     if figure and (found.runs["status"] == "done").sum() > 1:
-        from ..batch.picture import ensemble_figure
+        from ..batch.view import ensemble_figure
 
         files["figure"] = folder / "figure.png"
         ensemble_figure(found, files["figure"])
@@ -130,53 +131,6 @@ def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
 
 
 def _print(found: Ensemble, files: dict[str, Path]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    done = int((found.runs["status"] == "done").sum())
-    failed = len(found.runs) - done
-    heading = f"{found.plan.title}: {done} runs done, {failed} failed"
-    table = Table(title=heading, title_justify="left", box=None, pad_edge=False)
-    table.add_column("output", no_wrap=True)
-    levels = [str(name) for name in found.quantiles if str(name).endswith(" %")]
-    for level in levels:
-        table.add_column(level, justify="right")
-    table.add_column("unit")
-    for name, row in found.quantiles.iterrows():
-        unit = row["unit"] if row["unit"] != "1" else ""
-        table.add_row(str(name), *(f"{row[level]:.5g}" for level in levels), unit)
-    # In a pipe there is no width to fit.
-    width = None if sys.stdout.isatty() else 140
-    Console(highlight=False, markup=False, width=width).print(table)
-    for line in _limits(found):
-        print(line)
-    for note in found.notes:
-        print(f"{note[:1].upper()}{note[1:]}.")
-    for failure in found.failures:
-        print(f"failed {failure.count} times, first in run {failure.run}: {failure.reason}")
-    before = f", {found.continued} of them from before" if found.continued else ""
-    print(f"{len(found.runs)} runs{before} in {found.wall_time:.1f} s")
+    print(terminal.text(found.view()))
     for path in files.values():
         print(f"  {path}")
-
-
-def _limits(found: Ensemble) -> list[str]:
-    """Return what of each output's variance is from effects that are left open; none without."""
-    from ..batch.quantiles import VARIES
-    from ..data.open_effects import widest
-    from ..findings import command
-    from ..quantity import percent
-
-    plan, parts = found.plan, found.parts
-    if plan.identified is None or not parts:
-        return []
-    lines = ["Of the variance:"]
-    for output, own in parts.items():
-        shown = ", ".join(f"{name} {percent(part, 0)}" for name, part in [*own.items()][:3])
-        lines.append(f"  {output}: {shown}")
-    most, _ = widest([*parts.values()], (VARIES,))
-    if not most:
-        return [*lines, "No effect that the runs do not exclude widens them by much."]
-    name = most.partition(" ")[0]
-    see = command("plan", plan.identified.folder, "--see", name)
-    return [*lines, f"{name} widens them most, which the runs do not exclude. To see it:  {see}"]

@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..quantity import plain
+from ..view import terminal
 from ._common import add_overrides
 from ._consent import add_trust
 
@@ -81,7 +81,7 @@ def main(arguments: argparse.Namespace) -> int:
     )
     files = [folder / name for name in ("voltage.csv", "limit.toml", "results.csv")]
     if not arguments.no_figure:
-        from ..limit.picture import draw_limit
+        from ..limit.view import draw_limit
 
         files.append(folder / "limit.png")
         draw_limit(found).save(files[-1], dpi=160)
@@ -115,13 +115,6 @@ def _answer(found: Limit, files: list[Path]) -> dict[str, Any]:
 
 
 def _print(found: Limit, files: list[Path]) -> None:
-    from ..limit.text import compared, confidence
-
-    print(found.title)
-    print(f"{found.statistic} of {found.output} [{found.unit}]")
-    for name, value, said in compared(found):
-        print(f"  {name:40}{plain(value, 4):>8}  {said}".rstrip())
-    for text in confidence(found):
-        print(text)
+    print(terminal.text(found.view()))
     for path in files:
         print(f"  {path}")

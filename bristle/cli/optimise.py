@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..quantity import plain
+from ..view import terminal
 from ._common import add_overrides
 from ._consent import add_trust
 
@@ -117,7 +117,7 @@ def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     except OSError as error:
         raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
     if figure:
-        from ..batch.passive_picture import passive_figure
+        from ..batch.view import passive_figure
 
         files["figure"] = folder / "passive.png"
         passive_figure(found, files["figure"])
@@ -141,19 +141,6 @@ def _answer(found: Passive) -> dict[str, Any]:
 
 
 def _print(found: Passive, files: dict[str, Path]) -> None:
-    width = max(len(motion.name) for motion in found.motions)
-    at = [round(k) for k in (0, (len(found.grid) - 1) / 2, len(found.grid) - 1)]
-    heads = "".join(f"{f'{found.grid[k]:g} V':>9}" for k in at)
-    print(f"{found.what} [{found.unit}]")
-    print(f"{'':{width}}  best voltage   value {heads}")
-    for motion, best, row in zip(found.motions, found.best, found.values, strict=True):
-        values = "".join(f"{plain(row[k], 4):>9}" for k in at)
-        print(f"{motion.name:{width}}  {best.voltage:10.2f} V {plain(best.value, 4):>7} {values}")
-    print("for all of them")
-    for text, voltage, value in found.for_all():
-        print(f"  {text}: {voltage:.2f} V ({value})")
-    for note in found.notes:
-        print(f"Note: {note}")
-    print(f"{found.runs} runs")
+    print(terminal.text(found.view()))
     for path in files.values():
         print(f"  {path}")

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..findings import command
+from ..view.blocks import Next, Text
+from ._common import add_details
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -65,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
     add_trust(parser)
+    add_details(parser)
     parser.add_argument("--json", action="store_true", help="print the plan as JSON")
 
 
@@ -117,7 +120,7 @@ def main(arguments: argparse.Namespace) -> int:
         place = {"folder": str(folder)} if folder else {}
         print(json.dumps({**found.as_dict(), **place}, indent=2, ensure_ascii=False))
     else:
-        print(text(found, arguments.folder, folder))
+        print(text(found, arguments.folder, folder, details=arguments.details))
     return 0
 
 
@@ -133,19 +136,15 @@ def _free(folder: Path) -> Path:
     return found
 
 
-def text(found: Plan, study: Path | None, folder: Path | None) -> str:
+def text(found: Plan, study: Path | None, folder: Path | None, *, details: bool = False) -> str:
     """Return a plan as text, with the next command."""
-    from ..plan.outcome import HEADER
-    from ._table import aligned
+    from ..view import terminal
 
-    lines = [*found.sentences(), ""]
-    lines += aligned([list(HEADER), *(one.cells() for one in found.outcomes)])
+    view = found.view()
     if folder is not None:
-        lines += ["", f"Files:  {folder}"]
+        then = command("study", "new", "my_rig", "--data", "MEASURED.csv")
         if study is not None:
             then = command("study", "extend", study, "MEASURED.csv", "--plan", folder)
-            lines += [f"Next, once they are measured:  {then}"]
-        else:
-            then = command("study", "new", "my_rig", "--data", "MEASURED.csv")
-            lines += [f"Next, once they are measured:  {then}"]
-    return "\n".join(lines)
+        more = (Text(f"Files: {folder}"), Next(then, "once they are measured"))
+        view = view._replace(blocks=(*view.blocks, *more))
+    return terminal.text(view, details=details)

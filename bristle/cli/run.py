@@ -9,13 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..quantity import plain
 from ._common import add_overrides
 from ._consent import add_trust
 
 if TYPE_CHECKING:
     import pandas as pd
-    from rich.table import Table
+
+    from ..simulate.frame import Results
 
 HELP = "run a scenario: results, a figure, peaks and RMS"
 
@@ -113,7 +113,7 @@ def _further(
     """Return the files that are made of the results, and what makes each."""
     found: list[tuple[str, Callable[[pd.DataFrame, Path], None]]] = []
     if not arguments.no_figure:
-        from ..simulate.picture import run_figure
+        from ..simulate.view import run_figure
 
         found.append(("figure.png", run_figure))
     if arguments.spectrum:
@@ -188,68 +188,9 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
     print(json.dumps(answer, indent=2))
 
 
-def _print_plain(frame: pd.DataFrame, written: dict[str, Path]) -> None:
-    from rich.table import Table
+def _print_plain(frame: Results, written: dict[str, Path]) -> None:
+    from ..view import terminal
 
-    from ..simulate.summary import summarise
-
-    made = frame.attrs["made"]
-    first, last = frame.index[0], frame.index[-1]
-    heading = f"{made['title'] or made['file']}: RMS over {first:g} to {last:g} s"
-    table = Table(title=heading, title_justify="left", box=None, pad_edge=False)
-    table.add_column("output")
-    for column in ("peak", r"at \[s]", "RMS"):
-        table.add_column(column, justify="right")
-    table.add_column("unit")
-    for row in summarise(frame):
-        unit = row.unit if row.unit and row.unit != "1" else ""
-        table.add_row(
-            row.name, plain(row.peak, 5), plain(row.time_of_peak, 4), plain(row.rms, 5), unit
-        )
-    _print_table(table)
-    _print_errors(frame)
-    print(f"{len(frame)} rows in {made['wall_time']:.2f} s")
+    print(terminal.text(frame.view()))
     for path in written.values():
         print(f"  {path}")
-
-
-def _print_table(table: Table) -> None:
-    """Print a table without the blanks that fill its last column."""
-    from rich.console import Console
-
-    console = Console(highlight=False)
-    with console.capture() as captured:
-        console.print(table)
-    print("\n".join(line.rstrip() for line in captured.get().splitlines()))
-
-
-def _print_errors(frame: pd.DataFrame) -> None:
-    """Print the coupling error where it was estimated, else the energy that the coupling makes."""
-    from rich.table import Table
-
-    from ..simulate.summary import judged_by
-
-    found = frame.attrs.get("coupling_error")
-    if found is None:
-        for name, share in frame.attrs["made"].get("energy_residual", {}).items():
-            print(f"energy made by the coupling: {100 * share:.2g} % of that through {name}")
-        return
-    step = 1e3 * frame.attrs["made"]["step"]
-    heading = f"Coupling error at {step:g} ms, by {frame.attrs['coupling_error_by']}, in %"
-    shown = [n for n in judged_by(frame) if found[n]["along"] > 0.0 or not found[n]["worth"]]
-    if not shown:
-        print(f"{heading}: none, for nothing here depends on the step.")
-        return
-    table = Table(title=heading, title_justify="left", box=None, pad_edge=False)
-    table.add_column("output", overflow="fold")
-    for column in ("along run", "of peak", "of RMS", "order"):
-        table.add_column(column, justify="right")
-    for name in shown:
-        error = found[name]
-        keys = ("along", "peak", "rms")
-        # Runs that agree on the wrong side of a switch show no error, and have one.
-        shares = [plain(100.0 * error[key], 2) if error["along"] > 0.0 else "?" for key in keys]
-        order = f"{error['order']:.1f}" + ("" if error["worth"] else ", no use")
-        table.add_row(name, *shares, order)
-    _print_table(table)
-    print("The other outputs do not depend on the step.")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ._channels import add_channels
-from ._common import add_common_to_actions
+from ._common import add_common_to_actions, add_details
 from ._consent import add_trust
 from ._extend import add_extend
 from ._files import add_run_facts, channels_of, files_of, test_files
@@ -56,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="if no effect explains the error, add the one that lowers it most, and continue",
     )  # fmt: skip
     add_trust(auto)
+    add_details(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
     add_common_to_actions(commands)
@@ -333,5 +334,5 @@ def _auto(arguments: argparse.Namespace) -> int:
         print(f"{staircase(study.steps(), cut_off=low)}\n")
     for one in done.curves:
         print("\n".join(one.sentences()) + "\n")
-    print(text(verdict_of(study, done.verdict), arguments.folder))
+    print(text(verdict_of(study, done.verdict), arguments.folder, details=arguments.details))
     return 0

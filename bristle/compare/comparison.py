@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ..identify.error import ForceError
 from ..identify.fit import Fit, Model, Problem
 from ..physics.drive import DRIVES, Drive
-from ..quantity import short_z
-from ..shown import shown
+from ..view import Viewable
 from .bands import Spectrum, spectrum
 from .errors import (
     CLOSE,
@@ -34,14 +33,11 @@ from .prediction import RunPrediction, run_predictions
 from .regimes import Regime, regimes
 from .sentences import sentences
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Viewable):
     """A prediction held against measured runs; `bristle.compare` returns it, a notebook shows it.
 
     Attributes
@@ -94,7 +90,7 @@ class Comparison:
     second: ResidualPattern | None
     spectrum: Spectrum
     regimes: tuple[Regime, ...]
-    predictions: tuple[RunPrediction, ...] = field(repr=False)
+    predictions: tuple[RunPrediction, ...]
     sentences: tuple[str, ...] = ()
     seen: bool | None = False
     sites: tuple[SiteError, ...] = ()
@@ -145,27 +141,6 @@ class Comparison:
         """The run with the largest z."""
         name = max(self.runs, key=lambda run: run.z).name
         return next(one for one in self.predictions if one.name == name)
-
-    def plot(self, title: str = "") -> Figure:
-        """Return the figure: the worst stretch, loops, the error along coordinates, its spectrum.
-
-        Parameters
-        ----------
-        title : str
-            Above the panels; by default the finding in one line.
-        """
-        from .picture import draw_comparison
-
-        return draw_comparison(self, title).figure
-
-    def __repr__(self) -> str:
-        runs = f"{len(self.runs)} run" + "s" * (len(self.runs) > 1)
-        return shown(self, f"{self.quantity}, {runs}, z = {short_z(self.z)}", self.sentences)
-
-    def _repr_html_(self) -> str:
-        from .notebook import comparison_html
-
-        return comparison_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as JSON has it, without the samples."""

@@ -190,8 +190,8 @@ class ControllerComparison:
         return shown(self, ", ".join(self.controllers), self.verdict)
 
     def _repr_html_(self) -> str:
-        from ..draw import html
         from ..draw.style import png
+        from ..view import html
         from .picture import draw_summary
 
         return html.fragment(

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..control.controller import Controller, building_digest
-from ..shown import shown
+from ..view import Viewable
 from .lmi import Solution
 from .plant import Plant
 from .table import Bank
 from .task import Task
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
 _DIGITS = 12
 
 
-@dataclass(frozen=True)
-class DesignResult:
+@dataclass(frozen=True, repr=False)
+class DesignResult(Viewable):
     """A verified controller.
 
     Attributes
@@ -60,21 +57,6 @@ class DesignResult:
     def facts(self) -> dict[str, Any]:
         """The design's numbers: gamma, norms, poles ..."""
         return self.controller.facts
-
-    def plot(self) -> Figure:
-        """Return the figure: singular values of the loop and its weights; of LQG its poles."""
-        from .picture import draw_result
-
-        return draw_result(self).figure
-
-    def __repr__(self) -> str:
-        facts = (f"{name} = {value}" for name, value in self.facts.items())
-        return shown(self, f"{self.task.kind}, {self.task.title}", facts)
-
-    def _repr_html_(self) -> str:
-        from .notebook import design_html
-
-        return design_html(self)
 
 
 def packed(task: Task, discrete: Bank, facts: dict[str, Any]) -> Controller:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..identify.assigned import late_effects
 from ..identify.error import ForceError, pooled
 from ..identify.rig import DAMPER
 from ..physics.effect import EFFECTS
-from ..shown import shown
+from ..view import Viewable
 from . import verdict_text
 from .candidates import Trial
 from .effect_limits import EffectLimit
@@ -30,12 +30,9 @@ OF_WORST = (
 )  # fmt: skip
 """What verdict.json tells of the worst site beside the list of all."""
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Viewable):
     """The verdict on a rig's model; `bristle.diagnose` returns it, and a notebook shows it.
 
     Attributes
@@ -208,20 +205,6 @@ class Diagnosis:
     @property
     def _damper(self) -> Finding | None:
         return self.findings.get(DAMPER)
-
-    def plot(self) -> Figure:
-        """Return the figure of the verdict: what each effect that was tried leaves of the error."""
-        from .picture import draw_diagnosis
-
-        return draw_diagnosis(self).figure
-
-    def __repr__(self) -> str:
-        return shown(self, ", ".join([self.kind, *self.effects]), [self.words])
-
-    def _repr_html_(self) -> str:
-        from .notebook import diagnosis_html
-
-        return diagnosis_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""

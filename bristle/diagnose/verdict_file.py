@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import StudyError
-from .verdict_text import HEADINGS
+from .verdict_text import TONES
 
 SCHEMA = 2
 
@@ -30,9 +30,9 @@ def current(verdict: Mapping[str, Any], where: str = "verdict.json") -> dict[str
             f"{where}: schema = {schema!r}; this version reads {SCHEMA}. "
             "bristle diagnose writes it again."
         )
-    if kind not in HEADINGS:
+    if kind not in TONES:
         raise StudyError(
-            f"{where}: kind = {kind!r}; there are {', '.join(HEADINGS)}. "
+            f"{where}: kind = {kind!r}; there are {', '.join(TONES)}. "
             "bristle diagnose writes it again."
         )
     return dict(verdict)

@@ -20,24 +20,23 @@ from .rule import BENCH, DecisionRule
 
 Verdict = Mapping[str, Any]
 
-HEADINGS = {
-    "none": "Nothing found missing",
-    "effect": "Missing physics found",
-    "ambiguous": "One of a few is missing",
-    "unknown": "Something unknown is missing",
-    "insufficient": "The data do not allow a verdict",
-}
-"""The kinds of a verdict, and how each is headed."""
+TONES = {
+    "none": "green", "effect": "blue", "ambiguous": "purple", "unknown": "red", "insufficient": "",
+}  # fmt: skip
+"""The kinds of a verdict, and the colour of each."""
 
 
 def sentences(verdict: Verdict) -> list[str]:
     """Return what a verdict says, one sentence or a few in each text, the most important first."""
-    out = [headline(verdict), *law_sentences(verdict), *(verdict.get("reasons") or [])]
-    out += [*_besides(verdict), *_limits(verdict), *_remaining(verdict), *_gains(verdict)]
+    out = [headline(verdict), *reasons(verdict)]
     out += fault_texts(verdict, " ".join(out))
-    if any(map(_is_set_right, verdict.get("sensors") or [])):
-        out.append("The verdict and its numbers are those with that set right.")
     return list(dict.fromkeys(text for text in out if text))
+
+
+def reasons(verdict: Verdict) -> list[str]:
+    """Return why a verdict is as it is, in sentences, the most important first."""
+    out = [*law_sentences(verdict), *(verdict.get("reasons") or [])]
+    return [*out, *_besides(verdict), *_limits(verdict), *_remaining(verdict), *_gains(verdict)]
 
 
 def headline(verdict: Verdict) -> str:
@@ -132,6 +131,8 @@ def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
 def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
     """Return the sentences of sensors' faults; runs with the same fault are told in one text.
 
+    The last one says where the verdict is on data with the faults set right.
+
     Parameters
     ----------
     verdict : the content of verdict.json
@@ -142,7 +143,10 @@ def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
     for k, fault in enumerate(one for one in faults if _words(one) not in told):
         alone = () if fault.get("run") else (str(k),)
         alike[fault["channel"], fault["fault"], *alone].append(fault)
-    return [_told(*faults) for faults in alike.values()]
+    texts = [_told(*faults) for faults in alike.values()]
+    if any(map(_is_set_right, faults)):
+        texts.append("The verdict and its numbers are those with that set right.")
+    return texts
 
 
 def _is_set_right(fault: Mapping[str, Any]) -> bool:
@@ -225,14 +229,14 @@ def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
     )
 
 
-LIMITS = ("effect", "still possible (95 %)", "of the force", "to be named from, about")
+LIMITS = ("effect", "still possible (95 %)", "of the force", "named from")
 """Columns of the table of limits."""
 
 LIMITS_NOTES = (
     "Still possible: the size that these runs do not exclude, law and known effects refitted.",
     "Of the force: what such an effect leaves of it; -: not resolved by the sampling step, or the "
     "reason stands in the row.",
-    "To be named from: the size at which 9 of 10 verdicts would name it, as the rule predicts.",
+    "Named from: about the size at which 9 of 10 verdicts would name it, as the rule predicts.",
 )
 
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantity import plain
-from ..shown import shown
-from .text import AGREE, TRUST, compared
+from ..view import Viewable
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..simulate.frame import Results
 
+AGREE = 0.02
+"""Share by which starts that agree differ at most."""
+TRUST = 0.01
+"""Share by which the coupled engine may find another value than the search."""
 Array = NDArray[np.float64]
 
 
@@ -29,8 +29,8 @@ class Start:
     value: float
 
 
-@dataclass(frozen=True)
-class Limit:
+@dataclass(frozen=True, repr=False)
+class Limit(Viewable):
     """The least peak or RMS of an output that a damper's voltage reaches, the motion known.
 
     Attributes
@@ -98,21 +98,3 @@ class Limit:
     def best_constant(self) -> tuple[float, float]:
         """The best of the constant voltages [V], and its value."""
         return min(self.constant.items(), key=lambda one: one[1])
-
-    def plot(self) -> Figure:
-        """Return its picture as a figure."""
-        from .picture import draw_limit
-
-        return draw_limit(self).figure
-
-    def __repr__(self) -> str:
-        rows = (
-            f"{name}: {plain(value)} {self.unit}" + (f", {said}" if said else "")
-            for name, value, said in compared(self)
-        )
-        return shown(self, self.output, rows)
-
-    def _repr_html_(self) -> str:
-        from .notebook import limit_html
-
-        return limit_html(self)

@@ -7,9 +7,9 @@ import re
 from pathlib import Path
 
 from ..compare.comparison import Comparison
-from ..draw import html
+from ..view import html
+from ..view.page_data import pack
 from .errors_view import linked
-from .packing import pack
 
 STATIC = Path(__file__).with_name("static")
 MODULES = ("dom.mjs", "scale.mjs", "plot.mjs", "brush.mjs", "cells.mjs", "linked.mjs")

@@ -8,22 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..compare.names import site_name
 from ..data.files import read_json
-from ..diagnose.law_text import HEADER, law_table
-from ..diagnose.verdict_text import (
-    HEADINGS,
-    LIMITS_NOTES,
-    about,
-    drive_of,
-    limit_rows,
-    sentences,
-    separating,
-    untestable,
-)
+from ..diagnose.view import verdict_view, worst
 from ..errors import BristleError
 from ..plan.folder import read_plan
 from ..study.study import Study
+from ..view.page_data import page_data
 from .data_view import thinned
 
 
@@ -83,31 +73,12 @@ def learned(study: Study) -> list[dict[str, Any]]:
 
 
 def shown(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a verdict as the page shows it; z of the model before is that of its worst site."""
-    findings = verdict.get("findings") or []
-    drive = drive_of(verdict)
+    """Return a verdict as the page shows it: blocks, and the trials that it draws itself."""
+    view, at = verdict_view(verdict), worst(verdict)
     return {
-        "kind": verdict["kind"], "heading": HEADINGS[str(verdict["kind"])],
-        "sentences": sentences(verdict), "effects": list(verdict.get("effects") or []),
-        "about": {str(one): about(str(one), drive) for one in verdict.get("effects") or []},
-        "alternatives": list(verdict.get("alternatives") or []),
-        "before": max(
-            (z for one in findings if (z := one["z_holdout_before"]) is not None), default=None
-        ),
-        "sites": [
-            {
-                "name": site_name(one["site"]), "kind": one.get("kind"),
-                "before": one.get("z_holdout_before"),
-            }
-            for one in findings if len(findings) > 1
-        ],
-        "ranking": verdict.get("ranking") or [], "limits": limit_rows(verdict),
-        "limit_shares": [
-            one.get("share") for found in findings for one in found.get("limits") or []
-        ],
-        "limits_notes": list(LIMITS_NOTES), "untestable": untestable(verdict),
-        "separating": separating(verdict), "notes": list(verdict.get("notes") or []),
-        "laws": law_table(verdict["laws"]) if verdict.get("laws") else [], "laws_header": HEADER,
+        "kind": verdict["kind"], "title": view.title, "answer": page_data(view.blocks),
+        "details": page_data(view.details), "effects": list(verdict.get("effects") or []),
+        "before": at.get("z_holdout_before"), "ranking": verdict.get("ranking") or [],
     }  # fmt: skip
 
 

@@ -60,7 +60,7 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
     arguments : what the page asks for
     """
     from ..physics.user import unload_effects
-    from .packing import pack
+    from ..view.page_data import pack
 
     try:
         unload_effects()  # those of the study that was asked for before

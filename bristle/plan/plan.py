@@ -12,7 +12,7 @@ from ..errors import StudyError
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS, plain_name
 from ..quantity import plain
-from ..shown import shown
+from ..view import Viewable
 from .folder import PlanFolder, PlannedRun, write_plan
 from .outcome import NEAR, Outcome
 from .planned_test import Signals, Test
@@ -33,8 +33,8 @@ GAINED = 0.1
 """Share by which a plan must lower its figures on average; below that nothing is left to gain."""
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(Viewable):
     """The next tests of a rig.
 
     Attributes
@@ -202,14 +202,6 @@ class Plan:
         from .picture import draw_test
 
         return draw_test(self.runs()[k], self.signals[k], self.drive)
-
-    def __repr__(self) -> str:
-        return shown(self, f"{len(self.tests)} tests for {self.study}", self.sentences())
-
-    def _repr_html_(self) -> str:
-        from .notebook import plan_html
-
-        return plan_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""

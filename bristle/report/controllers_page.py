@@ -10,11 +10,11 @@ from ..controllers.folder import ENSEMBLES, SCENARIOS, plain_name
 from ..controllers.picture import draw_levels, draw_motion, draw_summary
 from ..controllers.tables import footnotes, header, lowest, rows
 from ..controllers.verdict import what
-from ..draw import html
 from ..draw.style import png
 from ..findings import command
 from ..quantity import plain, quantity
 from ..version import __version__
+from ..view import html
 
 if TYPE_CHECKING:
     from ..controllers.result import ControllerComparison

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from ..draw import html
 from ..findings import command
+from ..view import html
 
 if TYPE_CHECKING:
     from collections.abc import Collection

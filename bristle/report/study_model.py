@@ -6,9 +6,9 @@ import re
 from typing import TYPE_CHECKING
 
 from ..data.equation import equations
-from ..draw import html
 from ..physics.drive import DRIVES
 from ..study.budget_picture import budgets, draw_budget, sentence
+from ..view import html
 
 if TYPE_CHECKING:
     from .study_content import Content

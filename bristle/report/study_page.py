@@ -8,19 +8,21 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..compare.names import site_name
-from ..compare.picture import headline
-from ..draw import html
+from ..compare.view import band_table, headline, pattern_table, run_table, site_table, sites_page
+from ..diagnose.view import verdict_view
+from ..findings import command
 from ..physics.forms import shown_law
 from ..quantity import short_z
 from ..study.run_file import TEST
 from ..version import __version__
+from ..view import html
+from ..view.blocks import Text, View
 from .reproduce import commands
 from .study_content import Content, gather
 from .study_curves import curves_section
 from .study_model import model_section
 from .study_plan import plan_section
-from .study_tables import data_table, data_words, parameter_table, run_errors
-from .study_verdict import untold_section, verdict_section
+from .study_tables import data_table, data_words, parameter_table
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -46,11 +48,12 @@ def render(content: Content) -> str:
     settings = study.settings
     rig = "structure" if settings.has_building else "test bench"
     what = " + ".join([shown_law(content.model.law), *content.model.effects])
+    verdict = _verdict(content)
     body = [
         f"<h1>{html.escape(settings.title)}</h1>",
         html.paragraphs(f"A damper on a {rig}, compared with its model: {what}.", kind="soft"),
         f'<div class="notes">{html.escape(settings.notes)}</div>' if settings.notes.strip() else "",
-        verdict_section(content.verdict, study.name, content.notes),
+        html.answer(verdict),
         _tiles(content),
         _history(content),
         _before_after(content),
@@ -62,7 +65,9 @@ def render(content: Content) -> str:
         model_section(content),
         _parameters(content),
         _data(content),
-        untold_section(content.verdict),
+        html.section("The verdict in detail", html.blocks(verdict.details))
+        if verdict.details
+        else "",
         plan_section(study),
         _reproduce(content),
     ]
@@ -72,6 +77,17 @@ def render(content: Content) -> str:
         "large errors do not decide it. z = 1 is the best that these data can confirm."
     )
     return html.page(settings.title, [part for part in body if part], foot)
+
+
+def _verdict(content: Content) -> View:
+    """Return the view of the verdict, without the notes on the data, which have their section."""
+    if (verdict := content.verdict) is None:
+        none = "No diagnosis has been made of the present model."
+        order = command("diagnose", content.study.name)
+        then = f"{order} finds what it misses, and how certain that is."
+        return View("Not diagnosed", (Text(none, "say"), Text(then)))
+    notes = [note for note in verdict.get("notes") or [] if note not in content.notes]
+    return verdict_view({**verdict, "notes": notes})
 
 
 def _tiles(content: Content) -> str:
@@ -111,11 +127,9 @@ def _where(content: Content) -> str:
     now = content.now
     if now is None:
         return html.section("Error of the present model", html.paragraphs(content.trouble))
-    from ..compare.tables import pattern_table
     from ..draw.style import png
     from .study_pictures import error_page
 
-    _, header, rows = pattern_table(now)
     along = "the two coordinates that it depends on most"
     if now.second:
         along = "the coordinate that it depends on most, and the remaining error along the next"
@@ -130,12 +144,7 @@ def _where(content: Content) -> str:
         html.paragraphs(*say, kind="lead"),
         *_sites(content),
         html.figure(png(error_page(now)), title, caption),
-        html.table(*run_errors(now), numbers=range(1, 6)),
-        html.table(header, rows, numbers=range(1, 4)),
-        html.paragraphs(
-            "Chance: how often a true model, with an error as correlated as this one, would show "
-            "such a share along any coordinate.", kind="soft",
-        ),
+        html.blocks((run_table(now), pattern_table(now), band_table(now))),
     )  # fmt: skip
 
 
@@ -152,7 +161,7 @@ def _on_test_runs(content: Content) -> str:
     return html.section(
         title,
         html.paragraphs(*said, kind="lead"),
-        html.table(*run_errors(content.test), numbers=range(1, 6)),
+        html.blocks((run_table(content.test),)),
     )
 
 
@@ -161,11 +170,8 @@ def _sites(content: Content) -> list[str]:
     now = content.now
     if now is None or not now.sites:
         return []
-    from ..compare.site_pictures import sites_page
-    from ..compare.tables import site_table
     from ..draw.style import png
 
-    _, header, rows = site_table(now)
     rings = f" Rings: without {content.added}." if content.before else ""
     worst = now.sites[0]
     name = site_name(worst.site)
@@ -179,7 +185,7 @@ def _sites(content: Content) -> list[str]:
     )
     return [
         html.figure(png(sites_page(now, content.before, 9.2)), title, caption),
-        html.table(header, rows, numbers=range(1, 6)),
+        html.blocks((site_table(now),)),
     ]
 
 

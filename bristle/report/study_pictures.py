@@ -17,7 +17,7 @@ from ..compare.panels import (
     draw_spectrum,
     residual_map,
 )
-from ..compare.picture import LOOPS, loop_panels, telling_patterns
+from ..compare.view import LOOPS, loop_panels, telling_patterns
 from ..draw.style import Page, look, short_z
 
 if TYPE_CHECKING:

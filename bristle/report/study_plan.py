@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..draw import html
 from ..errors import BristleError
 from ..plan.folder import FILE, PlanFolder, read_plan
 from ..plan.outcome import OUTCOMES
 from ..plan.performed import shows
+from ..view import html
 
 if TYPE_CHECKING:
     from ..study.study import Study

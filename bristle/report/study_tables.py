@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..compare.tables import run_table
 from ..data.labels import label_text
 from ..physics.laws import LAWS
 from ..quantity import percent, plain, quantity
@@ -16,7 +15,6 @@ from ..study.reading import names_of_runs, place_of_run
 from ..study.run_file import TEST
 
 if TYPE_CHECKING:
-    from ..compare.comparison import Comparison
     from ..data.measurement import Measurement
     from ..data.model import StudyModel, Value
     from ..study.study import Study
@@ -127,39 +125,3 @@ def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[st
         of = percent(noise / size, 2) if size > 0.0 else "-"
         rows.append([channel, quantity(noise, unit, fine=True), of, "; ".join(found)])
     return header, rows
-
-
-def run_errors(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
-    """Return header and rows of the error on each held-out run."""
-    _, header, rows = run_table(comparison)
-    return header, rows
-
-
-def ranking_table(
-    verdict: Mapping[str, Any] | None,
-) -> tuple[list[str], list[list[str]], list[int]] | None:
-    """Return header, rows and the rows of the effects that the verdict names; None without any."""
-    ranking = (verdict or {}).get("ranking") or []
-    named = set((verdict or {}).get("effects") or [])
-    several = len({entry.get("site") for entry in ranking}) > 1
-    rows: list[list[str]] = []
-    strong: list[int] = []
-    for entry in ranking[:_RANKED]:
-        effect = str(entry.get("effect", ""))
-        if effect in named:
-            strong.append(len(rows))
-        z = entry.get("z_holdout")
-        text = f"{z:.3f}" if isinstance(z, int | float) and z < 10.0 else number(z)
-        at = f" ({entry['site']})" if several else ""
-        rows.append([effect + at, text, share(entry.get("gain"))])
-    return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
-
-
-def number(value: Any) -> str:
-    """Return a number of a JSON file as text, "-" where it is none."""
-    return plain(value) if isinstance(value, int | float) else "-"
-
-
-def share(value: Any) -> str:
-    """Return a share of a JSON file as text in percent, "-" where it is none."""
-    return percent(value) if isinstance(value, int | float) else "-"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..bridge.export import write_editable
-from ..draw import html
+from ..view import html
 
 if TYPE_CHECKING:
     from ..study.study import Study

@@ -25,7 +25,7 @@ from ..data.measurement import Measurement
 from ..data.relation import band
 from ..findings import command
 from ..quantity import plain, scale
-from ..shown import shown
+from ..view import Viewable
 from .openings import runs_for_test
 from .place import Place, place_of_damper
 from .reading import read_runs
@@ -33,15 +33,13 @@ from .run_file import TEST
 from .study import Study
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..draw.style import Page
 
 _HEADINGS = {"error": "Errors", "warning": "Warnings", "note": "Notes"}
 
 
-@dataclass(frozen=True)
-class DataCheck:
+@dataclass(frozen=True, repr=False)
+class DataCheck(Viewable):
     """What is found, worst first, and what each run excites; `place` is where the damper sits."""
 
     findings: tuple[Finding, ...]
@@ -54,19 +52,6 @@ class DataCheck:
         from ..draw.data_check import draw_data_check
 
         return draw_data_check([self.place.seen(run) for run in self.runs], self.place.level)
-
-    def plot(self) -> Figure:
-        """Return the figure: the channels of all runs over time, and force over motion."""
-        return self.page().figure
-
-    def __repr__(self) -> str:
-        found = (f"{one.level}: {sentence(one, group)}" for one, group in grouped(self.findings))
-        return shown(self, f"{len(self.runs)} runs", found)
-
-    def _repr_html_(self) -> str:
-        from .notebook import data_check_html
-
-        return data_check_html(self)
 
     @property
     def ok(self) -> bool:

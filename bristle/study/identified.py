@@ -11,8 +11,8 @@ from ..identify.error import ForceError
 from ..identify.fit import Fit, Problem
 from ..identify.rig_fit import RigErrors, SiteModel
 from ..identify.table import LawError
-from ..physics.forms import shown_law, split_form
-from ..shown import shown
+from ..physics.forms import split_form
+from ..view import Viewable
 from .forms import FormError, finite, form_of
 from .history import Step
 
@@ -27,8 +27,8 @@ def is_identified(model: StudyModel) -> bool:
     return any(value.origin == "identified" for value in model.flat().values())
 
 
-@dataclass(frozen=True)
-class Identified:
+@dataclass(frozen=True, repr=False)
+class Identified(Viewable):
     """What an identification found; `bristle.identify` returns it, and a notebook shows it.
 
     Attributes
@@ -126,12 +126,6 @@ class Identified:
         """Names of the parameters that the data do not identify."""
         return self.fit.unidentified
 
-    def plot(self) -> Figure:
-        """Return the figure: loops of single cycles, the force over time, and its residual."""
-        from .fit_picture import draw_identified
-
-        return draw_identified(self).figure
-
     def plot_budget(self) -> Figure:
         """Return the figure of the force budget: what the law's parts and the effects make of it.
 
@@ -146,15 +140,6 @@ class Identified:
         if page is None:
             raise StudyError(f"{self.at.site.name}: only a damper has a force budget.")
         return page.figure
-
-    def __repr__(self) -> str:
-        about = " + ".join([shown_law(self.model.law), *self.model.effects])
-        return shown(self, about, [*map(_in_line, self.parameters()), *self.notes])
-
-    def _repr_html_(self) -> str:
-        from .notebook import identified_html
-
-        return identified_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
@@ -210,10 +195,3 @@ class Identified:
                 }
             )  # fmt: skip
         return rows
-
-
-def _in_line(row: dict[str, Any]) -> str:
-    """Return a parameter in a line: name, value, half of its interval or how it was found, unit."""
-    known = row["how"] if row["interval95"] is None else f"+- {row['interval95']:.2g}"
-    unit = "" if row["unit"] == "1" else f" {row['unit']}"
-    return f"{row['name']} = {row['value']:.5g}{unit} ({known})"

@@ -26,6 +26,7 @@ from ..physics.user import Loaded, waiting
 from ..shown import shown
 from ..trust import can_do_without, load
 from ..version import __version__
+from ..view import Viewable
 from .added_runs import additions, behind_data, note_undone
 from .data_digest import building_in, data_digest, other_than
 from .history import History, Step
@@ -40,7 +41,7 @@ from .settings import Settings, read_draft, read_settings
 from .settings_text import with_corrections, with_excluded, with_mask, with_roles
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
@@ -49,7 +50,7 @@ PATIENCE = 10.0
 _AGAIN = "Nothing is written; run this again (in Python, open the study again first)."
 
 
-class Study:
+class Study(Viewable):
     """A study: a folder with measurements, a model, its history and verdict.
 
     Reading needs no lock. What is written is written whole, under a lock, and refused when another
@@ -490,27 +491,10 @@ class Study:
         keep_reports(self.reports_folder, old, before)
         make_room(self.reports_folder, new, self.history.undone(new).name)
 
-    def plot(self) -> Figure:
-        """Return the figure: the error of each model of the history, or the first run before any.
-
-        Raises
-        ------
-        RecordError
-            If nothing was identified, and the run cannot be read.
-        """
-        from .notebook import study_page
-
-        return study_page(self).figure
-
     def __repr__(self) -> str:
         steps = self.steps()
         last = f"; last step: {steps[-1].what}" if steps else ""
         return shown(self, f"{self.folder}, {len(self.settings.runs)} runs{last}")
-
-    def _repr_html_(self) -> str:
-        from .notebook import study_html
-
-        return study_html(self)
 
     @contextmanager
     def writing(self, patience: float = PATIENCE) -> Iterator[None]:

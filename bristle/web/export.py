@@ -11,10 +11,10 @@ from string import Template
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from ..draw.html import escape, page
 from ..errors import ScenarioError
 from ..fmu.variables import Variable
 from ..scenario.scenario import Component, Scenario
+from ..view.html import escape, page
 from .files import loader, write_files
 from .module import module
 from .numbers import Numbers, Slider

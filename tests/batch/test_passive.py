@@ -75,7 +75,7 @@ def test_a_notebook_shows_table_and_figure() -> None:
     shown = found._repr_html_()
     assert shown.startswith('<div class="bristle">')
     for motion, best in zip(found.motions, found.best, strict=True):
-        assert f"<td>{motion.name}</td>" in shown
+        assert f">{motion.name}</td>" in shown
         assert f">{best.voltage:.2f}</td>" in shown
     assert "least excess over each motion&#x27;s own best" in shown
     assert "data:image/png;base64," in shown

@@ -7,16 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.cli.diagnose import _limits, _not_excited
+from bristle.cli.diagnose import _not_excited
 from bristle.diagnose.effect_limits import NO_AMOUNT, EffectLimit, effect_limits, limit_of
 from bristle.diagnose.effect_size import Known, Sized
 from bristle.diagnose.resolved_size import STANDS_OUT, resolved
 from bristle.diagnose.verdict_text import limit_rows
+from bristle.diagnose.view import verdict_view
 from bristle.identify.fit import Model, intervals_of
 from bristle.identify.residuals import residuals
 from bristle.identify.search import HUBER
 from bristle.identify.search_context import refine
 from bristle.physics.effect import EFFECTS
+from bristle.view.blocks import Table
 from tests.diagnose.test_limits import VALUES, T, problem_of, steady, steps
 
 SPRING = "gas_spring"
@@ -220,13 +222,9 @@ def test_the_table_has_units_as_people_write_them():
         ["mount_compliance", "k above 21 MN/m", "-", "-"],
         ["base_friction", "f_c of the model absorbs it", "-", "-"],
     ]
-    table = _limits(verdict)
-    assert table[1].split() == [
-        "effect", "still", "possible", "(95", "%)", "of", "the", "force", "to", "be", "named",
-        "from,", "about",
-    ]  # fmt: skip
-    assert len(table) == 8
-    assert _limits({"findings": [{"site": "damper"}]}) == []
+    tables = [one.header for one in verdict_view({"kind": "none", **verdict}).every(Table)]
+    assert tables == [("effect", "still possible (95 %)", "of the force", "named from")]
+    assert not list(verdict_view({"kind": "none", "findings": []}).every(Table))
 
 
 def test_the_models_own_parameters_move_so_that_what_is_left_is_least(known):

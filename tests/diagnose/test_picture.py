@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bristle.diagnose.picture import draw_evidence
+from bristle.diagnose.view import draw_verdict
 
 LAWS = {"law": "dahl", "command": "quadratic", "laws": [{"law": "dahl", "command": "quadratic"}]}
 PAIR: dict[str, Any] = {
@@ -30,13 +30,11 @@ PAIR: dict[str, Any] = {
     ],
 )
 def test_the_dashed_line_names_its_model(laws: dict[str, Any], words: str) -> None:
-    page = draw_evidence(PAIR | laws)
-    assert page is not None
+    page = draw_verdict(PAIR | laws)
     assert page.figure.axes[0].get_title(loc="right") == f"dashed: {words}, z = 4.10"
 
 
 def test_the_pair_of_effects_that_a_verdict_names_has_a_bar() -> None:
-    page = draw_evidence(PAIR)
-    assert page is not None
+    page = draw_verdict(PAIR)
     names = [label.get_text() for label in page.figure.axes[0].get_yticklabels()]
     assert names == ["with delay\nand gas_spring", "with delay", "with gas_spring"]

@@ -11,7 +11,7 @@ from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding
 from bristle.diagnose.verdict_file import current
 from bristle.diagnose.verdict_text import (
-    HEADINGS,
+    TONES,
     fault_rows,
     fault_texts,
     headline,
@@ -45,7 +45,7 @@ def said(**findings):
     ],
 )
 def test_every_kind_has_a_headline(verdict, says):
-    assert verdict["kind"] in HEADINGS
+    assert verdict["kind"] in TONES
     assert headline(verdict).startswith(says)
 
 
@@ -152,6 +152,7 @@ def test_runs_with_the_same_fault_are_told_in_one_text_with_the_value_of_each():
     verdict = {"sensors": [late("a", 5e-4), gain, late("b", 5.24e-4), late("c", 5.43e-4)]}
     assert fault_texts(verdict) == [
         "In a it is late. The same in b (0.524 ms) and c (0.543 ms).", "A gain is off.",
+        SET_RIGHT,
     ]  # fmt: skip
 
 

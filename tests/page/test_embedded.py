@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "compare"))
 from predictions_made import predictions_with
 
 from bristle.compare.comparison import compare_predictions
-from bristle.draw.html import page as whole_page
 from bristle.page.embedded import linked_section, script
-from bristle.page.packing import unpack
+from bristle.view.html import page as whole_page
+from bristle.view.page_data import unpack
 
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "page_pictures.py"
 

@@ -15,8 +15,8 @@ from study.made import write_runs
 from bristle.page import controllers_view
 from bristle.page.commands import order_of
 from bristle.page.message import RequestError
-from bristle.page.packing import unpack
 from bristle.study import create_study
+from bristle.view.page_data import unpack
 
 MOTION = {"record": "el_centro_1940_ns", "peak": 0.2}
 ASKED: dict[str, Any] = {

@@ -31,10 +31,10 @@ from bristle.page.designs import (
     write_design,
 )
 from bristle.page.message import RequestError
-from bristle.page.packing import unpack
 from bristle.page.worker import answer
 from bristle.scenario.scenario import load_scenario, parse_overrides
 from bristle.study import Study, create_study
+from bristle.view.page_data import unpack
 
 SHAKEN: dict[str, Any] = {"motions": list(MOTIONS), "peak": 0.3}
 

@@ -30,8 +30,8 @@ from bristle.page.app import App
 from bristle.page.commands import order_of
 from bristle.page.consent import consent, waiting_texts
 from bristle.page.message import RequestError
-from bristle.page.packing import pack, unpack
 from bristle.study import Study, create_study
+from bristle.view.page_data import pack, unpack
 
 
 @pytest.fixture(scope="module", autouse=True)

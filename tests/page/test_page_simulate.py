@@ -20,10 +20,10 @@ from bristle.native import zig
 from bristle.page import answers, module_view, scenarios_view, simulate_view
 from bristle.page.asked import LONGEST, asked_for, damper_of
 from bristle.page.controls import controls, stock_file
-from bristle.page.packing import unpack
 from bristle.scenario.scenario import load_scenario, parse_overrides, stock_scenarios
 from bristle.simulate.spectra import spectra
 from bristle.study import Study, create_study
+from bristle.view.page_data import unpack
 
 BENCH = "bench_sine_bingham"
 PASSIVE = "el_centro_lugre_passive"

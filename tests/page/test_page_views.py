@@ -24,12 +24,12 @@ from bristle.page import (
     residual_view,
     verdict_view,
 )
-from bristle.page.packing import pack, unpack
 from bristle.page.worker import VIEWS, answer, function_of
 from bristle.study import Study, create_study
 from bristle.study.before_after import before_after, predictions
 from bristle.study.comparison import compare_study
 from bristle.study.data_check import check_data
+from bristle.view.page_data import pack, unpack
 
 
 @pytest.fixture(scope="module")

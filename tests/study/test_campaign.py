@@ -87,9 +87,9 @@ def test_compare_says_on_which_runs_the_error_is(lab, tmp_path) -> None:
     worst = max((one for one in comparison.labels if one.name == "current"), key=lambda one: one.z)
     assert (worst.value, worst.text) == (1.0, "1 A")
     assert comparison.as_dict()["labels"][0].keys() == {"label", "value", "z", "runs"}
-    from bristle.compare.tables import run_table
+    from bristle.compare.view import run_table
 
-    header, rows = run_table(comparison)[1:]
+    header, rows = run_table(comparison)[:2]
     assert set(header[-3:]) == {"amplitude", "frequency", "current"}
     assert rows[0][-1].endswith(" A")
     # A model of data in ampere names no volt.
@@ -385,12 +385,15 @@ ABOUT_FIELD = ("coil_lag", "saturation", "remanence")
 
 def test_a_verdict_speaks_of_its_own_command() -> None:
     from bristle.diagnose.verdict_text import about, drive_of
-    from bristle.report.study_verdict import untestable_rows
+    from bristle.diagnose.view import verdict_view
+    from bristle.view.blocks import Table
 
-    verdict = {"noise_floor": {"force": 1.0, "current": 0.0}, "untestable": ["coil_lag"]}
+    floor = {"force": 1.0, "current": 0.0}
+    verdict = {"kind": "none", "noise_floor": floor, "untestable": ["coil_lag"]}
     assert drive_of(verdict) == DRIVES["current"]
     assert drive_of({}) == VOLTAGE
-    told = " ".join(untestable_rows(verdict)[0]) + about("remanence", DRIVES["current"])
+    (table,) = verdict_view(verdict).every(Table)
+    told = " ".join(table.rows[0]) + about("remanence", DRIVES["current"])
     assert "current" in told
     assert "volt" not in told
 

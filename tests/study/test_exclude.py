@@ -8,7 +8,6 @@ from made import write_runs
 from bristle.cli import main
 from bristle.errors import StudyError
 from bristle.report.study_tables import data_table
-from bristle.study.notebook import study_html
 from bristle.study.study import Study
 
 
@@ -37,7 +36,7 @@ def test_an_excluded_run_is_read_by_nothing_and_said_to_be_left_out(folder, caps
     rows = data_table(study, study.read())[1]
     assert rows[-1][:2] == ["run_3", "left out"]
     assert len(rows) == 4
-    assert "data/run_3.csv" in study_html(study)
+    assert "data/run_3.csv" in study._repr_html_()
 
 
 def test_corrections_reach_their_run_behind_one_that_is_left_out(folder):

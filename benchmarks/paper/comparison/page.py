@@ -8,8 +8,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bristle.draw import html
 from bristle.version import __version__
+from bristle.view import html
 
 from .claims import Statement
 from .experiment import KAPPA, LAWS

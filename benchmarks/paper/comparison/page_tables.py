@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bristle.draw import html
+from bristle.view import html
 
 from .experiment import BEYOND, CONTROLLERS, NONE, Comparison
 from .tables import MARK, TABLES, columns, shown, stroke_lines, stroke_text

@@ -67,7 +67,7 @@ export const post = async (path, content) =>
 /** @param {string} path @param {File} file @returns {Promise<any>} */
 export const put = async (path, file) => (await ask("PUT", path, file)).json();
 
-/** Returns an answer with arrays as Float32Array: see packing.py. */
+/** Returns an answer with arrays as Float32Array: see page_data.py. */
 export const packed = async (path) => unpack(await (await ask("GET", path)).arrayBuffer());
 
 /** @param {string} path @param {object} content @returns {Promise<any>} */

@@ -69,7 +69,8 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
         "bristle.study.learning.diagnose_rig", lambda *_given, **_named: verdict_of_none
     )
     folder = str(rig)
-    printed = run(["identify", folder, "--no-table", "--starts", "1"], capsys)
+    order = ["identify", folder, "--no-table", "--starts", "1", "--details"]
+    printed = run(order, capsys)
     identified = json.loads((rig / "reports" / "identify.json").read_text())
     told = identified["error"]["holdout"]
     error = ForceError.of(told)
@@ -93,11 +94,11 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
     assert error.counted() in printed
     assert "3 missing" in error.counted()
 
-    compared = run(["compare", folder], capsys)
+    compared = " ".join(run(["compare", folder], capsys).split())
     assert f"misses the force by {text}, " in compared
     assert error.counted() in compared
     assert json.loads(run(["compare", folder, "--json"], capsys))["total"]["error"] == told
-    diagnosed = run(["diagnose", folder, "--law", "bingham"], capsys)
+    diagnosed = " ".join(run(["diagnose", folder, "--law", "bingham"], capsys).split())
     assert f"The study's model errs by {text} on the held-out runs." in diagnosed
     verdict = json.loads((rig / "verdict.json").read_text())
     assert verdict["error"]["holdout"] == told
@@ -138,6 +139,8 @@ def test_a_first_fit_shows_no_start_as_progress(rig: Path, capsys):
 
 
 def test_the_low_passed_error_has_a_name_of_its_own(rig: Path, capsys):
-    printed = run(["identify", str(rig), "--no-table", "--starts", "1", "--dry-run"], capsys)
+    printed = run(
+        ["identify", str(rig), "--no-table", "--starts", "1", "--dry-run", "--details"], capsys
+    )
     assert "below 18 Hz, held-out runs" in printed
     assert "error of the force: RMS, share" in printed

@@ -1,7 +1,7 @@
 // View 4, What is missing: verdict, evidence, limits of each effect, the next tests.
 
 import { packed } from "../api.mjs";
-import { bars, empty, h, key, number, shown, table, wrong, z } from "../dom.mjs";
+import { bars, blocks, empty, h, key, number, shown, wrong, z } from "../dom.mjs";
 import { Plot, extent } from "../plot.mjs";
 import { beforeAfter } from "../residual.mjs";
 
@@ -34,14 +34,8 @@ function residuals(page) {
 }
 
 function badge(verdict) {
-  const [first, ...rest] = verdict.sentences;
   return h("section", { class: `verdict ${verdict.kind}`, "aria-label": "Verdict" },
-    h("div", { class: "kind" }, verdict.heading),
-    h("p", { class: "say" }, first),
-    Object.values(verdict.about).map((text) => h("p", {}, text)),
-    rest.map((text) => h("p", {}, text)),
-    verdict.alternatives.length ? h("p", {}, "It could also be: ", verdict.alternatives.join(", "), ".") : null,
-    verdict.notes.map((text) => h("p", { class: "soft small" }, text)));
+    h("div", { class: "kind" }, verdict.title), blocks(verdict.answer));
 }
 
 function orders(page, verdict) {
@@ -143,31 +137,16 @@ function surface(one) {
 
 function evidence(verdict) {
   const rows = verdict.ranking.filter((row) => Number.isFinite(row.z_holdout));
-  const before = verdict.before ?? Math.max(...verdict.sites.map((one) => one.before ?? 0), ...rows.map((row) => row.z_holdout), 1);
+  const before = verdict.before ?? Math.max(...rows.map((row) => row.z_holdout), 1);
   const log = (value) => Math.log10(Math.max(value, 1) * 1.02);
-  const parts = [];
-  if (rows.length) {
-    parts.push(h("h2", {}, "The evidence"),
-      h("p", {}, "Error / noise (z) on held-out runs with each effect in the model, all parameters fitted again. Without any: ",
-        h("strong", {}, z(before)), "."),
-      bars("z with each effect", rows.slice(0, 20).map((row) => ({
-        name: row.site && row.site !== "damper" ? `${row.effect} (${row.site})` : row.effect, value: log(row.z_holdout),
-        strong: verdict.effects.includes(row.effect), good: row.z_holdout <= 1.1 && row.gain > 0.02,
-        text: z(row.z_holdout), title: row.refined ? "searched at length" : "short search: it gains too little",
-      })), { edge: log(before), most: log(Math.max(before, 2)) }),
-      h("p", { class: "soft small" }, "Logarithmic, from z = 1 on the left. Green line: the model as it is. Green bar: down to the noise floor. Blue bar: named by the verdict, above the noise floor."));
-  }
-  if (verdict.laws.length) parts.push(table("The laws", verdict.laws_header, verdict.laws, [2, 3, 4, 5, 6, 7]));
-  if (verdict.limits.length) {
-    const most = Math.max(...verdict.limit_shares.filter((one) => one !== null), 0) * 100;
-    parts.push(h("h2", {}, "How large each effect may still be"),
-      most ? bars("share of the force that each effect may still have", verdict.limits.map((row, k) => [row, verdict.limit_shares[k]])
-        .filter(([, share]) => share !== null).map(([row, share]) => ({ name: row[0], value: 100 * share, text: row[2] })), { most }) : null,
-      table("Limits at 95 %", ["effect", "still possible (95 %)", "of the force", "to be named from, about"], verdict.limits, []),
-      verdict.limits_notes.map((text) => h("p", { class: "soft small" }, text)));
-  }
-  if (verdict.untestable.length) parts.push(h("h2", {}, "Not testable with these runs"), h("p", {}, verdict.untestable.join(", "), "."));
-  return parts;
+  return [h("h2", {}, "The evidence"),
+    rows.length ? bars("z with each effect", rows.slice(0, 20).map((row) => ({
+      name: row.site && row.site !== "damper" ? `${row.effect} (${row.site})` : row.effect, value: log(row.z_holdout),
+      strong: verdict.effects.includes(row.effect), good: row.z_holdout <= 1.1 && row.gain > 0.02,
+      text: z(row.z_holdout), title: row.refined ? "searched at length" : "short search: it gains too little",
+    })), { edge: log(before), most: log(Math.max(before, 2)) }) : null,
+    rows.length ? h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic, from z = 1 on the left. Green line: the model as it is. Green bar: down to the noise floor. Blue bar: named by the verdict, above the noise floor.") : null,
+    blocks(verdict.details)];
 }
 
 const LIMITS = [
@@ -190,7 +169,6 @@ function plans(page, found, verdict) {
   page.onJobs(() => (go.disabled = Boolean(page.working()) || !verdict));
   return [
     h("h2", {}, "The next tests"),
-    verdict?.separating ? h("p", {}, verdict.separating) : null,
     h("p", { class: "soft" }, "Motions and commands that decide what is still open, within the limits of your rig. Without limits, the range of the past runs is used."),
     form,
     found.plans.toReversed().map((plan) => plan.error ? wrong(plan.name, plan.error) : drawn(page, plan)),

@@ -1,4 +1,4 @@
-"""Answers with many numbers: JSON in front, the arrays behind it as 32-bit floats.
+"""Blocks for the local page, and answers with many numbers: JSON, then arrays as 32-bit floats.
 
     bytes 0 to 3      length of the JSON in bytes, little-endian
     JSON              padded with spaces to a multiple of four
@@ -13,11 +13,25 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from .blocks import Block, Table, Text
+
 ALIGN = 4
+
+
+def page_data(shown: Iterable[Block]) -> list[dict[str, Any]]:
+    """Return the words and tables of blocks as JSON has them; the page draws its own figures."""
+    out: list[dict[str, Any]] = []
+    for block in shown:
+        if isinstance(block, Table):
+            out.append({**block._asdict(), "numbers": list(block.numbers)})
+        elif isinstance(block, Text) and block.text:
+            out.append(block._asdict())
+    return out
 
 
 def pack(content: Any) -> bytes:

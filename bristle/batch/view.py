@@ -1,4 +1,4 @@
-"""The figure of an ensemble: how each output is spread, and which of the varied names moves it."""
+"""Ensembles and best constant voltages as blocks: how outputs are spread, what is least where."""
 
 from __future__ import annotations
 
@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, Page, look
+from ..data.open_effects import widest
+from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, Page, label, look, ramp
+from ..findings import command
+from ..quantity import percent, plain
+from ..view.blocks import Block, Figure, Next, Table, Text, View, view_of
+from .execute import Ensemble
+from .passive import Passive
+from .quantiles import VARIES
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from .execute import Ensemble
     from .plan import Output
 
 MOST_OUTPUTS = 6
@@ -22,6 +28,77 @@ _HEIGHT = 1.75
 """Of one output's row [in]."""
 _SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
 _DPI = 160
+
+
+@view_of(Ensemble)
+def ensemble_view(found: Ensemble) -> View:
+    """Return the view of an ensemble: its quantiles, what widens them, and what failed."""
+    done = int((found.runs["status"] == "done").sum())
+    before = f", {found.continued} of them from before" if found.continued else ""
+    columns = [str(name) for name in found.quantiles.columns if name != "unit"]
+    rows = [
+        [
+            str(name), *(f"{row[one]:.5g}" for one in columns),
+            "" if row["unit"] == "1" else str(row["unit"]),
+        ]
+        for name, row in found.quantiles.iterrows()
+    ]  # fmt: skip
+    title = f"{found.plan.title}: {done} runs done, {len(found.runs) - done} failed"
+    failures = (
+        f"failed {one.count} times, first in run {one.run}: {one.reason}" for one in found.failures
+    )
+    figure = (Figure(lambda: draw_ensemble(found), found.plan.title),) if done > 1 else ()
+    return View(
+        title,
+        (
+            Table(("output", *columns, "unit"), rows, range(1, len(columns) + 1)),
+            *_limits(found),
+            Text(f"{len(found.runs)} runs{before} in {found.wall_time:.1f} s"),
+            *(Text(note, "note") for note in (*found.notes, *failures)),
+        ),
+        figure,
+    )  # fmt: skip
+
+
+def _limits(found: Ensemble) -> list[Block]:
+    """Return what of each output's variance is from effects that are left open; none without."""
+    plan, parts = found.plan, found.parts
+    if plan.identified is None or not parts:
+        return []
+    rows = [
+        [output, ", ".join(f"{name} {percent(part, 0)}" for name, part in [*own.items()][:3])]
+        for output, own in parts.items()
+    ]
+    table = Table(("output", "of its variance"), rows)
+    most, _ = widest([*parts.values()], (VARIES,))
+    if not most:
+        return [table, Text("No effect that the runs do not exclude widens them by much.")]
+    name = most.partition(" ")[0]
+    see = command("plan", plan.identified.folder, "--see", name)
+    told = f"{name} widens them most, which the runs do not exclude."
+    return [table, Text(told), Next(see, "plans a test that shows it")]
+
+
+@view_of(Passive)
+def passive_view(found: Passive) -> View:
+    """Return the view of best constant voltages: of each ground motion, and of all of them."""
+    at = [round(k) for k in (0, (len(found.grid) - 1) / 2, len(found.grid) - 1)]
+    best = [
+        [motion.name, f"{one.voltage:.2f}", plain(one.value, 4), *(plain(row[k], 4) for k in at)]
+        for motion, one, row in zip(found.motions, found.best, found.values, strict=True)
+    ]
+    header = ("ground motion", "best [V]", "value", *(f"{found.grid[k]:g} V" for k in at))
+    rows = [[text, f"{voltage:.2f}", said] for text, voltage, said in found.for_all()]
+    title = f"Best constant voltages: least {found.what} [{found.unit}]"
+    return View(
+        title,
+        (
+            Table(header, best, range(1, len(header))),
+            Table(("for all of them", "voltage [V]", ""), rows, (1,)),
+            Text(f"{found.runs} runs"), *(Text(note, "note") for note in found.notes),
+        ),
+        (Figure(lambda: draw_passive(found), title),),
+    )  # fmt: skip
 
 
 def ensemble_figure(found: Ensemble, path: str | Path) -> None:
@@ -139,3 +216,49 @@ def _title(output: Output) -> str:
     component, _, port = output.column.rpartition(".")
     statistic = {"rms": "RMS"}.get(output.statistic, output.statistic)
     return f"{statistic} of {port.replace('_', ' ')} ({component})"
+
+
+def passive_figure(found: Passive, path: str | Path) -> None:
+    """Draw the judged output over the voltage, the least of each motion marked, into a file.
+
+    Raises
+    ------
+    RunError
+        If the file cannot be written or its ending is no format.
+    """
+    draw_passive(found).save(Path(path), dpi=_DPI)
+
+
+def draw_passive(found: Passive) -> Page:
+    """Return the figure, drawn and not yet written."""
+    with look():
+        return _passive_page(found)
+
+
+def _passive_page(found: Passive) -> Page:
+    fair = found.goals["regret"]
+    what = found.what
+    title = f"Best constant voltage for {len(found.motions)} ground motions: {fair.voltage:.2g} V"
+    subtitle = (
+        f"{what} over the voltage. Ring: least for the motion. Dashed: the "
+        f"voltage that is at most {100 * (fair.value - 1):.0f} % above the least for any of them."
+    )
+    page = Page(7.6, 4.7, title, subtitle)
+    axes = page.figure.add_subplot(page.grid(1, 1, left=0.5, right=1.9)[0, 0])
+    axes.axvline(fair.voltage, color=PALE, linestyle=(0, (4, 3)), linewidth=1.2)
+    colours = ramp(len(found.motions))
+    for motion, values, best, colour in zip(
+        found.motions, found.values, found.best, colours, strict=True
+    ):
+        axes.plot(found.grid, values, color=colour, linewidth=1.6)
+        axes.plot(
+            best.voltage, best.value, "o", markersize=8, markerfacecolor="white",
+            markeredgecolor=INK,
+        )  # fmt: skip
+        label(axes, f"{best.value:.3g}", best.voltage, best.value, INK, xytext=(0, 8), ha="center")
+        end, last = float(found.grid[-1]), float(values[-1])
+        label(axes, motion.name, end, last, colour, xytext=(8, 0), va="center")
+    axes.set_title(f"{what} [{found.unit}]")
+    axes.set_xlabel("voltage [V]")
+    axes.set_ylim(0.0, 1.06 * float(found.values.max()))
+    return page

@@ -1,4 +1,4 @@
-"""A design in the frequency domain: loops, weights and the bound that gamma sets."""
+"""A design as blocks: its numbers, and loops, weights and the bound that gamma sets."""
 
 from __future__ import annotations
 
@@ -9,20 +9,77 @@ import numpy as np
 
 from ..draw.style import BLUE, GREY, INK, Page, look, ramp, zero_lines
 from ..quantity import tick
-from .margins import grid_rows
+from ..view.blocks import Figure, Table, Text, View, view_of
+from .margins import facts_of, grid_rows
 from .responses import omega_of, responses
+from .result import DesignResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .result import DesignResult
-
+_SHOWN = {
+    "gamma": "gamma",
+    "least_gamma": "least gamma of any controller",
+    "norm": "closed-loop norm, recomputed",
+    "largest_norm": "largest closed-loop norm, recomputed",
+    "open_loop_norm": "norm without control",
+    "largest_real_part": "largest real part of a pole [1/s]",
+    "fastest_pole": "fastest pole [rad/s]",
+    "sampled_loop_modulus": "largest modulus of a sampled pole",
+}
 _PANELS = (
     ("Weighted loop: largest singular value [1]", "open_loop", "closed_loop", ""),
     ("Floor per ground acceleration [1]", "acceleration_open", "acceleration_closed",
      "acceleration_bound"),
     ("Command per ground [{}.s²/m]", "", "command", "command_bound"),
 )  # fmt: skip
+
+
+@view_of(DesignResult)
+def design_view(result: DesignResult) -> View:
+    """Return the view of a design."""
+    facts, made = result.facts, result.controller
+    size = f"{made.n} states, sampled at {1e3 * made.sample_period:g} ms"
+    speeds = f", a table of {made.rows} speeds" if made.rows > 1 else ""
+    solver = f"; solver: {facts['solver']}" if "solver" in facts else ""
+    rows = [[name, f"{facts[key]:.5g}"] for key, name in _SHOWN.items() if key in facts]
+    poles, said = facts["poles"], list[Text]()
+    if poles and not isinstance(poles[0][0], list):  # else one list per grid speed
+        listed = [f"{a:.4g}" + (f" ± {b:.4g}j" if b else "") for a, b in poles if b >= 0.0]
+        said.append(Text(f"Poles [rad/s]: {', '.join(listed)}."))
+    if result.plants:
+        said.append(Text(f"Margins at the measurement: {_margins(facts_of(result))}."))
+    table = Table(("what", "value"), rows)
+    title = headline(result)
+    figure = Figure(lambda: draw_result(result), title)
+    blocks = (Text(f"{made.kind}: {size}{speeds}{solver}."), table)
+    return View(title, (*blocks, *_by_speed(facts), *said), (figure,))
+
+
+def _by_speed(facts: dict[str, Any]) -> list[Table]:
+    """Return the norms of a table at its speeds, and what is proved between them."""
+    if "norms" not in facts:
+        return []
+    norms = zip(facts["grid"], facts["norms"], facts["open_loop_norms"], strict=True)
+    rows = [[f"{speed:g}", f"{norm:.5g}", f"{free:.5g}"] for speed, norm, free in norms]
+    note = (
+        f"gamma is proved at these speeds. The largest norm between them: "
+        f"{facts['largest_row_norm']:.5g} at {facts['largest_row_norm_at']:g} m/s. LMI between "
+        f"them: holds at {100 * facts['share_proved']:.0f} % of the rows; largest eigenvalue "
+        f"{facts['largest_eigenvalue']:.3g} at {facts['largest_eigenvalue_at']:g} m/s (below 0: "
+        "proved)."
+    )
+    header = ("speed [m/s]", "closed-loop norm, recomputed", "without control")
+    return [Table(header, rows, (0, 1, 2), note=note)]
+
+
+def _margins(found: dict[str, Any]) -> str:
+    up, down, phase = (found[key] for key in ("gain_up", "gain_down", "phase"))
+    texts = [f"distance from -1 {found['modulus']:.3g}"]
+    texts.append(f"gain times {up:.3g}" if up is not None else "any larger gain")
+    texts.append(f"gain times {down:.3g}" if down is not None else "any smaller gain")
+    texts.append(f"phase {phase:.3g} deg" if phase is not None else "any phase")
+    return ", ".join(texts)
 
 
 def draw_design(result: DesignResult, path: Path) -> None:

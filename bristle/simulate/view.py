@@ -1,6 +1,4 @@
-"""The figure of a run: what the structure feels, and what the dampers do about it."""
-
-# Longer than 300 lines: all that can be drawn of one frame is one class.
+"""A run as blocks: peaks and RMS, what its coupling errs by, and the figure."""
 
 from __future__ import annotations
 
@@ -15,13 +13,16 @@ import numpy as np
 
 from ..draw.cycles import largest
 from ..draw.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
+from ..quantity import plain
+from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from .feeds import NOTHING, Feed, feeds_of
-from .summary import by_component, foreign, judged_by, reals
+from .frame import Results
+from .summary import by_component, foreign, judged_by, reals, summarise
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawn
     from matplotlib.gridspec import GridSpec
 
 _TOP = re.compile(r"(?P<component>.*)\.floor(?P<floor>\d+)_acceleration_absolute")
@@ -37,6 +38,63 @@ _DPI = 160
 
 Array = np.ndarray[Any, Any]
 Draw = Callable[["Axes"], None]
+
+
+@view_of(Results)
+def run_view(frame: pd.DataFrame) -> View:
+    """Return the view of a run's results; of a part of them what is told of that part."""
+    made = frame.attrs.get("made", {})
+    title = str(made.get("title") or made.get("file") or "results")
+    state = "" if frame.attrs.get("complete", True) else "; INCOMPLETE"
+    took = f" in {made['wall_time']:.2f} s," if "wall_time" in made else ""
+    found = summarise(frame)
+    rows = [
+        [
+            one.name, plain(one.peak, 5), plain(one.time_of_peak, 4), plain(one.rms, 5),
+            "" if one.unit in (None, "1") else str(one.unit),
+        ]
+        for one in found
+    ]  # fmt: skip
+    first, last = float(frame.index[0]), float(frame.index[-1])
+    more = len(frame.columns) - len(rows)
+    said = f"{len(frame)} rows{took} from {first:g} to {last:g} s{state}."
+    if more > 0:
+        said += f" {more} more columns."
+    energy = made.get("energy_residual", {}) if "coupling_error" not in frame.attrs else {}
+    energies = (
+        f"Energy made by the coupling: {100 * share:.2g} % of that through {name}."
+        for name, share in energy.items()
+    )
+    return View(
+        title,
+        (
+            Table(("output", "peak", "at [s]", "RMS", "unit"), rows, (1, 2, 3)),
+            *_coupling_error(frame), *map(Text, energies), Text(said),
+        ),
+        (Figure(lambda: draw_run(frame), title),),
+    )  # fmt: skip
+
+
+def _coupling_error(frame: pd.DataFrame) -> list[Block]:
+    """Return the coupling error, where it was estimated."""
+    found = frame.attrs.get("coupling_error")
+    if found is None:
+        return []
+    step, by = 1e3 * frame.attrs["made"]["step"], frame.attrs["coupling_error_by"]
+    heading = f"Coupling error at {step:g} ms, by {by}, in %"
+    shown = [n for n in judged_by(frame) if found[n]["along"] > 0.0 or not found[n]["worth"]]
+    if not shown:
+        return [Text(f"{heading}: none, for nothing here depends on the step.")]
+    rows = []
+    for name in shown:
+        error = found[name]
+        keys = ("along", "peak", "rms")
+        # Runs that agree on the wrong side of a switch show no error, and have one.
+        shares = [plain(100.0 * error[key], 2) if error["along"] > 0.0 else "?" for key in keys]
+        rows.append([name, *shares, f"{error['order']:.1f}" + ", no use" * (not error["worth"])])
+    note = "The other outputs do not depend on the step."
+    header = ("output", "along run", "of peak", "of RMS", "order")
+    return [Table(header, rows, range(1, 5), heading, note=note)]
 
 
 def run_figure(frame: pd.DataFrame, path: str | Path, *, title: str = "") -> None:
@@ -88,7 +146,7 @@ def draw_run(frame: pd.DataFrame, title: str = "") -> Page:
     return page
 
 
-def _draw_histories(figure: Figure, grid: GridSpec, histories: list[Draw]) -> None:
+def _draw_histories(figure: Drawn, grid: GridSpec, histories: list[Draw]) -> None:
     shared: Axes | None = None
     for row, draw in enumerate(histories):
         shared = figure.add_subplot(grid[row, 0], sharex=shared)

@@ -1,4 +1,4 @@
-"""Pieces of an HTML page that needs nothing else: no network, no script, images inside."""
+"""Blocks as HTML, and pages that need nothing else: no network, no script, images inside."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from .mathml import formula_html as formula
+from ..draw.mathml import formula_html as formula
+from .blocks import Block, Figure, Formula, Table, Text, View
 
 __all__ = [
     "CSS",
+    "answer",
+    "blocks",
     "escape",
     "figure",
     "formula",
     "fragment",
     "items",
+    "notebook",
     "page",
     "paragraphs",
     "section",
@@ -44,6 +48,58 @@ def fragment(title: str, *parts: str) -> str:
         f'<div class="bristle">\n<style>{_NOTEBOOK}</style>\n'
         f"<p><strong>{escape(title)}</strong></p>\n{inner}\n</div>"
     )
+
+
+def notebook(view: View) -> str:
+    """Return what a notebook shows of a result: the whole of its view."""
+    from ..draw.figure import DPI
+
+    return fragment(view.title, blocks((*view.blocks, *view.details), dpi=DPI))
+
+
+def answer(view: View) -> str:
+    """Return the title and the answer of a view: its words in a frame, the rest below it."""
+    words = [one for one in view.blocks if isinstance(one, Text) and one.kind != "note"]
+    return "\n".join(
+        [
+            f'<div class="verdict" style="--tone: var(--{view.tone or "soft"})">',
+            f'<div class="kind">{escape(view.title)}</div>',
+            blocks(words),
+            "</div>",
+            blocks(one for one in view.blocks if one not in words),
+        ]
+    )
+
+
+def blocks(shown: Iterable[Block], dpi: int = 160) -> str:
+    """Return blocks as HTML, notes that follow each other as one list; a page has its own links.
+
+    Figures are drawn here, with `dpi` dots per inch.
+    """
+    parts, notes = [], list[str]()
+    for block in shown:
+        if isinstance(block, Text) and block.kind == "note":
+            notes.append(block.text)
+            continue
+        parts += [items(notes), _block(block, dpi)]
+        notes = []
+    return "\n".join(part for part in [*parts, items(notes)] if part)
+
+
+def _block(block: Block, dpi: int) -> str:
+    if isinstance(block, Text):
+        return paragraphs(block.text, kind=block.kind)
+    if isinstance(block, Formula):
+        return formula(block.exact or block.text)
+    if isinstance(block, Table):
+        head = f"<h3>{escape(block.title)}</h3>\n" if block.title else ""
+        cells = table(block.header, block.rows, block.numbers, block.strong)
+        return head + cells + paragraphs(block.note, kind="soft")
+    if isinstance(block, Figure):
+        from ..draw.style import png
+
+        return figure(png(block.draw(), dpi), block.alt, block.caption)
+    return ""
 
 
 def page(title: str, body: Iterable[str], foot: str) -> str:
