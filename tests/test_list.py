@@ -83,7 +83,7 @@ def test_effects_have_site_and_meaning(capsys):
     rows = {row["name"]: row for row in json.loads(answer(capsys, "effects", "--json"))}
     assert set(rows) == set(EFFECTS)
     assert rows["gas_spring"]["site"] == "damper"
-    assert rows["gas_spring"]["description"].startswith("Gas spring")
+    assert rows["gas_spring"]["about"].startswith("Gas spring")
 
 
 def test_a_terminal_gets_a_table(capsys, monkeypatch):

@@ -41,7 +41,7 @@ def study_of(folder: Path, hard: float, capsys: pytest.CaptureFixture[str]) -> P
     write_runs(folder, hard)
     study = folder / "rig"
     assert main(["study", "new", str(study), "--data", str(folder / "*.csv"), "--law", "tanh"]) == 0
-    assert main(["identify", str(study), "--no-table"]) == 0
+    assert main(["identify", str(study), "--no-table", "--details"]) == 0
     assert "z, held-out runs" in capsys.readouterr().out
     return study
 
@@ -57,12 +57,12 @@ def numbers_of_z(value: Any, key: str = "") -> list[Any]:
 
 def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study = study_of(tmp_path, 0.0, capsys)
-    assert main(["identify", str(study), "--no-table", "--dry-run"]) == 0
+    assert main(["identify", str(study), "--no-table", "--dry-run", "--details"]) == 0
     told = capsys.readouterr().out
     rows = [line for line in told.splitlines() if line.startswith("  z, ")]
     assert len(rows) == 2
     assert all(row.count("not known") == 2 for row in rows)
-    assert "the noise cannot be told from the force" in told
+    assert "it cannot be told from the force" in told
     assert "times the noise" not in told
     assert main(["identify", str(study), "--no-table", "--dry-run", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
