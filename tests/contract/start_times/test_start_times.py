@@ -222,3 +222,14 @@ def test_a_time_without_a_unit_that_is_an_instant(tmp_path, capsys, scale, zero,
     assert f"its values are {text}: " in capsys.readouterr().out
     (run,) = Study(study).read()
     assert run.step == pytest.approx(0.002, rel=1e-3)
+
+
+def test_a_step_that_nobody_set_is_doubted(tmp_path: Path) -> None:
+    unset = [channel("displacement", path, "mm", step=1.0, size=300),
+             channel("force", force, "N", step=1.0, size=300)]  # fmt: skip
+    table = read_table(tdms(tmp_path / "run.tdms", *unset))
+    assert "wf_increment = 1 s, which may be the step that nobody set" in table.remarks[0]
+    rows = "".join(f"\t{path(0.002 * k):.4f}\t{force(0.002 * k):.4f}\n" for k in range(300))
+    head = HEADER.format(columns="No", clock="09:10:11.0", start=0, step=1)
+    (tmp_path / "run.lvm").write_text(head.replace("Delta_X\t0.002", "Delta_X\t1") + rows)
+    assert "Delta_X = 1 s, which" in read_table(tmp_path / "run.lvm").remarks[0]
