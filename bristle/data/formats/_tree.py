@@ -336,8 +336,9 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     fields : its content
     """
     before = key + "." if key and not isinstance(fields, Bare) else ""
-    paths = {one: before + one for one in fields}
-    long = {one: f"{key}.{one}" if key else one for one in fields}
+    names = {one: str(_get(_header(fields, one), _NAMES) or one) for one in fields}
+    paths = {one: before + name for one, name in names.items()}
+    long = {one: f"{key}.{name}" if key else name for one, name in names.items()}
     vectors = {one: array for one, node in fields.items() if (array := _vector(node)) is not None}
     for one, node in fields.items():
         if isinstance(node, Leaf) and node.array.size == 1 and node.array.dtype.kind in "fiu":
@@ -349,7 +350,7 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
             )
     own: dict[int, dict[str, AnyArray]] = {}
     for one, array in vectors.items():
-        if _is_time_name(one) and len(array) not in own and _rises(array):
+        if _is_time_name(names[one]) and len(array) not in own and _rises(array):
             own[len(array)] = {}
             found.clocks.append((found.free(paths[one], long[one]), array, own[len(array)]))
             _note_unit(found, found.clocks[-1][0], _unit_beside(fields, one))
@@ -620,11 +621,18 @@ def _short(key: str) -> str:
     return key.rpartition(".")[2].lower()
 
 
+def _header(fields: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Return what stands beside Channel_1_Data as Channel_1_Header, as catman writes it."""
+    found = fields.get(f"{key.removesuffix('_Data')}_Header")
+    return found if isinstance(found, dict) else {}
+
+
 def _unit_beside(fields: Mapping[str, Any], key: str) -> str:
     """Return a vector's unit: its own, one in a structure of units, or a text named after it."""
     every = [one for name, one in fields.items() if _TELLS_UNITS.search(name)]
     texts = [
         getattr(fields[key], "unit", ""),
+        _unit_of(_header(fields, key)),
         *(one.get(key) for one in every if isinstance(one, dict)),
         *(fields.get(f"{key}{ending}") for ending in ("_unit", "_units", "Unit")),
     ]
