@@ -233,3 +233,12 @@ def test_a_step_that_nobody_set_is_doubted(tmp_path: Path) -> None:
     head = HEADER.format(columns="No", clock="09:10:11.0", start=0, step=1)
     (tmp_path / "run.lvm").write_text(head.replace("Delta_X\t0.002", "Delta_X\t1") + rows)
     assert "Delta_X = 1 s, which" in read_table(tmp_path / "run.lvm").remarks[0]
+
+
+def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(tmp_path, capsys) -> None:
+    t = np.arange(300)
+    rows = (f"{k // 60:02}:{k % 60:02},{path(0.01 * k):.4f},{force(0.01 * k):.3f}" for k in t)
+    file = tmp_path / "run.csv"
+    file.write_text("\n".join(["Time,x [mm],F [N]", *rows, ""]))
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 2
+    assert 'Time (line 2: "00:00" is no number)' in capsys.readouterr().err
