@@ -107,6 +107,12 @@ def test_names_alone_settle_what_counts_and_what_is_a_level(tmp_path, names, val
     assert [read[name][1] for name in names] == pytest.approx(values)
 
 
+def test_a_power_of_ten_is_no_level_of_its_own(tmp_path) -> None:
+    data = made(tmp_path / "lab", {"5E-1A_1Hz": (1.0, 0.5), "1E0A_2Hz": (2.0, 1.0)})
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert runs(tmp_path / "rig") == {"5E-1A_1Hz": (1.0, None), "1E0A_2Hz": (2.0, None)}
+
+
 def test_two_names_of_one_level_that_may_be_two_are_not_taken(tmp_path, capsys) -> None:
     data = made(tmp_path / "lab", {"run_0_5A": (1.0, 0.5), "run_1_5A": (2.0, 1.5)})
     assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
