@@ -30,6 +30,8 @@ AnyArray: TypeAlias = NDArray[Any]
 _STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step")
 _RATES = ("fs", "rate", "samplerate", "sample_rate", "sampling_rate", "fsample", "f_s")
 _STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
+TELL_TIME = frozenset((*_STEPS, *_RATES, *_STARTS))
+"""Names, in small letters, of numbers beside a channel that tell its time."""
 _TIMES = ("t", "time", "tout", "zeit")
 _NAMES = ("name", "label", "signalname", "channelname")
 _VALUES = ("data", "values", "value", "samples", "signal", "y")
@@ -40,10 +42,11 @@ _TELLS_UNITS = re.compile(r"unit|einheit", re.IGNORECASE)
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """Numbers of any shape, with their unit where the file states it."""
+    """Numbers of any shape, with their unit and, of `TELL_TIME`, what the file states of them."""
 
     array: AnyArray
     unit: str = ""
+    about: Mapping[str, float] = field(default_factory=dict)
 
 
 class Bare(dict[str, Any]):
@@ -343,6 +346,8 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     for one, node in fields.items():
         if isinstance(node, Leaf) and node.array.size == 1 and node.array.dtype.kind in "fiu":
             found.scalars[long[one]] = float(node.array.ravel()[0])
+        elif isinstance(node, Leaf):
+            found.scalars |= {f"{long[one]}.{name}": v for name, v in node.about.items()}
         elif isinstance(node, Unread):
             found.remarks.append(
                 f"{long[one]} is a {node.what} object of MATLAB, which is not read: save its "

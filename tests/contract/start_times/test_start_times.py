@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from nptdms import ChannelObject, GroupObject, TdmsWriter
@@ -242,3 +243,22 @@ def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(tmp_path, capsy
     file.write_text("\n".join(["Time,x [mm],F [N]", *rows, ""]))
     assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 2
     assert 'Time (line 2: "00:00" is no number)' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("of_force", "step", "start"),
+    [
+        ({"sample_rate": 500.0}, 0.002, 0.0),
+        ({"sample_rate": 250.0}, 0.004, 0.0),
+        ({"dt": 0.002, "t0": 0.084}, 0.002, 0.084),
+    ],
+)
+def test_attributes_of_hdf5_tell_the_time_of_a_channel(tmp_path, of_force, step, start) -> None:
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["displacement"] = path(0.002 * np.arange(3000))
+        file["displacement"].attrs.update(units="mm", sample_rate=500.0)
+        file["force"] = force(start + step * np.arange(3000))
+        file["force"].attrs.update(units="N", **of_force)
+    run = measured(tmp_path / "run.h5", 5e-2 if step > 0.002 else 1e-6)
+    assert run.step == pytest.approx(0.002)
+    assert run.time[0] == pytest.approx(start)
