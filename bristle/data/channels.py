@@ -156,8 +156,7 @@ _PLACES = {
     "sensed": "temperature temp temperatur temperatura thermocouple thermoelement termopar tc "
     "pt100 pressure druck pression presion pressao torque drehmoment strain dehnung humidity "
     "feuchte accelerometer gauge dms",  # commands nothing, whatever unit its signal has
-    "commanding": "coil damper mr mrf cmd command setpoint soll ref reference desired target drive "
-    "supply",
+    "commanding": "coil damper mr mrf cmd command setpoint soll ref reference desired target drive",
 }
 _GROUND, _BASE, _FLOOR, _DAMPER, _OTHER, _SENSED, _COMMANDING = (
     frozenset(ws.split()) for ws in _PLACES.values()

@@ -38,6 +38,7 @@ _SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s
 _AFTER_UNIT = re.compile(
     rf"(?<![\d.])({SIGN}\d+)({_UNITS_IN_NAMES})(\d+)(?![A-Za-z0-9.,%])"
 )  # 0A5, as resistors are marked
+_NO_POWER = r"(?<!\d[eE])(?<!\d[eE][-+])"  # 5E-1A is half an ampere, and not 1 A: it is not read
 _UNIT = "unit"  # the mark of these
 _DIGITS = {"0", "5", "00", "25", "50", "75"}  # decimals that hardly count repeated runs
 
@@ -91,7 +92,9 @@ def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
     out: dict[str, Token] = {}
     twice = set()
     number = number_in(reading.marks)
-    wanted = re.compile(rf"(?<![\d.])({SIGN}{number})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})")
+    wanted = re.compile(
+        rf"(?<![\d.]){_NO_POWER}({SIGN}{number})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
+    )
     stem = file.stem
     found = [(match.start(), match[1], match[2], match[0]) for match in wanted.finditer(stem)]
     if _UNIT in reading.marks:

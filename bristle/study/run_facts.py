@@ -114,9 +114,7 @@ def facts_of(
     if choices.table is not None:
         rows = rows_of_table(choices.table, files, commanded)
         found = _joined(found, rows)
-        named = {name for row in rows for name in (*row.levels, *row.labels)}
-        if named:
-            notes.append(f"{', '.join(sorted(named))} of each run: from {choices.table}")
+        notes += _of_table(rows, choices.table)
     asked = {name for one in found for name in one.levels}
     if commanded and asked:
         raise StudyError(
@@ -178,6 +176,19 @@ def _told_twice(files: Sequence[Path], tones: Sequence[Tone | None], reading: Re
             "per file, says it"
         ]
     return []
+
+
+def _of_table(rows: Sequence[Facts], table: Path) -> list[str]:
+    """Return the sentence that tells what a table says of the runs, with units that it may lack."""
+    found: dict[str, dict[Label, str]] = {}
+    for row in rows:
+        for name, value in (*row.levels.items(), *row.labels.items()):
+            text = label_text(name, value, PLAIN[name] if name in row.levels else "")
+            found.setdefault(name, {})[value] = text
+    if not found:
+        return []
+    told = "; ".join(f"{name} {listed(found[name].values(), 6)}" for name in sorted(found))
+    return [f"of each run, from {table}: {told}"]
 
 
 def _levels_found(rows: Sequence[Facts], pattern: str) -> str:

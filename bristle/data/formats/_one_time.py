@@ -183,6 +183,12 @@ def _ms(seconds: float) -> str:
     return f"{plain(seconds, 4)} s" if seconds >= 1.0 else f"{plain(1e3 * seconds, 4)} ms"
 
 
+def unset_step(called: str, step: float) -> list[str]:
+    """Return that the step [s] of which a time is made is that of a waveform which nobody set."""
+    doubt = f"the time is made from {called} = 1 s, which may be the step that nobody set; --step S"
+    return [f"{doubt}, the sampling step in s, or the channel of the time says it"] * (step == 1.0)
+
+
 def by_length(
     data: Mapping[str, AnyArray], series: Sequence[Series]
 ) -> tuple[list[Series], dict[str, AnyArray]]:

@@ -30,6 +30,8 @@ AnyArray: TypeAlias = NDArray[Any]
 _STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step")
 _RATES = ("fs", "rate", "samplerate", "sample_rate", "sampling_rate", "fsample", "f_s")
 _STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
+TELL_TIME = frozenset((*_STEPS, *_RATES, *_STARTS))
+"""Names, in small letters, of numbers beside a channel that tell its time."""
 _TIMES = ("t", "time", "tout", "zeit")
 _NAMES = ("name", "label", "signalname", "channelname")
 _VALUES = ("data", "values", "value", "samples", "signal", "y")
@@ -40,10 +42,11 @@ _TELLS_UNITS = re.compile(r"unit|einheit", re.IGNORECASE)
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """Numbers of any shape, with their unit where the file states it."""
+    """Numbers of any shape, with their unit and, of `TELL_TIME`, what the file states of them."""
 
     array: AnyArray
     unit: str = ""
+    about: Mapping[str, float] = field(default_factory=dict)
 
 
 class Bare(dict[str, Any]):
@@ -336,12 +339,15 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     fields : its content
     """
     before = key + "." if key and not isinstance(fields, Bare) else ""
-    paths = {one: before + one for one in fields}
-    long = {one: f"{key}.{one}" if key else one for one in fields}
+    names = {one: str(_get(_header(fields, one), _NAMES) or one) for one in fields}
+    paths = {one: before + name for one, name in names.items()}
+    long = {one: f"{key}.{name}" if key else name for one, name in names.items()}
     vectors = {one: array for one, node in fields.items() if (array := _vector(node)) is not None}
     for one, node in fields.items():
         if isinstance(node, Leaf) and node.array.size == 1 and node.array.dtype.kind in "fiu":
             found.scalars[long[one]] = float(node.array.ravel()[0])
+        elif isinstance(node, Leaf):
+            found.scalars |= {f"{long[one]}.{name}": v for name, v in node.about.items()}
         elif isinstance(node, Unread):
             found.remarks.append(
                 f"{long[one]} is a {node.what} object of MATLAB, which is not read: save its "
@@ -349,7 +355,7 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
             )
     own: dict[int, dict[str, AnyArray]] = {}
     for one, array in vectors.items():
-        if _is_time_name(one) and len(array) not in own and _rises(array):
+        if _is_time_name(names[one]) and len(array) not in own and _rises(array):
             own[len(array)] = {}
             found.clocks.append((found.free(paths[one], long[one]), array, own[len(array)]))
             _note_unit(found, found.clocks[-1][0], _unit_beside(fields, one))
@@ -620,11 +626,18 @@ def _short(key: str) -> str:
     return key.rpartition(".")[2].lower()
 
 
+def _header(fields: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Return what stands beside Channel_1_Data as Channel_1_Header, as catman writes it."""
+    found = fields.get(f"{key.removesuffix('_Data')}_Header")
+    return found if isinstance(found, dict) else {}
+
+
 def _unit_beside(fields: Mapping[str, Any], key: str) -> str:
     """Return a vector's unit: its own, one in a structure of units, or a text named after it."""
     every = [one for name, one in fields.items() if _TELLS_UNITS.search(name)]
     texts = [
         getattr(fields[key], "unit", ""),
+        _unit_of(_header(fields, key)),
         *(one.get(key) for one in every if isinstance(one, dict)),
         *(fields.get(f"{key}{ending}") for ending in ("_unit", "_units", "Unit")),
     ]

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import RecordError
 from ..table import Table
 from ._extra import library
-from ._tree import Bare, Leaf, Node, Unread, table_of
+from ._tree import TELL_TIME, Bare, Leaf, Node, Unread, table_of
 
 _MARK = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT")
@@ -44,8 +44,8 @@ def read(content: bytes, name: str) -> Table:
 
 
 def _group(group: Any, h5py: Any) -> dict[str, Node]:
-    """Return what is below a group; what MATLAB keeps for itself is left."""
-    return {
+    """Return what is below a group, its rate as well; what MATLAB keeps for itself is left."""
+    return {key: Leaf(np.asarray(value)) for key, value in _times(group).items()} | {
         key: node
         for key, item in group.items()
         if not key.startswith("#") and item is not None
@@ -83,8 +83,19 @@ def _node(item: Any, file: Any, h5py: Any) -> Node | None:
         unit = _unit(item)
         return Bare({one: Leaf(np.asarray(rows[one]), unit) for one in item.dtype.names})
     if item.dtype.kind in "fiubc" and "MATLAB_empty" not in item.attrs:
-        return _with_names(Leaf(np.asarray(item[()]), _unit(item)), item)
+        return _with_names(Leaf(np.asarray(item[()]), _unit(item), _times(item)), item)
     return None
+
+
+def _times(item: Any) -> dict[str, float]:
+    """Return the attributes that are numbers and tell a sampling step, a rate or a start."""
+    return {
+        key: float(np.ravel(value)[0])
+        for key, value in item.attrs.items()
+        if key.lower() in TELL_TIME
+        and np.size(value) == 1
+        and np.asarray(value).dtype.kind in "fiu"
+    }
 
 
 def _with_names(leaf: Leaf, item: Any) -> Node:

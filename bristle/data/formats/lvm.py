@@ -11,7 +11,7 @@ from ...errors import RecordError
 from ..table import Table, from_arrays
 from . import delimited
 from ._instants import seconds_of
-from ._one_time import Series, on_one_time
+from ._one_time import Series, on_one_time, unset_step
 
 _BEGINS = b"LabVIEW Measurement"
 
@@ -72,7 +72,9 @@ def read(content: bytes, name: str) -> Table:
     out = ["" if row is None else "\t".join([*row[0], *row[1]]) for row in rows]
     out[at] = "\t".join(["time [s]", *named])
     table = delimited.read("\n".join(out).encode(), name)
-    return replace(table, notes=(*notes, *table.notes))
+    made = not any(line.fields[0].strip() for line in found if line)
+    unset = unset_step("Delta_X", clocks[0].step) if made else []
+    return replace(table, notes=(*notes, *table.notes), remarks=(*unset, *table.remarks))
 
 
 class _Clock(NamedTuple):

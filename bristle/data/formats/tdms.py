@@ -20,9 +20,9 @@ from ..channels import quantity_of_unit
 from ..table import Array, Table, from_arrays
 from ..titles import unit_or_none
 from ._extra import library
-from ._one_time import AnyArray, Series, by_length, on_one_time, overlap
+from ._one_time import AnyArray, Series, by_length, on_one_time, overlap, unset_step
 
-_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
+_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
 _UNSET = np.datetime64("1904-01-02")
 """LabVIEW's zero of time, and a day more for time zones: a start that nobody set."""
 _SHARED = 0.5
@@ -289,6 +289,7 @@ def _table(
         data, units["time"] = {"time": time, **data}, "s"
         if len(series) == 1:
             notes.append(f"the time is made from wf_increment = {step:g} s")
+            remarks = [*unset_step("wf_increment", step), *remarks]
     remarks = [*_another_length(untimed, len(time)), *remarks]
     return from_arrays(data, name, units, tuple(notes), tuple(remarks))
 

@@ -83,7 +83,7 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
 def _by_unit(column: Column, quantity: str, unit: str) -> Candidate:
     """Return what a column can be by its unit alone: volts may be those of any sensor."""
     doubt = ""
-    if quantity in DRIVE and not of_a_drive(column.name):
+    if quantity in ("voltage", "current") and not of_a_drive(column.name):
         doubt = (
             f"its name tells no command, and {unit} may be of a raw signal: `study channels FOLDER "
             f"--without {quantity}` leaves it out"

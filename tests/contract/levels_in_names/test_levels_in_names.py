@@ -107,6 +107,12 @@ def test_names_alone_settle_what_counts_and_what_is_a_level(tmp_path, names, val
     assert [read[name][1] for name in names] == pytest.approx(values)
 
 
+def test_a_power_of_ten_is_no_level_of_its_own(tmp_path) -> None:
+    data = made(tmp_path / "lab", {"5E-1A_1Hz": (1.0, 0.5), "1E0A_2Hz": (2.0, 1.0)})
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert runs(tmp_path / "rig") == {"5E-1A_1Hz": (1.0, None), "1E0A_2Hz": (2.0, None)}
+
+
 def test_two_names_of_one_level_that_may_be_two_are_not_taken(tmp_path, capsys) -> None:
     data = made(tmp_path / "lab", {"run_0_5A": (1.0, 0.5), "run_1_5A": (2.0, 1.5)})
     assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
@@ -161,3 +167,17 @@ def test_a_stroke_in_the_name_and_a_rig_that_reaches_less_are_no_contradiction(t
     data = made(tmp_path / "lab", {"20mm_1Hz_1A": (1.0, 1.0), "20mm_2Hz_2A": (1.9, 2.0)}, 0.009)
     assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
     assert "by its label" not in capsys.readouterr().out
+
+
+def test_what_a_table_of_runs_says_is_told_with_its_units(tmp_path, capsys) -> None:
+    data = made(tmp_path / "lab", {"a": (1.0, 1.0), "b": (2.0, 0.0)})
+    table = tmp_path / "runs.csv"
+    for text, told in (
+        ("file,current,oil\na.csv,1000,new\nb.csv,0,new\n", "current 1000 A, 0 A; oil new"),
+        ("file;current [mA]\na.csv;1,000\nb.csv;0\n", "current 0.001 A, 0 A"),
+    ):
+        table.write_text(text)
+        study = str(tmp_path / f"rig {len(text)}")
+        assert main(["study", "new", study, "--data", data, "--runs", str(table)]) == 0
+        said = capsys.readouterr().out
+        assert f"of each run, from {table}: {told}" in said.replace("Of each", "of each")

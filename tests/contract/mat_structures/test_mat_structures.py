@@ -195,6 +195,9 @@ def test_a_list_of_names_that_does_not_fit_is_said(tmp_path: Path) -> None:
     [
         {"test": {"time": T, "x": X, "F": F, "units": {"time": "s", "x": "mm", "F": "kN"}}},
         {"time": T, "x": X, "F": F, "x_unit": "mm", "F_unit": "kN"},
+        {"Channel_1_Data": T, "Channel_1_Header": {"SignalName": "Time", "Unit": "s"},
+         "Channel_2_Data": X, "Channel_2_Header": {"SignalName": "Weg", "Unit": "mm"},
+         "Channel_3_Data": F, "Channel_3_Header": {"SignalName": "Kraft", "Unit": "kN"}},
         {"x": {"Time": T, "Data": X, "DataInfo": {"Units": "mm"}},
          "F": {"Time": T, "Data": F, "DataInfo": {"Units": "kN"}}},
     ],

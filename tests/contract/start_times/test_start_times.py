@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from nptdms import ChannelObject, GroupObject, TdmsWriter
@@ -222,3 +223,42 @@ def test_a_time_without_a_unit_that_is_an_instant(tmp_path, capsys, scale, zero,
     assert f"its values are {text}: " in capsys.readouterr().out
     (run,) = Study(study).read()
     assert run.step == pytest.approx(0.002, rel=1e-3)
+
+
+def test_a_step_that_nobody_set_is_doubted(tmp_path: Path) -> None:
+    unset = [channel("displacement", path, "mm", step=1.0, size=300),
+             channel("force", force, "N", step=1.0, size=300)]  # fmt: skip
+    table = read_table(tdms(tmp_path / "run.tdms", *unset))
+    assert "wf_increment = 1 s, which may be the step that nobody set" in table.remarks[0]
+    rows = "".join(f"\t{path(0.002 * k):.4f}\t{force(0.002 * k):.4f}\n" for k in range(300))
+    head = HEADER.format(columns="No", clock="09:10:11.0", start=0, step=1)
+    (tmp_path / "run.lvm").write_text(head.replace("Delta_X\t0.002", "Delta_X\t1") + rows)
+    assert "Delta_X = 1 s, which" in read_table(tmp_path / "run.lvm").remarks[0]
+
+
+def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(tmp_path, capsys) -> None:
+    t = np.arange(300)
+    rows = (f"{k // 60:02}:{k % 60:02},{path(0.01 * k):.4f},{force(0.01 * k):.3f}" for k in t)
+    file = tmp_path / "run.csv"
+    file.write_text("\n".join(["Time,x [mm],F [N]", *rows, ""]))
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 2
+    assert 'Time (line 2: "00:00" is no number)' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("of_force", "step", "start"),
+    [
+        ({"sample_rate": 500.0}, 0.002, 0.0),
+        ({"sample_rate": 250.0}, 0.004, 0.0),
+        ({"dt": 0.002, "t0": 0.084}, 0.002, 0.084),
+    ],
+)
+def test_attributes_of_hdf5_tell_the_time_of_a_channel(tmp_path, of_force, step, start) -> None:
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["displacement"] = path(0.002 * np.arange(3000))
+        file["displacement"].attrs.update(units="mm", sample_rate=500.0)
+        file["force"] = force(start + step * np.arange(3000))
+        file["force"].attrs.update(units="N", **of_force)
+    run = measured(tmp_path / "run.h5", 5e-2 if step > 0.002 else 1e-6)
+    assert run.step == pytest.approx(0.002)
+    assert run.time[0] == pytest.approx(start)
