@@ -10,7 +10,7 @@ from shaken import building, friction, measured, shake
 
 from bristle.diagnose import damper as of_damper
 from bristle.diagnose import diagnose_rig, equilibrium, trials
-from bristle.diagnose.candidates import Trial
+from bristle.diagnose.candidates import Trial, judge
 from bristle.diagnose.conclusion import About, conclude, lookalikes
 from bristle.diagnose.decision import Decision
 from bristle.diagnose.faults import SensorFault
@@ -330,6 +330,21 @@ def test_a_stop_that_is_met_once_is_told_by_its_likelihood():
     assert of_damper._rare(before, [trial(("gas_spring",), 0.99, losses=quiet)]) is None
     poor = trial(("end_stop",), 1.25, losses=hit * 0.99)
     assert of_damper._rare(before, [poor]) is None
+
+
+def test_what_dry_friction_holds_at_rest_judges_no_effect():
+    b, runs = runs_of(duffing)
+    found = responses(runs, b)
+    train, held_out = problems_of(found[:2], found[2:], b, "bingham")["damper"]
+    run = held_out.runs[0]
+    rest = np.ones(len(run.whole.force), dtype=bool)
+    rest[run.keep] = False
+    assert rest[run.whole.skip :].any()
+    whole = replace(run.whole, force=run.whole.force + 1e3 * rest)
+    pushed = held_out.of([replace(run, whole=whole)])
+    one, other = (judge(Model("bingham"), train, held) for held in (held_out, pushed))
+    assert other.rms == one.rms
+    assert other.error.rms > 2.0 * one.error.rms, "the error that is told has all samples"
 
 
 def test_only_what_an_instrument_accounts_for_is_excused_by_sensor():
