@@ -49,7 +49,7 @@ def diagnose_laws(
     building : the building that the damper is in, None for a test bench
     named : the present law with its variant, "" where nobody chose one
     profile : whether the model is fitted again at every limit of an effect
-    kept : fits of laws to a bench's runs that are known already, and where those that are made go
+    kept : fits of laws that are known already, and where those that are made go
     say : called with a few words at each stage
     rule : the numbers that decide
 
@@ -61,7 +61,8 @@ def diagnose_laws(
     if building is not None:
         runs = BuildingRuns(train, holdout, present, building, say, free=True)
         if runs.lacking is None:
-            return _in_building(runs, tells_a_bend(train), (named, profile), say, rule)
+            wish = (named, profile)
+            return _in_building(runs, tells_a_bend(train), wish, kept, say, rule)
     lacking = None if building is None else runs.lacking
     data = lacking or bench_data(train, holdout, present, say)
     if isinstance(data, Insufficient):
@@ -80,8 +81,9 @@ def diagnose_laws(
 
 
 def _in_building(
-    runs: BuildingRuns, bends: bool, wish: tuple[str, bool], say: Progress, rule: DecisionRule
-) -> Diagnosis:
+    runs: BuildingRuns, bends: bool, wish: tuple[str, bool], kept: KeptFits | None, say: Progress,
+    rule: DecisionRule,
+) -> Diagnosis:  # fmt: skip
     """Return the law of a building's damper and what it misses, beside what other sites miss.
 
     `wish` is the present law by name, and whether limits are profiled.
@@ -100,7 +102,7 @@ def _in_building(
     runs.correct(findings)
     problem, held_out = runs.damper
     say("trying every law")
-    rows = try_laws(problem, held_out, present, bends=bends)
+    rows = try_laws(problem, held_out, present, bends=bends, kept=kept)
     looks = Looks(runs.opened_with, say)
     sought = _sought(rows, looks, runs.damper, say, rule)
     runs.suppose(sought.chosen.row.trial.model)

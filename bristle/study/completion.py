@@ -129,12 +129,15 @@ def complete(
         stepped(added.step)
 
 
+_ON = "the same command goes on there, a search for effects that was under way begins anew."
+
+
 def _kept(steps: Sequence[Step]) -> str:
     """Return what is kept where this ends now, behind a step or a verdict."""
     if not steps:
-        return "The verdict is kept in verdict.json: the same command goes on there."
+        return f"The verdict is kept in verdict.json: {_ON}"
     made = "1 step was made and is" if len(steps) == 1 else f"{len(steps)} steps were made and are"
-    return f"{made} kept in the study's history: the same command goes on there."
+    return f"{made} kept in the study's history: {_ON}"
 
 
 def _begun_free(

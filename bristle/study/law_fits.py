@@ -45,8 +45,8 @@ class LawFits:
             count = len(self.known)
         keeps(
             f"The fit{'s' * (count > 1)} of {count} law{'s' * (count > 1)} "
-            f"{'are' if count > 1 else 'is'} kept, the effects are not sought yet: the same "
-            "command goes on there."
+            f"{'are' if count > 1 else 'is'} kept, the search for effects is not: the same command "
+            "goes on there."
         )
 
 

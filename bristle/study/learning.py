@@ -73,7 +73,7 @@ def diagnose_study(
     known = runs.train, runs.holdout, as_model(model), building_of(study, model)
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
-            kept = LawFits(study, model) if write and not study.settings.has_building else None
+            kept = LawFits(study, model) if write else None
             found = diagnose_laws(*known, named=model.law, profile=profile, kept=kept, say=say)
         else:
             fitted = is_identified(model)

@@ -63,7 +63,7 @@ def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, mo
     known = json.loads((rig / "reports" / NAME).read_text())["laws"]
     assert len(known) == len(fitted) > 5
     assert told == (
-        f"interrupted. The fits of {len(known)} laws are kept, the effects are not sought yet: the "
+        f"interrupted. The fits of {len(known)} laws are kept, the search for effects is not: the "
         "same command goes on there."
     )
     assert len(Study(rig).steps()) == 1  # no step was made, and none is claimed
@@ -90,6 +90,6 @@ def test_a_step_is_there_when_it_is_told(rig, capsys, monkeypatch):
     told = capsys.readouterr().err.splitlines()[-1]
     assert told == (
         "interrupted. 1 step was made and is kept in the study's history: the same command goes on "
-        "there."
+        "there, a search for effects that was under way begins anew."
     )
     assert [step.what for step in Study(rig).steps()][1:] == ["identify bingham"]
