@@ -329,7 +329,7 @@ def read_text(path: Path, raises: type[BristleError]) -> str:
         raise _error(raises, path, line, words) from None
 
 
-def content(path: Path) -> dict[str, Any]:
+def toml_content(path: Path) -> dict[str, Any]:
     """Return what a TOML file holds, unchecked; {} where it holds nothing that can be read.
 
     For what is looked up on the side: what is wrong with the file is told where it is read.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 import sys
-import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import cache
@@ -14,6 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from .. import units
+from ..core.config import toml_content
 from ..errors import BuildError, StudyError
 from ..physics.forms import split_form
 from ..physics.law import LAWS
@@ -221,8 +221,7 @@ def read_building_data(path: Path) -> dict[str, Any]:
     from ..physics.building import read_building
 
     read_building(path)
-    with path.open("rb") as file:
-        return tomllib.load(file)
+    return toml_content(path)
 
 
 def design_file(component: str, kind: type[Slave], controller: Path) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..core.config import toml_content
 from ..data.channels import (
     ChannelSpec,
     at_device,
@@ -126,10 +126,10 @@ def devices_of(folder: Path, settings: Settings) -> tuple[list[str], list[str]]:
     """Return the levels of a study's building and its devices; none on a bench."""
     if not settings.has_building:
         return [], []
-    model = tomllib.loads((folder / "model.toml").read_text(encoding="utf-8-sig"))
-    if not model.get("building"):
+    building = toml_content(folder / "model.toml").get("building")
+    if not building:
         return paper_building().levels(), []
-    house = read_building(folder / str(model["building"]))
+    house = read_building(folder / str(building))
     return house.levels(), [one.name for one in house.devices]
 
 
