@@ -9,10 +9,11 @@ from typing import Any
 from ..batch.plan import Output
 from ..control.controller import Controller
 from ..core.config import toml_content
+from ..data.building_file import read_building
 from ..errors import DesignError, ScenarioError
 from ..fmu import catalogue
 from ..fmu.controller import MEASURED
-from ..physics.building import PAPER, Building, frequencies, paper_building, read_building
+from ..physics.building import PAPER, Building, frequencies, paper_building
 from ..physics.device import Device, Ports
 from .folder import Folder, Part
 

@@ -218,7 +218,7 @@ def instantiate(
 
 def read_building_data(path: Path) -> dict[str, Any]:
     """Return the checked data of a building file, to be baked into a Structure."""
-    from ..physics.building import read_building
+    from ..data.building_file import read_building
 
     read_building(path)
     return toml_content(path)
@@ -259,7 +259,8 @@ def check_controller(
         Naming both; if the building is wrong.
     """
     from ..control.controller import read_controller
-    from ..physics.building import paper_building, read_building
+    from ..data.building_file import read_building
+    from ..physics.building import paper_building
 
     kind = component_class(source(component))
     if getattr(kind, "design", ""):

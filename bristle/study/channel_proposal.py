@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..core.config import toml_content
+from ..data.building_file import read_building
 from ..data.channels import (
     ChannelSpec,
     at_device,
@@ -19,7 +20,7 @@ from ..data.extra import found_in
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import RecordError, StudyError
-from ..physics.building import paper_building, read_building
+from ..physics.building import paper_building
 from ..units import canonical, same_dimension
 from .channel_file import spec_text
 from .run_file import TEST, RunFile

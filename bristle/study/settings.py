@@ -9,13 +9,13 @@ from hashlib import sha256
 from pathlib import Path
 
 from ..core.config import Document, Key, Spec, toml_content
+from ..data.building_file import read_building
 from ..data.channels import DRIVE, ChannelSpec, at_device
 from ..data.files import write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
 from ..errors import PhysicsError, StudyError
 from ..findings import listed, written
-from ..physics.building import read_building
 from .channel_file import CHANNELS, EXTRA, channel_as_toml, read_channels, read_extra
 from .run_file import (
     EXCLUDE,
