@@ -76,7 +76,7 @@ def test_a_record_is_baked_in(here: Path) -> None:
     ("arguments", "words"),
     [
         (["Structur"], 'no component is named "Structur"'),
-        (["Structure", "--from", "gone.toml"], "gone.toml: cannot be read"),
+        (["Structure", "--from", "gone.toml"], "gone.toml: there is no such file"),
         (["LuGreDamper", "--from", "my.toml"], "a building goes into Structure"),
         (["Structure", "--record", "my.toml"], "a record goes into GroundMotion"),
         (["GroundMotion", "--record", "gone.at2"], "gone.at2"),

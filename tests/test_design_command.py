@@ -151,9 +151,9 @@ def test_a_refusal_has_exit_code_2_one_message_and_no_file(
 def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    from bristle.data.building_file import read_building
     from bristle.data.model import new_model
     from bristle.data.model_text import write_model
-    from bristle.physics.building import read_building
 
     model = new_model("lugre").with_effect("gas_spring")
     found = {"sigma_a": 720.0, "sigma_0": 390.0, "gas_spring.k": 60.0}

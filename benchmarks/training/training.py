@@ -160,7 +160,7 @@ def read_policy_task(path: Path) -> PolicyTask:
     try:
         motions = Training(**found, folder=path.parent)
     except DesignError as error:
-        document.error(("motions", str(error).split()[1]), str(error))
+        document.error_of(("motions",), str(error))
         document.check()
         raise
     data["kind"] = "lqg"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.config import toml_content
+from ..core.toml_write import toml_key, toml_value
 from ..errors import PhysicsError
 from ..physics.building import PAPER, from_data
 from ..scenario.scenario import Component
@@ -29,7 +29,7 @@ def changed(component: Component, values: Mapping[str, object]) -> dict[str, Any
     PhysicsError
         If there is no such number, or the building is none with it.
     """
-    data = copy.deepcopy(_data(component.building))
+    data = copy.deepcopy(toml_content(component.building) if component.building else PAPER)
     for path, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise PhysicsError(f"building {path} = {value!r} must be a number.")
@@ -44,13 +44,6 @@ def changed(component: Component, values: Mapping[str, object]) -> dict[str, Any
     return data
 
 
-def _data(path: Path | None) -> dict[str, Any]:
-    if path is None:
-        return PAPER
-    with path.open("rb") as file:
-        return tomllib.load(file)
-
-
 def _within(place: Any, key: str, path: str) -> Any:
     if isinstance(place, list) and key.isdigit() and int(key) < len(place):
         return place[int(key)]
@@ -62,12 +55,5 @@ def _within(place: Any, key: str, path: str) -> Any:
 
 def write(data: Mapping[str, Any], path: Path) -> None:
     """Write building data as TOML: its values are numbers, texts, lists and one level of tables."""
-    path.write_text("".join(f"{key} = {_toml(v)}\n" for key, v in data.items()), encoding="utf-8")
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value)  # numbers and texts are the same in both
+    text = "".join(f"{toml_key(key)} = {toml_value(value)}\n" for key, value in data.items())
+    path.write_text(text, encoding="utf-8")

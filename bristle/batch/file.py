@@ -125,11 +125,11 @@ def read_ensemble(name: str | Path, runs: int | None = None, *, with_limits: boo
         If the base scenario is wrong.
     """
     path = resolve_ensemble(name)
-    return _Reader(path).plan(runs, with_limits)
+    return _Ensemble(path).plan(runs, with_limits)
 
 
-class _Reader:
-    """Reads one file and collects what is wrong with it."""
+class _Ensemble:
+    """One file, on its way to a plan."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

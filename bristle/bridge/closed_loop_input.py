@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.building_file import read_building
 from ..data.motion import read_ground_motion
 from ..errors import StudyError
 from ..findings import command
-from ..physics.building import read_building, with_damper
+from ..physics.building import with_damper
 from ..study.inputs import measurements
 from .closed_loop_runs import Trial, begins_in_motion, trial_of
 from .in_building import House, Shaking

@@ -142,14 +142,12 @@ def _records() -> Rows:
 
 
 def _scenarios() -> Rows:
-    import tomllib
-
+    from ..core.config import toml_content
     from ..scenario.scenario import stock_scenarios
 
     rows = []
     for file in stock_scenarios():
-        with file.open("rb") as stream:
-            title = tomllib.load(stream).get("title", file.stem)
+        title = toml_content(file).get("title", file.stem)
         rows.append({"name": file.stem, "title": title, "file": str(file)})
     return rows
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core.toml_write import toml_key, toml_value
 from ..errors import not_usable
-from ..scenario.text import toml_key, toml_value
 
 FILES, SCENARIOS, ENSEMBLES, LIMITS = "files", "scenarios", "ensembles", "limits"
 UNFINISHED = ".unfinished"
@@ -121,7 +121,7 @@ def scenario_text(
     for name, part in parts.items():
         lines += ["", f"[components.{toml_key(name)}]", *_lines(part.source)]
         if part.parameters:
-            lines.append(f"parameters = {_value(part.parameters)}")
+            lines.append(f"parameters = {toml_value(part.parameters)}")
     return "\n".join([*lines, "", "[connections]", *_lines(wires)]) + "\n"
 
 
@@ -140,12 +140,4 @@ def ensemble_text(content: Mapping[str, Any], tables: Mapping[str, Mapping[str, 
 
 
 def _lines(table: Mapping[str, Any]) -> list[str]:
-    return [f"{toml_key(key)} = {_value(value)}" for key, value in table.items()]
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(_lines(value)) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
-    return toml_value(value)
+    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]

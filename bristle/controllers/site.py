@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..batch.plan import Output
 from ..control.controller import Controller
+from ..core.config import toml_content
+from ..data.building_file import read_building
 from ..errors import DesignError, ScenarioError
 from ..fmu import catalogue
 from ..fmu.controller import MEASURED
-from ..physics.building import PAPER, Building, frequencies, paper_building, read_building
+from ..physics.building import PAPER, Building, frequencies, paper_building
 from ..physics.device import Device, Ports
 from .folder import Folder, Part
 
@@ -138,8 +139,6 @@ def site_from(file: str | Path | None, device: str, folder: Folder) -> Site:
         part = Part({"fmu": "Structure"}, {})
         return Site(paper_building(), PAPER, paper_building().device(device), part)
     building = read_building(file)
-    with Path(file).open("rb") as stream:
-        data = tomllib.load(stream)
     names = [one.name for one in building.devices]
     if not device and len(names) == 1:
         device = names[0]
@@ -153,5 +152,10 @@ def site_from(file: str | Path | None, device: str, folder: Folder) -> Site:
     source = {"fmu": "Structure", "building": folder.keep(Path(file))}
     parameters = {building.device(name).ports.force: 0.0 for name in idle}
     return Site(
-        building, data, building.device(device), Part(source, parameters), Path(file), tuple(notes)
+        building,
+        toml_content(Path(file)),
+        building.device(device),
+        Part(source, parameters),
+        Path(file),
+        tuple(notes),
     )

@@ -284,6 +284,11 @@ class Document:
         """Add what must be put right."""
         self.add("error", keys, text)
 
+    def error_of(self, keys: KeyPath, text: str) -> None:
+        """Add an error in a table at the line of the first of its keys that the text names."""
+        named = [key for key in re.findall(r"\w+", text) if (*keys, key) in self.lines]
+        self.error((*keys, *named[:1]), text)
+
     def warning(self, keys: KeyPath, text: str) -> None:
         """Add what is allowed and probably a mistake."""
         self.add("warning", keys, text)
@@ -329,7 +334,7 @@ def read_text(path: Path, raises: type[BristleError]) -> str:
         raise _error(raises, path, line, words) from None
 
 
-def content(path: Path) -> dict[str, Any]:
+def toml_content(path: Path) -> dict[str, Any]:
     """Return what a TOML file holds, unchecked; {} where it holds nothing that can be read.
 
     For what is looked up on the side: what is wrong with the file is told where it is read.

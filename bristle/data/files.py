@@ -1,4 +1,4 @@
-"""Files of a study: written whole or not at all, read with the lines of what is wrong."""
+"""Files of a study: written whole or not at all; JSON read."""
 
 from __future__ import annotations
 

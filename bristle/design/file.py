@@ -38,10 +38,11 @@ from typing import Any
 
 from ..core.config import Document, Key, Spec
 from ..core.toml_lines import KeyPath
+from ..data.building_file import read_building
 from ..data.model import read_model
 from ..errors import BristleError, DesignError, StudyError
 from ..findings import written
-from ..physics.building import Building, paper_building, read_building
+from ..physics.building import Building, paper_building
 from ..physics.laws import DEFAULT_OF_DESIGN
 from .passive import Share
 from .sliding import Damper
@@ -212,11 +213,10 @@ def _damper(document: Document, found: Mapping[str, Any], folder: Path) -> Any:
 def _made(
     document: Document, keys: KeyPath, make: Callable[..., Any], *args: Any, **given: Any
 ) -> Any:
-    """Return what `make` makes, None after a mistake: its text begins with the key it is about."""
+    """Return what `make` makes, None after a mistake, which is noted."""
     try:
         return make(*args, **given)
     except DesignError as error:
         text = str(error).removeprefix(f"{keys[0]}: ") if keys else str(error)
-        word = text.split()[0].rstrip(":")
-        document.error((*keys, word), f"[{keys[0]}] {text}" if keys else text)
+        document.error_of(keys, f"[{keys[0]}] {text}" if keys else text)
         return None

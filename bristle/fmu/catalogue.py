@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 import sys
-import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import cache
@@ -14,6 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from .. import units
+from ..core.config import toml_content
 from ..errors import BuildError, StudyError
 from ..physics.forms import split_form
 from ..physics.law import LAWS
@@ -218,11 +218,10 @@ def instantiate(
 
 def read_building_data(path: Path) -> dict[str, Any]:
     """Return the checked data of a building file, to be baked into a Structure."""
-    from ..physics.building import read_building
+    from ..data.building_file import read_building
 
     read_building(path)
-    with path.open("rb") as file:
-        return tomllib.load(file)
+    return toml_content(path)
 
 
 def design_file(component: str, kind: type[Slave], controller: Path) -> str:
@@ -260,7 +259,8 @@ def check_controller(
         Naming both; if the building is wrong.
     """
     from ..control.controller import read_controller
-    from ..physics.building import paper_building, read_building
+    from ..data.building_file import read_building
+    from ..physics.building import paper_building
 
     kind = component_class(source(component))
     if getattr(kind, "design", ""):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
+from ..core.config import Document, toml_content
 from ..errors import BristleError, StudyError
 from ..version import __version__
 from .answers import Answers, Compiling
@@ -238,25 +238,22 @@ def _is_study(folder: Path) -> bool:
 
 def _building(folder: Path) -> str:
     """Return the file of a study's building, as its model names it, "" where there is none."""
-    with suppress(OSError, ValueError), (folder / "model.toml").open("rb") as file:
-        return str(tomllib.load(file).get("building", ""))
-    return ""
+    return str(toml_content(folder / "model.toml").get("building", ""))
 
 
 def _about(folder: Path) -> dict[str, Any]:
     """Return what the first screen tells of a study, without reading its measurements."""
     about: dict[str, Any] = {"name": folder.name, "title": folder.name, "error": ""}
     try:
-        with (folder / "study.toml").open("rb") as file:
-            settings = tomllib.load(file)
+        settings = Document(folder / "study.toml", StudyError).data
         runs = [run for run in settings.get("runs", []) if isinstance(run, dict)]
         about |= {
             "title": str(settings.get("title", folder.name)),
             "rig": str(settings.get("rig", "bench")), "runs": len(runs),
             "held_out": sum(run.get("role") == "holdout" for run in runs),
         }  # fmt: skip
-    except (OSError, ValueError) as error:
-        about["error"] = f"study.toml cannot be read: {error}"
+    except StudyError as error:
+        about["error"] = str(error)
     with suppress(OSError, ValueError):
         verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
         about |= {"verdict": str(verdict["kind"]), "effects": list(verdict.get("effects", []))}

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from ..data.building_file import read_building
 from ..data.channels import channel_unit
 from ..data.guess import Guess, guess_channels, left_out
 from ..data.read import files_in, read_table
 from ..data.table import Table
 from ..errors import BristleError, RecordError
-from ..physics.building import read_building, with_damper
+from ..physics.building import with_damper
 from ..units import same_dimension
 from .data_view import thinned
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from ..batch.passive import OUTPUT, G
 from ..batch.passive import SCENARIO as PASSIVE
+from ..core.config import toml_content
 from ..data.files import read_json
 from ..design import implausible, read_task, task_from_data
 from ..design.responses import task_curves
@@ -63,8 +63,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         solved = folder / FOLDER / f"{name}_answer.json"
         if solved.is_file():  # it is not where the solver found none, or was cancelled
             found = read_json(solved)
-            with (folder / FOLDER / f"{name}.toml").open("rb") as file:
-                values = values_of(tomllib.load(file))
+            values = values_of(toml_content(folder / FOLDER / f"{name}.toml"))
             older = _is_older(folder / FOLDER / f"{name}.toml", found)
             solves.append({"name": name, "values": values, "older": older, **_solve(found)})
     return {

@@ -5,13 +5,13 @@ The server asks often, so that no file is read but study.toml and model.toml, an
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ..core.config import toml_content
 from .consent import own_files
 
 DEPENDS = ("study.toml", "model.toml", "verdict.json", "reports/identify.json")
@@ -49,13 +49,12 @@ def _named(folder: Path) -> Iterator[str]:
 
 def _toml(path: Path) -> dict[str, Any]:
     """Return what a file holds; what is wrong with it is told by the view that needs it."""
-    try:
+    with suppress(OSError):
         about = path.stat()
         return _content(path, about.st_mtime_ns, about.st_size)
-    except (OSError, ValueError):
-        return {}
+    return {}
 
 
 @lru_cache(maxsize=64)
 def _content(path: Path, _changed: int, _size: int) -> dict[str, Any]:
-    return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    return toml_content(path)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from math import isfinite, pi
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import PhysicsError
@@ -318,27 +317,6 @@ def _rotate(A: list[list[float]], V: list[list[float]], i: int, j: int, n: int) 
 def frequencies(building: Building) -> list[float]:
     """Return the undamped natural frequencies [Hz], ascending."""
     return [omega / (2.0 * pi) for omega, _ in modes(building.M, building.K)]
-
-
-def read_building(path: str | Path) -> Building:
-    """Return the building of a TOML file (schema 1).
-
-    Raises
-    ------
-    PhysicsError
-        Naming the file, the key and what would be right.
-    """
-    import tomllib  # not in Python 3.9, where FMUs may run; they carry the data, not the file
-
-    path = Path(path)
-    try:
-        with path.open("rb") as file:
-            data = tomllib.load(file)
-    except OSError as error:
-        raise PhysicsError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (ValueError, RecursionError) as error:  # also numbers and nests beyond all measure
-        raise PhysicsError(f"{path}: not valid TOML: {error}.") from error
-    return from_data(data, str(path))
 
 
 def with_damper(building: Building, name: str = "") -> Building:

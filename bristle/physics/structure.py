@@ -392,10 +392,3 @@ def start_states(n: int, values: dict[str, float], slots: Slots) -> list[float]:
 def work_size(n: int) -> int:
     """Return how many floats `step` needs as room to work."""
     return 6 * n
-
-
-def read_building(path: Any) -> Building:
-    """Return the building of a TOML file; see `building.read_building`."""
-    from .building import read_building as read
-
-    return read(path)

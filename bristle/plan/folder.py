@@ -4,8 +4,6 @@ plan.toml     kind of rig, name of the study, rate, channel of the command, [[ru
 NAME.csv      time [s], displacement [mm] or ground_acceleration [m/s2], the command
 """
 
-# Longer than 300 lines: half of it are messages that say what would be right.
-
 from __future__ import annotations
 
 import re

@@ -87,12 +87,19 @@ def read_new_rig(path: Path, given: Mapping[str, Any] | None = None) -> NewRig:
     if lacking == ["command"] and "levels" in limits:
         lacking = []
     if lacking:
-        raise StudyError(
-            f"{path}: [limits] lacks {', '.join(lacking)}: before the first measurement nothing "
-            "else says what the rig can do."
+        document.error(
+            ("limits",),
+            f"[limits] lacks {', '.join(lacking)}: before the first measurement nothing else says "
+            "what the rig can do.",
         )
+        document.check()
     noise = {name: value for name, value in found["noise"].items() if value is not None}
-    rig = with_given(RigLimits(1.0, 1.0), limits)
+    try:
+        rig = with_given(RigLimits(1.0, 1.0), limits)
+    except StudyError as error:
+        document.error_of(("limits",), str(error))
+        document.check()
+        raise
     return NewRig(rig, damper["max_force"], damper["law"], noise, drive)
 
 

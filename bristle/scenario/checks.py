@@ -1,7 +1,5 @@
 """Checks of a scenario's own tables: the run, the components and their parameters."""
 
-# Longer than 300 lines: half of it are messages that say what would be right.
-
 from __future__ import annotations
 
 import re

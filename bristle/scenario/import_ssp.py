@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from .. import resources
+from ..core.toml_write import toml_key, toml_value
 from ..errors import FmuError, ScenarioError
 from ..fmu.description import Description, Value, Variable, read_description, read_root
 from ..ssp.conversion import SAME, convert
@@ -24,7 +25,6 @@ from ..ssp.structure import Structure, read_structure
 from ..units import Measure
 from .checks import NAME, RESERVED, STEP_TOLERANCE
 from .parts import ALGORITHMS
-from .text import toml_key, toml_value
 
 FORM = 2
 """Version of what is written: another one unpacks packages anew."""

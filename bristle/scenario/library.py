@@ -122,7 +122,8 @@ def driven_mass(building: Path | None, port: str = "damper_force", attached: flo
     port : the Structure's input that takes the force
     attached : mass [kg] more on the first level
     """
-    from ..physics.building import paper_building, read_building
+    from ..data.building_file import read_building
+    from ..physics.building import paper_building
     from ..physics.device import driven_mass as driven_by
 
     found = read_building(building) if building else paper_building()
@@ -140,7 +141,8 @@ def check_carried(file: Path, building: Path | None) -> None:
     DesignError, PhysicsError
         Naming both; if the building is wrong.
     """
-    from ..physics.building import paper_building, read_building
+    from ..data.building_file import read_building
+    from ..physics.building import paper_building
 
     controller = controller_in(file)
     if controller is not None:

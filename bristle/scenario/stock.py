@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 
+from ..core.config import toml_content
 from ..errors import ScenarioError
 from ..findings import unknown
 from .scenario import stock_scenarios
@@ -36,7 +36,7 @@ def copy_scenario(name: str, target: Path | None = None) -> Path:
         raise ScenarioError(unknown("stock scenario", name, list(stock)))
     file = target or Path(source.name)
     text = source.read_text(encoding="utf-8")
-    components = tomllib.loads(text)["components"].values()
+    components = toml_content(source)["components"].values()
     buildings = [component["building"] for component in components if "building" in component]
     _write_new(file, _SCHEMA.sub("", text))
     for building in buildings:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..core.config import Document
+from ..data.building_file import read_building
 from ..errors import PhysicsError
-from ..physics.building import ROUNDING, Building, read_building
+from ..physics.building import ROUNDING, Building
 from ..physics.effect import EFFECTS
 from .parts import Part
 

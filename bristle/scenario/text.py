@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import math
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..fmu.description import Value
+from ..core.toml_write import toml_key, toml_value
 from ..physics.forms import split_form
 from .document import FILE_PARAMETERS
 
 if TYPE_CHECKING:
     from .parts import DamperLaw
     from .scenario import Component, Scenario
-
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def scenario_text(scenario: Scenario) -> str:
@@ -85,19 +80,3 @@ def _law(law: DamperLaw) -> list[str]:
     if knots:
         lines.append(f"command_knots = {list(knots)}")
     return lines
-
-
-def toml_key(name: str) -> str:
-    """Return a name as a key of TOML, with quotes where it needs them."""
-    return name if _BARE.fullmatch(name) else toml_value(name)
-
-
-def toml_value(value: Value) -> str:
-    """Return a value as TOML writes it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)  # "inf", "-inf", "nan", as TOML spells them
-    if isinstance(value, str):  # JSON's escapes are TOML's; only DEL is missing
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..core.config import toml_content
+from ..data.building_file import read_building
 from ..data.channels import (
     ChannelSpec,
     at_device,
@@ -20,7 +21,7 @@ from ..data.extra import found_in
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import RecordError, StudyError
-from ..physics.building import paper_building, read_building
+from ..physics.building import paper_building
 from ..units import canonical, same_dimension
 from .channel_file import spec_text
 from .run_file import TEST, RunFile
@@ -127,10 +128,10 @@ def devices_of(folder: Path, settings: Settings) -> tuple[list[str], list[str]]:
     """Return the levels of a study's building and its devices; none on a bench."""
     if not settings.has_building:
         return [], []
-    model = tomllib.loads((folder / "model.toml").read_text(encoding="utf-8-sig"))
-    if not model.get("building"):
+    building = toml_content(folder / "model.toml").get("building")
+    if not building:
         return paper_building().levels(), []
-    house = read_building(folder / str(model["building"]))
+    house = read_building(folder / str(building))
     return house.levels(), [one.name for one in house.devices]
 
 

@@ -7,13 +7,13 @@ counts, and no date, so that a study that was copied or cloned stays as it is.
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Sequence
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from ..core.config import toml_content
 from .channel_file import channel_as_toml
 from .run_file import TEST
 from .settings import Settings
@@ -64,10 +64,7 @@ def building_in(model: Path) -> str:
 
     What is wrong with the model is told where it is asked for.
     """
-    try:
-        return str(tomllib.loads(model.read_text(encoding="utf-8-sig")).get("building", ""))
-    except (OSError, ValueError):
-        return ""
+    return str(toml_content(model).get("building", ""))
 
 
 def _of_settings(settings: Settings) -> str:
@@ -81,12 +78,8 @@ def _of_settings(settings: Settings) -> str:
 
 def _of_building(folder: Path, name: str) -> str:
     """Return the digest of a building's numbers: its comments and its spaces do not count."""
-    if not name:
-        return ""
-    try:
-        return _digest(tomllib.loads((folder / name).read_text(encoding="utf-8-sig")))
-    except (OSError, ValueError):
-        return ""
+    found = toml_content(folder / name) if name else {}
+    return _digest(found) if found else ""
 
 
 def _of_file(path: Path) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..data.building_file import read_building
 from ..data.channels import ChannelSpec, channel_unit, device_channel, is_channel
 from ..data.guess import Guess, guess_channels, specs
 from ..data.measurement import Measurement, measurements_of, stem_of
@@ -22,7 +23,7 @@ from ..data.run_names import is_part, names_of_files
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
 from ..findings import listed, unknown, written
-from ..physics.building import Building, read_building, with_damper
+from ..physics.building import Building, with_damper
 from ..physics.effect import EFFECTS
 from ..physics.laws import law_names
 from .identified import Identified

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..data.building_file import read_building
 from ..data.channels import (
     DRIVE,
     ChannelSpec,
@@ -33,7 +34,7 @@ from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import BristleError, StudyError, UnitError
 from ..findings import capital, command, listed
-from ..physics.building import Building, read_building, with_damper
+from ..physics.building import Building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
 from ..progress import counted

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..data.building_file import read_building
 from ..data.cut_off import without_cut_off
 from ..data.model import StudyModel
 from ..identify.rig import Rig, bench_rig, building_rig
-from ..physics.building import Building, paper_building, read_building, with_damper
+from ..physics.building import Building, paper_building, with_damper
 from .runs import Runs
 from .study import Study
 

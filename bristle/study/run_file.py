@@ -108,7 +108,7 @@ RUNS = Spec({
 
 def _labels(document: Document, keys: KeyPath, table: Mapping[str, Any]) -> dict[str, Label]:
     """Return the labels in a run's table `labels`."""
-    for name in {*DRIVE, *UNITS} & set(table["labels"]):
+    for name in (name for name in table["labels"] if name in (*DRIVE, *UNITS)):
         words = f"{name} stands beside file and role, not in labels."
         document.error((*keys, "labels", name), words)
     return dict(table["labels"])

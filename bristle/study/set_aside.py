@@ -8,13 +8,13 @@ that they belong to. The model is again the last one that no measurement had cha
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..core.config import toml_content
 from ..data.files import read_json, write_whole
 
 DRAFT = ".study.toml"
@@ -175,7 +175,7 @@ def _from_data(step: Path) -> bool:
     """Return whether a step holds errors of runs, or a model with an identified value."""
     about = read_json(step / "step.json")
     return bool(about.get("before") or about.get("after")) or _identified(
-        _model_in(step / "model.toml")
+        toml_content(step / "model.toml")
     )
 
 
@@ -188,20 +188,13 @@ def _identified(part: Any) -> bool:
     return part.get("origin") == "identified" or any(map(_identified, part.values()))
 
 
-def _model_in(file: Path) -> dict[str, Any]:
-    """Return a model.toml as it is read; what is wrong with it is told where it is opened."""
-    with suppress(OSError, ValueError):
-        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    return {}
-
-
 def _effects_in(model: Path) -> list[str]:
-    found = _model_in(model).get("effects", {})
+    found = toml_content(model).get("effects", {})
     return list(found) if isinstance(found, dict) else []
 
 
 def _building_in(model: Path) -> str:
-    return str(_model_in(model).get("building", ""))
+    return str(toml_content(model).get("building", ""))
 
 
 def _learned(study: Path) -> Iterator[Path]:

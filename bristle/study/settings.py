@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
-from ..core.config import Document, Key, Spec, content
+from ..core.config import Document, Key, Spec, toml_content
+from ..data.building_file import read_building
 from ..data.channels import DRIVE, ChannelSpec, at_device
 from ..data.files import write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
 from ..errors import PhysicsError, StudyError
 from ..findings import listed, written
-from ..physics.building import read_building
 from .channel_file import CHANNELS, EXTRA, channel_as_toml, read_channels, read_extra
 from .run_file import (
     EXCLUDE,
@@ -184,7 +184,7 @@ def only_device(folder: Path) -> str:
     folder : the study's; what is wrong with its model or building is told where they are asked for
     """
     try:
-        building = content(folder / "model.toml").get("building")
+        building = toml_content(folder / "model.toml").get("building")
         devices = read_building(folder / str(building)).devices
     except PhysicsError:
         return ""

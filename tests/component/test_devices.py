@@ -10,9 +10,10 @@ import pytest
 from scipy.signal import cont2discrete
 
 from bristle.component import structure
+from bristle.data.building_file import read_building
 from bristle.errors import PhysicsError
 from bristle.fmu.catalogue import describe
-from bristle.physics.building import Building, from_data, paper_building, read_building
+from bristle.physics.building import Building, from_data, paper_building
 from bristle.physics.device import Device, driven_mass
 
 TOWER: dict[str, Any] = {

@@ -95,19 +95,9 @@ def test_a_model_file_brings_its_units_and_effects(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("schema = 1", "kind is missing: expected .hinf. or .lpv. or .lqg."),
-        ('kind = "lpv"', "schema is missing"),
-        ('schema = 2\nkind = "lpv"', ":1: schema is 2"),
-        ('schema = 1\nkind = "pid"', "hinf, lpv, lqg"),
-        ("schema = ", "not TOML"),
-        (HEAD + "tua = 2.0", 'Did you mean "tau"'),
-        (HEAD + "[lqg]\nforce = 1.0", "no key .lqg."),
-        (HEAD + "tau = true", "tau is true, not a number"),
         (HEAD + "tau = nan", "tau is nan, not a finite number"),
-        (HEAD + "order = 2.5", ":3: order is 2.5: expected a whole number"),
         (HEAD + "sample_period = 0.0", "must be positive"),
         (HEAD + "sample_period = 1.0", "too long for the first mode"),
-        (HEAD + "title = 3", "title is 3: expected a text"),
         (HEAD + "weights = 3", "weights is 3: expected a table"),
         (HEAD + "[weights]\nnoise = 0", r"\[weights\].*singular"),
         (HEAD + "[weights]\ncommand = { gain = 1, corner = 3 }", r"\[weights\].*singular"),
@@ -115,7 +105,6 @@ def test_a_model_file_brings_its_units_and_effects(tmp_path: Path) -> None:
             HEAD + "[weights]\ncommand = { gain = 1 }",
             r"\[weights\] command is a table: expected a weight",
         ),
-        (HEAD + "[weights]\ncommand = 3", "expected a weight, one of"),
         (
             HEAD + "[weights]\ncommand = { numerator = [1, 0, 0], denominator = [1, 1] }",
             r"\[weights\].*improper",
@@ -127,10 +116,6 @@ def test_a_model_file_brings_its_units_and_effects(tmp_path: Path) -> None:
         (HEAD + "[scheduling]\ngrid = [0.1]", r"\[scheduling\].*no range"),
         (HEAD + "[scheduling]\ngrid = [0.0, 0.2, 0.1]", r"\[scheduling\].*must rise"),
         (HEAD + "[scheduling]\ngrid = 3", "grid is 3: expected a list"),
-        (HEAD + '[scheduling]\ngrid = [0.0, "a"]', "grid holds the text .a."),
-        (HEAD + "[scheduling]\nrows = 3.5", "rows is 3.5: expected a whole"),
-        (HEAD + '[scheduling]\nrate = "fast"', "rate is the text .fast."),
-        (HEAD + "[scheduling]\ngird = [0.0, 0.1]", 'Did you mean "grid"'),
         (HEAD + "[damper]\nknown_to = 0.1", "beyond the 0.1 m/s"),
         (HEAD + "[damper]\nv_max = 0.0", r"\[damper\].*v_max"),
         (HEAD + '[damper]\nlaw = "ling"', r"\[damper\].*law"),
@@ -166,13 +151,11 @@ def test_a_wrong_building_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('law = "lugre"', "schema is missing"),
         ('schema = 1\nlaw = "maxwell"', 'there is no law "maxwell"'),
         ('schema = 1\nlaw = "bingham"\n[parameters.f_z]\nvalue = 1', ":3: .*f_z"),
         ('schema = 1\nlaw = "bingham"\n[parameters]\nf_c = 1', r"expected \{ value = ... \}"),
         ('schema = 1\nlaw = "bingham"\n[parameters.f_c]\nvalue = 1\nunit = "kg"', "dimension"),
         ('schema = 1\nlaw = "bingham"\n[effects.nonsense]', "nonsense"),
-        ("law =", "not TOML"),
     ],
 )
 def test_mistakes_of_a_model_are_named(tmp_path: Path, text: str, message: str) -> None:

@@ -11,8 +11,9 @@ import pytest
 
 from bristle.cli import main
 from bristle.control.controller import Controller, building_digest, read_controller
+from bristle.data.building_file import read_building
 from bristle.errors import ScenarioError
-from bristle.physics.building import paper_building, read_building
+from bristle.physics.building import paper_building
 from bristle.scenario.scenario import check_scenario, load_scenario, stock_scenarios
 from bristle.scenario.text import scenario_text
 from bristle.simulate.run import run

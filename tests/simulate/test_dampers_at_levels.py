@@ -11,8 +11,9 @@ import pytest
 from scipy.signal import lsim
 
 from bristle import run
+from bristle.data.building_file import read_building
 from bristle.fmu import catalogue
-from bristle.physics.building import Building, read_building
+from bristle.physics.building import Building
 from bristle.physics.device import Device
 from bristle.scenario.library import driven_mass
 from bristle.scenario.scenario import check_scenario, load_scenario

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from bristle import cli
+from bristle.data.building_file import read_building
 from bristle.fmu.catalogue import describe
 from bristle.identify.building import StructureFit
 from bristle.identify.building_file import building_text
-from bristle.physics.building import from_data, read_building
+from bristle.physics.building import from_data
 from bristle.study.study import Study
 
 DT = 0.004

@@ -60,7 +60,7 @@ def test_names_that_are_no_run_and_leaving_out_all_are_refused(folder):
     with pytest.raises(StudyError, match="every run has role"):
         Study(folder)
     path.write_text(text.replace('role = "train"', 'role = "left"', 1), encoding="utf-8")
-    with pytest.raises(StudyError, match='"train", "holdout", "test" or "exclude" is right'):
+    with pytest.raises(StudyError, match="There are: train, holdout, test, exclude"):
         Study(folder)
 
 

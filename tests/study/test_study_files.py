@@ -47,14 +47,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def edit(folder: Path, old: str, new: str) -> Path:
-    path = folder / "study.toml"
-    text = path.read_text(encoding="utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    return path
-
-
 def test_settings_are_read(folder: Path) -> None:
     settings = read_settings(folder / "study.toml")
     assert settings.title == "rig A"
@@ -80,32 +72,6 @@ def test_settings_come_back_as_written(folder: Path) -> None:
     assert "# doubtful: so could be another" in (folder / "study.toml").read_text()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ("schema = 1", "schema = 2", ":1: schema is 2"),
-        ("schema = 1\n", "", "schema is missing"),
-        ('rig = "bench"', 'rig = "bensch"', ':4: there is no rig "bensch".*"bench"'),
-        ('title = "rig A"', "title = 5", ":2: title is 5: expected a text"),
-        ('title = "rig A"', 'titel = "x"', ':2: there is no key "titel".* "title"'),
-        ('role = "holdout"', 'role = "seen"', ':12: .*no role "seen".*train, holdout,'),
-        ("run_2.csv", "run_9.csv", ":11: there is no file"),
-        ("run_2.csv", "run_1.csv", ":11: .* listed twice"),
-        ("[channels.force]", "[channels.forse]", ':18: there is no channel "forse".*"force"'),
-        ('unit = "N"', 'unit = "mm"', ':20: unit = "mm": expected N'),
-        ('unit = "N"', 'unit = "Newt"', ':20: unit "Newt" is not known'),
-        ("sign = -1", "sign = 0", ":21: .*sign = 0: expected 1 or -1"),
-        ("noise = 0.02", "noise = -1.0", ":22: .*noise = -1: expected a number of 0 or more"),
-        ("noise = 0.02", "noise = nan", ":22: .*noise is nan, not a finite number"),
-        ('column = "F [N]"\n', "", ":18: .*column is missing"),
-        ('column = "x [mm]"', 'column = "x [mm]"\nstep = 0.1', "step belongs to"),
-    ],
-)
-def test_mistakes_are_told_with_their_line(folder: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(StudyError, match=told):
-        read_settings(edit(folder, old, new))
-
-
 EXTRA = """
 [extra.oil_pressure]
 column = "p [bar]"
@@ -127,12 +93,7 @@ def test_extra_channels_come_back_as_written(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("oil_pressure", "force", 'cannot be called "force".*\\[channels.force\\] is its place'),
         ("oil_pressure", "Oil", 'cannot be called "Oil": small letters'),
-        ('column = "p [bar]"\n', "", ":24: .*column is missing"),
-        ('unit = "bar"\n', "", ':24: .*unit is missing: .*"1" for a plain number'),
-        ("sign = -1", "sign = 3", ":27: .*sign = 3: expected 1 or -1"),
-        ("sign = -1", "noise = 0.1", 'there is no key "noise"'),
         ('[extra.oil_pressure]\ncolumn = "p [bar]"\nunit = "bar"\nsign = -1', "extra = 3", "extra"),
     ],
 )
@@ -143,22 +104,6 @@ def test_mistakes_of_an_extra_channel_are_told(folder: Path, old: str, new: str,
     path.write_text(text + EXTRA.replace(old, new), encoding="utf-8")
     with pytest.raises(StudyError, match=told):
         read_settings(path)
-
-
-def test_all_mistakes_at_once(folder: Path) -> None:
-    edit(folder, "sign = -1", "sign = 2")
-    edit(folder, 'rig = "bench"', 'rig = "car"')
-    with pytest.raises(StudyError) as caught:
-        read_settings(folder / "study.toml")
-    assert ":4:" in str(caught.value)
-    assert ":21:" in str(caught.value)
-
-
-@pytest.mark.parametrize("text", ["schema = ", '[[runs]]\nfile="a"]'])
-def test_no_toml(folder: Path, text: str) -> None:
-    (folder / "study.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(StudyError, match="not TOML"):
-        read_settings(folder / "study.toml")
 
 
 def test_law_and_schema_suffice(tmp_path: Path) -> None:
@@ -267,9 +212,6 @@ def test_comments_of_a_model_stay(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ('law = "lugre"', "schema is missing"),
-        ('schema = 1\nlaw = "lugree"', ':2: there is no law "lugree".* "lugre"'),
-        ('schema = 1\nlaw = "lugre"\n[parameters.f_c]\nvalue = 1.0', 'no parameter "f_c"'),
         (
             'schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nvalue = 1.0\nunit = "N"',
             ':5: sigma_a: "N/m"',
@@ -282,15 +224,11 @@ def test_comments_of_a_model_stay(tmp_path: Path) -> None:
             'schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nlow = -5.0',
             "sigma_a: -5 to .* leaves what is physical",
         ),
-        ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nvalue = "x"', "expected a number"),
-        ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nfree = 1', "true or false"),
         (
             'schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nstd = -1.0',
             ":4: .*std = -1: expected a number of 0 or more",
         ),
-        ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\norigin = "x"', 'no origin "x"'),
         ('schema = 1\nlaw = "lugre"\n[parameters]\nsigma_a = 5.0', "value = ..."),
-        ('schema = 1\nlaw = "lugre"\n[effects.gas_sprin]', 'effect "gas_sprin".*"gas_spring"'),
         ('schema = 1\nlaw = "lugre"\nbuilding = "b.toml"', ":3: there is no file"),
     ],
 )
