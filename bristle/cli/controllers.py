@@ -163,7 +163,7 @@ def _share(option: str, text: str | None) -> float | None:
 
 
 def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
-    from ..controllers.tables import footnotes, header, lowest, rows
+    from ..controllers.view import footnotes, header, lowest, rows
 
     def values(frame: Any) -> list[dict[str, Any]]:
         return [
@@ -191,34 +191,9 @@ def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
 
 
 def _print(found: ControllerComparison, folder: Path, files: list[Path]) -> None:
-    from ..controllers.tables import footnotes, header, rows
+    from ..view import terminal
 
-    for motion in found.motions:
-        _print_table(motion, header(found)[1:], rows(found, motion))
-    for text in footnotes(found):
-        print(text)
-    print()
-    for text in found.verdict:
-        print(text)
-    for text in found.notes:
-        print(f"Note: {text}")
+    print(terminal.text(found.view()))
     print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
     for path in files:
         print(f"  {path}")
-
-
-def _print_table(title: str, titles: list[str], rows: list[list[str]]) -> None:
-    import textwrap
-    from itertools import zip_longest
-
-    wrapped = [textwrap.wrap(text, 12) for text in titles]
-    widths = [max(6, *(len(line) for line in lines)) + 2 for lines in wrapped]
-    first = max(len(row[0]) for row in rows) + 2
-    for line in zip_longest(*wrapped, fillvalue=""):
-        cells = "".join(f"{text:>{n}}" for text, n in zip(line, widths, strict=True))
-        print(f"{'':{first}}{cells}".rstrip())
-    print(title)
-    for name, *texts in rows:
-        cells = "".join(f"{text:>{n}}" for text, n in zip(texts, widths, strict=True))
-        print(f"  {name:{first - 2}}{cells}".rstrip())
-    print()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..batch.plan import Output
 from ..errors import not_usable
-from ..shown import shown
+from ..view import Viewable
 from .dampers import Damper
 from .entry import BEST, LIMIT, OFF, ON, Entry
 from .limits import Reached
@@ -19,7 +19,6 @@ from .site import Site
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 REFERENCES = (OFF, ON, BEST)
 
@@ -42,8 +41,8 @@ class Setting:
     varied: str = ""
 
 
-@dataclass(frozen=True)
-class ControllerComparison:
+@dataclass(frozen=True, repr=False)
+class ControllerComparison(Viewable):
     """Controllers under ground motions, beside constant voltages.
 
     Attributes
@@ -179,22 +178,3 @@ class ControllerComparison:
         except OSError as error:
             raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
         return [folder / name for name in frames]
-
-    def plot(self) -> Figure:
-        """Return the figure of all motions: each controller beside the best constant voltage."""
-        from .picture import draw_summary
-
-        return draw_summary(self).figure
-
-    def __repr__(self) -> str:
-        return shown(self, ", ".join(self.controllers), self.verdict)
-
-    def _repr_html_(self) -> str:
-        from ..draw.style import png
-        from ..view import html
-        from .picture import draw_summary
-
-        return html.fragment(
-            self.verdict[0], html.paragraphs(*self.verdict[1:]),
-            html.figure(png(draw_summary(self)), "controllers beside the best constant voltage"),
-        )  # fmt: skip

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 from ..controllers.entry import BEST, LIMIT
 from ..controllers.folder import ENSEMBLES, SCENARIOS, plain_name
-from ..controllers.picture import draw_levels, draw_motion, draw_summary
-from ..controllers.tables import footnotes, header, lowest, rows
-from ..controllers.verdict import what
+from ..controllers.view import draw_levels, draw_motion, motion_table
 from ..draw.style import png
 from ..findings import command
 from ..quantity import plain, quantity
 from ..version import __version__
 from ..view import html
+from ..view.blocks import Figure, Text
 
 if TYPE_CHECKING:
     from ..controllers.result import ControllerComparison
@@ -24,19 +23,16 @@ def controllers_report(found: ControllerComparison) -> str:
     """Return a comparison of controllers as one HTML document."""
     setting = found.setting
     title = f"Controllers for {setting.site.building.name}"
-    first, *others = found.verdict
+    view = found.view()
+    words = (one for one in view.blocks if isinstance(one, Text) and one.kind != "note")
+    summary = tuple(view.every(Figure))
     body = [
         f"<h1>{escape(title)}</h1>",
         html.paragraphs(
             f"{len(found.controllers)} controllers of one damper, {setting.damper.name}, under "
             f"{len(found.motions)} ground motions, beside constant voltages.", kind="soft",
         ),
-        f'<div class="verdict" style="--tone: var(--blue)"><span class="kind">Verdict</span>\n'
-        f'<p class="say">{escape(first)}</p>\n{html.paragraphs(*others)}\n</div>',
-        html.figure(
-            png(draw_summary(found)), "controllers beside the best constant voltage",
-            f"All motions at a glance: {what(found)}.",
-        ),
+        html.answer(view._replace(blocks=(*words, *summary))),
         _notes(found),
         _setting(found),
         *(_motion(found, name) for name in found.motions),
@@ -93,14 +89,9 @@ def _settings(values: dict[str, object]) -> str:
 
 
 def _motion(found: ControllerComparison, motion: str) -> str:
-    texts = [[name.replace(" ", "\u00a0"), *row] for name, *row in rows(found, motion)]
     return html.section(
         motion,
-        html.table(
-            header(found), texts, range(1, len(header(found))),
-            [lowest(found, motion)],
-        ),
-        html.paragraphs(*footnotes(found), kind="soft"),
+        html.blocks([motion_table(found, motion)._replace(title="")]),
         html.figure(png(draw_motion(found, motion)), f"responses under {motion}"),
     )  # fmt: skip
 

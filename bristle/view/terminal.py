@@ -70,6 +70,13 @@ def aligned(
     if sum(wide) + 2 * len(wide) > WIDTH and rows:
         words = [max(map(len, title.split()), default=0) for title in header]
         wide = [max(pair) for pair in zip(words, cells, strict=True)]
+    if sum(wide) + 2 * len(wide) > WIDTH and right >= set(range(1, len(header))):
+        fits = max(2, sum(sum(wide[: k + 1]) + 2 * k + 2 <= WIDTH for k in range(len(wide))))
+        if fits < len(wide):
+            parts = (slice(1, fits), slice(fits, None))  # numbers: the first column stands again
+            both = [[[row[0], *row[part]] for row in (header, *rows)] for part in parts]
+            tables = (aligned(one[0], one[1:], range(1, len(one[0]))) for one in both)
+            return [line for lines in tables for line in (*lines, "")][:-1]
     if sum(wide) + 2 * len(wide) > WIDTH:
         return [line for row in rows for line in _stacked(header, row)]
     titles = [wrap(title, width) for title, width in zip(header, wide, strict=True)]

@@ -1,22 +1,24 @@
-"""Figures of a comparison of controllers: all motions at a glance, and each by itself."""
+"""A comparison of controllers as blocks: who is best, by how much, the tables of all motions."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from math import isfinite
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..draw.style import COLOURS, GREY, INK, PALE, Page, label, look
-from ..quantity import scale
+from ..quantity import plain, scale
+from ..view.blocks import Figure, Table, Text, View, view_of
 from .cells import best_level
 from .entry import BEST, LIMIT, OFF, ON
+from .result import REFERENCES, ControllerComparison
+from .site import DAMPER
 from .verdict import beside, what, winner
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-    from .result import ControllerComparison
 
 _MORE = ("#E69F00", "#56B4E9", "#8a4a78", "#5b6770")
 _MARKERS = "osD^vP<>"
@@ -26,6 +28,123 @@ _LEFT = 72.0 * 2.15
 """How far left of the axes a motion's heading begins [pt]."""
 _LASTS = 16.0
 """Longest part of a run that is shown [s]."""
+MARK = "†"
+"""Behind a controller with which the displacement leaves the damper's stroke."""
+_SHORT = {"passive off": "of 0 V", "passive on": "of full", BEST: "of best"}
+
+
+@view_of(ControllerComparison)
+def comparison_view(found: ControllerComparison) -> View:
+    """Return the view of a comparison of controllers."""
+    first, *others = found.verdict
+    summary = Figure(
+        lambda: draw_summary(found), "controllers beside the best constant voltage",
+        f"All motions at a glance: {what(found)}.",
+    )  # fmt: skip
+    return View(
+        first,
+        (
+            *map(Text, others), *(motion_table(found, motion) for motion in found.motions),
+            *(Text(note, "note") for note in found.notes), summary,
+        ),
+        tone="blue",
+    )  # fmt: skip
+
+
+def motion_table(found: ControllerComparison, motion: str) -> Table:
+    """Return the table of a motion, a row per controller; what its columns mean is below it."""
+    titles = header(found)
+    note = " ".join(footnotes(found))
+    strong = (lowest(found, motion),)
+    return Table(titles, rows(found, motion), range(1, len(titles)), motion, strong, note)
+
+
+class Column(NamedTuple):
+    """A column of numbers: heading and unit, and the outputs of which it shows the largest."""
+
+    heading: str
+    unit: str
+    factor: float
+    outputs: tuple[str, ...]
+
+
+def columns(found: ControllerComparison) -> list[Column]:
+    """Return the columns that every motion's table has."""
+    site = found.setting.site
+    shown: list[tuple[str, tuple[str, ...]]] = [
+        (f"peak {site.building.levels()[-1]} acceleration", (f"peak {site.top}",))
+    ]
+    shown.append((f"RMS {site.building.levels()[-1]} acceleration", (f"rms {site.top}",)))
+    if site.building.isolated:
+        shown.append(("peak base drift", ("peak structure.base_displacement",)))
+    shown.append(("peak storey drift", tuple(f"peak {name}" for name in site.drifts)))
+    shown.append(("peak force", (f"peak {DAMPER}.force",)))
+    shown.append(("RMS voltage", (f"rms {found.outputs[-1].column}",)))
+    if not any(outputs == (found.setting.judged.name,) for _, outputs in shown):
+        shown.insert(0, (what(found), (found.setting.judged.name,)))
+    return [_column(found, heading, outputs) for heading, outputs in shown]
+
+
+def _column(found: ControllerComparison, heading: str, outputs: tuple[str, ...]) -> Column:
+    unit = found.units[outputs[0]]
+    factor, said = scale(unit, float(found.table[list(outputs)].to_numpy().max()))
+    return Column(heading, said.replace("s2", "s²"), factor, outputs)
+
+
+def header(found: ControllerComparison) -> list[str]:
+    """Return the titles of a motion's table, the controller's first."""
+    titles = [f"{one.heading} [{one.unit}]" for one in columns(found)]
+    titles += [f"{_SHORT[name]} [%]" for name in REFERENCES]
+    if found.worst is not None:
+        titles.append(f"worst [{_judged(found).unit}]")
+    return ["", *titles]
+
+
+def _judged(found: ControllerComparison) -> Column:
+    return _column(found, "", (found.setting.judged.name,))
+
+
+def rows(found: ControllerComparison, motion: str) -> list[list[str]]:
+    """Return a motion's table as texts, a row per controller, its name first."""
+    part = found.table[found.table["motion"] == motion]
+    shown, judged = columns(found), _judged(found)
+    texts = []
+    for case in part.to_dict(orient="records"):
+        name = str(case["controller"])
+        title = f"{name} ({case['level']:g} V)" if isfinite(case["level"]) else name
+        row = [title + (f" {MARK}" if case["stroke"] > 1.0 else "")]
+        for one in shown:
+            row.append(plain(one.factor * max(case[name] for name in one.outputs), 4))
+        for reference in REFERENCES:
+            share = found.value(motion, name) / found.value(motion, reference)
+            row.append(f"{100.0 * share:.0f}")
+        if found.worst is not None:
+            value = found.worst_value(motion, name)
+            row.append(plain(judged.factor * value, 4) if np.isfinite(value) else "")
+        texts.append(row)
+    return texts
+
+
+def lowest(found: ControllerComparison, motion: str) -> int:
+    """Return which row of a motion's table has the controller with the lowest judged value."""
+    names = list(found.table[found.table["motion"] == motion]["controller"])
+    first = min(found.controllers, key=lambda name: found.value(motion, name))
+    return names.index(first)
+
+
+def footnotes(found: ControllerComparison) -> list[str]:
+    """Return what the tables' columns and marks mean."""
+    texts = [
+        f"of 0 V, of full, of best: the {what(found)} over that of the damper at 0 V, at its "
+        "largest voltage, and at the best constant voltage."
+    ]
+    if found.worst is not None:
+        texts.append(f"worst: the largest {what(found)} of the case and its members.")
+    if (found.table["stroke"] > 1.0).any():
+        texts.append(f"{MARK} the displacement leaves the damper's stroke.")
+    if found.limits:
+        texts.append(f"{LIMIT}: any voltage, the ground motion known in advance.")
+    return texts
 
 
 def colour_of(found: ControllerComparison, name: str) -> Any:
