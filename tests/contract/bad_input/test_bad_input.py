@@ -95,6 +95,50 @@ def test_a_force_saturated_in_more_than_half_is_told_and_carries_no_verdict(
     assert main(["diagnose", str(rig)]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "The force is saturated in" in told
-    assert "in run_0, run_1 (3,000 samples)" in told
+    assert " samples); 20% is the most" in told
     assert "Measure with a wider range, or leave these runs out." in told
     assert (rig / "model.toml").read_bytes() == model
+
+
+BURST = """from math import exp
+
+from bristle.physics.law import Constant, Law, Parameter
+
+
+class Burst(Law):
+    '''Burst: a drag that grows beyond all bounds with the speed.'''
+
+    name = "burst"
+    parts = ("sign", "viscous")
+    source = "made for this test, 2024"
+    parameters = {
+        "f": Parameter(5.0, "N", (0.0, 1e3), "yield force"),
+        "c": Parameter(1.0, "N", (1e-3, 1e3), "drag"),
+    }
+    command = {"held": Constant("f"), "drag": Constant("c")}
+
+    @staticmethod
+    def limit(q, z, p):
+        return p.held
+
+    @staticmethod
+    def viscous(q, z, p):
+        return p.drag * q.v * exp(1e3 * abs(q.v))
+"""
+
+
+def test_a_law_that_is_not_finite_on_one_run_is_refused_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [bench_run(1), bench_run(2)]
+    runs[1]["x [m]"] *= 5.0  # so fast that the square of the law's drag is beyond all numbers
+    rig = study_of(tmp_path, runs)
+    (rig / "laws").mkdir(exist_ok=True)
+    (rig / "laws" / "burst.py").write_text(BURST)
+    before = content(rig)
+    capsys.readouterr()
+    assert main(["identify", str(rig), "--law", "burst", "--no-table", "--starts", "1"]) == 2
+    said = capsys.readouterr().err
+    assert "run_1: the force of the model burst is not finite there, so there is no error." in said
+    assert "or another law" in said
+    assert content(rig) == before
