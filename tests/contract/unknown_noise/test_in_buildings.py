@@ -75,7 +75,7 @@ def test_compare_tells_no_z_of_these_sites(study: Path, capsys: pytest.CaptureFi
     assert main(["compare", str(study)]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "the isolation layer" in told
-    assert "noise not known" in told
+    assert "no known noise for a statement" in told
     assert "too few samples" not in told
     assert "nan" not in told.lower()
     assert main(["report", str(study)]) == 0
