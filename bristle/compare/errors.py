@@ -108,7 +108,7 @@ class SiteError:
         """Why z tells nothing, "" where it does; a base that hardly slides leaves few samples."""
         if self.identifiable:
             return ""
-        return "noise not known" if self.total.samples else "too few samples"
+        return "no known noise" if self.total.samples else "too few samples"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the error as JSON has it."""

@@ -90,7 +90,7 @@ def _elsewhere(comparison: Comparison) -> str:
         text += f"; {site_names([one.site for one in right])} {are} ({span})"
     for why in dict.fromkeys(one.why_not for one in others if one.why_not):
         hidden = [one.site for one in others if one.why_not == why]
-        text += f"; {site_names(hidden)}: {why}, no statement"
+        text += f"; {site_names(hidden)}: {why} for a statement"
     return text
 
 

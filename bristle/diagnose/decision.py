@@ -181,8 +181,8 @@ def _too_loud(before: Trial, best: Trial, where: str) -> Decision:
             f"On held-out runs {Z} = {before.z:.2f}: the noise of {where} was estimated too high, "
             "as happens where a force turns within a few samples. "
             f"{_new(best, before)[0].capitalize()} lowers the error further, but this noise "
-            "estimate cannot decide. State it in study.toml, noise = ... in [channels.NAME] of "
-            "what was measured, or sample faster.",
+            "estimate cannot decide. State the noise in study.toml, noise = ... in [channels.NAME] "
+            "of what was measured, or sample faster.",
         ),
     )  # fmt: skip
 

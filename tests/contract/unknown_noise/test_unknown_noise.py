@@ -74,6 +74,7 @@ def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFi
     told = capsys.readouterr().out
     assert "noise included, which is not known" in told
     assert "times the noise" not in told
+    assert "what exceeds" not in told
     assert "nan" not in told
     assert main(["compare", str(study), "--json"]) == 0
     assert set(numbers_of_z(json.loads(capsys.readouterr().out))) == {None}
