@@ -4,7 +4,7 @@
 
 makes what is missing of so many buildings as `bristle example building` makes them, each with
 another hidden effect, and prints the share of measured peaks and RMS that lie in the 95 % band of
-`bristle compare --closed-loop` on held-out runs. The model is identified, and has the hidden effect
+`bristle predict` on held-out runs. The model is identified, and has the hidden effect
 added: what is judged is the band, not the verdict. Without a number it prints what is there.
 """
 

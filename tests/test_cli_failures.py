@@ -34,7 +34,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def test_a_channel_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["compare", "--fmu", "a.fmu", "--data", "run.csv"]
+    asked = ["compare-fmu", "a.fmu", "--data", "run.csv"]
     assert main([*asked, "--channel", "force=a", "--channel", "force=b"]) == 2
     assert "--channel force is given twice; once is right" in capsys.readouterr().err
 

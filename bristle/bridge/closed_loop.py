@@ -60,8 +60,8 @@ def closed_loop(
     building = building_of(study, model)
     if building is None:
         raise StudyError(
-            f"{study.folder}: the damper was measured on a bench: --closed-loop needs a building, "
-            f"as in  {command('compare', study.name, '--closed-loop', '--in', 'house.toml')}"
+            f"{study.folder}: the damper was measured on a bench: a prediction needs a building, "
+            f"as in  {command('predict', study.name, '--in', 'house.toml')}"
         )
     effects, more = _prepared(study, model, draws, with_limits)
     runs = study.runs()

@@ -62,7 +62,7 @@ def trials_in(
     if (data is None) == (ground is None):
         raise StudyError(
             "--in needs the ground motion: a record, or measured responses of the building with "
-            f"it, as in  {command('compare', 'RIG', '--closed-loop', '--in', 'house.toml')} "
+            f"it, as in  {command('predict', 'RIG', '--in', 'house.toml')} "
             "--ground el_centro_1940_ns --level 3, or --data shake.csv"
         )
     if ground is not None:

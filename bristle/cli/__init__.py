@@ -31,10 +31,11 @@ _FORMER = {
     "effects": "list effects, new effect NAME, and check FILE",
     "laws": "list laws, new law NAME, and check FILE",
     "scenarios": "list scenarios, and new scenario NAME --like SCENARIO",
+    "compare --fmu": "compare-fmu FILE.fmu --data FILE",
+    "compare --closed-loop": "predict FOLDER",
+    "compare --runs": "compare FOLDER --role ROLE",
 }
-"""Commands of before, and what took their place."""
-
-_NAMES = {"list_": "list", "export_ssp": "export-ssp", "import_ssp": "import-ssp"}
+"""Commands of before, with an option or without, and what took their place."""
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -52,7 +53,7 @@ def build_parser() -> argparse.ArgumentParser:
         if found.name.startswith("_"):
             continue
         module = importlib.import_module(f"{__name__}.{found.name}")
-        name = _NAMES.get(found.name, found.name)
+        name = found.name.strip("_").replace("_", "-")
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
         add_common(sub)
         module.add_arguments(sub)
@@ -64,8 +65,10 @@ def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     """Return the arguments of a command line; an old spelling is an error that names the new."""
     parser = build_parser()
     words = sys.argv[1:] if argv is None else argv
-    if words and words[0] in _FORMER:
-        parser.error(f"{words[0]} is now {_FORMER[words[0]]}.")
+    for old, new in _FORMER.items():
+        command, *option = old.split()
+        if words[:1] == [command] and set(option) <= set(words):
+            parser.error(f"bristle {old} is now bristle {new}")
     return parser.parse_args(words)
 
 

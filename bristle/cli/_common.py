@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import json
+from typing import Any
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -42,3 +44,18 @@ def _add(parser: argparse.ArgumentParser, default: object) -> None:
     parser.add_argument("--quiet", action="store_true", default=default, help=text)
     text = "show the traceback of an error"
     parser.add_argument("--debug", action="store_true", default=default, help=text)
+
+
+def print_json(answer: dict[str, Any]) -> None:
+    """Print an answer as JSON has it: what is not finite is null."""
+    print(json.dumps(_finite(answer), indent=2, ensure_ascii=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+        return None
+    return value

@@ -16,6 +16,7 @@ KEPT = {
     "check": _ANEW,
     "build": _COMPILED,
     "compare": f"No picture was written. {_ANEW}",
+    "compare-fmu": f"No picture was written. {_ANEW}",
     "conform": f"No verdict is kept. {_ANEW}",
     "controllers": "Limits that were found and runs of ensembles are kept; the same command takes "
     "them, and runs each case once more.",
@@ -32,6 +33,7 @@ KEPT = {
     "limit": _NO_FILE,
     "optimise": _NO_FILE,
     "plan": f"No plan was written. {_ANEW}",
+    "predict": _ANEW,
     "report": f"No report was written; an older one is as it was. {_ANEW}",
     "study auto": _AS_IT_WAS,
     "study check": f"No picture was written. {_ANEW}",

@@ -284,7 +284,7 @@ def test_data_without_noise_are_judged_by_a_stated_floor(toys, tmp_path):
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "bristle.cli", "compare", *map(str, arguments)],
+        [sys.executable, "-m", "bristle.cli", "compare-fmu", *map(str, arguments)],
         capture_output=True, text=True, timeout=300,
     )  # fmt: skip
 
@@ -292,12 +292,12 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
 def test_the_command_prints_sentences_and_writes_a_picture(toys, tmp_path):
     data, picture = gain_data(tmp_path), tmp_path / "out.png"
     wires = ["--map", "u=pressure", "--map", "y=flow", "--out", picture]
-    done = command("--fmu", toys["Gain"], "--data", data, *wires)
+    done = command(toys["Gain"], "--data", data, *wires)
     assert (done.returncode, done.stderr) == (0, "")
     assert "u [Pa] is fed from pressure: as given" in done.stdout
     assert "In this measurement the model misses" in done.stdout
     assert picture.read_bytes().startswith(b"\x89PNG")
-    done = command("--fmu", toys["Gain"], "--data", data, *wires, "--json")
+    done = command(toys["Gain"], "--data", data, *wires, "--json")
     answer = json.loads(done.stdout)
     assert answer["comparisons"][0]["z"] == pytest.approx(1.0, abs=0.15)
     assert [one["signal"] for one in answer["inputs"]] == ["pressure"]
@@ -306,16 +306,12 @@ def test_the_command_prints_sentences_and_writes_a_picture(toys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["--fmu", "no.fmu", "--data", "no.csv"], "no.fmu"),
-        (["--fmu", "no.fmu"], "--data"),
-        ([], "--fmu and --data"),
-        (["study", "--data", "run.csv"], "--data needs --fmu"),
-        (["study", "--set", "a=1"], "--set needs --fmu"),
-        (["--fmu", "no.fmu", "--data", "no.csv", "--set", "gain"], "NAME=VALUE"),
-        (["nowhere"], "no study"),
+        (["compare-fmu", "no.fmu", "--data", "no.csv"], "no.fmu"),
+        (["compare-fmu", "no.fmu", "--data", "no.csv", "--set", "gain"], "NAME=VALUE"),
+        (["compare", "nowhere"], "no study"),
     ],
 )
 def test_the_command_says_what_would_be_right(arguments, text, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["compare", *arguments]) == 2
+    assert main(arguments) == 2
     assert text in capsys.readouterr().err

@@ -135,7 +135,7 @@ def test_no_draws_no_band(made: Path) -> None:
 def test_the_command_tells_it_in_tables_and_json(
     made: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked = ["compare", str(made), "--closed-loop", "--draws", "5"]
+    asked = ["predict", str(made), "--draws", "5"]
     assert main(asked) == 0
     said = capsys.readouterr().out
     assert "From the ground motion of holdout_2 alone, the model predicts the peaks" in said
@@ -212,16 +212,14 @@ def test_what_cannot_be_is_refused(
     with pytest.raises(StudyError, match="no ground_acceleration was measured"):
         closed_loop(Study(study.folder), draws=0)
     for options, told in (
-        (["--draws", "3"], "--draws needs --closed-loop"),
-        (["--closed-loop", "--level", "3"], "--level needs --in"),
-        (["--closed-loop", "--draws", "-1"], "0 or a positive whole number"),
-        (["--closed-loop", "--in", "house.toml", "--role", "test"], "does not go with --in"),
-        (["--closed-loop", "--in", "house.toml", "--level", "nan"], "a finite number is right"),
-        (["--closed-loop", "--out", "a.png"], "there is no picture"),
-        (["--closed-loop", "--in", str(house(made)), "--ground", "el_centro_1940_ns"],
+        (["--level", "3"], "--level needs --in"),
+        (["--draws", "-1"], "0 or a positive whole number"),
+        (["--in", "house.toml", "--role", "test"], "does not go with --in"),
+        (["--in", "house.toml", "--level", "nan"], "expected a finite number"),
+        (["--in", str(house(made)), "--ground", "el_centro_1940_ns"],
          "in a building of its own"),
     ):  # fmt: skip
-        assert main(["compare", str(made), *options]) == 2
+        assert main(["predict", str(made), *options]) == 2
         assert told in capsys.readouterr().err
 
 
@@ -252,7 +250,7 @@ def test_a_record_alone_gives_a_prediction_with_its_band(
     made: Path, bench: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked = [
-        "compare", str(bench.folder), "--closed-loop", "--in", str(house(made)),
+        "predict", str(bench.folder), "--in", str(house(made)),
         "--draws", "5",
     ]  # fmt: skip
     assert main([*asked, "--ground", "el_centro_1940_ns", "--level", "2", "--json"]) == 0
@@ -269,7 +267,7 @@ def test_a_record_alone_gives_a_prediction_with_its_band(
     ):
         assert main([*asked, *options]) == 2
         assert told in capsys.readouterr().err
-    assert main(["compare", str(bench.folder), "--closed-loop"]) == 2
+    assert main(["predict", str(bench.folder)]) == 2
     assert "--in house.toml" in capsys.readouterr().err
 
 
@@ -348,6 +346,6 @@ def test_a_prediction_says_that_its_model_is_of_other_data(
     study = Study(shutil.copytree(made, tmp_path / "rig"))
     first = study.files("holdout")[0]
     first.write_text("\n".join(first.read_text().split("\n")[:-50]) + "\n")
-    assert main(["compare", str(study.folder), "--closed-loop", "--draws", "0"]) == 0
+    assert main(["predict", str(study.folder), "--draws", "0"]) == 0
     told = capsys.readouterr().out
     assert f"Identify it again:  bristle identify {study.folder}\n" in told

@@ -154,14 +154,12 @@ def test_what_cannot_be_is_refused(
     rig: Path, found: ClosedLoop, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (rig / "verdict.json").unlink(missing_ok=True)
-    asked = ["compare", str(rig), "--closed-loop", "--with-limits"]
+    asked = ["predict", str(rig), "--with-limits"]
     assert main(asked) == 2
     assert "there is no verdict, whose limits" in capsys.readouterr().err
     Study(rig).write_verdict(verdict(SMALL))
     assert main([*asked, "--draws", "2"]) == 2
     assert "--draws 5 is the least" in capsys.readouterr().err
-    assert main(["compare", str(rig), "--with-limits"]) == 2
-    assert "--with-limits needs --closed-loop" in capsys.readouterr().err
     assert main([*asked, "--draws", "5", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["rows"][0]["parts"]["the parameters"] > 0.99

@@ -118,7 +118,7 @@ def test_its_model_goes_into_a_scenario_at_its_place(two, tmp_path, capsys):
 
 
 def test_building_and_model_predict_the_responses_in_closed_loop(two, capsys):
-    assert main(["compare", str(two.folder), "--closed-loop", "--draws", "0", "--json"]) == 0
+    assert main(["predict", str(two.folder), "--draws", "0", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     rows = found["responses"] if "responses" in found else found["rows"]
     for row in rows:

@@ -1,0 +1,95 @@
+"""Compare any FMU with a measurement: how wrong its outputs are, and where.
+
+The FMU's code runs on this machine, with your rights. z is the error divided by the noise floor.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ._common import add_details, print_json
+from ._files import channels_of
+
+if TYPE_CHECKING:
+    from ..bridge.fmu import FmuComparison
+
+HELP = "show where an FMU of any tool deviates from a measurement: text and figure"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle compare-fmu`."""
+    parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="an FMU of any tool")
+    parser.add_argument("--data", type=Path, metavar="FILE", required=True, help="the measurement")
+    parser.add_argument(
+        "--set",
+        dest="values",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter's or input's value, in the FMU's unit",
+    )
+    parser.add_argument(
+        "--map",
+        dest="maps",
+        action="append",
+        default=[],
+        metavar="PORT=CHANNEL@UNIT",
+        help="the channel that feeds an input, or that an output is compared with",
+    )
+    parser.add_argument(
+        "--channel",
+        action="append",
+        default=[],
+        metavar="CHANNEL=COLUMN@UNIT",
+        help="the column of a channel in the file, instead of the guess",
+    )
+    parser.add_argument(
+        "--timeout", type=float, default=300.0, metavar="S", help="time limit of the run in s"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
+    add_details(parser)
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Run the FMU under the measured inputs; print what it errs by, draw the picture."""
+    from ..bridge.fmu import compare_fmu
+    from ..compare.view import draw_comparison
+    from ..view import terminal
+
+    found: FmuComparison = compare_fmu(
+        arguments.fmu,
+        arguments.data,
+        values=_pairs(arguments.values, "--set"),
+        maps=_pairs(arguments.maps, "--map"),
+        channels=channels_of(arguments.channel),
+        timeout=arguments.timeout,
+    )
+    picture = arguments.out or Path(f"{arguments.fmu.stem}_{arguments.data.stem}.png")
+    worst = max(found.outputs, key=lambda one: one.z)
+    draw_comparison(worst).save(picture, dpi=160)
+    if arguments.json:
+        print_json({**found.as_dict(), "picture": str(picture.absolute())})
+        return 0
+    print("\n".join(found.mapping_lines()))
+    for one in found.outputs:
+        print(f"\n{one.quantity} [{one.unit}]")
+        print(terminal.text(one.view(), details=arguments.details))
+    print(f"\nPicture: {picture}")
+    return 0
+
+
+def _pairs(texts: list[str], option: str) -> dict[str, str]:
+    from ..errors import StudyError
+
+    found: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise StudyError(f'{option} "{text}": NAME=VALUE is right.')
+        if name.strip() in found:
+            raise StudyError(f"{option} {name.strip()} is given twice; once is right.")
+        found[name.strip()] = value.strip()
+    return found

@@ -1,0 +1,94 @@
+"""Simulate building and identified damper under ground motions alone, and say how far that holds.
+
+Of a study of a building the ground motion and command of each run are taken, and the error of peak
+and RMS of each response stands beside its 95 % band. `--in` puts a damper from a bench into the
+building of a file.
+"""
+
+from __future__ import annotations
+
+import argparse
+from math import isfinite
+from pathlib import Path
+
+from ._common import print_json
+from ._consent import add_trust
+from .compare import add_role
+
+HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 % band"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle predict`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_role(parser)
+    parser.add_argument(
+        "--in", dest="house", type=Path, metavar="FILE",
+        help="simulate a damper from a bench in the building of this file, under --ground or "
+        "--data",
+    )  # fmt: skip
+    text = "with --in: a measurement of that building"
+    parser.add_argument("--data", type=Path, metavar="FILE", help=text)
+    text = "with --in: name or file of a ground motion, for a prediction without a measurement"
+    parser.add_argument("--ground", metavar="RECORD", help=text)
+    text = "with --in: the damper's constant command if the ground motion has none; else 0"
+    parser.add_argument("--level", type=float, metavar="V", help=text)
+    text = "number of draws of the parameters for the band; 0 for no band; else 20"
+    parser.add_argument("--draws", type=int, metavar="N", help=text)
+    text = (
+        "widen the band by the effects that the verdict's limits do not exclude, and list the part "
+        "of each"
+    )
+    parser.add_argument("--with-limits", action="store_true", help=text)
+    add_trust(parser)
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Simulate; print sentences, tables and notes."""
+    from ..bridge.closed_loop import closed_loop, closed_loop_in
+    from ..bridge.closed_loop_figures import DRAWS
+    from ..bridge.closed_loop_input import house_of, trials_in
+    from ..study.study import Study
+    from ..view.terminal import print_tables
+
+    _refuse(arguments)
+    study = Study(arguments.folder)
+    draws = DRAWS if arguments.draws is None else arguments.draws
+    if arguments.house is None:
+        found = closed_loop(
+            study, role=arguments.role, draws=draws, with_limits=arguments.with_limits
+        )
+    else:
+        house = house_of(arguments.house)
+        trials = trials_in(house, arguments.data, arguments.ground, arguments.level)
+        found = closed_loop_in(study, house, trials, draws=draws, with_limits=arguments.with_limits)
+    if arguments.json:
+        print_json(found.as_dict())
+        return 0
+    print("\n".join(found.sentences()))
+    print_tables(found.tables())
+    if any(row.inside is False for row in found.rows):
+        print("\n* the measured figure is outside the band")
+    for note in found.notes:
+        # A command that ends a note is copied to a shell: no full stop is part of it.
+        end = "" if note.endswith(".") or ":  bristle " in note else "."
+        print(f"{note[:1].upper()}{note[1:]}{end}")
+    return 0
+
+
+def _refuse(arguments: argparse.Namespace) -> None:
+    """Refuse options that need --in, those that do not go with it, and bad numbers."""
+    from ..errors import StudyError
+
+    alone = [one for one in ("data", "ground", "level") if getattr(arguments, one) is not None]
+    if alone and arguments.house is None:
+        raise StudyError(
+            f"--{alone[0]} needs --in: a study of a building has ground motions of its own."
+        )
+    if arguments.house is not None and arguments.role != "holdout":
+        raise StudyError("--role does not go with --in: the runs are those of the building.")
+    if arguments.level is not None and not isfinite(arguments.level):
+        raise StudyError(f"--level {arguments.level}: expected a finite number.")
+    if arguments.draws is not None and arguments.draws < 0:
+        raise StudyError(f"--draws {arguments.draws}: expected 0 or a positive whole number.")

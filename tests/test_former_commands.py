@@ -1,0 +1,28 @@
+"""A spelling of before is an error that names the new one."""
+
+from __future__ import annotations
+
+import pytest
+
+from bristle.cli import main
+
+
+@pytest.mark.parametrize(
+    ("line", "new"),
+    [
+        ("effects new rub", "new effect NAME"),
+        ("laws", "list laws"),
+        ("components new mine", "new controller NAME"),
+        ("scenarios copy no_damper", "new scenario NAME --like SCENARIO"),
+        ("compare --fmu a.fmu --data run.csv", "compare-fmu FILE.fmu --data FILE"),
+        ("compare my_rig --closed-loop --draws 3", "predict FOLDER"),
+        ("compare my_rig --runs train", "compare FOLDER --role ROLE"),
+    ],
+)
+def test_it_names_what_took_its_place(
+    line: str, new: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(line.split())
+    assert ended.value.code == 2
+    assert f"is now bristle {new}" in capsys.readouterr().err
