@@ -40,7 +40,7 @@ from ..core.config import Document, Key, Spec
 from ..core.toml_lines import KeyPath
 from ..data.building_file import read_building
 from ..data.model import read_model
-from ..errors import BristleError, DesignError, StudyError
+from ..errors import BristleError, DesignError, PhysicsError, StudyError
 from ..findings import written
 from ..physics.building import Building, paper_building
 from ..physics.laws import DEFAULT_OF_DESIGN
@@ -216,7 +216,7 @@ def _made(
     """Return what `make` makes, None after a mistake, which is noted."""
     try:
         return make(*args, **given)
-    except DesignError as error:
+    except (DesignError, PhysicsError) as error:
         text = str(error).removeprefix(f"{keys[0]}: ") if keys else str(error)
         document.error_of(keys, f"[{keys[0]}] {text}" if keys else text)
         return None

@@ -563,9 +563,9 @@ def test_what_does_not_belong_together(write: Any) -> None:
 
 
 def test_wrong_files_are_named(write: Any, tmp_path: Path) -> None:
-    with pytest.raises(PhysicsError, match=r"a\.toml: .*masses\[0\] = -3.0 must be positive"):
+    with pytest.raises(PhysicsError, match=r"a\.toml:\d+: .*masses\[0\] = -3.0 must be positive"):
         plan("Structure", building=write(BUILDING.replace("[3.0", "[-3.0"), "a.toml"))
-    with pytest.raises(PhysicsError, match=r"none\.toml: cannot be read"):
+    with pytest.raises(PhysicsError, match=r"none\.toml: there is no such file"):
         plan("Structure", building=tmp_path / "none.toml")
     with pytest.raises(RecordError, match=r"none\.csv"):
         plan("GroundMotion", record=tmp_path / "none.csv")
