@@ -12,7 +12,10 @@ import pytest
 
 import benchmarks
 
-NAMES = [m.name for m in pkgutil.iter_modules(benchmarks.__path__) if not m.name.startswith("_")]
+FOUND = pkgutil.iter_modules(benchmarks.__path__)
+NAMES = [m.name for m in FOUND if not (m.ispkg or m.name.startswith("_"))]
+COMMANDS = ("paper", "train")
+"""What has options of its own in place of rows."""
 AT_WORK = 120.0
 """Seconds after which a benchmark counts as started: many take hours, and have no small case."""
 
@@ -34,3 +37,14 @@ def test_a_benchmark_starts(name: str) -> None:
         return
     assert done.returncode == 0, done.stderr[-2000:]
     assert json.loads(done.stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_of_the_benchmarks_says_what_it_does(name: str) -> None:
+    command = [sys.executable, "-m", "benchmarks", name, "--help"]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[1]
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.startswith("usage:")
