@@ -50,9 +50,11 @@ class Results(pd.DataFrame, Viewable):
         title : str
             Above the panels; by default the scenario's title.
         """
-        from .view import draw_run
-
-        return draw_run(self, title).figure
+        shown = Results(self)
+        shown.attrs = dict(self.attrs)
+        if title:
+            shown.attrs["made"] = {**self.attrs.get("made", {}), "title": title}
+        return Viewable.plot(shown)
 
     def _repr_html_(self) -> str:
         return Viewable._repr_html_(self)
