@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from bristle.cli._native import add_native, builder
+from bristle.cli._options import add_native, builder
 from bristle.errors import BristleError
 from bristle.fmu.build import plan
 from bristle.fmu.catalogue import component_names

@@ -11,7 +11,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from bristle.resources import cache_folder
+from bristle.core.files import cache_folder
 
 from ._blind import work
 from ._blind.cases import ROOT, digest_of

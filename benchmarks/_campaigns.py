@@ -10,18 +10,14 @@ from typing import Any
 import numpy as np
 
 from bristle.data.measurement import Measurement
-from bristle.example.bench import Signals, perform
-from bristle.example.damper import Damper
-from bristle.example.make import Choice, make_bench
-from bristle.example.planned import motion_of, programme_of
-from bristle.example.recorder import recorded, write_csv
-from bristle.example.rigs import rig_of, scales_of
-from bristle.example.sealed import seal, unseal
-from bristle.plan.folder import PlannedRun
-from bristle.plan.motions import Command, Waveform
-from bristle.plan.planned_test import Test
-from bristle.plan.rig_limits import RigLimits
-from bristle.study.create import create_study
+from bristle.examples.hidden import seal, unseal
+from bristle.examples.make import Choice, make_bench
+from bristle.examples.perform import motion_of, programme_of
+from bristle.examples.rigs import Damper, Signals, perform, recorded, rig_of, scales_of, write_csv
+from bristle.planning.folder import PlannedRun
+from bristle.planning.limits import RigLimits, Test
+from bristle.planning.waveforms import Command, Waveform
+from bristle.study.steps import create_study
 from bristle.study.study import Study
 from tests.independent.experiments import proposed
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.identify.fit import Scaled
-from bristle.identify.model import Model, Problem, Run
+from bristle.identification.fit import Scaled
+from bristle.identification.problem import Model, Problem, Run
 
 Array = NDArray[np.float64]
 

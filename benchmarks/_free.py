@@ -10,40 +10,39 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
-from bristle.data.checks.levels import tells_a_bend
+from bristle.data.checks.runs import tells_a_bend
 from bristle.data.measurement import Measurement
-from bristle.diagnose.candidates import judge
-from bristle.diagnose.corrected import corrected
-from bristle.diagnose.damper import look_at_damper
-from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.finding import Finding
-from bristle.diagnose.law_choice import choose, search
-from bristle.diagnose.law_free import Looks
-from bristle.diagnose.law_trials import LawTrial, try_laws
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.fit import learn
-from bristle.diagnose.opening import (
+from bristle.diagnosis.joint_search import Looks
+from bristle.diagnosis.law_choice import choose, search
+from bristle.diagnosis.law_trials import LawTrial, try_laws
+from bristle.diagnosis.prepared import (
     BenchData,
     Insufficient,
     Opening,
     Progress,
     bench_data,
+    corrected,
     opened_with,
     opening,
     silent,
 )
-from bristle.identify.model import Model, Problem
-from bristle.identify.prepare import prepare
-from bristle.identify.residuals import has_offset, zero_of
-from bristle.identify.rig import DAMPER, Site
-from bristle.identify.site_fit import fit_site
+from bristle.diagnosis.sensor_faults import SensorFault
+from bristle.diagnosis.site import look_at_damper
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.trials import judge
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem, has_offset, zero_of
+from bristle.identification.rig import DAMPER, Site
+from bristle.identification.rig_fit import fit_site
+from bristle.learning.curve import Curve
+from bristle.learning.effect_file import effect_text
+from bristle.learning.fit import learn
 from bristle.physics.laws import DEFAULT
-from bristle.physics.user import defined
-from bristle.study.completion import MOST_EFFECTS, gaining
-from bristle.study.identification import FitTask
+from bristle.study.auto import MOST_EFFECTS, gaining
+from bristle.study.identify import FitTask
 from bristle.study.inputs import runs_of
 from bristle.study.runs import Runs
+from bristle.user_code.load import defined
 
 from ._floor import share_of
 

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from bristle.data.measurement import Measurement
-from bristle.diagnose import diagnose_rig
-from bristle.identify.model import Model
+from bristle.diagnosis import diagnose_rig
+from bristle.identification.problem import Model
 from bristle.physics.building import Building, from_data
 from tests.independent.effects import LIBRARY, forms
 from tests.independent.rigs import LAWS, draw_rig

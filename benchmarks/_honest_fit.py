@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bristle.data.measurement import read_measurements
-from bristle.identify.fit import Model, Problem, Scaled
-from bristle.identify.model import steady, without
-from bristle.identify.rig import DAMPER, ROLES, Site, bench_rig
-from bristle.identify.site_fit import fit_site
-from bristle.identify.starts import start_models
+from bristle.identification.fit import Scaled
+from bristle.identification.problem import Model, Problem, steady, without
+from bristle.identification.rig import DAMPER, ROLES, Site, bench_rig
+from bristle.identification.rig_fit import fit_site
+from bristle.identification.starts import start_models
 from bristle.physics.laws import base_and_variant, law_names
 
 from . import _measured

@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 
 from bristle.data.channels import ChannelSpec, channel_unit
 from bristle.data.measurement import Measurement, measurements_of_frame
-from bristle.example import tower
-from bristle.example.bench import Signals
-from bristle.example.damper import Damper
-from bristle.example.hidden import Scales
-from bristle.example.rigs import CENTRE
-from bristle.example.solve import ROUGH
+from bristle.examples import rigs
+from bristle.examples.hidden import Scales
+from bristle.examples.rigs import CENTRE, ROUGH, Damper, Signals
 from bristle.physics.building import Building, from_data
 
 Array = NDArray[np.float64]
@@ -94,7 +91,7 @@ ODDITIES = (
 
 
 @dataclass(frozen=True)
-class OddTower(tower.Tower):
+class OddTower(rigs.Tower):
     """A tower with a further force [N] at one of its levels."""
 
     level: int = 0
@@ -140,17 +137,17 @@ def house(number: int, hidden: Oddity | None, share: float) -> House:
     values = {name: v * (1.0 + draw.uniform(-0.12, 0.12)) for name, v in table.items()}
     masses = np.array([1.97, 1.23, 1.23]) * (1.0 + draw.uniform(-0.12, 0.12, 3))
     stiffnesses = np.array([1057.0, 1366.0, 1366.0]) * (1.0 + draw.uniform(-0.12, 0.12, 3))
-    frame = tower.frame(masses, stiffnesses)
+    frame = rigs.frame(masses, stiffnesses)
     scales = Scales(10.0, 0.18, 0.02, table["w_n"], drift=5e-3)
     rig = OddTower(frame, Damper(LAW, values), {}, scales)
-    plan = tower.plan(rig, draw)
+    plan = rigs.tower_plan(rig, draw)
     if hidden is not None:
         rig = _hiding(rig, hidden, rig.perform(plan[0][1], plan[0][2], ROUGH), share)
     shown = {name: rig.perform(ground, volts) for name, ground, volts in plan}
     runs = {name: _measured(name, run, noise) for name, run in shown.items()}
     told = {
         "schema": 1, "name": "house", "base": "isolated", "masses": masses.tolist(),
-        "stiffnesses": stiffnesses.tolist(), "damping_ratio": tower.RATIO,
+        "stiffnesses": stiffnesses.tolist(), "damping_ratio": rigs.RATIO,
     }  # fmt: skip
     train = [run for name, run in runs.items() if name.startswith("train")]
     holdout = [run for name, run in runs.items() if name.startswith("holdout")]
@@ -159,7 +156,7 @@ def house(number: int, hidden: Oddity | None, share: float) -> House:
 
 def _hiding(rig: OddTower, hidden: Oddity, shown: Signals, share: float) -> OddTower:
     """Return a tower that hides something, of a size that follows from a run without it."""
-    level, below = tower.LEVELS[hidden.level], tower.LEVELS[hidden.level - 1]
+    level, below = rigs.LEVELS[hidden.level], rigs.LEVELS[hidden.level - 1]
     x, v = shown[f"{level}_displacement"], shown[f"{level}_velocity"]
     if hidden.level:
         x, v = x - shown[f"{below}_displacement"], v - shown[f"{below}_velocity"]

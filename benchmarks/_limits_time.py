@@ -7,12 +7,12 @@ import time
 from typing import Any
 
 from bristle import cli
-from bristle.diagnose import detail
+from bristle.diagnosis import diagnosis
 
 
 def main(study: str) -> int:
     """Diagnose; return the exit code of the command."""
-    limits, spent = detail.effect_limits, 0.0
+    limits, spent = diagnosis.effect_limits, 0.0
 
     def timed(*given: Any) -> Any:
         nonlocal spent
@@ -21,7 +21,7 @@ def main(study: str) -> int:
         spent += time.perf_counter() - begin
         return found
 
-    detail.effect_limits = timed
+    diagnosis.effect_limits = timed
     begin = time.perf_counter()
     code = cli.main(["diagnose", study, "--quiet"])
     whole = time.perf_counter() - begin

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, read_measurement, read_measurements
-from bristle.diagnose import Diagnosis, diagnose, diagnose_rig
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.corrected import corrected
-from bristle.identify.building import equilibrium, identify_structure
-from bristle.identify.model import Model, Problem
-from bristle.identify.prepare import prepare
-from bristle.identify.table import error_table
+from bristle.diagnosis import Diagnosis, diagnose, diagnose_rig
+from bristle.diagnosis.prepared import corrected
+from bristle.diagnosis.trials import Trial
+from bristle.identification.building_fit import equilibrium, identify_structure
+from bristle.identification.error_table import error_table
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem
 from bristle.physics.building import Building, from_data
 
 Array = NDArray[np.float64]

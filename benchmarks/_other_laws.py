@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bristle.data.measurement import Measurement
-from bristle.diagnose.candidates import joinable
-from bristle.identify.model import Model, Problem
-from bristle.identify.prepare import prepare
-from bristle.identify.search_context import Search
-from bristle.identify.start_grid import initial_guesses
+from bristle.diagnosis.trials import joinable
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem
+from bristle.identification.start_grid import Search, initial_guesses
 from bristle.physics.effect import effects_of
 
 from .laws import recorded, truth_of

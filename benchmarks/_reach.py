@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bristle.data.measurement import Measurement
-from bristle.identify.prepare import prepare
+from bristle.identification.prepare import prepare
 
 from . import _measured
 from ._answers import Answer, Answers

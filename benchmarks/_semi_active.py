@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from bristle.control import inverse, linear, switching
-from bristle.control.controller import read_controller
-from bristle.jit import compiled
+from bristle.component import control_laws
+from bristle.component.controller_file import read_controller
+from bristle.core.jit import compiled
 from bristle.physics.building import paper_building
 from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
@@ -34,11 +34,11 @@ STILL = 0.3
 """Force per volt [N/V] below which the voltage does next to nothing: it is then held."""
 
 LUGRE = law_code("lugre")
-force_of_law = inverse.force_of_law
-estimate_states = inverse.estimate_states
-clipped_voltage = switching.clipped_voltage
-limited = switching.limited
-command, advance = linear.command, linear.advance
+force_of_law = control_laws.force_of_law
+estimate_states = control_laws.estimate_states
+clipped_voltage = control_laws.clipped_voltage
+limited = control_laws.limited
+command, advance = control_laws.command, control_laws.advance
 
 
 def rates(x, ground, V, K, C, mass, p, out):  # type: ignore[no-untyped-def]
@@ -183,7 +183,7 @@ def _observer() -> tuple[Array, Array, Array]:
 def _hinf() -> Any:
     import bristle
 
-    return read_controller(Path(bristle.__file__).parent / "control" / "data" / "hinf.json")
+    return read_controller(Path(bristle.__file__).parent / "component" / "data" / "hinf.json")
 
 
 def run(law: int, ground: Array, gains: Array, quick: bool = False) -> Array:

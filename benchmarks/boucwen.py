@@ -27,15 +27,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bristle.core.text import plain
 from bristle.data.measurement import measurements_of_frame
-from bristle.identify.fit import Model, Run, identify
-from bristle.identify.model import Problem
-from bristle.identify.prepare import prepare
+from bristle.identification.fit import identify
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem, Run
 from bristle.physics import damper
-from bristle.physics.inputs import Inputs
 from bristle.physics.law import Law, Shape, forget_law
 from bristle.physics.parameter import Parameter
-from bristle.quantity import plain
+from bristle.physics.tuples import Inputs
 
 from ._answers import Answer, Answers
 from ._floor import share_of

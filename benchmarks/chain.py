@@ -11,9 +11,9 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.master import Master
-from bristle.simulate.session import Instance
+from bristle.engine.cosimulation import Master
+from bristle.engine.instance import Instance
+from bristle.system.scenario import load_scenario
 
 from ._rows import Row, least_times
 from .master import find_fmus

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from bristle.fmu.build import ensure
-from bristle.scenario.scenario import load_scenario
+from bristle.system.scenario import load_scenario
 
 from ._rows import Row, Times, interleave
 

@@ -97,7 +97,7 @@ def built(component: str, folder: Path, native: bool = False) -> Path:
     what = build.plan(component, starts=parameters(component))
     if native:
         from bristle.native.build import build as build_native
-        from bristle.native.platforms import here
+        from bristle.native.zig import here
 
         return build_native(what, folder, [here()])
     return build.build(what, folder)

@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 from bristle.component.damper import VOLTAGE
-from bristle.jit import compiled
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import LONGEST_SUBSTEP, simulate
-from bristle.simulate.system import System
-from bristle.simulate.time_loop import INLINE, MAX_SWEEPS, TOLERANCE, integrate
+from bristle.core.jit import compiled
+from bristle.engine.coupled import LONGEST_SUBSTEP, System, simulate
+from bristle.engine.time_loop import INLINE, MAX_SWEEPS, TOLERANCE, integrate
+from bristle.system.scenario import load_scenario
 
 from ._published import DRIFT, SECOND_FLOOR, half_sine, passive, peak_errors, symbol
 from ._rows import Row, interleave, ratio_of

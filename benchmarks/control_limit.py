@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from bristle.engine.coupled import simulate
 from bristle.errors import RecordError
-from bristle.limit import Limit, limit
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
+from bristle.optimal_control import Limit, limit
+from bristle.system.scenario import load_scenario
 
 from ._motions import DATA, NEWHALL, REPORTED, G, recorded
 from ._rows import Row

@@ -16,14 +16,14 @@ import numpy as np
 import pandas as pd
 
 import bristle
+from bristle.engine.cosimulation import Master
+from bristle.engine.coupling_error import CouplingError, against, estimate, finer
+from bristle.engine.run import run_quietly
+from bristle.engine.summary import judged_by
 from bristle.errors import BuildError, ScenarioError
 from bristle.fmu.build import ensure
 from bristle.native.build import ensure as ensure_native
-from bristle.scenario.scenario import Scenario, load_scenario
-from bristle.simulate.coupling_error import CouplingError, against, estimate, finer
-from bristle.simulate.master import Master
-from bristle.simulate.run import run_quietly
-from bristle.simulate.summary import judged_by
+from bristle.system.scenario import Scenario, load_scenario
 
 from ._exact import half_sine_exact
 from ._published import DRIFT, Case, half_sine, peak_errors, symbol

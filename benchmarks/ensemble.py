@@ -12,12 +12,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bristle.batch.file import read_ensemble
-from bristle.batch.plan import Plan
-from bristle.batch.pool import run_local
-from bristle.batch.worker import prepare, statistic
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
+from bristle.campaign.campaign import prepare, statistic
+from bristle.campaign.ensemble_file import read_ensemble
+from bristle.campaign.plan import Plan
+from bristle.campaign.pool import run_local
+from bristle.engine.coupled import simulate
+from bristle.system.scenario import load_scenario
 
 from ._rows import Row
 

@@ -30,10 +30,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bristle
+from bristle.core.files import fmus_folder
 from bristle.fmu.build import ensure
 from bristle.native import zig
 from bristle.native.build import ensure as ensure_native
-from bristle.resources import fmus_folder
 
 from ._rows import Row
 

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 import bristle
 from bristle.data.left_out import SETTLING
-from bristle.identify.error import ForceError, error_of, pooled, reasons_of
-from bristle.identify.prepare import prepare
+from bristle.identification.error import ForceError, error_of, pooled, reasons_of
+from bristle.identification.prepare import prepare
 
 from . import _honest_buildings, _honest_fit, _honest_intervals
 from ._motions import DATA as MOTIONS

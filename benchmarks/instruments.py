@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from bristle.diagnose import diagnose, diagnose_rig
-from bristle.identify.model import Model
+from bristle.diagnosis import diagnose, diagnose_rig
+from bristle.identification.problem import Model
 from bristle.physics.building import Building
 from bristle.physics.effect import EFFECTS
 from tests.independent.rigs import LAWS

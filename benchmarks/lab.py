@@ -36,16 +36,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bristle.core.text import plain
 from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.finding import Finding
 from bristle.data.checks.recording import check_recording
 from bristle.data.measurement import Measurement
-from bristle.diagnose.damper import look_at_damper
-from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.low_pass import low_pass_text
-from bristle.diagnose.opening import opening
-from bristle.identify.model import Model
-from bristle.quantity import plain
+from bristle.diagnosis.load_cell import low_pass_text
+from bristle.diagnosis.prepared import opening
+from bristle.diagnosis.sensor_faults import SensorFault
+from bristle.diagnosis.site import look_at_damper
+from bristle.identification.problem import Model
 from tests.independent.generate import Case
 from tests.independent.rigs import Rig
 from tests.independent.specimen import Specimen

@@ -20,10 +20,10 @@ import json
 import traceback
 from time import perf_counter
 
-from bristle.diagnose.faults import instruments_of
-from bristle.diagnose.law_choice import Pair
-from bristle.diagnose.law_free import diagnose_laws
-from bristle.identify.model import Model
+from bristle.diagnosis.joint_search import diagnose_laws
+from bristle.diagnosis.law_choice import Pair
+from bristle.diagnosis.sensor_faults import instruments_of
+from bristle.identification.problem import Model
 from bristle.physics.forms import split_form
 
 from ._answers import Answer, Answers, ask

@@ -23,10 +23,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bristle.data.measurement import Measurement, measurements_of_frame
-from bristle.identify.bench import Bench
-from bristle.identify.fit import identify
-from bristle.identify.model import Problem
-from bristle.identify.prepare import prepare
+from bristle.identification.fit import identify
+from bristle.identification.histories import Bench
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Problem
 from bristle.physics.laws import LAWS, laws_of
 
 from ._rows import Row

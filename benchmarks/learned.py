@@ -27,17 +27,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.equilibrium import BuildingRuns
-from bristle.diagnose.learned.closed import closed_forms, name_of
-from bristle.diagnose.learned.closed_fit import close
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.fit import LearnedCurve, learn
-from bristle.diagnose.opening import Insufficient, Opening, opening, silent
-from bristle.identify.model import Model
-from bristle.identify.rig import DAMPER
-from bristle.physics.user import defined
+from bristle.diagnosis.prepared import Insufficient, Opening, opening, silent
+from bristle.diagnosis.rig_runs import BuildingRuns
+from bristle.diagnosis.trials import Trial
+from bristle.identification.problem import Model
+from bristle.identification.rig import DAMPER
+from bristle.learning.closed_forms import close, closed_forms, name_of
+from bristle.learning.curve import Curve
+from bristle.learning.effect_file import effect_text
+from bristle.learning.fit import LearnedCurve, learn
+from bristle.user_code.load import defined
 
 from ._answers import Answer, Answers, ask
 from ._blind import cases

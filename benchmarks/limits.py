@@ -20,13 +20,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from bristle.diagnose.candidates import joinable, judge
-from bristle.diagnose.damper import look_at_damper
-from bristle.diagnose.effect_limits import limit_of
-from bristle.diagnose.effect_size import Known, Sized
-from bristle.diagnose.opening import Insufficient, Opening, opening
-from bristle.identify.model import Model, Problem, Run
-from bristle.identify.search_context import refine
+from bristle.diagnosis.effect_limits import limit_of
+from bristle.diagnosis.effect_size import Known, Sized
+from bristle.diagnosis.prepared import Insufficient, Opening, opening
+from bristle.diagnosis.site import look_at_damper
+from bristle.diagnosis.trials import joinable, judge
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.start_grid import refine
 
 from ._answers import Answer, Answers, ask
 from ._blind import cases

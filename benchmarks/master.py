@@ -10,11 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from bristle.engine.cosimulation import Master
+from bristle.engine.instance import Instance, Unpacked
 from bristle.fmu.build import ensure
 from bristle.fmu.description import Description, read_description
-from bristle.scenario.scenario import Scenario, fmu_parameters, load_scenario
-from bristle.simulate.master import Master
-from bristle.simulate.session import Instance, Unpacked
+from bristle.system.scenario import Scenario, fmu_parameters, load_scenario
 
 from ._rows import Row, Times, interleave, ratio_of
 

@@ -16,14 +16,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bristle.example.bench import perform
-from bristle.example.excitation import Motion, Programme
-from bristle.example.make import Choice
-from bristle.example.recorder import instruments, recorded, write_csv
-from bristle.example.rigs import scales_of
-from bristle.plan.motions import Command, Waveform
-from bristle.plan.planned_test import Signals, Test
-from bristle.study.create import create_study
+from bristle.examples.make import Choice
+from bristle.examples.rigs import (
+    Motion,
+    Programme,
+    instruments,
+    perform,
+    recorded,
+    scales_of,
+    write_csv,
+)
+from bristle.planning.limits import Signals, Test
+from bristle.planning.waveforms import Command, Waveform
+from bristle.study.steps import create_study
 
 from ._campaigns import LIMITS, TrueRig
 from ._rows import Row

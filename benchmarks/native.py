@@ -22,10 +22,10 @@ from pathlib import Path
 from bristle.errors import BuildError
 from bristle.fmu import catalogue
 from bristle.native.build import ensure
-from bristle.native.platforms import PLATFORMS
+from bristle.native.zig import PLATFORMS
 from bristle.physics.effect import effects_of
 from bristle.physics.laws import laws_of
-from bristle.scenario.scenario import load_scenario
+from bristle.system.scenario import load_scenario
 
 from . import _hosts, compatibility
 from ._rows import Row, interleave, ratio_of
@@ -46,7 +46,7 @@ from pathlib import Path
 from bristle.fmu.build import plan
 from bristle.fmu.catalogue import component_names
 from bristle.native.build import build
-from bristle.native.platforms import PLATFORMS
+from bristle.native.zig import PLATFORMS
 
 names = component_names()
 for name in names:

@@ -1,4 +1,4 @@
-/* The time loop of bristle/simulate/time_loop.py written in C, for one building and one LuGre damper:
+/* The time loop of bristle/engine/time_loop.py written in C, for one building and one LuGre damper:
  * what compiled Python is measured against. Same scheme, same order of operations; the building may
  * have any number of levels; effects, other laws and other wirings are left out. */
 

@@ -26,19 +26,19 @@ from pathlib import Path
 import numpy as np
 
 import bristle
-from bristle.diagnose.bench import BenchRuns
-from bristle.diagnose.candidates import joinable
-from bristle.diagnose.effect_limits import limit_of
-from bristle.diagnose.effect_size import Known, Sized
-from bristle.diagnose.opening import Opening
-from bristle.example.make import Choice
-from bristle.example.perform import perform_plan
-from bristle.identify.fit import intervals_of
-from bristle.identify.model import Model
+from bristle.diagnosis.effect_limits import limit_of
+from bristle.diagnosis.effect_size import Known, Sized
+from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.rig_runs import BenchRuns
+from bristle.diagnosis.trials import joinable
+from bristle.examples.make import Choice
+from bristle.examples.perform import perform_plan
+from bristle.identification.fit import intervals_of
+from bristle.identification.problem import Model
 from bristle.physics.effect import EFFECTS
-from bristle.plan.folder import PlannedRun
-from bristle.study.curves import learn_effect
-from bristle.study.learning import add_effects, diagnose_study
+from bristle.planning.folder import PlannedRun
+from bristle.study.learn import learn_effect
+from bristle.study.steps import add_effects, diagnose_study
 
 from ._answers import Answer, Answers, ask
 from ._campaigns import LIMITS, ORDINARY, SHEET, HiddenRig, TrueRig, few_sines
@@ -63,7 +63,7 @@ OF_EACH = 4
 APART = 0.02
 """Relative difference of two z below which they are alike: about what the noise of runs makes."""
 
-ALSO = ("plan", "example")
+ALSO = ("planning", "examples")
 
 
 def run() -> list[Row]:

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bristle.bridge.closed_loop import closed_loop
-from bristle.example.hidden import able
-from bristle.example.make import Choice, make_building
-from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects
+from bristle.examples.hidden import able
+from bristle.examples.make import Choice, make_building
+from bristle.prediction.closed_loop import closed_loop
+from bristle.study.identify import identify_study
+from bristle.study.steps import add_effects
 
 from ._answers import Answer, Answers, ask
 from ._rows import Row

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from bristle.engine.coupling_error import ROUNDING, CouplingError, estimate, finer, largest
+from bristle.engine.run import run_quietly
+from bristle.engine.summary import judged_by
 from bristle.errors import BristleError, ScenarioError
-from bristle.scenario.scenario import Scenario, load_scenario
-from bristle.simulate.coupling_error import ROUNDING, CouplingError, estimate, finer, largest
-from bristle.simulate.run import run_quietly
-from bristle.simulate.summary import judged_by
+from bristle.system.scenario import Scenario, load_scenario
 
 from ._random_scenarios import write_random
 from ._rows import Row

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.control.controller import read_controller
-from bristle.design import Damper
+from bristle.component.controller_file import read_controller
+from bristle.core.files import scenarios_folder
+from bristle.engine.coupled import simulate
 from bristle.errors import RecordError
 from bristle.fmu.catalogue import instantiate
-from bristle.resources import scenarios_folder
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
+from bristle.synthesis import Damper
+from bristle.system.scenario import load_scenario
 
 from ._motions import DATA, NEWHALL, REPORTED, G, recorded
 from ._rows import Row
@@ -43,7 +43,7 @@ STEP = 200e-6
 """Goal for a step of the FMU [s]."""
 DRAWS = 10
 """Wrong buildings, dampers and sensors of each case."""
-POLICY = Path(__file__).parents[1] / "bristle" / "control" / "data" / "policy.json"
+POLICY = Path(__file__).parents[1] / "bristle" / "component" / "data" / "policy.json"
 
 
 class Case(NamedTuple):

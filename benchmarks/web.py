@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bristle.core.jit import compiled
+from bristle.engine.coupled import System, linked, simulate, substeps_of
+from bristle.engine.time_loop import INLINE, integrate
 from bristle.errors import BuildError
-from bristle.jit import compiled
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import linked, simulate, substeps_of
-from bristle.simulate.system import System
-from bristle.simulate.time_loop import INLINE, integrate
-from bristle.web.export import export_web
+from bristle.export.web import export_web
+from bristle.system.scenario import load_scenario
 
 from ._rows import Row
 

@@ -20,52 +20,52 @@ from typing import TYPE_CHECKING
 from .version import __version__
 
 if TYPE_CHECKING:
-    from .batch.execute import Ensemble as Ensemble
-    from .batch.execute import ensemble as ensemble
-    from .compare.comparison import Comparison as Comparison
-    from .controllers.compare import compare_controllers as compare_controllers
+    from .campaign.ensemble import Ensemble as Ensemble
+    from .campaign.ensemble import ensemble as ensemble
+    from .comparison.comparison import Comparison as Comparison
+    from .controller_comparison.compare import compare_controllers as compare_controllers
     from .data.measurement import Measurement as Measurement
-    from .design import design as design
-    from .design.result import DesignResult as DesignResult
-    from .diagnose.verdict import Diagnosis as Diagnosis
+    from .diagnosis.verdict import Diagnosis as Diagnosis
+    from .engine.results import Results as Results
+    from .engine.results import load_results as load_results
+    from .engine.run import run as run
     from .errors import BristleError as BristleError
     from .physics.effect import Effect as Effect
     from .physics.law import Law as Law
     from .physics.parameter import Parameter as Parameter
-    from .plan.plan import Plan as Plan
-    from .plan.public import plan as plan
-    from .simulate.frame import Results as Results
-    from .simulate.results import load_results as load_results
-    from .simulate.run import run as run
+    from .planning.api import plan as plan
+    from .planning.plan import Plan as Plan
+    from .study.api import compare as compare
+    from .study.api import diagnose as diagnose
+    from .study.api import identify as identify
     from .study.identified import Identified as Identified
-    from .study.public import compare as compare
-    from .study.public import diagnose as diagnose
-    from .study.public import identify as identify
     from .study.study import Study as Study
+    from .synthesis import design as design
+    from .synthesis.result import DesignResult as DesignResult
 
 _LAZY = {
     "BristleError": "errors",
-    "Comparison": "compare.comparison",
-    "DesignResult": "design.result",
-    "Diagnosis": "diagnose.verdict",
+    "Comparison": "comparison.comparison",
+    "DesignResult": "synthesis.result",
+    "Diagnosis": "diagnosis.verdict",
     "Effect": "physics.effect",
-    "Ensemble": "batch.execute",
+    "Ensemble": "campaign.ensemble",
     "Identified": "study.identified",
     "Law": "physics.law",
     "Measurement": "data.measurement",
     "Parameter": "physics.parameter",
-    "Plan": "plan.plan",
-    "Results": "simulate.frame",
+    "Plan": "planning.plan",
+    "Results": "engine.results",
     "Study": "study.study",
-    "compare": "study.public",
-    "compare_controllers": "controllers.compare",
-    "design": "design",
-    "diagnose": "study.public",
-    "ensemble": "batch.execute",
-    "identify": "study.public",
-    "load_results": "simulate.results",
-    "plan": "plan.public",
-    "run": "simulate.run",
+    "compare": "study.api",
+    "compare_controllers": "controller_comparison.compare",
+    "design": "synthesis",
+    "diagnose": "study.api",
+    "ensemble": "campaign.ensemble",
+    "identify": "study.api",
+    "load_results": "engine.results",
+    "plan": "planning.api",
+    "run": "engine.run",
 }
 """The public names, and the modules that they are in."""
 

@@ -1,7 +1,7 @@
 """Consent to code that came with a file: an effect of somebody's own runs after its user said yes.
 
 A study or a scenario may come from somebody else, and the effects in it are Python. The loader of
-such files (`physics.user`) asks here before it runs any text. Consent is remembered by the digest
+such files (`user_code.load`) asks here before it runs any text. Consent is remembered by the digest
 of the text, in a folder of this user on this machine: a text that changes asks again, one that
 moves does not. The check that the loader makes of a text keeps hooks pure; it is no fence against
 somebody who means harm.
@@ -18,9 +18,9 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
+from .core.files import state_folder
 from .errors import TrustError
-from .physics import user
-from .resources import state_folder
+from .user_code import load as user
 
 VARIABLE = "BRISTLE_TRUST"
 """The environment variable that consents to all code, for CI: 1 is yes."""
@@ -143,7 +143,7 @@ def load(folder: Path, word: str = "effect", *, trust: bool = False) -> list[use
         "effect" or "law". Load laws first: an effect joins those that are there.
     trust : bool
         Whether to consent to what they hold. Without it a text that has not run here before is
-        left out, and `physics.user.waiting` says so.
+        left out, and `user_code.load.waiting` says so.
 
     Raises
     ------

@@ -9,7 +9,7 @@ class ClippedOptimal(LinearSlave):
 
     design = "hinf"
     law_kind = CLIPPED
-    files = ("control/data/hinf.json",)
+    files = ("component/data/hinf.json",)
 
     def declare_law(self):
         super().declare_law()

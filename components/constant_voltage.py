@@ -1,7 +1,7 @@
 """FMU: the same voltage all the time."""
 
 from bristle.component import source
-from bristle.fmu.source import SourceSlave
+from bristle.fmu.component import SourceSlave
 
 
 class ConstantVoltage(SourceSlave):

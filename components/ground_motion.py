@@ -1,8 +1,8 @@
 """FMU: the ground shakes as recorded."""
 
 from bristle.component import source
-from bristle.fmu.source import Reading, SourceSlave
-from bristle.physics.record import HEADER
+from bristle.fmu.component import Reading, SourceSlave
+from bristle.physics.motion_file import HEADER
 
 BUILT_IN = ("el_centro_1940_ns",)
 

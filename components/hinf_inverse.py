@@ -9,7 +9,7 @@ class HinfInverse(LinearSlave):
 
     design = "hinf"
     law_kind = INVERSE
-    files = ("control/data/hinf.json",)
+    files = ("component/data/hinf.json",)
 
     def declare_law(self):
         super().declare_law()

@@ -10,7 +10,7 @@ class Lpv(LinearSlave):
     design = "lpv"
     law_kind = SIGNED
     command_unit = "V"
-    files = ("control/data/lpv.json",)
+    files = ("component/data/lpv.json",)
 
     def declare_law(self):
         super().declare_law()

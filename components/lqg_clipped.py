@@ -9,7 +9,7 @@ class LqgClipped(LinearSlave):
 
     design = "lqg"
     law_kind = CLIPPED_LQG
-    files = ("control/data/lqg.json",)
+    files = ("component/data/lqg.json",)
 
     def declare_law(self):
         super().declare_law()

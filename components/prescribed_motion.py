@@ -1,6 +1,6 @@
 """FMU: a test bench that moves a damper's rod."""
 
-from bristle.fmu.source import SignalSlave
+from bristle.fmu.component import SignalSlave
 
 
 class PrescribedMotion(SignalSlave):

@@ -1,6 +1,6 @@
 """FMU: a test signal for any input."""
 
-from bristle.fmu.source import SignalSlave
+from bristle.fmu.component import SignalSlave
 
 
 class SignalSource(SignalSlave):

@@ -10,7 +10,7 @@ class TrainedPolicy(LinearSlave):
     design = "policy"
     law_kind = POLICY
     command_unit = "V"
-    files = ("control/data/policy.json",)
+    files = ("component/data/policy.json",)
 
     def declare_law(self):
         super().declare_law()

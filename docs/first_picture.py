@@ -19,15 +19,16 @@ from typing import TYPE_CHECKING, Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from bristle.compare.prediction import RunPrediction
-from bristle.data.model import read_model
-from bristle.draw.style import BLUE, FLOOR, GREEN, GREY, INK, VERMILION, Page, look, short_z
+from bristle.comparison.predictions import RunPrediction
+from bristle.core.text import short_z
+from bristle.model.model_file import read_model
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
-from bristle.study.comparison import comparer
 from bristle.study.history import Step
-from bristle.study.identification import as_model
+from bristle.study.identify import as_model
+from bristle.study.steps import comparer
 from bristle.study.study import Study
+from bristle.view.style import BLUE, FLOOR, GREEN, GREY, INK, VERMILION, Page, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

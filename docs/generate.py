@@ -97,8 +97,8 @@ def on_post_build(config: MkDocsConfig) -> None:
     With DOCS_WITHOUT_LIVE in the environment nothing is compiled for them.
     """
     from bristle.errors import BuildError
+    from bristle.export.web import export_web
     from bristle.view.html import page
-    from bristle.web.export import export_web
 
     for name, (scenario, sliders) in LIVE.items():
         folder = Path(config.site_dir) / name

@@ -6,10 +6,10 @@ import io
 from math import cos, pi, sin
 from typing import TYPE_CHECKING
 
-from bristle.draw.style import BLUE, PALE, Page, label, look, zero_lines
 from bristle.physics import damper
 from bristle.physics.effect import EFFECTS, Effect, Q, laws_joined
 from bristle.physics.laws import DEFAULT
+from bristle.view.style import BLUE, PALE, Page, label, look, zero_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -23,7 +23,7 @@ def figures() -> None:
     import bristle
     from benchmarks.paper.comparison.make import make as comparison
     from benchmarks.paper.figures import make, paper_figures
-    from bristle.simulate.view import run_figure
+    from bristle.engine.view import run_figure
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import textwrap
 
-from bristle.data.equation import formulas
-from bristle.draw.mathml import formula_html
+from bristle.model.equations import formulas
+from bristle.view.formula import formula_html
 
 
 def table(titles: list[str], rows: list[list[str]]) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 import bristle
-from bristle.identify.bench import Bench
+from bristle.identification.histories import Bench
 
 
 def compile_ahead() -> None:

@@ -15,7 +15,7 @@ from hypothesis import settings
 from toys import Maker, build_toys
 
 from bristle import trust
-from bristle.physics.user import unload_effects
+from bristle.user_code.load import unload_effects
 
 _STATUS = pytest.StashKey[int]()
 _AHEAD = pytest.StashKey["subprocess.Popen[bytes]"]()

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from bristle.core.jit import compiled
 from bristle.fmu import catalogue
-from bristle.fmu.component import ComponentSlave
+from bristle.fmu.component import ComponentSlave, SourceSlave
 from bristle.fmu.controller import SampledSlave
-from bristle.fmu.source import SourceSlave
-from bristle.jit import compiled
 
 STEPS = (5e-4, 5e-4, 2e-3, 2e-3, 7e-4, 0.011)
 """Lengths of the steps of a run [s], again and again."""
@@ -60,7 +59,10 @@ def entry(functions: Any) -> Any:
         namespace["__name__"] = f"entry_{len(_ENTRIES)}"
         exec(text, namespace)
         # Not kept: machine code whose module is made here could not be read by another process.
-        _ENTRIES[id(functions)] = functions, compiled(namespace["entry"], ("rows.row",), keep=False)
+        _ENTRIES[id(functions)] = (
+            functions,
+            compiled(namespace["entry"], ("linear.row",), keep=False),
+        )
     return _ENTRIES[id(functions)][1]
 
 

@@ -38,7 +38,7 @@ QUICK = (
 
 def compared(effect: str, form: str, law: str) -> tuple[float, float]:
     """Return RMS of the generator's force and of what the package's law leaves of it [N]."""
-    from bristle.identify.bench import Bench
+    from bristle.identification.histories import Bench
     from tests.independent.experiments import bench_experiment
     from tests.independent.rigs import draw_rig
     from tests.independent.specimen import Specimen

@@ -15,10 +15,10 @@ from benchmarks._blind import plan
 from benchmarks._blind.plan import Task
 from benchmarks._calibrate import page, replay, trials, varied
 from benchmarks._calibrate.trials import NotStoredError, Stored
-from bristle.diagnose import damper, decision, inconsistent_runs, sites
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.decision import decide
-from bristle.diagnose.rule import (
+from bristle.diagnosis import decision, inconsistent_runs
+from bristle.diagnosis import site as damper
+from bristle.diagnosis.decision import decide
+from bristle.diagnosis.rule import (
     BENCH,
     DRIVE,
     INSIDE,
@@ -28,7 +28,8 @@ from bristle.diagnose.rule import (
     SITE,
     DecisionRule,
 )
-from bristle.identify.fit import Model
+from bristle.diagnosis.trials import Trial
+from bristle.identification.problem import Model
 
 N = 5000
 NOISE = np.random.default_rng(5).standard_normal(N) ** 2
@@ -87,7 +88,7 @@ def fields_read(*functions: object) -> set[str]:
 def test_every_field_that_a_decision_reads_is_varied() -> None:
     read = fields_read(decision, damper.is_organised, inconsistent_runs.kind_of)
     assert read | {"least_excess"} == set(varied.BENCH_VALUES)
-    site = (sites.decide_site, sites.lowers, sites.better, sites.equals, sites._rivals)
+    site = (damper.decide_site, damper.lowers, damper.better, damper.equals, damper._rivals)
     read = fields_read(*site, inconsistent_runs.kind_of)
     assert read | {"least_excess"} == set(varied.SITE_VALUES)
 

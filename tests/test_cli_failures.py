@@ -113,7 +113,7 @@ def test_only_the_last_tracebacks_are_kept(
 
 
 KERNEL = """
-        from bristle.jit import compiled
+        from bristle.core.jit import compiled
 
         def spin(n):
             total = 0.0

@@ -181,11 +181,11 @@ def test_ctrl_c_tells_what_is_kept(
     def interrupted(*given: object, **named: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bristle.study.learning.diagnose_study", interrupted)
+    monkeypatch.setattr("bristle.study.steps.diagnose_study", interrupted)
     assert main(["diagnose", str(rig)]) == 130
     (line,) = capsys.readouterr().err.splitlines()
     assert line == f"interrupted. {KEPT['diagnose']}"
-    monkeypatch.setattr("bristle.study.completion.complete", interrupted)
+    monkeypatch.setattr("bristle.study.auto.complete", interrupted)
     assert main(["study", "auto", str(rig)]) == 130
     assert KEPT["study auto"] in capsys.readouterr().err
     monkeypatch.setattr(Study, "undo", interrupted)

@@ -14,13 +14,12 @@ import pytest
 from numpy.typing import NDArray
 
 from bristle.cli import main
-from bristle.control.controller import read_controller
-from bristle.design import DesignResult, Task, design
-from bristle.design.margins import facts_of, grid_rows, margins
-from bristle.design.plant import Plant, StateSpace
-from bristle.design.responses import curves, task_curves
-from bristle.design.view import draw_design
+from bristle.component.controller_file import read_controller
 from bristle.fmu.build import plan
+from bristle.synthesis import DesignResult, Task, design
+from bristle.synthesis.analysis import curves, facts_of, grid_rows, margins, task_curves
+from bristle.synthesis.plant import Plant, StateSpace
+from bristle.synthesis.view import draw_design
 
 IMPROPER = "[weights]\ncommand = { numerator = [1, 2, 3], denominator = [1, 4] }"
 ROLLING_OFF = "[weights]\ncommand = { gain = 2.0, corner = 50.0 }"
@@ -152,8 +151,8 @@ def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from bristle.data.building_file import read_building
-    from bristle.data.model import new_model
-    from bristle.data.model_text import write_model
+    from bristle.model.model import new_model
+    from bristle.model.model_file import write_model
 
     model = new_model("lugre").with_effect("gas_spring")
     found = {"sigma_a": 720.0, "sigma_0": 390.0, "gas_spring.k": 60.0}
@@ -197,8 +196,8 @@ def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
 def test_a_study_model_that_is_wrong_is_one_message(
     edit: tuple[str, str], words: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bristle.data.model import new_model
-    from bristle.data.model_text import write_model
+    from bristle.model.model import new_model
+    from bristle.model.model_file import write_model
 
     write_model(here / "model.toml", new_model("lugre"))
     text = (here / "model.toml").read_text()

@@ -17,11 +17,11 @@ import bristle
 from benchmarks.paper.figures import paper_figures
 from bristle.cli import build_parser
 from bristle.cli.list_ import effect_as_dict
-from bristle.data.equation import formulas
-from bristle.draw.mathml import formula_html
 from bristle.fmu import catalogue
+from bristle.model.equations import formulas
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
+from bristle.view.formula import formula_html
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

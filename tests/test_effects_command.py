@@ -7,9 +7,9 @@ import json
 import pytest
 
 from bristle.cli import main
+from bristle.core.text import typed
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
-from bristle.quantity import typed
 
 
 def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:

@@ -14,10 +14,11 @@ from typing import Any
 import pytest
 
 from benchmarks import exits
+from bristle.engine import instance
 from bristle.errors import FmuError
+from bristle.fmu.archive import extract
 from bristle.fmu.build import ensure
-from bristle.fmu.description import extract, read_description
-from bristle.simulate import binding, session
+from bristle.fmu.description import read_description
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the binary ends in order")
 compiles = pytest.mark.skipif(
@@ -111,13 +112,13 @@ def test_libraries_are_loaded_one_after_the_other(
             inside[0] -= 1
             raise OSError("enough")
 
-    monkeypatch.setattr(binding.fmi2, "FMU2Slave", Slow)
+    monkeypatch.setattr(instance.fmi2, "FMU2Slave", Slow)
     path = ensure("ConstantVoltage")
     about, folder = read_description(path), extract(path, tmp_path / "one")
 
     def load() -> None:
         with pytest.raises(FmuError, match="enough"):
-            session.Instance("one", about, folder, print)
+            instance.Instance("one", about, folder, print)
 
     threads = [threading.Thread(target=load) for _ in range(4)]
     for thread in threads:

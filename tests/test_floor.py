@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import _floor, _free, _reach, boucwen
 from benchmarks._measured import Row
-from bristle.identify.model import Model, Problem, Run
+from bristle.identification.problem import Model, Problem, Run
 
 DT = 0.01
 

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 import bristle
-from bristle import jit
-from bristle.jit import digest
+from bristle.core import jit
+from bristle.core.jit import digest
 
 PACKAGE = Path(bristle.__file__).resolve().parent
 OLD = "return p.preload + q.x * (p.k + q.x * (p.k_2 + q.x * p.k_3))"
@@ -29,8 +29,8 @@ import json
 from collections import namedtuple
 from pathlib import Path
 
-from bristle.jit import compiled, digest
-from bristle.simulate.time_loop import integrate
+from bristle.core.jit import compiled, digest
+from bristle.engine.time_loop import integrate
 from bristle.physics.effects.gas_spring import GasSpring
 
 Motion = namedtuple("Motion", "x")
@@ -153,7 +153,7 @@ NAMESAKES = """
 import sys
 
 import namesakes
-from bristle.jit import compiled
+from bristle.core.jit import compiled
 
 LONG = "    x = math.sin(x) if x > 1.0 else x\\n" * 60  # too long to be inlined
 

@@ -39,12 +39,12 @@ def twice(x):
 
 
 try:
-    from bristle.jit import compiled
+    from bristle.core.jit import compiled
 
     compiled(twice, keep=False)
 except KeyboardInterrupt:
     print("interrupted", press.pressed)
-from bristle.jit import compiled
+from bristle.core.jit import compiled
 
 print(compiled(twice, keep=False)(21.0))
 """

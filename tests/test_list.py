@@ -8,7 +8,7 @@ from bristle.cli import main
 from bristle.data import list_ground_motions
 from bristle.fmu.catalogue import component_names
 from bristle.physics.effect import EFFECTS
-from bristle.scenario.scenario import stock_scenarios
+from bristle.system.scenario import stock_scenarios
 
 
 def answer(capsys, *arguments):

@@ -13,15 +13,15 @@ import pytest
 
 from bristle.cli import main
 from bristle.conformance import conform
+from bristle.engine.run import IncompleteRunError, run
 from bristle.errors import BuildError, ScenarioError
 from bristle.fmu import catalogue
 from bristle.fmu.build import build, plan
 from bristle.fmu.controller import MEASURED
 from bristle.fmu.own_controller import Measured
-from bristle.scenario.scenario import load_scenario, stock_scenarios
-from bristle.scenario.stock import copy_scenario
-from bristle.scenario.text import scenario_text
-from bristle.simulate.run import IncompleteRunError, run
+from bristle.system.scenario import load_scenario, stock_scenarios
+from bristle.system.stock import copy_scenario
+from bristle.system.toml import scenario_text
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -10,10 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from bristle import progress
 from bristle.cli import _line
 from bristle.cli._line import Line
-from bristle.progress import Count, Progress, Stages, counted, listening, tell, telling
+from bristle.core import progress
+from bristle.core.progress import Count, Progress, Stages, counted, listening, tell, telling
 
 
 def test_nobody_is_told_where_nobody_listens(capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,13 +43,13 @@ def python(code: str, timeout: float = 120.0) -> subprocess.CompletedProcess[str
     "lines",
     [
         "import bristle",
-        "import bristle; import bristle.simulate.run; import bristle.batch.execute",
-        "import bristle.simulate.run; import bristle.batch.execute; import bristle",
-        "import bristle; bristle.run; bristle.ensemble; import bristle.batch, bristle.simulate",
+        "import bristle; import bristle.engine.run; import bristle.campaign.ensemble",
+        "import bristle.engine.run; import bristle.campaign.ensemble; import bristle",
+        "import bristle; bristle.run; bristle.ensemble; import bristle.campaign, bristle.engine",
         "from bristle import ensemble, run; import bristle",
-        "import bristle.identify.fit, bristle.compare.rig, bristle.diagnose, bristle.design.file",
-        "from bristle.diagnose import Diagnosis; import bristle",
-        "import bristle; bristle.identify; import bristle.identify.rig, bristle.compare",
+        "import bristle.identification.fit, bristle.comparison, bristle.diagnosis",
+        "from bristle.diagnosis import Diagnosis; import bristle",
+        "import bristle; bristle.identify; import bristle.identification.rig, bristle.comparison",
     ],
 )
 def test_public_names_are_functions_in_any_order_of_imports(lines: str) -> None:
@@ -59,14 +59,14 @@ import sys
 from types import FunctionType
 names = {FUNCTIONS}
 assert all(type(getattr(bristle, name)) is FunctionType for name in names)
-import bristle.identify.model, bristle.design.task
+import bristle.identification.problem, bristle.synthesis.task
 assert all(type(getattr(bristle, name)) is FunctionType for name in names)
-assert sys.modules["bristle.identify"].__path__
+assert sys.modules["bristle.identification"].__path__
 print(bristle.run.__module__, bristle.identify.__module__, bristle.design.__module__)
 """
     done = python(code)
     assert done.stdout.split() == [
-        "bristle.simulate.run", "bristle.study.public", "bristle.design"
+        "bristle.engine.run", "bristle.study.api", "bristle.synthesis"
     ], done.stderr  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import pytest
 from study.made import bench_run, write
 
 from bristle.cli import main
-from bristle.quantity import log_ticks, plain, quantity, scale, short_z, tick, typed, with_interval
+from bristle.core.text import log_ticks, plain, quantity, scale, short_z, tick, typed, with_interval
 from bristle.study import create_study
 
 POWER = re.compile(r"\d[eE][+-]?\d")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.data.study_model import StudyModel, Value
-from bristle.shown import shown
+from bristle.core.text import shown
+from bristle.model.model import StudyModel, Value
 
 RESULTS = (
     "Comparison", "DesignResult", "Diagnosis", "Ensemble", "Identified", "Measurement", "Plan",

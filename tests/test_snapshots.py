@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bristle import snapshots
-from bristle.snapshots import SEPARATOR, read, watched_by, watcher, write
+from bristle.core import progress
+from bristle.core.progress import SEPARATOR, read, watched_by, watcher, write
 
 
 def test_what_is_written_is_read_as_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -36,7 +36,7 @@ def test_nobody_watches_unless_asked(monkeypatch: pytest.MonkeyPatch) -> None:
         with watched_by(None):
             assert watcher() is None
     assert watcher() is None
-    monkeypatch.delenv(snapshots.VARIABLE, raising=False)
-    assert not snapshots.wanted()
-    monkeypatch.setenv(snapshots.VARIABLE, "lines")
-    assert snapshots.wanted()
+    monkeypatch.delenv(progress.VARIABLE, raising=False)
+    assert not progress.wanted()
+    monkeypatch.setenv(progress.VARIABLE, "lines")
+    assert progress.wanted()

@@ -12,14 +12,13 @@ from study.made import write_runs
 
 from bristle import trust
 from bristle.cli import main
-from bristle.cli._effect_template import template
-from bristle.cli._law_template import template as law_template
 from bristle.errors import PhysicsError, StudyError, TrustError
-from bristle.physics import user
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 from bristle.study import Study, create_study
-from bristle.study.learning import add_effects
+from bristle.study.steps import add_effects
+from bristle.user_code import load
+from bristle.user_code.templates import effect_template, law_template
 
 Files = dict[str, str]
 
@@ -35,7 +34,7 @@ def telltale(marker: Path, name: str = "seal") -> str:
     """Return an effect that works, and that writes a file as soon as its text runs."""
     write = f"open({str(marker)!r}, 'w').close()"
     more = f'def said(made):\n    return "{write}"\n\n\n@exec\n@said\nclass Made:\n    """."""\n'
-    return f"{template(name)}\n\n{more}"
+    return f"{effect_template(name)}\n\n{more}"
 
 
 @pytest.fixture
@@ -244,12 +243,12 @@ def test_consent_is_remembered_until_the_text_changes(mailed: Path, marker: Path
     assert main(["list", "effects", "seal", "--study", str(mailed), "--trust"]) == 0
     assert marker.exists()
     marker.unlink()
-    user.unload_effects()
+    load.unload_effects()
     moved = mailed.rename(mailed.with_name("elsewhere"))
     assert main(["list", "effects", "seal", "--study", str(moved)]) == 0
     assert marker.exists()
     marker.unlink()
-    user.unload_effects()
+    load.unload_effects()
     file = moved / "effects" / "seal.py"
     file.write_text(file.read_text(encoding="utf-8") + "\n# more\n", encoding="utf-8")
     assert main(["list", "effects", "seal", "--study", str(moved)]) == 2
@@ -294,7 +293,7 @@ def test_the_environment_consents_for_ci_and_is_not_remembered(
     assert main(["list", "effects", "seal", "--study", str(mailed)]) == 0
     assert marker.exists()
     marker.unlink()
-    user.unload_effects()
+    load.unload_effects()
     monkeypatch.delenv(trust.VARIABLE)
     assert main(["list", "effects", "seal", "--study", str(mailed)]) == 2
     assert not marker.exists()
@@ -313,7 +312,7 @@ def test_a_file_made_here_is_trusted_and_checking_it_is_consent(
     assert main(["check", "rub.py"]) == 0
     assert trust.load_file(file).parameters["f_s"].value == 0.4
     other = tmp_path / "sent.py"
-    other.write_text(template("sent"))
+    other.write_text(effect_template("sent"))
     assert main(["check", "sent.py"]) == 2
     assert "sent.py: this file's code has not run here" in capsys.readouterr().err
     assert main(["check", "sent.py", "--trust"]) == 0
@@ -343,7 +342,7 @@ def test_a_file_imports_nothing_beside_it(tmp_path: Path, marker: Path) -> None:
     (tmp_path / "helper.py").write_text(f"open({str(marker)!r}, 'w').close()\n")
     for line in ("import helper", "from . import helper", "from .helper import x"):
         file = tmp_path / "rub.py"
-        file.write_text(template("rub").replace("from math import tanh", line))
+        file.write_text(effect_template("rub").replace("from math import tanh", line))
         with pytest.raises(PhysicsError, match=r"is imported"):
             trust.load_file(file, trust=True)
     assert not marker.exists()
@@ -351,7 +350,7 @@ def test_a_file_imports_nothing_beside_it(tmp_path: Path, marker: Path) -> None:
 
 def test_a_text_in_another_coding_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "rub.py"
-    file.write_text("# -*- coding: utf-7 -*-\n" + template("rub"))
+    file.write_text("# -*- coding: utf-7 -*-\n" + effect_template("rub"))
     with pytest.raises(PhysicsError, match="utf-8 is right"):
         trust.load_file(file, trust=True)
 
@@ -363,10 +362,10 @@ def test_nothing_hides_in_what_is_shown() -> None:
 
 def test_without_the_gate_nothing_runs(tmp_path: Path) -> None:
     code = (
-        "import sys; from pathlib import Path; from bristle.physics import user\n"
+        "import sys; from pathlib import Path; from bristle.user_code import load as user\n"
         "print(user.load_effects(Path(sys.argv[1]))[0].error)"
     )
-    (tmp_path / "rub.py").write_text(template("rub"))
+    (tmp_path / "rub.py").write_text(effect_template("rub"))
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True,
         env={**os.environ, trust.VARIABLE: "1"},

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.data.measurement import Measurement
-from bristle.diagnose import Diagnosis, diagnose_rig
-from bristle.diagnose.sites import try_effect
-from bristle.identify.fit import Model, identify
-from bristle.identify.line import fit_line
-from bristle.identify.search_context import refine
-from bristle.identify.structure import StructureProblem
-from bristle.identify.structure import structure_problems as problems
+from bristle.diagnosis import Diagnosis, diagnose_rig
+from bristle.diagnosis.site import try_effect
+from bristle.identification.building_sites import StructureProblem
+from bristle.identification.building_sites import structure_problems as problems
+from bristle.identification.fit import identify
+from bristle.identification.problem import Model
+from bristle.identification.rig_fit import fit_line
+from bristle.identification.start_grid import refine
 from bristle.physics.building import Building, from_data
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import law_of_part

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.resources import cache_folder
+from bristle.core.files import cache_folder
 from tests.independent import generate
 
 from .plan import Task

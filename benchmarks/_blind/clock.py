@@ -17,12 +17,12 @@ from .plan import Task
 
 CODE = {
     "identification": """
-from bristle.identify.fit import Problem, identify
-from bristle.identify.prepare import prepare
+from bristle.identification.fit import Problem, identify
+from bristle.identification.prepare import prepare
 identify(Problem([prepare(m) for m in train]), law)
 """,
     "diagnosis": """
-from bristle.diagnose import diagnose
+from bristle.diagnosis import diagnose
 diagnose(train, holdout, law=law)
 """,
 }

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.diagnose.candidates import short_search
-from bristle.identify.fit import Model, Problem, Run, identify
-from bristle.identify.prepare import prepare
-from bristle.identify.search_context import refine
-from bristle.identify.start_grid import SearchContext, ranked_guesses
+from bristle.diagnosis.trials import short_search
+from bristle.identification.fit import identify
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.start_grid import SearchContext, ranked_guesses, refine
 
 from . import cases, separate, subject
 from .cases import Recorded

@@ -18,7 +18,7 @@ ROLES = ("train", "holdout")
 def perform(case: Recorded, made: Any, experiment: Any) -> dict[str, Any]:
     """Return the verdict once two further runs of the proposed kind are there.
 
-    `experiment` is a `bristle.diagnose.experiments.Experiment`. One run joins the training runs,
+    `experiment` is a `bristle.diagnosis.experiments.Experiment`. One run joins the training runs,
     one the held-out ones, the latter with the motion turned round. The velocity and voltage are
     kept within what the rig can do, as a laboratory would.
     """

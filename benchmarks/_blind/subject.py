@@ -10,10 +10,10 @@ import pandas as pd
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, measurements_of_frame
-from bristle.diagnose import Diagnosis, diagnose
-from bristle.identify.fit import Model, Problem
-from bristle.identify.prepare import prepare
-from bristle.identify.search import z_scale
+from bristle.diagnosis import Diagnosis, diagnose
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem
+from bristle.identification.search import z_scale
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 
@@ -31,7 +31,7 @@ KEPT = 8  # rows of the ranking that a record keeps
 
 def digest() -> str:
     """Return the digest of all code that a verdict rests on."""
-    folders = ("diagnose", "identify", "compare", "check", "data", "physics")
+    folders = ("diagnosis", "identification", "comparison", "user_code", "data", "physics")
     package = ROOT / "bristle"
     files = [path for folder in folders for path in (package / folder).rglob("*.py")]
     return digest_of([*files, package / "jit.py"])

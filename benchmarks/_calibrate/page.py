@@ -6,7 +6,7 @@ from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
 
-from bristle.diagnose.rule import BENCH, SITE, DecisionRule
+from bristle.diagnosis.rule import BENCH, SITE, DecisionRule
 
 from .replay import Traded
 from .trials import Stored

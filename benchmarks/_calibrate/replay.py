@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from bristle.diagnose.decision import decide
-from bristle.diagnose.inconsistent_runs import kind_of
-from bristle.diagnose.rule import BENCH, SITE, DecisionRule
-from bristle.diagnose.sites import decide_site
+from bristle.diagnosis.decision import decide
+from bristle.diagnosis.inconsistent_runs import kind_of
+from bristle.diagnosis.rule import BENCH, SITE, DecisionRule
+from bristle.diagnosis.site import decide_site
 from bristle.physics.effect import EFFECTS
 
 from .trials import NotStoredError, Stored, organised

@@ -20,18 +20,15 @@ from numpy.typing import NDArray
 
 from benchmarks._blind import building, cases, plan, subject
 from benchmarks._blind.plan import Task
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.damper import is_organised
-from bristle.diagnose.decision import decide
-from bristle.diagnose.evidence import BLOCK, parts_of
-from bristle.diagnose.faults import instruments_of
-from bristle.diagnose.opening import Insufficient, opening
-from bristle.diagnose.rule import BENCH, DecisionRule
-from bristle.diagnose.sites import look_at
-from bristle.diagnose.trials import Trials
-from bristle.identify.fit import Model
-from bristle.identify.structure import structure_problems
-from bristle.resources import cache_folder
+from bristle.core.files import cache_folder
+from bristle.diagnosis.decision import decide
+from bristle.diagnosis.prepared import Insufficient, opening
+from bristle.diagnosis.rule import BENCH, DecisionRule
+from bristle.diagnosis.sensor_faults import instruments_of
+from bristle.diagnosis.site import Trials, is_organised, look_at
+from bristle.diagnosis.trials import BLOCK, Trial, parts_of
+from bristle.identification.building_sites import structure_problems
+from bristle.identification.problem import Model
 
 from .varied import variants
 

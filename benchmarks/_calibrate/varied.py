@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from bristle.diagnose import rule as module
-from bristle.diagnose.rule import BENCH, SITE, DecisionRule
+from bristle.diagnosis import rule as module
+from bristle.diagnosis.rule import BENCH, SITE, DecisionRule
 
 BENCH_VALUES: dict[str, tuple[float, ...]] = {
     "gain": (0.005, 0.01, 0.02, 0.03, 0.05),

@@ -11,8 +11,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bristle.draw.style import FORMATS
 from bristle.errors import BristleError
+from bristle.view.style import FORMATS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,9 +9,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bristle.draw.style import FORMATS, look
+from bristle.core.progress import Progress
 from bristle.errors import ScenarioError, not_usable
-from bristle.progress import Progress
+from bristle.view.style import FORMATS, look
 
 from . import identification, loops, optimum, stiction
 from .runs import Drawing, Runs

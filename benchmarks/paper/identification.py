@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.draw.style import BLUE, GREY, INK, RECONSTRUCTED, VERMILION, Page, label, zero_lines
-from bristle.identify.fit import Model, Problem, Run
-from bristle.identify.table import CUTOFF, LawError, error_table, low_pass
+from bristle.identification.error_table import CUTOFF, LawError, error_table, low_pass
+from bristle.identification.problem import Model, Problem, Run
+from bristle.view.style import BLUE, GREY, INK, RECONSTRUCTED, VERMILION, Page, label, zero_lines
 
 from .runs import Drawing, Runs
 

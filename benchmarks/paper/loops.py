@@ -6,7 +6,7 @@ from collections.abc import Callable
 from math import pi
 from typing import TYPE_CHECKING, Any
 
-from bristle.draw.style import GREY, RECONSTRUCTED, Page, label, ramp, zero_lines
+from bristle.view.style import GREY, RECONSTRUCTED, Page, label, ramp, zero_lines
 
 from .runs import Drawing, Runs
 

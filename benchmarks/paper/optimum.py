@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bristle.draw.style import INK, RECONSTRUCTED, Page, label, ramp
+from bristle.view.style import INK, RECONSTRUCTED, Page, label, ramp
 
 from .runs import Drawing, Runs
 

@@ -1,7 +1,7 @@
 """Writes the controllers of the reference design: `python -m benchmarks.paper.reference --out DIR`.
 
 The controllers that the FMUs carry unless told otherwise are these, with a coarser table: `--rows
-121 --out bristle/control/data` is a fifth of the size and, on El Centro at nominal 0.2 and 0.6 g,
+121 --out bristle/component/data` is a fifth of the size and, on El Centro at nominal 0.2 and 0.6 g,
 moves peaks of acceleration and force by less than 0.2 %, of drift by 0.5 % at most.
 
 A solver's matrices are not unique, and a switching law feels their last digits. So tests that
@@ -15,10 +15,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from bristle.control.controller import KINDS
-from bristle.design import design
-from bristle.design.task import Scheduling, Task
+from bristle.component.controller_file import KINDS
 from bristle.errors import BristleError, DesignError
+from bristle.synthesis import design
+from bristle.synthesis.task import Scheduling, Task
 
 TITLE = "reference design of the base-isolated two-storey model"
 

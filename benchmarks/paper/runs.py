@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from bristle.draw.style import Page
-from bristle.simulate.run import run
+from bristle.engine.run import run
+from bristle.view.style import Page
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bristle.draw.style import BLUE, GREY, PALE, RECONSTRUCTED, VERMILION, Page, label
+from bristle.view.style import BLUE, GREY, PALE, RECONSTRUCTED, VERMILION, Page, label
 
 from .runs import Drawing, Runs
 

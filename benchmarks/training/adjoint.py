@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from bristle.control.policy import ACCELERATION, BESIDES, FORCE, KEEP, LARGEST, SPEED
-from bristle.control.switching import sign
-from bristle.physics.vectors import dot
+from bristle.component.control_laws import ACCELERATION, BESIDES, FORCE, KEEP, LARGEST, SPEED, sign
+from bristle.physics.linear import dot
 
 from .closed_loop import (
     DISPLACEMENT,

@@ -8,23 +8,23 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from bristle.control.linear import advance, command
-from bristle.control.policy import (
+from bristle.component.control_laws import (
     BESIDES,
     KEEP,
     LARGEST,
     LEAST_LEVEL,
+    advance,
+    clipped_voltage,
+    command,
     estimate,
     policy_inputs,
     recent_level,
     voltage_share,
 )
-from bristle.control.switching import clipped_voltage
 from bristle.physics.damper import force_at
 from bristle.physics.damper import step as damper_step
-from bristle.physics.inputs import Inputs
-from bristle.physics.tuples import record
-from bristle.physics.vectors import dot
+from bristle.physics.linear import dot
+from bristle.physics.tuples import Inputs, record
 
 FLOOR, DISPLACEMENT, VELOCITY, PUSHED = range(4)
 """Places of what is measured."""
@@ -61,7 +61,8 @@ class Plant(NamedTuple):
 
 
 class Policy(NamedTuple):
-    """A policy: A (n n), B (n 4), weights and scales flat as in `control.policy`; hidden units.
+    """A policy: A (n n), B (n 4), weights and scales flat as in `component.control_laws`; hidden
+    units.
 
     With `clipped` it is the clipped-optimal switch instead, on a linear law: A (n n), B (n,), the
     command's row as weights, `f_min` [N].

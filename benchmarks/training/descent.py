@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.progress import Count
+from bristle.core.progress import Count
 
 from .runs import PATIENT, Loop, Run
 

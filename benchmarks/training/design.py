@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from bristle.control.controller import POLICY, Controller, building_digest
-from bristle.control.policy import weight_count
-from bristle.design.hinf import design_hinf
-from bristle.design.plant import StateSpace, structure
-from bristle.design.result import DesignResult, flat, pole_list
-from bristle.design.sliding import coefficients
-from bristle.design.table import Bank
-from bristle.design.task import Task
+from bristle.component.control_laws import weight_count
+from bristle.component.controller_file import POLICY, Controller, building_digest
+from bristle.core.progress import counted, tell
 from bristle.errors import DesignError
-from bristle.progress import counted, tell
+from bristle.synthesis.damper import coefficients
+from bristle.synthesis.kinds import design_hinf
+from bristle.synthesis.plant import StateSpace, structure
+from bristle.synthesis.result import DesignResult, flat, pole_list
+from bristle.synthesis.sampling import Bank
+from bristle.synthesis.task import Task
 
 from . import motions
 from .closed_loop import Motion, Policy

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from bristle.design.plant import StateSpace
 from bristle.errors import DesignError
+from bristle.synthesis.plant import StateSpace
 
 Array = NDArray[np.float64]
 

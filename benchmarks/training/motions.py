@@ -7,7 +7,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.data.motion import GroundMotion
+from bristle.data.ground_motion import GroundMotion
 
 Array = NDArray[np.float64]
 

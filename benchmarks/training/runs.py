@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from bristle.control.policy import BESIDES, LARGEST, weight_count
-from bristle.design.plant import structure
-from bristle.design.sliding import Damper
-from bristle.jit import compiled
+from bristle.component.control_laws import BESIDES, LARGEST, weight_count
+from bristle.core.jit import compiled
 from bristle.physics import damper
 from bristle.physics.building import Building
-from bristle.physics.inputs import Setup
+from bristle.physics.tuples import Setup
+from bristle.synthesis.damper import Damper
+from bristle.synthesis.plant import structure
 
 from .adjoint import PULL_BACK, RESPOND, compute
 from .closed_loop import STATES, Course, Motion, Plant, Policy

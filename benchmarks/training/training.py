@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from bristle.control.controller import POLICY
+from bristle.component.controller_file import POLICY
 from bristle.core.config import ANY, Document, Spec
-from bristle.data.motion import GroundMotion, read_ground_motion
-from bristle.design.file import task_of
-from bristle.design.task import Task
+from bristle.data.ground_motion import GroundMotion, read_ground_motion
 from bristle.errors import DesignError, RecordError
+from bristle.synthesis.design_file import task_of
+from bristle.synthesis.task import Task
 
 ALIKE = 1e-3
 """Largest difference, as a share of the peak, of two records that are the same motion."""

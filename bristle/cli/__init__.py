@@ -17,13 +17,13 @@ from contextlib import contextmanager
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
-from ._common import add_common
+from ._options import add_common
 
 _BLAS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """How many threads a product of matrices takes, read when numpy is imported. The matrices here are
 narrow, and laws, effects and runs have threads of their own: both together are slower."""
 
-_SLOW_TO_LEAVE = ("bristle.simulate.session", "numba")
+_SLOW_TO_LEAVE = ("bristle.engine.instance", "numba")
 """Modules with which a process takes half a second and more to be taken down."""
 
 _FORMER = {
@@ -85,7 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         if debug:
             raise
-        from ..interrupt import message
+        from ..core.interrupt import message
 
         print(message(), file=sys.stderr)
         return 130
@@ -93,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     """Run a command; say in one line why it fails, unless its tracebacks are asked for."""
-    from ..interrupt import Hurry, keeps
+    from ..core.interrupt import Hurry, keeps
     from ._kept import kept_by
 
     keeps(kept_by(arguments))
@@ -103,7 +103,7 @@ def _run(arguments: argparse.Namespace) -> int:
     except BristleError as error:
         if arguments.debug:
             raise
-        from ..findings import cut_short
+        from ..core.text import cut_short
 
         print(cut_short(f"{type(error).__name__}: {error}"), file=sys.stderr)
         return error.exit_code
@@ -125,8 +125,8 @@ def _progress(arguments: argparse.Namespace) -> Iterator[None]:
 
     Where the answer is JSON, a terminal and a program that asks for lines want to: no other pipe.
     """
-    from .. import snapshots
-    from ..progress import telling, wants_lines
+    from ..core import progress as snapshots
+    from ..core.progress import telling, wants_lines
     from ._line import Line
 
     piped = not (sys.stderr.isatty() or wants_lines())
@@ -155,7 +155,7 @@ def _with_consent(arguments: argparse.Namespace) -> int:
             try:
                 return int(arguments.main(arguments))
             except TrustError as error:
-                from . import _consent
+                from . import _options as _consent
 
                 answered = digest(error.text)
                 if _consent.given(error):
@@ -177,7 +177,7 @@ def run_and_exit() -> NoReturn:
         os.environ.setdefault(threads, "1")
     code = main()
     if code == 130:
-        from ..interrupt import leave
+        from ..core.interrupt import leave
 
         leave(code)
     if any(name in sys.modules for name in _SLOW_TO_LEAVE):

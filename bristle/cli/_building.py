@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..findings import command
-from ..quantity import plain
+from ..core.text import command, plain
 
 if TYPE_CHECKING:
-    from ..study.building import IdentifiedBuilding
+    from ..study.steps import IdentifiedBuilding
 
 
-def main(arguments: argparse.Namespace) -> int:
+def main_building(arguments: argparse.Namespace) -> int:
     """Identify the building, write its file and the step, print the tables."""
     from ..errors import StudyError
-    from ..study.building import identify_building_alone
+    from ..study.steps import identify_building_alone
     from ..study.study import Study
 
     if arguments.law:
@@ -27,11 +26,11 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(found.as_dict(), indent=2, ensure_ascii=False))
         return 0
-    print(text(found))
+    print(building_text(found))
     return 0
 
 
-def text(found: IdentifiedBuilding) -> str:
+def building_text(found: IdentifiedBuilding) -> str:
     """Return the tables as text."""
     fit = found.fit
     levels = fit.building.levels()

@@ -27,7 +27,7 @@ def line(error: Exception, command: str) -> str:
 
 def _keep(error: Exception) -> Path | None:
     """Write a traceback among those of this user; return the file, None where none can be."""
-    from ..resources import state_folder
+    from ..core.files import state_folder
     from ..version import __version__
 
     lines = [

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self, TextIO, cast
 
-from ..progress import SOON, wants_lines
+from ..core.progress import SOON, wants_lines
 
 _PLAIN_AFTER = 5.0
 """Seconds without a word after which a plain line is due."""

@@ -7,12 +7,12 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..findings import command
+from ..core.text import command
 from ..view.blocks import Next, Text, View
-from ._consent import add_trust
+from ._options import add_trust
 
 if TYPE_CHECKING:
-    from ..study.learning import Added
+    from ..study.steps import Added
 
 HELP = (
     "add an effect to a study's model and refit it: error before and after, a step in the history"
@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Add, refit, print."""
-    from ..interrupt import keeps
-    from ..study.learning import add_effects
+    from ..core.interrupt import keeps
+    from ..study.steps import add_effects
     from ..study.study import Study
 
     study = Study(arguments.folder)
@@ -47,7 +47,7 @@ def main(arguments: argparse.Namespace) -> int:
 def text(added: Added, folder: Path) -> str:
     """Return what adding did, as text."""
     from ..study.fit_view import error_table, parameter_table, z_text
-    from ..study.laws import law_command
+    from ..study.forms import law_command
     from ..view import terminal
 
     found, then = added.identified, [Next(command("diagnose", folder))]

@@ -8,9 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..findings import command
-from ._consent import add_trust
-from ._native import add_native, builder
+from ..core.text import command
+from ._options import add_native, add_trust, builder
 
 if TYPE_CHECKING:
     from ..fmu.build import Plan

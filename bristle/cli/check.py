@@ -15,12 +15,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..findings import cut_short
-from ._common import add_overrides
-from ._consent import add_trust
+from ..core.text import cut_short
+from ._options import add_overrides, add_trust
 
 if TYPE_CHECKING:
-    from ..scenario.scenario import Finding
+    from ..system.scenario import Finding
 
 HELP = "check scenario files, or your own effects and laws: every mistake, with its line"
 
@@ -51,7 +50,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..errors import ScenarioError
 
     if arguments.schema:
-        from ..scenario.schema import schema_text
+        from ..system.schema import schema_text
 
         print(schema_text(), end="")
         return 0
@@ -61,7 +60,7 @@ def main(arguments: argparse.Namespace) -> int:
         if len(arguments.files) > 1 or arguments.overrides:
             raise ScenarioError("bristle check: expected one effect or law, without --set.")
         return _own(Path(arguments.files[0]), arguments.json)
-    from ..scenario.scenario import check_scenario, parse_overrides
+    from ..system.scenario import check_scenario, parse_overrides
 
     overrides = parse_overrides(arguments.overrides)
     found = {file: check_scenario(file, overrides) for file in arguments.files}
@@ -124,14 +123,14 @@ def _own(file: Path, as_json: bool) -> int:
 
     Of a file that `bristle new` made here, checking it is consent to what it holds now.
     """
+    from ..core.progress import tell
     from ..errors import PhysicsError
-    from ..progress import tell
     from ..trust import is_made_here, load_file
 
     word = _word(file)
     made = load_file(file, word, trust=is_made_here(file))  # refuses with file and line
     tell(f"checking {file.name}: its hooks are called some hundred thousand times, and compiled")
-    program = [sys.executable, "-m", "bristle.check.own", word, str(file)]
+    program = [sys.executable, "-m", "bristle.user_code.own", word, str(file)]
     try:
         child = subprocess.run(program, capture_output=True, text=True, check=False, timeout=WITHIN)
     except subprocess.TimeoutExpired:
@@ -157,7 +156,7 @@ def _own(file: Path, as_json: bool) -> int:
 def _word(file: Path) -> str:
     """Return what a file defines, "effect" or "law", by the class that its class extends."""
     from ..errors import PhysicsError
-    from ..physics.user_text import text_of
+    from ..user_code.reading import text_of
 
     try:
         bases = re.findall(r"^class \w+\((\w+)", text_of(file, errors="replace"), re.MULTILINE)

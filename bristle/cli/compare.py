@@ -6,10 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..findings import command
+from ..core.text import command
 from ..view.blocks import Block, Next, Text
-from ._common import add_details, print_json
-from ._consent import add_trust
+from ._options import add_details, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -44,12 +43,12 @@ def add_role(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Compare, print the sentences and tables, draw the picture."""
-    from ..compare.view import draw_comparison
-    from ..draw.style import png
-    from ..progress import tell
-    from ..study.comparison import compare_study
+    from ..comparison.view import draw_comparison
+    from ..core.progress import tell
+    from ..study.steps import compare_study
     from ..study.study import Study
     from ..view import terminal
+    from ..view.style import png
 
     study = Study(arguments.folder)
     comparison = compare_study(study, role=arguments.role)
@@ -83,8 +82,8 @@ def _opened(study: Study) -> dict[str, Any]:
     """Return when the test runs were opened, nothing where the study has none."""
     from dataclasses import asdict
 
-    from ..study.openings import openings
-    from ..study.run_file import TEST
+    from ..study.steps import openings
+    from ..study.study_file import TEST
 
     opened = [asdict(one) for one in openings(study)]
     return {"test_openings": opened} if study.files(TEST) else {}

@@ -9,11 +9,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._common import add_details, print_json
-from ._files import channels_of
+from ._options import add_details, channels_of, print_json
 
 if TYPE_CHECKING:
-    from ..bridge.fmu import FmuComparison
+    from ..prediction.compare_fmu import FmuComparison
 
 HELP = "show where an FMU of any tool deviates from a measurement: text and figure"
 
@@ -55,8 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run the FMU under the measured inputs; print what it errs by, draw the picture."""
-    from ..bridge.fmu import compare_fmu
-    from ..compare.view import draw_comparison
+    from ..comparison.view import draw_comparison
+    from ..prediction.compare_fmu import compare_fmu
     from ..view import terminal
 
     found: FmuComparison = compare_fmu(

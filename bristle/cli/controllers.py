@@ -11,10 +11,10 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._consent import add_trust
+from ._options import add_trust
 
 if TYPE_CHECKING:
-    from ..controllers.result import ControllerComparison
+    from ..controller_comparison.result import ControllerComparison
 
 HELP = "compare controllers on your building, damper and ground motions"
 
@@ -88,9 +88,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Compare, write scenarios, tables and report; print tables and verdict."""
-    from ..controllers import compare_controllers
-    from ..controllers.folder import plain_name
-    from ..data.files import write_whole
+    from ..controller_comparison import compare_controllers
+    from ..controller_comparison.setting import plain_name
+    from ..core.files import write_whole
 
     name = Path(arguments.building).stem if arguments.building else "building"
     folder: Path = arguments.out or Path("results", "comparison", plain_name(name))
@@ -106,7 +106,7 @@ def main(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     files = found.write(folder)
     if not arguments.no_figure:
-        from ..progress import tell
+        from ..core.progress import tell
         from ..report.controllers_page import controllers_report
 
         tell("drawing")
@@ -123,7 +123,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _said(arguments: argparse.Namespace) -> str:
     """Return the command that makes the same comparison."""
-    from ..findings import command
+    from ..core.text import command
 
     words: list[object] = []
     for name in (*OPTIONS, "out"):
@@ -137,7 +137,7 @@ def _said(arguments: argparse.Namespace) -> str:
 
 def _spread(arguments: argparse.Namespace) -> Any:
     """Return how far reality may lie from the case, None where nobody asks."""
-    from ..controllers import Spread
+    from ..controller_comparison import Spread
 
     given = {
         "share": _share("--spread", arguments.spread), "noise": _share("--noise", arguments.noise),
@@ -163,7 +163,7 @@ def _share(option: str, text: str | None) -> float | None:
 
 
 def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
-    from ..controllers.view import footnotes, header, lowest, rows
+    from ..controller_comparison.view import footnotes, header, lowest, rows
 
     def values(frame: Any) -> list[dict[str, Any]]:
         return [

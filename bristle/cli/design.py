@@ -11,12 +11,12 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..findings import command
+from ..core.text import command
 from ..view import terminal
 from ..view.blocks import Next
 
 if TYPE_CHECKING:
-    from ..design import DesignResult
+    from ..synthesis import DesignResult
 
 HELP = "design a controller and verify it"
 
@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Design, verify, write controller file and picture; print what was found."""
-    from ..design import design, implausible, read_task
     from ..errors import DesignError
+    from ..synthesis import design, implausible, read_task
 
     out: Path = arguments.out or Path(arguments.file.stem + ".json")
     if out.suffix != ".json":
@@ -65,7 +65,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _answer(result: DesignResult) -> dict[str, Any]:
-    from ..design.margins import facts_of
+    from ..synthesis.analysis import facts_of
 
     c = result.controller
     size = {"kind": c.kind, "title": c.title, "states": c.n, "rows": c.rows}
@@ -79,8 +79,8 @@ def _write(result: DesignResult, answer: dict[str, Any], out: Path) -> list[Path
     """Write controller file, answer and picture beside the target, and rename them into place."""
     import json
 
-    from ..design.responses import curves
     from ..errors import DesignError
+    from ..synthesis.analysis import curves
 
     try:
         with tempfile.TemporaryDirectory(prefix=".bristle_", dir=out.absolute().parent) as folder:
@@ -90,7 +90,7 @@ def _write(result: DesignResult, answer: dict[str, Any], out: Path) -> list[Path
             whole = {**answer, "curves": curves(result)}
             made[-1].write_text(json.dumps(whole, allow_nan=False), encoding="utf-8")
             if result.plants:
-                from ..design.view import draw_design
+                from ..synthesis.view import draw_design
 
                 made.append(made[0].with_suffix(".png"))
                 draw_design(result, made[-1])

@@ -7,13 +7,12 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..findings import command
+from ..core.text import command
 from ..view.blocks import Next
-from ._common import add_details
-from ._consent import add_trust
+from ._options import add_details, add_trust
 
 if TYPE_CHECKING:
-    from ..diagnose.verdict_text import Verdict
+    from ..diagnosis.words import Verdict
 
 HELP = "find the effects that a study's model misses, with confidence and alternatives"
 
@@ -41,12 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Diagnose, write verdict.json and the picture, print the verdict with its evidence."""
-    from ..diagnose.view import draw_verdict
-    from ..draw.style import png
-    from ..interrupt import keeps
-    from ..progress import tell
-    from ..study.learning import diagnose_study, verdict_of
+    from ..core.interrupt import keeps
+    from ..core.progress import tell
+    from ..diagnosis.view import draw_verdict
+    from ..study.steps import diagnose_study, verdict_of
     from ..study.study import Study
+    from ..view.style import png
 
     study = Study(arguments.folder)
     found = diagnose_study(
@@ -69,7 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 def text(verdict: Verdict, folder: Path, *, details: bool = False) -> str:
     """Return the content of verdict.json as text, with the next command for a study's folder."""
-    from ..diagnose.view import verdict_view
+    from ..diagnosis.view import verdict_view
     from ..view import terminal
 
     view = verdict_view(verdict)
@@ -79,7 +78,7 @@ def text(verdict: Verdict, folder: Path, *, details: bool = False) -> str:
 
 def _next(verdict: Verdict, folder: Path) -> list[Next]:
     """Return the commands that follow from a verdict: what sets the data right comes first."""
-    from ..diagnose.correctable import is_correctable
+    from ..diagnosis.conclusion import is_correctable
 
     then = _with_law(verdict, folder)
     if not any(map(is_correctable, verdict.get("sensors") or [])):
@@ -96,7 +95,7 @@ def _with_law(verdict: Verdict, folder: Path) -> list[Next]:
     if not verdict.get("laws") or verdict["kind"] == "insufficient":
         return then
     from ..physics.forms import joined_form
-    from ..study.laws import law_command
+    from ..study.forms import law_command
 
     law = joined_form(verdict["law"], verdict["command"])
     return then if law == verdict["law_before"] else [Next(law_command(folder, law)), *then]
@@ -136,7 +135,7 @@ def _not_excited(verdict: Verdict) -> list[str]:
 
     What a parameter of another effect absorbs is that effect.
     """
-    from ..diagnose.effect_limits import NO_AMOUNT
+    from ..diagnosis.effect_limits import NO_AMOUNT
 
     rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
     hidden = [row for row in rows if row.get("why") and "." not in row["why"].partition(" ")[0]]

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..view import terminal
-from ._consent import add_trust
+from ._options import add_trust
 
 if TYPE_CHECKING:
-    from ..batch.execute import Ensemble
+    from ..campaign.ensemble import Ensemble
 
 HELP = "run a scenario hundreds of times with varied parameters"
 
@@ -52,8 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run what is left, write tables and figure; return 1 if every run failed, else 0."""
-    from ..batch.execute import EnsembleInterrupted, ensemble
-    from ..batch.file import resolve_ensemble
+    from ..campaign.ensemble import EnsembleInterrupted, ensemble
+    from ..campaign.ensemble_file import resolve_ensemble
 
     file = resolve_ensemble(arguments.file)
     folder: Path = arguments.out or Path("results", file.stem)
@@ -98,7 +98,7 @@ def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
             f"{files['quantiles']}: cannot be written: {error.strerror or error}."
         ) from error
     if figure and (found.runs["status"] == "done").sum() > 1:
-        from ..batch.view import ensemble_figure
+        from ..campaign.view import ensemble_figure
 
         files["figure"] = folder / "figure.png"
         ensemble_figure(found, files["figure"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ._common import add_common_to_actions
+from ._options import add_common_to_actions
 
 HELP = "make an example study: measurements of a rig with a hidden effect"
 
@@ -80,7 +80,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    from ..example.hidden import HIDDEN
+    from ..examples.hidden import HIDDEN
 
     rows = [
         {
@@ -106,21 +106,21 @@ def _list(arguments: argparse.Namespace) -> int:
 
 
 def _bench(arguments: argparse.Namespace) -> int:
-    from ..example.make import make_bench
+    from ..examples.make import make_bench
 
     make_bench(arguments.folder, _choice(arguments))
     return _made(arguments.folder)
 
 
 def _building(arguments: argparse.Namespace) -> int:
-    from ..example.make import make_building
+    from ..examples.make import make_building
 
     make_building(arguments.folder, _choice(arguments), load_cell=not arguments.no_load_cell)
     return _made(arguments.folder)
 
 
 def _choice(arguments: argparse.Namespace):  # type: ignore[no-untyped-def]
-    from ..example.make import Choice
+    from ..examples.make import Choice
 
     return Choice(
         effects=tuple(arguments.effect),
@@ -134,7 +134,7 @@ def _choice(arguments: argparse.Namespace):  # type: ignore[no-untyped-def]
 
 
 def _made(folder: Path) -> int:
-    from ..example.sealed import FILE
+    from ..examples.hidden import FILE
     from ..study.study import Study
 
     runs = Study(folder).settings.runs
@@ -146,8 +146,8 @@ def _made(folder: Path) -> int:
 
 
 def _perform(arguments: argparse.Namespace) -> int:
-    from ..example.perform import perform_plan
-    from ._extend import print_added
+    from ..examples.perform import perform_plan
+    from .study import print_added
 
     extended = perform_plan(
         arguments.folder, arguments.plan, name=arguments.as_runs, insist=arguments.insist
@@ -157,7 +157,7 @@ def _perform(arguments: argparse.Namespace) -> int:
 
 
 def _reveal(arguments: argparse.Namespace) -> int:
-    from ..example.sealed import told, unseal
+    from ..examples.hidden import told, unseal
     from ..study.study import Study
 
     answer = unseal(arguments.folder)

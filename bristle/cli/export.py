@@ -10,11 +10,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..core.text import command
 from ..errors import ScenarioError, StudyError
-from ..findings import command
-from ._common import add_overrides
-from ._consent import add_trust
-from ._native import add_native, builder
+from ._options import add_native, add_overrides, add_trust, builder
 
 HELP = "write a study's model as an FMU; or a scenario as one FMU, or as a web page"
 
@@ -65,7 +63,7 @@ def main(arguments: argparse.Namespace) -> int:
             "--set and --input are for a scenario: with --native --as-one it becomes one FMU. A "
             "study has its values in its model."
         )
-    from ..bridge.export import export_study
+    from ..prediction.export import export_study
     from ..study.study import Study
 
     found = export_study(Study(Path(arguments.what)), arguments.out, builder(arguments))
@@ -107,9 +105,9 @@ def _refuse_for_fmus(arguments: argparse.Namespace) -> None:
 
 def _as_one(arguments: argparse.Namespace) -> int:
     """Write a scenario as one FMU; say what it has."""
-    from ..composite.export import export_composite
+    from ..export.composite import export_composite
     from ..fmu.description import read_description
-    from ..scenario.scenario import parse_overrides
+    from ..system.scenario import parse_overrides
 
     if not arguments.native:
         raise ScenarioError("--as-one goes with --native: the parts are solved by compiled code.")
@@ -136,12 +134,11 @@ def _as_one(arguments: argparse.Namespace) -> int:
 
 def _web(arguments: argparse.Namespace) -> int:
     """Write a scenario or study as a web page, or a component as a module; print the files."""
+    from ..export.web import export_component, export_web
     from ..fmu.catalogue import component_names
     from ..report.what_if import movable
-    from ..scenario.scenario import parse_overrides
     from ..study.study import Study
-    from ..web.component import export_component
-    from ..web.export import export_web
+    from ..system.scenario import parse_overrides
 
     if arguments.out is not None:
         raise ScenarioError("--out is for a study; --web DIR says where the page goes.")

@@ -10,13 +10,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._common import add_overrides
-from ._consent import add_trust
-from ._native import add_native, builder
+from ._options import add_native, add_overrides, add_trust, builder
 
 if TYPE_CHECKING:
-    from ..scenario.export_ssp import ExportedPackage
-    from ..simulate.elsewhere import Expected
+    from ..engine.coupling_error import Expected
+    from ..system.ssp_write import ExportedPackage
 
 HELP = "write a scenario as an SSP package for other tools"
 
@@ -40,9 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Export; print the files, what is otherwise elsewhere, and the error to expect there."""
     from ..errors import ScenarioError
-    from ..scenario.export_ssp import export_ssp
-    from ..scenario.naming import run_name
-    from ..scenario.scenario import load_scenario, parse_overrides, resolve_scenario
+    from ..system.library import run_name
+    from ..system.scenario import load_scenario, parse_overrides, resolve_scenario
+    from ..system.ssp_write import export_ssp
 
     if arguments.osp is not None and arguments.fmi != 2:
         raise ScenarioError("--osp goes with FMI 2.0: tools of OSP know no FMUs of FMI 3.0.")
@@ -53,9 +51,9 @@ def main(arguments: argparse.Namespace) -> int:
     exported = export_ssp(scenario, target, arguments.osp, builder(arguments))
     expected: tuple[Expected, ...] = ()
     if not arguments.no_coupling_error:
-        from ..progress import tell
-        from ..simulate.elsewhere import expect
-        from ..simulate.run import run_quietly
+        from ..core.progress import tell
+        from ..engine.coupling_error import expect
+        from ..engine.run import run_quietly
 
         tell("estimating the coupling error in other tools")
         expected = expect(scenario, run_quietly)

@@ -6,10 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..findings import command
+from ..core.text import command
 from ..view.blocks import Block, Next, Text
-from ._common import add_details
-from ._consent import add_trust
+from ._options import add_details, add_trust
 
 if TYPE_CHECKING:
     from ..study.identified import Identified
@@ -73,12 +72,12 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.structure:
         from . import _building
 
-        return _building.main(arguments)
-    from ..interrupt import keeps
-    from ..progress import Progress, tell
-    from ..study.identification import STAGES, identify_study
+        return _building.main_building(arguments)
+    from ..core.interrupt import keeps
+    from ..core.progress import Progress, tell
+    from ..study.identify import STAGES, identify_study
     from ..study.study import Study
-    from ._ahead import import_ahead
+    from ._options import import_ahead
 
     study = Study(arguments.folder)
     if not arguments.dry_run:
@@ -99,9 +98,9 @@ def main(arguments: argparse.Namespace) -> int:
         keeps("The new step is kept in the study's history; its pictures were not all drawn.")
     picture = budget = None
     if not arguments.dry_run:
-        from ..draw.style import png
         from ..study.budget_picture import draw_budget
         from ..study.fit_view import draw_identified
+        from ..view.style import png
 
         picture = study.write_report("identify.png", png(draw_identified(found), 110))
         budget = draw_budget(found.holdout or found.train, found.at.model)

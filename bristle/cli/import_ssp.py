@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..findings import command, cut_short
+from ..core.text import command, cut_short
 
 HELP = "convert an SSP package of another tool to a scenario"
 
@@ -26,8 +26,8 @@ def main(arguments: argparse.Namespace) -> int:
 
     Return 0, or 2 where the scenario cannot run as it is.
     """
-    from ..scenario.import_ssp import import_ssp
-    from ..scenario.scenario import check_scenario
+    from ..system.scenario import check_scenario
+    from ..system.ssp_import import import_ssp
     from .check import print_findings
 
     made = import_ssp(arguments.package, arguments.out or Path(arguments.package.stem))

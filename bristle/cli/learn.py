@@ -14,8 +14,8 @@ import json
 from collections.abc import Collection
 from pathlib import Path
 
-from ..findings import command
-from ._consent import add_trust
+from ..core.text import command
+from ._options import add_trust
 
 HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
@@ -54,9 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Learn, write the effect's file, print what was found."""
-    from ..diagnose.learned.along import ALONG
-    from ..diagnose.learned.parts import PARTS, PARTS_OF_LINE
-    from ..study.curves import learn_effect
+    from ..learning.curve import PARTS, PARTS_OF_LINE
+    from ..learning.signals import ALONG
+    from ..study.learn import learn_effect
     from ..study.study import Study
 
     study = Study(arguments.folder)
@@ -97,8 +97,8 @@ def _of_command(drive: str) -> dict[str, str]:
 
 
 def _listed(text: str, known: Collection[str], option: str) -> list[str]:
+    from ..core.text import unknown
     from ..errors import StudyError
-    from ..findings import unknown
 
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names:

@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..view import terminal
-from ._common import add_overrides
-from ._consent import add_trust
+from ._options import add_overrides, add_trust
 
 if TYPE_CHECKING:
-    from ..limit import Limit
+    from ..optimal_control import Limit
 
 HELP = "compute the smallest peak or RMS that any control of a scenario's damper can give"
 
@@ -64,9 +63,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Compute, write voltage, scenario, results and picture, print what was found."""
-    from ..limit import limit
-    from ..scenario.naming import run_name
-    from ..scenario.scenario import load_scenario, parse_overrides
+    from ..optimal_control import limit
+    from ..system.library import run_name
+    from ..system.scenario import load_scenario, parse_overrides
 
     overrides = parse_overrides(arguments.overrides)
     scenario = load_scenario(arguments.scenario, overrides)
@@ -81,7 +80,7 @@ def main(arguments: argparse.Namespace) -> int:
     )
     files = [folder / name for name in ("voltage.csv", "limit.toml", "results.csv")]
     if not arguments.no_figure:
-        from ..limit.view import draw_limit
+        from ..optimal_control.view import draw_limit
 
         files.append(folder / "limit.png")
         draw_limit(found).save(files[-1], dpi=160)

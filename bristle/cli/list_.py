@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..quantity import tick, typed
-from ._consent import add_trust
+from ..core.text import tick, typed
+from ._options import add_trust
 
 if TYPE_CHECKING:
     from ..fmu.description import Description, Variable
@@ -96,8 +96,8 @@ def _components() -> Rows:
 
 def _describe(name: str, building: Path | None) -> Description:
     """Return the description of a built-in component or of an FMU file."""
+    from ..core.text import unknown
     from ..errors import ScenarioError
-    from ..findings import unknown
     from ..fmu import catalogue
     from ..fmu.description import read_description
 
@@ -143,7 +143,7 @@ def _records() -> Rows:
 
 def _scenarios() -> Rows:
     from ..core.config import toml_content
-    from ..scenario.scenario import stock_scenarios
+    from ..system.scenario import stock_scenarios
 
     rows = []
     for file in stock_scenarios():
@@ -269,7 +269,7 @@ def _read_own(study: Path | None, word: str) -> dict[str, str]:
 
 def _refuse_untrusted(file: Path) -> None:
     """Raise where the effect or law that is asked for waits for consent."""
-    from ..physics.user import waiting
+    from ..user_code.load import waiting
 
     if untrusted := waiting(file):
         raise untrusted
@@ -277,8 +277,8 @@ def _refuse_untrusted(file: Path) -> None:
 
 def _find(name: str, kind: _Kind, left_out: dict[str, str]) -> Any:
     """Return the one of a name; PhysicsError that names the nearest where there is none."""
+    from ..core.text import unknown
     from ..errors import PhysicsError
-    from ..findings import unknown
 
     if name in kind.registered:
         return kind.registered[name]

@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write a new file; say what to do next."""
+    from ..core.text import command
     from ..errors import BristleError
-    from ..findings import command
 
     kind, name = arguments.kind, arguments.name
     if arguments.study is not None and kind not in ("effect", "law"):
@@ -43,7 +43,7 @@ def main(arguments: argparse.Namespace) -> int:
         )
     about = {"file": "", kind: name}
     if kind == "scenario":
-        from ..scenario.stock import copy_scenario
+        from ..system.stock import copy_scenario
 
         file = copy_scenario(arguments.like, Path(f"{name.removesuffix('.toml')}.toml"))
         then = f"{command('check', file)}  and  {command('run', file)}"
@@ -65,7 +65,8 @@ def _controller(name: str) -> tuple[Path, str]:
     """Write the file; return it and the name of the component in it."""
     from ..errors import BuildError
     from ..fmu.catalogue import component_names
-    from ._controller_template import class_name, template
+    from ..user_code.templates import class_name
+    from ..user_code.templates import controller_template as template
 
     component = class_name(name)
     if component in component_names():
@@ -80,7 +81,8 @@ def _physics(word: str, name: str, study: Path | None) -> Path:
     from ..physics.effect import EFFECTS
     from ..physics.laws import law_names
     from ..trust import remember_made
-    from . import _effect_template, _law_template
+    from ..user_code import templates as _effect_template
+    from ..user_code import templates as _law_template
 
     if name in (*law_names(), *law_names("structure"), *EFFECTS):
         raise PhysicsError(f'"{name}" is taken in the library; take another name.')

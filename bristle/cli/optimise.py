@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..view import terminal
-from ._common import add_overrides
-from ._consent import add_trust
+from ._options import add_overrides, add_trust
 
 if TYPE_CHECKING:
-    from ..batch.passive import Passive
+    from ..campaign.best_constant import Passive
 
 HELP = "find the best constant voltage for a set of ground motions"
 
@@ -72,9 +71,9 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Optimise, write table and figure, print what was found."""
-    from ..batch.passive import INTENSITIES, Motion, optimise_passive
+    from ..campaign.best_constant import INTENSITIES, Motion, optimise_passive
     from ..errors import ScenarioError
-    from ..scenario.scenario import parse_overrides
+    from ..system.scenario import parse_overrides
 
     intensities = arguments.intensities or INTENSITIES
     for intensity in intensities:
@@ -103,7 +102,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     import pandas as pd
 
-    from ..data.files import write_json
+    from ..core.files import write_json
     from ..errors import not_usable
 
     table = pd.DataFrame(found.values.T, columns=[motion.name for motion in found.motions])
@@ -117,7 +116,7 @@ def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     except OSError as error:
         raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
     if figure:
-        from ..batch.view import passive_figure
+        from ..campaign.view import passive_figure
 
         files["figure"] = folder / "passive.png"
         passive_figure(found, files["figure"])

@@ -26,9 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
+    from ..core.progress import tell
     from ..page.app import App
     from ..page.run import open_browser, serve
-    from ..progress import tell
 
     def ready(address: str) -> None:
         tell("")

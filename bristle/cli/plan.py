@@ -16,13 +16,12 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..findings import command
+from ..core.text import command
 from ..view.blocks import Next, Text
-from ._common import add_details
-from ._consent import add_trust
+from ._options import add_details, add_trust
 
 if TYPE_CHECKING:
-    from ..plan.plan import Plan
+    from ..planning.plan import Plan
 
 HELP = "plan the next tests of a rig: motions and commands as files for its controller"
 
@@ -88,8 +87,8 @@ LIMITS = {
 def main(arguments: argparse.Namespace) -> int:
     """Plan, write the files, print the tests and what they will show."""
     from ..errors import StudyError
-    from ..plan.folder import refuse_existing
-    from ..plan.public import plan
+    from ..planning.api import plan
+    from ..planning.folder import refuse_existing
 
     if (arguments.folder is None) == (arguments.new is None):
         raise StudyError("name a study, or a rig.toml with --new; one of the two.")

@@ -11,8 +11,7 @@ import argparse
 from math import isfinite
 from pathlib import Path
 
-from ._common import print_json
-from ._consent import add_trust
+from ._options import add_trust, print_json
 from .compare import add_role
 
 HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 % band"
@@ -46,9 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Simulate; print sentences, tables and notes."""
-    from ..bridge.closed_loop import closed_loop, closed_loop_in
-    from ..bridge.closed_loop_figures import DRAWS
-    from ..bridge.closed_loop_input import house_of, trials_in
+    from ..prediction.closed_loop import closed_loop, closed_loop_in
+    from ..prediction.excitation import house_of, trials_in
+    from ..prediction.monte_carlo import DRAWS
     from ..study.study import Study
     from ..view.terminal import print_tables
 

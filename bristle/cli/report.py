@@ -7,7 +7,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from ._consent import add_trust
+from ._options import add_trust
 
 HELP = "write a study's report as one HTML file: verdict, history, loops, parameters, data"
 
@@ -38,12 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write the report; print where it is."""
-    from ..data.files import write_whole
+    from ..core.files import write_whole
+    from ..core.progress import tell
     from ..page.embedded import linked_section
-    from ..progress import tell
-    from ..report.study_content import gather
-    from ..report.study_page import render
-    from ..study.staircase import Staircase
+    from ..report.study_page import gather, render
+    from ..study.history import Staircase
     from ..study.study import Study
 
     study = Study(arguments.folder)

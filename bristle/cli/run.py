@@ -9,13 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._common import add_overrides
-from ._consent import add_trust
+from ._options import add_overrides, add_trust
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..simulate.frame import Results
+    from ..engine.results import Results
 
 HELP = "run a scenario: results, a figure, peaks and RMS"
 
@@ -66,11 +65,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run, draw, print; return 0, 1 if the run failed on its way, 130 if it was interrupted."""
+    from ..engine.run import IncompleteRunError, Output, RunInterrupted, execute
     from ..errors import RunError
-    from ..scenario.naming import run_name
-    from ..scenario.scenario import parse_overrides, resolve_scenario
-    from ..simulate.output import Output
-    from ..simulate.run import IncompleteRunError, RunInterrupted, execute
+    from ..system.library import run_name
+    from ..system.scenario import parse_overrides, resolve_scenario
 
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.file)
@@ -113,11 +111,11 @@ def _further(
     """Return the files that are made of the results, and what makes each."""
     found: list[tuple[str, Callable[[pd.DataFrame, Path], None]]] = []
     if not arguments.no_figure:
-        from ..simulate.view import run_figure
+        from ..engine.view import run_figure
 
         found.append(("figure.png", run_figure))
     if arguments.spectrum:
-        from ..simulate.spectra import FILE, write_spectra
+        from ..engine.results import FILE, write_spectra
 
         found.append((FILE, write_spectra))
     return found
@@ -130,10 +128,10 @@ def _steps_for(
 
     Components with a step of their own step the more often, the shorter that of the run is.
     """
+    from ..engine.coupling_error import find_step
+    from ..engine.run import run_quietly
     from ..errors import not_usable
-    from ..scenario.scenario import load_scenario
-    from ..simulate.run import run_quietly
-    from ..simulate.tolerance import find_step
+    from ..system.scenario import load_scenario
 
     if arguments.engine != "fmu":
         raise not_usable('--tolerance: engine "compiled" makes no coupling error; "fmu" does.')
@@ -166,7 +164,7 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
     import json
     from dataclasses import asdict
 
-    from ..simulate.summary import summarise
+    from ..engine.summary import summarise
 
     answer = {
         "complete": frame.attrs["complete"],

@@ -8,18 +8,257 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._channels import add_channels
-from ._common import add_common_to_actions, add_details
-from ._consent import add_trust
-from ._extend import add_extend
-from ._files import add_run_facts, channels_of, files_of, test_files
-from ._roles import add_roles
+from ._options import (
+    add_common_to_actions,
+    add_details,
+    add_run_facts,
+    add_trust,
+    channels_of,
+    files_of,
+    test_files,
+)
 
 if TYPE_CHECKING:
-    from ..study.create import Created
+    from ..planning.performed import Performed
     from ..study.data_check import DataCheck
-    from ..study.joined_corrections import RunCorrections
+    from ..study.extend import Extended
+    from ..study.read_again import CorrectedChannels
+    from ..study.runs import RunCorrections
+    from ..study.steps import Created
     from ..study.study import Study
+
+
+# `bristle study channels`: which column each channel of a study is, in which unit and sign.
+
+
+def add_channels(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle study channels`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--channel", action="append", default=[], metavar="CHANNEL=COLUMN@UNIT",
+        help="new column of a channel; a minus before COLUMN reverses its sign: --channel "
+        "'force=-Ch3@kN'; without @UNIT the unit stays, or is that of the title",
+    )  # fmt: skip
+    parser.add_argument(
+        "--without", action="append", default=[], metavar="CHANNEL",
+        help="do not read this channel any more",
+    )  # fmt: skip
+    parser.add_argument(
+        "--step", type=float, metavar="S", help="sampling step in s of files without a time"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="show the changes, and write nothing"
+    )
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    parser.set_defaults(act=_channels)
+
+
+def _channels(arguments: argparse.Namespace) -> int:
+    """Correct the channels that are named; without any print them all."""
+    from ..data.channels import ChannelSpec
+    from ..errors import StudyError
+    from ..study.read_again import correct_channels
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    channels = channels_of(arguments.channel)
+    if arguments.step is not None:
+        if "time" in channels:
+            raise StudyError("--step and --channel time=... exclude each other.")
+        channels["time"] = ChannelSpec(step=arguments.step)
+    if not channels and not arguments.without:
+        _print_channels(study, as_json=arguments.json)
+        return 0
+    dry = arguments.dry_run
+    done = correct_channels(study, channels, without=arguments.without, write=not dry)
+    if arguments.json:
+        _print_channels_json(study, done)
+    else:
+        _print(study, done, dry)
+    return 0
+
+
+def _print_channels(study: Study, *, as_json: bool) -> None:
+    import json
+    from dataclasses import asdict
+
+    from ..study.study_file import spec_text
+
+    listed = study.settings.channels
+    if as_json:
+        print(json.dumps({name: asdict(spec) for name, spec in listed.items()}, indent=2))
+        return
+    for name, spec in listed.items():
+        print(f"{name:28} {spec_text(spec)}")
+
+
+def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
+    import json
+    from dataclasses import asdict
+
+    answer = {
+        "folder": str(study.folder.absolute()),
+        "changes": [asdict(one) for one in done.changes],
+        "notes": list(done.notes),
+        "set_aside": done.results.sentences() if done.changes else [],
+        "beside": list(done.results.beside),
+        "kept": str(done.kept.absolute()) if done.kept else None,
+    }
+    print(json.dumps(answer, indent=2, ensure_ascii=False))
+
+
+def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
+    """Print what changes, what is no longer of the data, and the next command."""
+    from ..core.text import command
+
+    if not done.changes:
+        print(f"{study.folder}: the channels are so already. Nothing is written.")
+        return
+    runs = len(study.settings.runs)
+    what = "would change" if dry else "are corrected"
+    print(f"{study.folder}: channels {what}; {runs} run{'s' * (runs != 1)} read by them.")
+    for one in done.changes:
+        print(f"  {one.channel:16} {one.text}")
+    for note in done.notes:
+        print(f"{note[:1].upper()}{note[1:]}.")
+    lost = done.results.sentences()
+    if lost:
+        kept = "it would be set aside" if dry else f"kept in {done.kept}"
+        print(f"No longer of these data, {kept}:", *lost, sep="\n  ")
+    if beside := done.results.beside_text():
+        print(beside)
+    if not dry:
+        print(f"Next:  {command('study', 'check', study.folder)}")
+
+
+# `bristle study extend`: more runs in a study, held against the plan that asked for them.
+
+
+def add_extend(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle study extend`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "data", nargs="+", metavar="FILES",
+        help="measurement files, or a folder of them, with the columns of the study's others",
+    )  # fmt: skip
+    parser.add_argument(
+        "--holdout", nargs="+", action="extend", default=[], metavar="GLOB",
+        help="held-out runs among them, by file name; else those of the plan, or by the usual "
+        "names, or every third run",
+    )  # fmt: skip
+    add_run_facts(parser)
+    parser.add_argument(
+        "--plan", type=Path, metavar="PLAN",
+        help="the plan of these tests: take its roles, and report differences from it",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    parser.set_defaults(act=_extend)
+
+
+def _extend(arguments: argparse.Namespace) -> int:
+    from ..planning.folder import read_plan
+    from ..planning.performed import performed
+    from ..study.extend import extend_study
+    from ..study.run_facts import RunChoices
+    from ..study.study import Study
+
+    study, table = Study(arguments.folder), arguments.runs
+    files = [file for file in files_of(arguments.data, "") if table is None or Path(file) != table]
+    by_plan = None
+    if arguments.plan is not None:
+        by_plan = performed(study, files, read_plan(arguments.plan))
+    choices = RunChoices(arguments.level, arguments.label, table)
+    roles = by_plan.roles if by_plan else None
+    extended = extend_study(study, files, roles=roles, holdout=arguments.holdout, choices=choices)
+    print_added(extended, by_plan, as_json=arguments.json)
+    return 0
+
+
+def print_added(
+    extended: Extended, by_plan: Performed | None = None, *, as_json: bool = False
+) -> None:
+    """Print the runs that were added, what differs from their plan, and the next command."""
+    if as_json:
+        _print_extended_json(extended, by_plan)
+        return
+    from ..core.text import capital, command
+    from ..study.changes import unknown_to_model
+
+    folder, runs = extended.study.folder, extended.runs
+    print(f"{folder}: {len(runs)} run{'s' * (len(runs) != 1)} added.")
+    for run in runs:
+        print(f"  {run.name:28} {run.role}")
+    notes = [*extended.notes, *(by_plan.notes if by_plan else ())]
+    for note in notes:
+        print(f"{capital(note, [run.file for run in runs])}.")
+    for text in by_plan.differences if by_plan else ():
+        print(f"Warning: {text}.")
+    then = "identify" if unknown_to_model(extended.study) else "diagnose"
+    print(f"Next:  {command(then, folder)}")
+
+
+def _print_extended_json(extended: Extended, by_plan: Performed | None) -> None:
+    import json
+    from dataclasses import asdict
+
+    answer = {
+        "folder": str(extended.study.folder.absolute()),
+        "added": [asdict(run) for run in extended.runs],
+        "notes": [*extended.notes, *(by_plan.notes if by_plan else ())],
+        "plan": [asdict(pair) for pair in by_plan.pairs] if by_plan else None,
+    }
+    print(json.dumps(answer, indent=2, ensure_ascii=False))
+
+
+# `bristle study roles`: what the runs of a study are for.
+
+ROLES = {
+    "train": "fitted to",
+    "holdout": "held out: they test the model, and no fit uses them",
+    "test": "test runs, which neither a fit nor a verdict uses",
+    "exclude": "left out",
+}
+"""The roles, with what is said of runs that get them."""
+
+
+def add_roles(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle study roles`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    for role, text in ROLES.items():
+        parser.add_argument(
+            f"--{role}", nargs="+", action="extend", default=[], metavar="RUN",
+            help=f"these runs are {text}" if role != "test" else f"these are {text}",
+        )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print the runs as JSON")
+    parser.set_defaults(act=_roles)
+
+
+def _roles(arguments: argparse.Namespace) -> int:
+    """Change the roles that are named; print those of all runs."""
+    from ..errors import StudyError
+    from ..study.changes import behind_data
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    roles: dict[str, str] = {}
+    for role in ROLES:
+        for run in getattr(arguments, role):
+            if roles.setdefault(run, role) != role:
+                raise StudyError(f"{run} is given two roles, {roles[run]} and {role}.")
+    if roles:
+        study = study.with_roles(roles)
+    runs = (*study.settings.runs, *study.settings.excluded)
+    if arguments.json:
+        import json
+
+        print(json.dumps([{"run": run.name, "role": run.role} for run in runs], indent=2))
+        return 0
+    for run in runs:
+        print(f"{run.role:8} {run.name}")
+    if changed := behind_data(study):
+        print(changed)
+    return 0
+
 
 HELP = "make and change studies of measurements: new, extend, check, roles, channels, auto"
 
@@ -150,8 +389,8 @@ def _new(arguments: argparse.Namespace) -> int:
     from ..data.channels import ChannelSpec
     from ..errors import StudyError
     from ..physics.laws import law_names
-    from ..study.create import create_study
     from ..study.run_facts import RunChoices
+    from ..study.steps import create_study
 
     law = arguments.law
     if law is not None and law not in law_names():
@@ -205,7 +444,7 @@ def _print_json(created: Created) -> None:
 
 
 def _print_new(created: Created) -> None:
-    from ..findings import capital, command, listed
+    from ..core.text import capital, command, listed
 
     folder, settings = created.study.folder, created.study.settings
     print(f"{folder}: a study of {len(settings.runs)} run(s). The columns are read as:")
@@ -232,11 +471,11 @@ def _print_new(created: Created) -> None:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    from ..draw.style import png
+    from ..core.progress import Progress
     from ..errors import StudyError
-    from ..progress import Progress
     from ..study.data_check import check_data
     from ..study.study import Study
+    from ..view.style import png
 
     study = Study(arguments.folder)
     if arguments.mask and not study.settings.mask:
@@ -274,8 +513,8 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _corrections(study: Study, found: DataCheck) -> list[RunCorrections]:
     """Return what the check and the verdict on these data can set right, run by run."""
-    from ..diagnose.correctable import corrections_of
-    from ..study.joined_corrections import joined_corrections
+    from ..diagnosis.conclusion import corrections_of
+    from ..study.runs import joined_corrections
 
     corrections = found.corrections()
     verdict = study.verdict()
@@ -304,9 +543,9 @@ def _print_corrections(joined: Sequence[RunCorrections]) -> None:
 
 
 def _auto(arguments: argparse.Namespace) -> int:
-    from ..study.completion import complete
-    from ..study.learning import verdict_of
-    from ..study.staircase import staircase
+    from ..study.auto import complete
+    from ..study.history import staircase
+    from ..study.steps import verdict_of
     from ..study.study import Study
     from .diagnose import text
 

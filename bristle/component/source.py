@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..physics.linear import Row
-from ..physics.rows import open_row, packed, place, row
+from ..physics.linear import Row, open_row, packed, place, row
 from ..physics.signals import CONSTANT, CSV, PARAMETERS, STEPS, rate, value
 
 

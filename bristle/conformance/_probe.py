@@ -11,11 +11,10 @@ import os
 import sys
 from pathlib import Path
 
-from .bench import Bench
+from .bench import Bench, Plan
 from .native import BlackBox, FatalAnswerError, MissingFunctionError
-from .plan import Plan
+from .probe import Finding, UnexpectedError, failed
 from .probes import PROBES
-from .registry import Finding, UnexpectedError, failed
 
 PLAN, FINDING, BOX = "plan.json", "finding.json", "box"
 

@@ -1,9 +1,7 @@
-"""The FMI 2.0 functions of a shared library, called bare, so that each status is seen.
+"""The functions of an FMU's library, FMI 2.0 and 3.0, called bare, so that each status is seen.
 
 Runs in the child process beside code that nobody has vouched for: standard library only.
 """
-
-# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
 
 from __future__ import annotations
 
@@ -12,13 +10,81 @@ import mmap
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
-from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from ctypes import (
+    POINTER,
+    byref,
+    c_bool,
+    c_char_p,
+    c_double,
+    c_int,
+    c_int32,
+    c_size_t,
+    c_uint,
+    c_uint32,
+    c_void_p,
+)
+from ctypes import create_string_buffer as buffer_of
 from pathlib import Path
 from typing import Any
 
 from ..fmu.description import Value
-from .signatures import OPTIONAL, REQUIRED, RESULTS, TYPES
+from .probe import UnexpectedError
+
+# The functions of FMI 2.0 co-simulation: names, argument types, results.
+
+_refs, _state = POINTER(c_uint), c_void_p
+TYPES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
+_VALUES = {
+    f"fmi2{verb}{kind}": (c_void_p, _refs, c_size_t, POINTER(TYPES[kind]))
+    for verb in ("Get", "Set")
+    for kind in TYPES
+}
+OPTIONAL = {
+    "fmi2GetFMUstate": (c_void_p, POINTER(_state)),
+    "fmi2SetFMUstate": (c_void_p, _state),
+    "fmi2FreeFMUstate": (c_void_p, POINTER(_state)),
+    "fmi2SerializedFMUstateSize": (c_void_p, _state, POINTER(c_size_t)),
+    "fmi2SerializeFMUstate": (c_void_p, _state, c_char_p, c_size_t),
+    "fmi2DeSerializeFMUstate": (c_void_p, c_char_p, c_size_t, POINTER(_state)),
+    "fmi2GetDirectionalDerivative": (
+        (c_void_p, _refs, c_size_t, _refs, c_size_t, POINTER(c_double), POINTER(c_double))
+    ),
+    "fmi2SetRealInputDerivatives": ((c_void_p, _refs, c_size_t, POINTER(c_int), POINTER(c_double))),
+    "fmi2GetRealOutputDerivatives": (
+        (c_void_p, _refs, c_size_t, POINTER(c_int), POINTER(c_double))
+    ),
+    "fmi2CancelStep": (c_void_p,),
+    "fmi2GetStatus": (c_void_p, c_int, POINTER(c_int)),
+    "fmi2GetRealStatus": (c_void_p, c_int, POINTER(c_double)),
+    "fmi2GetIntegerStatus": (c_void_p, c_int, POINTER(c_int)),
+    "fmi2GetBooleanStatus": (c_void_p, c_int, POINTER(c_int)),
+    "fmi2GetStringStatus": (c_void_p, c_int, POINTER(c_char_p)),
+}
+REQUIRED = {
+    "fmi2GetTypesPlatform": (),
+    "fmi2GetVersion": (),
+    "fmi2SetDebugLogging": (c_void_p, c_int, c_size_t, POINTER(c_char_p)),
+    "fmi2Instantiate": (c_char_p, c_int, c_char_p, c_char_p, c_void_p, c_int, c_int),
+    "fmi2FreeInstance": (c_void_p,),
+    "fmi2SetupExperiment": (c_void_p, c_int, c_double, c_double, c_int, c_double),
+    "fmi2EnterInitializationMode": (c_void_p,),
+    "fmi2ExitInitializationMode": (c_void_p,),
+    "fmi2Terminate": (c_void_p,),
+    "fmi2Reset": (c_void_p,),
+    "fmi2DoStep": (c_void_p, c_double, c_double, c_int),
+    **_VALUES,
+}
+RESULTS: dict[str, Any] = {
+    "fmi2GetTypesPlatform": c_char_p,
+    "fmi2GetVersion": c_char_p,
+    "fmi2Instantiate": c_void_p,
+    "fmi2FreeInstance": None,
+}
+
+
+# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
+
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
@@ -369,3 +435,252 @@ class Instance:
 
 def _base(kind: str) -> str:
     return "Integer" if kind == "Enumeration" else kind
+
+
+# The functions of FMI 3.0 co-simulation: names, argument types, results.
+
+_refs3, _state3, _sizes = POINTER(c_uint32), c_void_p, POINTER(c_size_t)
+_flag, _numbers, _qualifiers = POINTER(c_bool), POINTER(c_double), POINTER(ctypes.c_int)
+_counters = POINTER(ctypes.c_uint64)
+TYPES_FMI3: dict[str, Any] = {
+    "Float64": c_double, "Float32": ctypes.c_float, "Boolean": c_bool, "String": c_char_p,
+    "Int8": ctypes.c_int8, "UInt8": ctypes.c_uint8, "Int16": ctypes.c_int16,
+    "UInt16": ctypes.c_uint16, "Int32": c_int32, "UInt32": c_uint32,
+    "Int64": ctypes.c_int64, "UInt64": ctypes.c_uint64,
+}  # fmt: skip
+NATURAL = {
+    "Real": "Float64", "Integer": "Int32", "Enumeration": "Int64", "Boolean": "Boolean",
+    "String": "String",
+}  # fmt: skip
+"""The type of a kind of FMI 2.0 where nothing else is said."""
+LOGGER = ctypes.CFUNCTYPE(None, c_void_p, ctypes.c_int, c_char_p, c_char_p)
+
+_values = {
+    f"fmi3{verb}{name}": (c_void_p, _refs3, c_size_t, POINTER(kind), c_size_t)
+    for verb in ("Get", "Set")
+    for name, kind in TYPES_FMI3.items()
+}
+REQUIRED_FMI3 = {
+    "fmi3GetVersion": (),
+    "fmi3SetDebugLogging": (c_void_p, c_bool, c_size_t, POINTER(c_char_p)),
+    "fmi3InstantiateCoSimulation": (
+        *(c_char_p, c_char_p, c_char_p, c_bool, c_bool, c_bool, c_bool),
+        *(_refs3, c_size_t, c_void_p, LOGGER, c_void_p),
+    ),
+    "fmi3FreeInstance": (c_void_p,),
+    "fmi3EnterInitializationMode": (c_void_p, c_bool, c_double, c_double, c_bool, c_double),
+    "fmi3ExitInitializationMode": (c_void_p,),
+    "fmi3Terminate": (c_void_p,),
+    "fmi3Reset": (c_void_p,),
+    "fmi3DoStep": (c_void_p, c_double, c_double, c_bool, _flag, _flag, _flag, _numbers),
+    **_values,
+}
+OPTIONAL_FMI3 = {
+    "fmi3GetFMUState": (c_void_p, POINTER(_state3)),
+    "fmi3SetFMUState": (c_void_p, _state3),
+    "fmi3FreeFMUState": (c_void_p, POINTER(_state3)),
+    "fmi3SerializedFMUStateSize": (c_void_p, _state3, _sizes),
+    "fmi3SerializeFMUState": (c_void_p, _state3, c_char_p, c_size_t),
+    "fmi3DeserializeFMUState": (c_void_p, c_char_p, c_size_t, POINTER(_state3)),
+    "fmi3GetDirectionalDerivative": (
+        (c_void_p, _refs3, c_size_t, _refs3, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
+    ),
+    "fmi3GetAdjointDerivative": (
+        (c_void_p, _refs3, c_size_t, _refs3, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
+    ),
+    "fmi3GetOutputDerivatives": (c_void_p, _refs3, c_size_t, POINTER(c_int32), _numbers, c_size_t),
+    "fmi3GetBinary": (c_void_p, _refs3, c_size_t, _sizes, c_void_p, c_size_t),
+    "fmi3SetBinary": (c_void_p, _refs3, c_size_t, _sizes, c_void_p, c_size_t),
+    "fmi3GetClock": (c_void_p, _refs3, c_size_t, _flag),
+    "fmi3SetClock": (c_void_p, _refs3, c_size_t, _flag),
+    "fmi3GetIntervalDecimal": (c_void_p, _refs3, c_size_t, _numbers, _qualifiers),
+    "fmi3GetIntervalFraction": (c_void_p, _refs3, c_size_t, _counters, _counters, _qualifiers),
+    "fmi3GetShiftDecimal": (c_void_p, _refs3, c_size_t, _numbers),
+    "fmi3GetShiftFraction": (c_void_p, _refs3, c_size_t, _counters, _counters),
+    "fmi3SetIntervalDecimal": (c_void_p, _refs3, c_size_t, _numbers),
+    "fmi3SetIntervalFraction": (c_void_p, _refs3, c_size_t, _counters, _counters),
+    "fmi3SetShiftDecimal": (c_void_p, _refs3, c_size_t, _numbers),
+    "fmi3SetShiftFraction": (c_void_p, _refs3, c_size_t, _counters, _counters),
+    "fmi3GetNumberOfVariableDependencies": (c_void_p, c_uint32, _sizes),
+    "fmi3GetVariableDependencies": (
+        (c_void_p, c_uint32, _sizes, _refs3, _sizes, _qualifiers, c_size_t)
+    ),
+    "fmi3EnterEventMode": (c_void_p,),
+    "fmi3EnterStepMode": (c_void_p,),
+    "fmi3UpdateDiscreteStates": (c_void_p, _flag, _flag, _flag, _flag, _flag, _numbers),
+    "fmi3EvaluateDiscreteStates": (c_void_p,),
+    "fmi3EnterConfigurationMode": (c_void_p,),
+    "fmi3ExitConfigurationMode": (c_void_p,),
+}
+RESULTS_FMI3: dict[str, Any] = {
+    "fmi3GetVersion": c_char_p,
+    "fmi3InstantiateCoSimulation": c_void_p,
+    "fmi3FreeInstance": None,
+}
+
+
+# The FMI 3.0 functions of a shared library, called bare, under the names of `native`.
+#
+# Instances are stepped without event mode, intermediate update and early return, as an importer may
+# choose for any FMU. Runs in the child process: standard library only.
+
+
+class LibraryFmi3(Library):
+    """A loaded FMU library of FMI 3.0; `types` says of value references which type they have."""
+
+    prefix = "fmi3"
+    required, optional, results = REQUIRED_FMI3, OPTIONAL_FMI3, RESULTS_FMI3
+
+    def __init__(self, file: Path, box: BlackBox, types: Mapping[int, str]) -> None:
+        super().__init__(file, box)
+        self.types = types
+        self._names: list[str] = []
+        self._logger = LOGGER(self._log_fmi3)
+
+    def _log_fmi3(
+        self, environment: int | None, status: int, kind: bytes | None, text: bytes | None
+    ) -> None:
+        """Take a message; an instance is told apart by the environment that it passes back."""
+        place = (environment or 0) - 1
+        known = 0 <= place < len(self._names)
+        self._log(None, self._names[place].encode() if known else None, status, kind, text)
+
+    def instantiate(
+        self, name: str, guid: str, resources: str, *, logging: bool = False
+    ) -> Instance | None:
+        """Return a new instance for co-simulation, None if the FMU refuses.
+
+        Parameters
+        ----------
+        name, guid : of the instance; the token of the model description
+        resources : path of the unpacked resources, with a separator at its end
+        logging : whether the FMU logs for debugging
+        """
+        self._names.append(name)
+        handle = self.call(
+            "fmi3InstantiateCoSimulation", name.encode(), guid.encode(), resources.encode(),
+            False, logging, False, False, None, 0, len(self._names), self._logger, None,
+        )  # fmt: skip
+        self._refused = [] if handle else list(self._latest)
+        return InstanceFmi3(self, handle) if handle else None
+
+
+class InstanceFmi3(Instance):
+    """One instance of FMI 3.0. Every method returns the status that the FMU answered."""
+
+    library: LibraryFmi3
+
+    def __init__(self, library: LibraryFmi3, handle: int) -> None:
+        super().__init__(library, handle)
+        self._start = 0.0
+        self._stop: float | None = None
+        self._ended = False
+
+    def setup(self, start: float, stop: float | None) -> int:
+        """Keep start and stop [s] until initialisation mode is entered, which tells them."""
+        self._start, self._stop = start, stop
+        return OK
+
+    def enter(self) -> int:
+        """Call fmi3EnterInitializationMode with the times of `setup`."""
+        stop = self._stop
+        told = False, 0.0, self._start, stop is not None, stop or 0.0
+        return self._do("fmi3EnterInitializationMode", *told)
+
+    def step(self, time_: float, step: float) -> int:
+        """Call fmi3DoStep (s); Discard if the FMU asks to end the run, which is its word for it."""
+        event, end, early = c_bool(), c_bool(), c_bool()
+        last = c_double()
+        answers = (byref(one) for one in (event, end, early, last))
+        status = self._do("fmi3DoStep", time_, step, True, *answers)
+        if status in (OK, WARNING) and early.value:
+            raise UnexpectedError("fmi3DoStep returned early, which it was not allowed to")
+        self._ended = bool(end.value)
+        return DISCARD if self._ended and status in (OK, WARNING) else status
+
+    def wants_to_end(self) -> bool:
+        """Return whether the last step asked to terminate the simulation."""
+        return self._ended
+
+    def _by_type(self, kind: str, references: Sequence[int]) -> Iterator[tuple[str, list[int]]]:
+        """Yield each type of these variables with their places; an unknown one is the natural."""
+        found: dict[str, list[int]] = {} if references else {NATURAL[kind]: []}
+        for i, reference in enumerate(references):
+            name = self.library.types.get(reference, NATURAL[kind])
+            found.setdefault("Int64" if name == "Enumeration" else name, []).append(i)
+        yield from found.items()
+
+    def get(self, kind: str, references: Sequence[int]) -> tuple[int, list[Value]]:
+        """Return the worst status and the values of variables of one kind, whatever their types."""
+        worst, found = OK, dict[int, Value](dict.fromkeys(range(len(references)), 0))
+        for name, places in self._by_type(kind, references):
+            count = len(places)
+            some = (c_uint32 * count)(*(references[i] for i in places))
+            values = (TYPES_FMI3[name] * count)()
+            status = self._do(f"fmi3Get{name}", some, count, values, count)
+            worst = max(worst, status)
+            for i, value in zip(places, values, strict=True):
+                text = name == "String"
+                found[i] = (value or b"").decode("utf-8", "replace") if text else value
+        return worst, list(found.values())
+
+    def set(self, kind: str, references: Sequence[int], values: Sequence[Value]) -> int:
+        """Set variables of one kind, whatever their types; return the worst status."""
+        worst = OK
+        for name, places in self._by_type(kind, references):
+            count = len(places)
+            some = (c_uint32 * count)(*(references[i] for i in places))
+            raw = [values[i] for i in places]
+            array = (TYPES_FMI3[name] * count)(
+                *(v.encode() if isinstance(v, str) else v for v in raw)
+            )
+            worst = max(worst, self._do(f"fmi3Set{name}", some, count, array, count))
+        return worst
+
+    def save(self, state: c_void_p) -> int:
+        """Call fmi3GetFMUState into `state`."""
+        return self._do("fmi3GetFMUState", byref(state))
+
+    def restore(self, state: c_void_p) -> int:
+        """Call fmi3SetFMUState."""
+        return self._do("fmi3SetFMUState", state)
+
+    def forget(self, state: c_void_p) -> int:
+        """Call fmi3FreeFMUState."""
+        return self._do("fmi3FreeFMUState", byref(state))
+
+    def serialise(self, state: c_void_p) -> tuple[int, bytes]:
+        """Return the status and the bytes of a saved state."""
+        size = c_size_t(0)
+        status = self._do("fmi3SerializedFMUStateSize", state, byref(size))
+        if status not in (OK, WARNING):
+            return status, b""
+        buffer = buffer_of(size.value)
+        return self._do("fmi3SerializeFMUState", state, buffer, size.value), buffer.raw
+
+    def deserialise(self, data: bytes, state: c_void_p) -> int:
+        """Call fmi3DeserializeFMUState into `state`."""
+        return self._do("fmi3DeserializeFMUState", data, len(data), byref(state))
+
+    def debug_logging(self, on: bool, categories: Sequence[str] = ()) -> int:
+        """Call fmi3SetDebugLogging."""
+        names = (c_char_p * len(categories))(*(c.encode() for c in categories))
+        return self._do("fmi3SetDebugLogging", on, len(categories), names)
+
+    def derivatives(
+        self, unknowns: Sequence[int], knowns: Sequence[int]
+    ) -> tuple[int, list[float]]:
+        """Return the status and the directional derivative along the sum of all knowns."""
+        n, m = len(unknowns), len(knowns)
+        result = (c_double * n)()
+        status = self._do(
+            "fmi3GetDirectionalDerivative", (c_uint32 * n)(*unknowns), n, (c_uint32 * m)(*knowns),
+            m, (c_double * m)(*[1.0] * m), m, result, n,
+        )  # fmt: skip
+        return status, list(result)
+
+    def output_derivative(self, reference: int) -> tuple[int, float]:
+        """Return the status and the first derivative of one output."""
+        value, one = (c_double * 1)(), (c_uint32 * 1)(reference)
+        status = self._do("fmi3GetOutputDerivatives", one, 1, (c_int32 * 1)(1), value, 1)
+        return status, value[0]

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import BristleError
-from ..findings import Finding, Level, number, unknown, worded, written
 from ..version import __version__
+from .text import Finding, Level, number, unknown, worded, written
 from .toml_lines import KeyPath, key_lines, repeated_keys
 
 SCHEMA = 1

@@ -5,14 +5,14 @@ Ground motions are built in, come from an extra package, or from the user's AT2 
 
 from __future__ import annotations
 
-from .listing import Listing
-from .motion import (
+from .ground_motion import (
     GroundMotion,
     baked_in,
     ground_motion_file,
     list_ground_motions,
     read_ground_motion,
 )
+from .listing import Listing
 
 __all__ = [
     "GroundMotion",

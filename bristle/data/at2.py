@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 
 from ..errors import PhysicsError, UnitError
-from ..physics.record import number, shortened
+from ..physics.motion_file import number, shortened
 from ..units import Unit
 from ..units import parse as parse_unit
 from .titles import unit_or_none

@@ -1,18 +1,75 @@
-"""The channels of a measurement: their names and units, and what a column's name says of them."""
+"""The channels of a measurement, their names and units; labels of whole runs."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.text import plain
+from ..core.text import quantity as quantity_text
 from ..errors import RecordError
 from ..physics.drive import DRIVES
-from ..units import parse as parse_unit
-from .labels import TEMPERATURE
+from ..units import parse
+
+# What is known of a run as a whole: its temperature, frequency, amplitude, the batch of oil.
+#
+# A label is a number or a word. Those with a name that is known have a unit.
+
+Label: TypeAlias = float | str
+Labels: TypeAlias = Mapping[str, Label]
+
+UNITS = {"temperature": "degC", "frequency": "Hz", "amplitude": "m"}
+"""Labels that have a unit, in which study.toml gives them."""
+
+
+TEMPERATURE = "temperature"
+"""The label that is a channel's mean where a run has one of that name."""
+
+
+def mean_temperature(values: NDArray[np.float64]) -> tuple[float | None, str]:
+    """Return the mean of a temperature (n,) [degC] over a run, None without any, and a note of it.
+
+    A slow logger leaves fields empty: they do not count. Tenths of a kelvin are what a sensor
+    knows.
+    """
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return None, "temperature: no value in the whole run"
+    mean, low, high = (round(float(one), 1) for one in (known.mean(), known.min(), known.max()))
+    return mean, f"temperature: {mean:g} °C, the mean of the run, from {low:g} to {high:g} °C"
+
+
+def label_text(name: str, value: Label, unit: str = "") -> str:
+    """Return a label's value as people write it: "40 °C", "10 mm", "batch B".
+
+    Parameters
+    ----------
+    name : of the label
+    value : its value
+    unit : its unit, where it is none of `UNITS`: that of a command's level
+    """
+    if isinstance(value, str):
+        return value
+    unit = unit or UNITS.get(name, "")
+    if unit == "degC":
+        return f"{plain(value, 4)} °C"
+    return quantity_text(value, unit or "1", 4)
+
+
+def varying(labels: Sequence[Labels]) -> list[str]:
+    """Return the labels that every one has, and that are not the same for all."""
+    if not labels:
+        return []
+    shared = [name for name in labels[0] if all(name in one for one in labels)]
+    return [name for name in shared if len({one[name] for one in labels}) > 1]
+
 
 PLAIN = {
     "time": "s",
@@ -204,11 +261,11 @@ def quantity_of_unit(unit: str | None) -> str | None:
     """Return the quantity that a unit alone tells, None if it tells none."""
     if unit is None:
         return None
-    dimension = parse_unit(unit).dimension
-    if parse_unit(unit).name == PLAIN["duty"]:
+    dimension = parse(unit).dimension
+    if parse(unit).name == PLAIN["duty"]:
         return "duty"  # any other number without a unit is no duty cycle
     for quantity in ("time", *MOTION, "force", "voltage", "current", "field"):
-        if parse_unit(PLAIN[quantity]).dimension == dimension:
+        if parse(PLAIN[quantity]).dimension == dimension:
             return quantity
     return None
 

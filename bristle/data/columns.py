@@ -10,9 +10,9 @@ import csv
 import re
 from dataclasses import dataclass
 
+from ..core.text import listed
 from ..errors import PhysicsError, UnitError
-from ..findings import listed
-from ..physics.record import check_times, number, rows, shortened
+from ..physics.motion_file import check_times, number, rows, shortened
 from ..units import Unit
 from ..units import parse as parse_unit
 

@@ -1,4 +1,4 @@
-"""Samples that may have been cut off at the end of a channel's range: they say nothing."""
+"""Samples cut off at the end of a channel's range, and velocities that were computed."""
 
 from __future__ import annotations
 
@@ -8,13 +8,91 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantity import quantity
+from ..core.text import quantity
 from .channels import DRIVE, channel_unit
-from .checks.clipping import stands_at_top
 from .left_out import merged
 from .measurement import Measurement
 
+# Whether a channel was cut off at the end of its range, by three measures for three questions.
+#
+# All look at stretches of equal samples at an extreme, and none can stand for another. Before any
+# model a channel of any sampling is asked, and a peak in coarse steps must not be taken for a cut:
+# `clipped_ends`, which knows the step. A diagnosis leaves out what may have been cut, so chance
+# must
+# not cut it short: `stands_at_top`, on one side, its limits those of a decision rule. A fit refuses
+# a
+# force that carries nothing but its ends, whatever did that: `saturated_share`, both sides
+# together,
+# coarse steps included.
+
 Array = NDArray[np.float64]
+
+LONG = 5
+"""Equal samples in a row at an extreme that a moving force does not show."""
+
+
+def stretches(flat: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the first sample and the one after the last (k, 2) of each stretch that is true."""
+    padded = np.concatenate([[0], flat.astype(np.int8), [0]])
+    return np.asarray(np.flatnonzero(np.diff(padded)).reshape(-1, 2), dtype=np.int64)
+
+
+def saturated_share(values: Array) -> float:
+    """Return the share of samples (n,) that repeat an extreme in stretches of `LONG` or more."""
+    count = 0
+    for extreme in (values.max(), values.min()):
+        lengths = np.diff(stretches(values == extreme))
+        count += int(lengths[lengths >= LONG].sum())
+    return count / len(values)
+
+
+def stands_at_top(values: Array, near: float, longest: int, crowded: float) -> bool:
+    """Return whether a signal (n,) is cut at its largest value.
+
+    At a cut the very same number comes many times in a row; a noisy signal never does that. One in
+    coarse steps does at its turns, but not many times more often than one step below.
+
+    Parameters
+    ----------
+    values : (n,) in the channel's unit
+    near : distance from the largest value that counts as equal, in the same unit
+    longest : samples of a stretch at a turn at the most
+    crowded : how many times as many samples as one step below a cut holds at the least
+    """
+    at_end = values >= values.max() - near
+    stays, often = np.diff(stretches(at_end)).ravel(), int(at_end.sum())
+    # Once may be a rest before or after the test, at that end of the stroke.
+    if np.count_nonzero(stays >= longest) < 2 or often < 2 * longest:
+        return False
+    _, below = np.unique(values[~at_end], return_counts=True)
+    return bool(len(below)) and often > crowded * float(np.mean(below[-longest:]))
+
+
+def clipped_ends(values: Array, quantum: float) -> list[tuple[float, float, int]]:
+    """Return (share of samples, level, stretches) of each end where a channel is cut off.
+
+    A stretch is three or more equal samples at the largest or smallest value, away from the ends of
+    the record. A turning point of a signal written in steps dwells there too, but then almost as
+    long on the next step.
+    """
+    span = float(np.ptp(values))
+    tolerance = max(0.5 * quantum, 1e-9 * span)
+    found = []
+    for extreme in (float(values.max()), float(values.min())):
+        distance = np.abs(values - extreme)
+        edges = stretches(distance <= tolerance).tolist()
+        inner = [(a, b) for a, b in edges if b - a >= 3 and a > 0 and b < len(values)]
+        count = sum(b - a for a, b in inner)
+        near = max(quantum, 5e-3 * span) + tolerance
+        beside = int(((distance > tolerance) & (distance <= near)).sum())
+        levels = max(1.0, 5e-3 * span / quantum) if quantum else 1.0
+        # How much longer a round peak dwells on the last step than on each of the next.
+        round_peak = 0.707 * levels / ((levels + 0.5) ** 0.5 - 0.707)
+        often = count >= 5 and (len(inner) > 1 or count >= 10)
+        if often and count > 4.0 * round_peak * beside / levels:
+            found.append((count / len(values), extreme, len(inner)))
+    return sorted(found, key=lambda end: -end[0])
+
 
 CHANNELS = ("force", "displacement", "velocity", *DRIVE)
 """Channels of a damper that are looked at."""
@@ -124,3 +202,79 @@ def _is_noisy(run: Measurement, channel: str) -> bool:
 
 def _rounding(values: Array) -> float:
     return 1e-9 * float(np.max(np.abs(values)))
+
+
+# A velocity that was computed from the displacement tells nothing of its own.
+#
+# Its noise is that of the displacement, differentiated, so that the two channels agree in their
+# noise
+# as two instruments never do; a difference to one side is half a sample early or late as well.
+#
+# Two questions are asked. `numerical_derivative`, of two columns whose noise nobody knows yet: are
+# they equal to the digits that were written? `derived_velocity`, of a measurement: do they agree
+# better than the noise of the displacement lets two instruments agree?
+
+AGREED = 0.1
+"""Mismatch of a channel with a difference of the other, as a share of that difference's noise."""
+
+WRITTEN = 1e-3
+"""Median mismatch, as a share of the velocity's spread, that the digits of a file leave."""
+
+SPREAD = {"backward": np.sqrt(2.0), "forward": np.sqrt(2.0), "central": np.sqrt(0.5)}
+"""Noise of a difference, in noises of the displacement per sampling step."""
+
+LATE = {"backward": 0.5, "forward": -0.5, "central": 0.0}
+"""By how many samples a velocity comes late that is such a difference of the displacement."""
+
+
+def derived_velocity(measurement: Measurement) -> str:
+    """Return of which difference of the displacement the velocity is, "" where it is of none.
+
+    Returns
+    -------
+    str
+        "backward", "forward" or "central"; "" too without noise, when no difference can be told
+        from a good instrument.
+    """
+    if not measurement.has("displacement", "velocity") or len(measurement.time) < 3:
+        return ""
+    noise = measurement.noise.get("displacement", 0.0) / measurement.step
+    rests = mismatches(measurement["displacement"], measurement["velocity"], measurement.step)
+    for name in ("backward", "forward", "central"):
+        rest = rests[name]
+        if _rms(rest[np.isfinite(rest)]) < AGREED * SPREAD[name] * noise:
+            return name
+    return ""
+
+
+def numerical_derivative(x: Array, v: Array, step: float) -> str:
+    """Return which difference of x (n,) a velocity v (n,) is to its digits, "" if it is none.
+
+    Parameters
+    ----------
+    x, v : (n,) evenly spaced
+    step : float, s
+    """
+    scale = float(np.std(v))
+    if scale == 0.0 or len(x) < 10:
+        return ""
+    rests = mismatches(x, v, step)
+    for name in ("central", "backward", "forward"):
+        # What is written with few digits differs by their rounding.
+        if float(np.median(np.abs(rests[name]))) < WRITTEN * scale:
+            return f"{name} differences"
+    return ""
+
+
+def mismatches(x: Array, v: Array, step: float) -> dict[str, Array]:
+    """Return by how much a velocity (n,) differs from each difference of x (n,), by its name."""
+    rise = np.diff(x) / step
+    return {
+        "backward": v[1:] - rise,
+        "forward": v[:-1] - rise,
+        "central": v[1:-1] - 0.5 * (rise[1:] + rise[:-1]),
+    }
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else np.inf

@@ -1,9 +1,9 @@
-"""Fewer samples where there are more than a fit needs, behind an anti-alias filter.
+"""Fewer samples where there are more than a fit needs, behind a filter; clocks that differ.
 
 A motion is smooth: a long filter takes what would be folded back, and leaves the motion. A force
 jumps where the motion turns or the command switches, and so do accelerations; a long filter would
 ring there. They get a filter as short as the new step, and a model's force gets the same: see
-`data.finer`.
+`data.decimate`.
 """
 
 from __future__ import annotations
@@ -15,16 +15,203 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.text import plain
 from ..errors import RecordError
-from ..quantity import plain
 from .channels import DRIVE, is_smooth
-from .finer import MOST, hann
+from .corrections import TIMING, Correction, jumps
 from .noise import SHORTEST, Noise, estimate_noise, is_switched
 from .sampling import Even
 from .table import Array
-from .timing import InTime
+
+# Between the samples of a decimated run: where a model is evaluated, and the filter behind it.
+#
+# A force jumps where the motion turns or the command switches, and the measured one went through a
+# short filter before samples were left out. So does a model's: it is evaluated at several moments
+# per
+# sample, on the motion between them, and what the same filter leaves is held against the
+# measurement.
+
+MOST = 10
+"""Moments per sample at most, for a model costs as many times more. Up to here they are the samples
+as recorded, and a model is exact; beyond, one that jumps where the motion turns is off by up to 1 %
+of its RMS, others by less than a tenth of that."""
+
+
+@cache
+def hann(parts: int) -> Array:
+    """Return the filter of a force (2 parts - 1,), as short as a step of so many parts; sum 1."""
+    taps = np.hanning(2 * parts + 1)[1:-1]
+    return np.asarray(taps / taps.sum(), dtype=float)
+
+
+def between(y: Array, rate: Array | None, dt: float, parts: int = 2) -> Array:
+    """Return samples (parts (n - 1) + 1,), of which every so many are those of y (n,).
+
+    Parameters
+    ----------
+    y : (n,) samples, `dt` [s] apart
+    rate : (n,) their derivative, for Hermite's cubic; None for a line
+    dt : s
+    parts : into how many the steps are cut
+    """
+    s = np.arange(parts) / parts
+    shares = [1.0 - s, s]
+    columns = [y[:-1], y[1:]]
+    if rate is not None:
+        bend = s * s * (3.0 - 2.0 * s)
+        shares = [1.0 - bend, bend, dt * s * (1.0 - s) ** 2, -dt * s * s * (1.0 - s)]
+        columns += [rate[:-1], rate[1:]]
+    out = np.empty(parts * (len(y) - 1) + 1)
+    out[:-1] = (np.column_stack(columns) @ np.array(shares)).ravel()
+    out[::parts] = y
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Finer:
+    """How a model of a decimated run is evaluated: at `parts` moments per sample.
+
+    `since` (n,) says at how many of the moments up to each sample the command had gone over to its
+    value there, should it jump: a part of one where it jumped about a moment.
+    """
+
+    parts: int
+    since: Array
+
+    def of(self, part: slice) -> Finer:
+        """Return that of some neighbouring samples."""
+        return replace(self, since=self.since[part])
+
+    def halved(self) -> Finer:
+        """Return the same with twice as many moments."""
+        return Finer(2 * self.parts, 2.0 * self.since - 0.5)
+
+    def motion(self, x: Array, v: Array, a: Array, dt: float) -> tuple[Array, Array, Array]:
+        """Return a motion (n,) at all moments (m,): Hermite's cubics, that of `a` by its slope.
+
+        Parameters
+        ----------
+        x, v, a : (n,) displacement, velocity, acceleration [m, m/s, m/s2]
+        dt : s between samples
+        """
+        slope = np.gradient(a, dt)
+        return (
+            between(x, v, dt, self.parts), between(v, a, dt, self.parts),
+            between(a, slope, dt, self.parts),
+        )  # fmt: skip
+
+    def command(self, V: Array) -> Array:
+        """Return a command (n,) at all moments (m,): held until it jumps, else on a line."""
+        out, moments = between(V, None, 1.0, self.parts), np.arange(self.parts + 1)
+        k = np.flatnonzero(jumps(V))[:, None]
+        share = np.clip(moments - self.parts + self.since[k], 0.0, 1.0)
+        out[self.parts * (k - 1) + moments] = (1.0 - share) * V[k - 1] + share * V[k]
+        return out
+
+    def filtered(self, force: Array) -> Array:
+        """Return what the filter leaves at the samples (n,) of a force at all moments (m,)."""
+        half = self.parts - 1
+        begin = 2.0 * force[0] - force[half:0:-1]
+        end = 2.0 * force[-1] - force[-2 : -half - 2 : -1]
+        around = np.concatenate([begin, force, end])
+        rows = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1)[:: self.parts]
+        return np.asarray(rows @ hann(self.parts))
+
+
+# Channels whose clock is late, or runs fast or slow, at the times of the others.
+#
+# Values between two samples are interpolated linearly: a force that jumps would ring behind
+# anything
+# smoother. That lowers white noise, by a share that is known, so that noise is estimated before.
+# Where a force bends so much between two samples that no line follows it, its value is not judged.
 
 Flags = NDArray[np.bool_]
+
+_ALONE = np.ones(1)
+_BINS = 20  # of the distances from a sample, where a clock goes through all of them
+_EXACT = 1e-9  # steps within which a value lies on a sample
+
+MISSED = 1e-3
+"""Share of a force's standard deviation that a line between two samples may miss, where its noise
+is smaller: a signal of a simulation has none, and bends everywhere."""
+
+
+@dataclass(frozen=True)
+class InTime:
+    """Channels (n,) at the times of the others, and what is known of those that were moved.
+
+    By name: `lost` (n,) where the record does not tell what it was at that time; `between` (n,) how
+    far from a sample of the record the values are, as shares of a step; `noise` that of the record.
+    """
+
+    channels: dict[str, Array]
+    lost: dict[str, Flags] = field(default_factory=dict)
+    between: dict[str, Array] = field(default_factory=dict)
+    noise: dict[str, Noise] = field(default_factory=dict)
+
+    def noise_left(self, channel: str, taps: Array = _ALONE) -> float:
+        """Return what is left of a channel's white noise behind a filter.
+
+        Parameters
+        ----------
+        channel : its name, moved or not
+        taps : (k,) of the filter
+        """
+        weights = taps / taps.sum()
+        if channel not in self.between or is_smooth(channel):
+            return float(np.sqrt(np.sum(weights**2)))
+        shares, edges = np.histogram(self.between[channel], _BINS, (0.0, 1.0))
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        if np.ptp(self.between[channel]) < 1.0 / _BINS:  # a delay, the same for all
+            middles[:] = np.mean(self.between[channel])
+        power = [np.sum(np.convolve(weights, [1.0 - w, w]) ** 2) for w in middles]
+        return float(np.sqrt(np.average(power, weights=shares)))
+
+
+def _error(y: Array, first: NDArray[np.int_], between: Array) -> Array:
+    """Return what linear interpolation behind samples `first` (n,) misses where a signal bends."""
+    places = np.clip(first[:, None] + np.arange(-1, 3), 0, len(y) - 1)
+    bend = y[places] @ np.array([0.5, -0.5, -0.5, 0.5])
+    return np.asarray(0.5 * between * (1.0 - between) * np.abs(bend))
+
+
+def in_time(
+    channels: Mapping[str, Array], known: Mapping[str, Flags], step: float,
+    corrections: Sequence[Correction], begin: float = 0.0,
+) -> InTime:  # fmt: skip
+    """Return channels at the times at which the others were measured.
+
+    Parameters
+    ----------
+    channels : name to (n,), evenly spaced
+    known : by channel (n,) False where it says nothing, such as where a sample was filled in
+    step : s
+    corrections : those of other faults are passed over
+    begin : s since the record began, from which on a clock gains
+    """
+    out = InTime(dict(channels))
+    for name, y in channels.items():
+        own = [one for one in corrections if one.channel == name and one.fault in TIMING]
+        if not own:
+            continue
+        rate = float(np.prod([1.0 + one.value for one in own if one.fault == "clock"]))
+        late = sum(one.value for one in own if one.fault == "delay")
+        last = len(y) - 1
+        wanted = (np.arange(len(y)) + (begin + late) / step) * rate - begin / step
+        place = np.clip(wanted, 0.0, last)
+        first = np.floor(place + _EXACT).astype(int)
+        second = np.ceil(place - _EXACT).astype(int)
+        there = (wanted > -0.5) & (wanted < last + 0.5) & known[name][first] & known[name][second]
+        out.channels[name] = np.interp(place, np.arange(len(y)), y)
+        out.between[name] = np.clip(place - first, 0.0, 1.0)
+        out.noise[name] = estimate_noise(y)
+        if not (is_smooth(name) or name in DRIVE):
+            most = max(out.noise[name].std, MISSED * float(np.std(y)))
+            there &= _error(y, first, out.between[name]) <= most
+        if not there.all():
+            out.lost[name] = ~there
+    return out
+
 
 RATE = 500.0
 """Samples per second [Hz] that a fit needs: motion and force of a damper lie far below half."""
@@ -42,7 +229,7 @@ _NONE = np.ones(1)
 class Decimated:
     """Pieces with fewer samples.
 
-    `parts` and, by command, `since` of each piece are those of `data.finer.Finer`; 1 and nothing
+    `parts` and, by command, `since` of each piece are those of `data.decimate.Finer`; 1 and nothing
     where no sample was left out. `lost` of each piece says where the record of a channel that was
     moved in time holds nothing. `gain` is by channel what filter and interpolation leave of white
     noise, where there was one; `noise` of each piece that before them.

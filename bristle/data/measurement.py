@@ -3,11 +3,10 @@
 Units are converted here, once. What was done to the samples is in `notes`; no sample is filtered.
 """
 
-# Longer than 300 lines: a measurement is one class, and every way to make one is here.
-
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,26 +15,34 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.text import shown
 from ..errors import RecordError, UnitError
-from ..shown import shown
 from ..units import conversion
-from .channels import DRIVE, ChannelSpec, at_device, channel_unit, is_smooth
+from .channels import (
+    DRIVE,
+    TEMPERATURE,
+    ChannelSpec,
+    Labels,
+    at_device,
+    channel_unit,
+    is_smooth,
+    mean_temperature,
+)
 from .corrections import Correction, gain_of, set_right
-from .decimate import decimated
-from .extra import Extra, found_in, read_extra
-from .finer import Finer
+from .decimate import Finer, InTime, decimated, in_time
+from .extra_channels import Extra, found_in, read_extra
 from .guess import guess_channels, specs, too_few_rows
-from .labels import TEMPERATURE, Labels, mean_temperature
 from .left_out import MASKED, MISSING, SATURATED, any_of, occurring
-from .noise import KNOWN, Noise, estimate_noise, quietest
+from .noise import KNOWN, Noise, Spike, estimate_noise, quietest, spikes_of, spikes_text
 from .read import read_table
 from .sampling import Even, Sampling, evenly
-from .spikes import Spike, spikes_of, spikes_text
 from .table import Array, Table, table_from_frame
-from .timing import InTime, in_time
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+# Longer than 300 lines: a measurement is one class, and every way to make one is here.
 
 
 @dataclass(frozen=True)
@@ -516,3 +523,53 @@ def _what_is_missing(values: Sequence[str]) -> list[str]:
     if bench and not any(drive in values for drive in DRIVE):
         notes.append("no command: if there is one, it is constant at an unknown level")
     return notes
+
+
+# Names of runs, no two of which are alike: corrections, roles and faults go by them.
+
+_PARTS = (" (", ", ")
+"""How the name of a part of a run goes on behind that of the run: "run (1 of 2)", "run, first"."""
+
+
+def names_of_files(files: Sequence[str], ends: Sequence[str] = ()) -> list[str]:
+    """Return a name for each run in a file, the shortest that means no other run.
+
+    Parameters
+    ----------
+    files : (n,) path of the file of each run. Its run is called by its stem; where another one has
+        that too, as of run.csv and run.txt, by its whole name; else by its path
+    ends : (n,) what tells the runs of one file apart, such as " run 2"; by default nothing
+
+    Returns
+    -------
+    list of str
+        (n,) names.
+    """
+    ends = ends or [""] * len(files)
+    forms = [
+        [f"{form}{end}" for form in (stem_of(file), Path(file).name, file)]
+        for file, end in zip(files, ends, strict=True)
+    ]
+    longer = [0] * len(files)
+    while True:
+        names = [own[k] for own, k in zip(forms, longer, strict=True)]
+        counts, wholes = Counter(names), {whole for name in names for whole in _wholes(name)}
+        doubtful = [
+            k
+            for k, name in enumerate(names)
+            if longer[k] < len(forms[k]) - 1 and (counts[name] > 1 or name in wholes)
+        ]
+        if not doubtful:
+            return names
+        for k in doubtful:
+            longer[k] += 1
+
+
+def is_part(name: str, whole: str) -> bool:
+    """Return whether a name is that of a run or of a part of it."""
+    return name == whole or name.startswith(tuple(f"{whole}{part}" for part in _PARTS))
+
+
+def _wholes(name: str) -> list[str]:
+    """Return of which runs' parts this could be the name."""
+    return [name[:k] for part in _PARTS for k in range(len(name)) if name.startswith(part, k)]

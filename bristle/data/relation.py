@@ -1,7 +1,7 @@
 """How two channels belong together: one the derivative of the other, a force against a motion.
 
 A first look at any two columns, whose units, signs and order may be wrong: gain and delay of the
-derivative, to first order in the delay. `diagnose.sensors` asks more of a displacement and a
+derivative, to first order in the delay. `diagnosis.sensor_faults` asks more of a displacement and a
 velocity that are known to be these: it integrates the velocity, for a derivative's noise would
 drown a lag's order, a geophone's corner and a bias.
 """

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.text import listed
 from ..errors import RecordError
-from ..findings import listed
 from .columns import Column
 from .titles import titles
 

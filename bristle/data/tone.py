@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..quantity import quantity
-from .labels import Labels, label_text
+from ..core.text import quantity
+from .channels import Labels, label_text
 from .measurement import Measurement
 from .relation import band, differentiated
 from .table import Array

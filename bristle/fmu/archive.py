@@ -1,4 +1,4 @@
-"""FMU archives, opened with suspicion: bounded sizes, no path that leaves the folder.
+"""FMU archives and their XML, opened with suspicion: bounded sizes, no path out of the folder.
 
 An FMU comes from anywhere and is unpacked before anything else is known of it. So names, sizes
 and kinds of all members are judged from the archive's directory first, and nothing is written
@@ -11,11 +11,13 @@ import platform
 import stat
 import struct
 import sys
+import xml.etree.ElementTree as ElementTree
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from xml.parsers import expat
 
 from ..errors import FmuError
 
@@ -264,3 +266,38 @@ def _unpack(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, target:
             if written > info.file_size:
                 raise FmuError(f"{path}: the member {info.filename!r} holds more than it declares.")
             sink.write(chunk)
+
+
+# XML of unknown origin, parsed with suspicion: no entities, so no expansion and no other file.
+
+
+def parse_xml(data: bytes, name: str) -> ElementTree.Element:
+    """Return the root of an XML text.
+
+    Parameters
+    ----------
+    data : bytes
+        The text as it stands in a file.
+    name : str
+        What the file is called in messages.
+
+    Raises
+    ------
+    FmuError
+        If it has a document type declaration, or is not well-formed.
+    """
+
+    def refuse(kind: str, *_: object) -> None:
+        raise FmuError(
+            f"{name} has a document type declaration ({kind}): refused, "
+            "since entities can expand without bound. FMI and SSP need none."
+        )
+
+    # ElementTree expands entities, so a first pass refuses every declaration of one.
+    scout = expat.ParserCreate()
+    scout.StartDoctypeDeclHandler = refuse
+    try:
+        scout.Parse(data, True)
+        return ElementTree.fromstring(data)
+    except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
+        raise FmuError(f"{name} is not well-formed XML: {error}.") from None

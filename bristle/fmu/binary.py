@@ -20,6 +20,8 @@ import _thread
 import atexit
 import os
 import sys
+from collections.abc import Callable
+from threading import RLock
 from typing import Any
 
 RESET = "finalizePythonInterpreter"
@@ -99,3 +101,25 @@ def _loaded_libraries(ctypes: Any) -> list[str]:
     visit = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.POINTER(Begin), ctypes.c_size_t, ctypes.c_void_p)
     ctypes.PyDLL(None).dl_iterate_phdr(visit(note), None)
     return [name for name in names if name]
+
+
+# Modules that FMUs in Python bring into this interpreter: threads come and go one at a time.
+#
+# An import takes its module out of `sys.modules` for a moment and fails if it is gone meanwhile. So
+# who instantiates an FMU, or removes what one has left, holds the lock.
+
+LOCK = RLock()
+
+
+def forget(left: Callable[[str, object], bool]) -> None:
+    """Remove modules from this interpreter, once no other thread imports any.
+
+    Parameters
+    ----------
+    left : callable
+        Name and module to whether it goes.
+    """
+    with LOCK:
+        for name, module in list(sys.modules.items()):
+            if left(name, module):
+                sys.modules.pop(name, None)

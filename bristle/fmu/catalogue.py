@@ -14,11 +14,11 @@ from typing import Any
 
 from .. import units
 from ..core.config import toml_content
+from ..core.files import cache_folder, components_folder
 from ..errors import BuildError, StudyError
 from ..physics.forms import split_form
 from ..physics.law import LAWS
-from ..physics.user import own_laws
-from ..resources import cache_folder, components_folder
+from ..user_code.load import own_laws
 from .component import EffectSlave
 from .description import Description, Variable
 from .slave import Slave
@@ -115,7 +115,7 @@ def _own_source(law: str) -> Path:
     All projects share the folder, and each text has its own: laws of one name differ in their
     first lines.
     """
-    from ..data.files import write_whole  # here: what only lists components needs no numpy
+    from ..core.files import write_whole  # here: what only lists components needs no numpy
 
     about = LAWS[law].first_line().replace("\\", "/").replace('"', "'")
     text = _OWN_DAMPER.format(law=law, component=_own_component(law), about=about)
@@ -232,7 +232,7 @@ def design_file(component: str, kind: type[Slave], controller: Path) -> str:
     BuildError, DesignError
         If it takes none, or none of this kind; if the file is no controller.
     """
-    from ..control.controller import read_controller
+    from ..component.controller_file import read_controller
 
     wanted = getattr(kind, "design", "")
     if not wanted:
@@ -258,7 +258,7 @@ def check_controller(
     DesignError, PhysicsError
         Naming both; if the building is wrong.
     """
-    from ..control.controller import read_controller
+    from ..component.controller_file import read_controller
     from ..data.building_file import read_building
     from ..physics.building import paper_building
 

@@ -13,10 +13,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
-from ..component import SAMPLED, clock, controller
-from ..control import inverse
-from ..control.controller import Controller, read_controller
-from ..control.policy import LARGEST
+from ..component import SAMPLED, clock, control_laws, controller
+from ..component.control_laws import LARGEST
+from ..component.controller_file import Controller, read_controller
 from ..errors import BristleError
 from ..physics.damper_source import LIBRARY
 from ..physics.laws import DEFAULT, DEFAULT_OF_DESIGN, Law, law_code
@@ -188,9 +187,9 @@ def declare_inverse(slave: ControllerSlave) -> None:
         for name, p in zip(names_of(law), law.parameters.values()):
             slave.add_parameter(name, p.value, p.unit, p.text, p.bounds)
     text = "no voltage below this speed"
-    slave.add_parameter("still", inverse.STILL, "m/s", text, (0.0, 10.0))
+    slave.add_parameter("still", control_laws.STILL, "m/s", text, (0.0, 10.0))
     text = "least force per volt that is divided by"
-    slave.add_parameter("least_slope", inverse.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
+    slave.add_parameter("least_slope", control_laws.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
 
 
 def take_damper(slave: LinearSlave, damper: Mapping[str, Any]) -> None:

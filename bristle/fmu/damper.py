@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 
 from ..component import HELD, damper
 from ..physics import damper as laws
-from ..physics.codegen import Functions
-from ..physics.damper_setup import refusals
+from ..physics.damper import refusals
 from ..physics.drive import Drive, declared_for, drive_named, text_for, unit_for
+from ..physics.generate import Functions
 from ..physics.laws import LAWS
 from .component import ComponentSlave
 

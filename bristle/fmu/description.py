@@ -1,46 +1,381 @@
-"""What an FMU says of itself: its variables with units, starts and dependencies."""
+"""What an FMU says of itself in FMI 2.0 or 3.0: variables with units, starts and dependencies."""
 
 from __future__ import annotations
 
+import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..errors import FmuError
-from ..findings import listed
-from ..units import Measure
-from . import description_fmi3
+from ..component import OVER_STEP
+from ..core.text import listed
+from ..errors import FmuError, UnitError
+from ..units import Measure, Unit, definitions
 from .archive import (
     DESCRIPTION,
     MAX_DESCRIPTION,
     check_library,
     extract,
     open_archive,
+    parse_xml,
     read_member,
 )
 from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
-from .variables import (
-    Description,
-    Value,
-    Variable,
-    begins,
-    check_jumps,
-    items_of,
-    mark_optional,
-    number_of,
-    over_step_of,
-    reference_of,
-    start_of,
-    unit_of,
-    units_of,
-    unsigned,
-)
-from .xml_text import parse_xml
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
+
+
+# What is known of an FMU's variables, whatever version of FMI it follows, and how numbers read.
+
+Value = float | int | bool | str
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One scalar variable of an FMU.
+
+    `kind` is "Real", "Integer", "Boolean", "String" or "Enumeration"; `unit` is None where the
+    FMU gives none ("1" for a dimensionless real that says so). `dependencies` are the names of
+    the inputs that the output follows directly, None where the FMU does not say. `over_step` is how
+    an input is taken over a step, one of `component.OVER_STEP`, None where the FMU does not say.
+    `jumps_without` names the input without which an output may jump, None where the FMU names none.
+    `type` is FMI 3.0's ("Float64", "Int32" ...), "" in FMI 2.0. `defined` is what the FMU's
+    BaseUnit says the unit is, None where it has none. `items` are the values of an Enumeration by
+    name, none where the FMU does not list them.
+    """
+
+    name: str
+    kind: str
+    causality: str
+    variability: str | None
+    reference: int
+    unit: str | None = None
+    start: Value | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    description: str = ""
+    dependencies: tuple[str, ...] | None = None
+    optional: bool = False
+    over_step: str | None = None
+    jumps_without: str | None = None
+    type: str = ""
+    defined: Unit | None = None
+    items: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def measure(self) -> Measure | None:
+        """The unit with what the FMU defines it as, None without a unit."""
+        return Measure(self.unit, self.defined) if self.unit else None
+
+
+_WITHOUT_LOSS = {
+    ("Integer", "Real"), ("Enumeration", "Real"), ("Enumeration", "Integer"),
+    ("Integer", "Enumeration"),
+}  # fmt: skip
+
+
+def passes(given: str, wanted: str) -> bool:
+    """Return whether an output of one kind can feed an input of another: a text feeds nothing."""
+    return given == wanted != "String" or (given, wanted) in _WITHOUT_LOSS
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a scenario needs to know of a component before it runs; `version` is that of FMI.
+
+    `begins` is the start time of its default experiment as the file writes it, "" without one.
+    """
+
+    name: str
+    guid: str
+    identifier: str
+    description: str = ""
+    variables: dict[str, Variable] = field(default_factory=dict)
+    capabilities: dict[str, str] = field(default_factory=dict)
+    version: str = "2.0"
+    begins: str = ""
+
+    def of(self, causality: str) -> list[Variable]:
+        """Return the variables of one causality ("input", "output", "parameter"), in order."""
+        return [v for v in self.variables.values() if v.causality == causality]
+
+
+def units_of(root: ElementTree.Element) -> dict[str, Measure]:
+    """Return the units that an FMU defines, by name.
+
+    Raises
+    ------
+    FmuError
+        If one cannot be read, or is defined twice and differently.
+    """
+    told = []
+    for element in root.iterfind("UnitDefinitions/Unit"):
+        base = element.find("BaseUnit")
+        told.append((element.get("name", ""), None if base is None else base.attrib))
+    try:
+        return definitions(told)
+    except UnitError as error:
+        raise FmuError(str(error)) from None
+
+
+def unit_of(own: Mapping[str, str], units: Mapping[str, Measure]) -> Unit | None:
+    """Return what the FMU defines a variable's unit as; a difference has no offset.
+
+    Parameters
+    ----------
+    own : attributes of the variable, those of its type included
+    units : the FMU's, by name
+    """
+    name = own.get("unit", "")
+    unit = units.get(name, Measure(name)).defined
+    if unit is not None and own.get("relativeQuantity", "").strip() in ("true", "1"):
+        return unit._replace(offset=0.0)
+    return unit
+
+
+def items_of(name: str, declared: ElementTree.Element | None) -> dict[str, int]:
+    """Return the values of an Enumeration by the names of its items.
+
+    Raises
+    ------
+    FmuError
+        If a value is no whole number.
+    """
+    found = {}
+    for item in () if declared is None else declared.iterfind("Item"):
+        try:
+            found[item.get("name", "")] = int(item.get("value", ""))
+        except ValueError:
+            text = f'the item "{item.get("name")}" has the value {item.get("value")!r}'
+            raise FmuError(f'variable "{name}": {text}, no whole number.') from None
+    return found
+
+
+def begins(root: ElementTree.Element) -> str:
+    """Return the start time of an FMU's default experiment as it writes it, "" without one."""
+    experiment = root.find("DefaultExperiment")
+    return "" if experiment is None else experiment.get("startTime", "")
+
+
+def reference_of(name: str, text: str | None) -> int:
+    """Return a value reference of the variable of this name."""
+    number = unsigned(text)
+    if number is None or number >= 2**32:
+        raise FmuError(f'variable "{name}": the value reference {text!r} is no unsigned integer.')
+    return number
+
+
+def unsigned(text: str | None) -> int | None:
+    """Return a number without a sign, None where the text is none."""
+    digits = (text or "").strip()
+    return int(digits) if digits.isdecimal() and len(digits) <= 10 else None
+
+
+def number_of(name: str, attribute: str, text: str | None) -> float | None:
+    """Return the number in an attribute of a variable, None where it has none."""
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        raise FmuError(f'variable "{name}": {attribute} is {text!r}, not a number.') from None
+    if math.isnan(number):
+        raise FmuError(f'variable "{name}": {attribute} is not a number.')
+    return number
+
+
+def start_of(name: str, kind: str, text: str | None) -> Value | None:
+    """Return the start value of a variable, None where it has none."""
+    if text is None or kind == "String":
+        return text
+    try:
+        if kind == "Real":
+            return float(text)
+        if kind == "Boolean":
+            return {"true": True, "1": True, "false": False, "0": False}[text.strip()]
+        return int(text)
+    except (ValueError, KeyError):
+        raise FmuError(f'variable "{name}": the start {text!r} is no {kind}.') from None
+
+
+def over_step_of(name: str, text: str | None) -> str | None:
+    """Return what an annotation says of how an input is taken over a step, None without one."""
+    if text is not None and text not in OVER_STEP:
+        known = ", ".join(OVER_STEP)
+        said = f"the annotation {OVER_STEP_TAG} is {text!r}, none of {known}."
+        raise FmuError(f'variable "{name}": {said}')
+    return text
+
+
+def check_jumps(variables: dict[str, Variable]) -> None:
+    """Refuse an output that may jump without an input which is none."""
+    for variable in variables.values():
+        cure = variable.jumps_without
+        if cure is not None and (cure not in variables or variables[cure].causality != "input"):
+            raise FmuError(
+                f'"{variable.name}" may jump without "{cure}", but no input has that name.'
+            )
+
+
+def mark_optional(variables: dict[str, Variable], names: str) -> None:
+    """Mark the inputs that an annotation names as optional, in place."""
+    for name in names.split():
+        if name not in variables or variables[name].causality != "input":
+            raise FmuError(f'the annotation calls "{name}" optional, but no input has that name.')
+        variables[name] = replace(variables[name], optional=True)
+
+
+# What an FMI 3.0 FMU for co-simulation says of itself, in the words of FMI 2.0 where it has them.
+#
+# Numbers keep the type that FMI 3.0 gives them in `Variable.type`; their kind is that of FMI 2.0,
+# so
+# that scenarios and the master need not ask for the version. Arrays and binaries that are no ports
+# are left out: nothing here sets or shows them.
+
+KINDS = {
+    **dict.fromkeys(("Float64", "Float32"), "Real"),
+    **dict.fromkeys(("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32"), "Integer"),
+    **dict.fromkeys(("Int64", "UInt64"), "Integer"),
+    "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration",
+}  # fmt: skip
+"""The kind of each type's values."""
+_BITS = {"Int8": 8, "Int16": 16, "Int32": 32}
+_RANGES = {
+    **{name: (-(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1) for name, bits in _BITS.items()},
+    **{f"U{name}": (0.0, 2.0**bits - 1) for name, bits in _BITS.items()},
+    "UInt64": (0.0, None),
+}
+"""What an integer of a type can hold, where that is less than the master's 32 bits or unsigned."""
+_CAPABILITIES = {
+    "canGetAndSetFMUState": "canGetAndSetFMUstate",
+    "canSerializeFMUState": "canSerializeFMUstate",
+    "providesDirectionalDerivatives": "providesDirectionalDerivative",
+}
+"""Capabilities by another name than in FMI 2.0."""
+
+
+def describe_fmi3(root: ElementTree.Element) -> Description:
+    """Return the description in an XML tree of FMI 3.0 for co-simulation.
+
+    Raises
+    ------
+    FmuError
+        It contradicts itself, or has ports that are arrays or belong to clocks.
+    """
+    slave = root.find("CoSimulation")
+    assert slave is not None  # read_root refuses what has none
+    types = {child.get("name", ""): child for child in root.iterfind("TypeDefinitions/*")}
+    units = units_of(root)
+    variables: dict[str, Variable] = {}
+    check_ports(root)
+    for element in root.iterfind("ModelVariables/*"):
+        name = element.get("name", "")
+        if element.tag in KINDS and element.find("Dimension") is None:
+            if name in variables:
+                raise FmuError(f"variables defined twice: {name}.")
+            variables[name] = _variable_fmi3(element, types, units)
+    _add_dependencies_fmi3(root, variables)
+    mark_optional(variables, _annotation_fmi3(root, "optional") or "")
+    check_jumps(variables)
+    return Description(
+        name=root.get("modelName", ""),
+        guid=root.get("instantiationToken", ""),
+        identifier=slave.get("modelIdentifier", ""),
+        description=root.get("description", ""),
+        variables=variables,
+        capabilities={
+            _CAPABILITIES.get(k, k): v for k, v in slave.attrib.items() if k != "modelIdentifier"
+        },
+        version="3.0",
+        begins=begins(root),
+    )
+
+
+def check_ports(root: ElementTree.Element) -> None:
+    """Refuse ports that a scenario cannot connect and the master cannot step.
+
+    Raises
+    ------
+    FmuError
+        If a port is an array or belongs to a clock.
+    """
+    for element in root.iterfind("ModelVariables/*"):
+        _refuse(element)
+
+
+def _refuse(element: ElementTree.Element) -> None:
+    name = element.get("name")
+    if not name:
+        raise FmuError("a variable has no name.")
+    if element.get("causality") not in ("input", "output"):
+        return
+    if element.tag == "Clock" or element.get("clocks"):
+        raise FmuError(
+            f'"{name}" belongs to a clock. Values are passed on at communication points only; an '
+            "FMU without clocks is right."
+        )
+    if element.find("Dimension") is not None:
+        raise FmuError(f'"{name}" is an array. Ports are single numbers here.')
+
+
+def _variable_fmi3(
+    element: ElementTree.Element,
+    types: Mapping[str, ElementTree.Element],
+    units: Mapping[str, Measure],
+) -> Variable:
+    name, kind = element.attrib["name"], KINDS[element.tag]
+    declared = types.get(element.get("declaredType", ""))
+    own = {**(declared.attrib if declared is not None else {}), **element.attrib}
+    low, high = _RANGES.get(element.tag, (None, None))
+    least, most = (number_of(name, key, own.get(key)) for key in ("min", "max"))
+    start = element.get("start")
+    if kind == "String" and (given := element.find("Start")) is not None:
+        start = given.get("value")
+    return Variable(
+        name=name,
+        kind=kind,
+        causality=element.get("causality", "local"),
+        variability=element.get("variability", "continuous" if kind == "Real" else None),
+        reference=reference_of(name, element.get("valueReference")),
+        unit=own.get("unit"),
+        start=start_of(name, kind, start),
+        minimum=low if least is None else least,
+        maximum=high if most is None else most,
+        nominal=number_of(name, "nominal", own.get("nominal")),
+        description=element.get("description", ""),
+        over_step=over_step_of(name, _annotation_fmi3(element, OVER_STEP_TAG)),
+        jumps_without=_annotation_fmi3(element, JUMPS_TAG),
+        type=element.tag,
+        defined=unit_of(own, units),
+        items=items_of(name, declared if kind == "Enumeration" else None),
+    )
+
+
+def _annotation_fmi3(element: ElementTree.Element, tag: str) -> str | None:
+    """Return the text of one of bristle's annotations of a variable, or of the whole FMU."""
+    for own in element.iterfind("Annotations/Annotation"):
+        text = own.findtext(tag)
+        if own.get("type") == TOOL and text is not None:
+            return text
+    return None
+
+
+def _add_dependencies_fmi3(root: ElementTree.Element, variables: dict[str, Variable]) -> None:
+    """Say of each output which inputs it follows; the description names value references."""
+    named = {v.reference: v for v in variables.values()}
+    for element in root.iterfind("ModelStructure/Output"):
+        output = named.get(reference_of("Output", element.get("valueReference")))
+        text = element.get("dependencies")
+        if output is None or text is None:
+            continue
+        causes = [named.get(reference_of(output.name, one)) for one in text.split()]
+        inputs = tuple(v.name for v in causes if v is not None and v.causality == "input")
+        variables[output.name] = replace(output, dependencies=inputs)
+
 
 VERSIONS = ("2.0", "3.0")
 """Versions of FMI that are read."""
@@ -101,7 +436,7 @@ def read_root(
 def describe(root: ElementTree.Element) -> Description:
     """Return the description in an XML tree that `read_root` let through."""
     if root.get("fmiVersion") == "3.0":
-        return description_fmi3.describe(root)
+        return describe_fmi3(root)
     slave = root.find("CoSimulation")
     assert slave is not None  # read_root refuses what has none
     types = {

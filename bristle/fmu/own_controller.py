@@ -12,8 +12,7 @@ from types import FunctionType, SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
 
 from ..component.clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
-from ..physics.linear import copy
-from ..physics.rows import open_row, packed, row
+from ..physics.linear import copy, open_row, packed, row
 from ..physics.tuples import made, record
 from .controller import SampledSlave
 

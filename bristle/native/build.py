@@ -3,20 +3,250 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import struct
+import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from uuid import UUID, uuid5
+from xml.etree.ElementTree import Element, SubElement, fromstring
 
+from ..core.progress import Count, tell
 from ..errors import BuildError
-from ..fmu.build import built_guid, planned
-from ..fmu.plan import Plan
+from ..fmu.build import Plan, built_guid, planned
 from . import zig
-from .parts import functions_text, libraries, shim_digest
-from .platforms import Platform, here
-from .prepare import GUID, prepare
-from .sources import described, source_members
-from .universal import universal
+from .description import text_of
+from .prepare import GUID, compile_functions, prepare
+from .zig import Platform, here
+
+# The compiled parts of native FMUs, kept by the digest of what they are made of.
+
+SHIM = Path(__file__).resolve().parent / "shim"
+"""Folder with the C that all native FMUs share."""
+
+
+def shim_files(fmi: int = 2) -> list[Path]:
+    """Return the files of the C that all native FMUs of FMI 2.0, or all of FMI 3.0, share."""
+    others = tuple(f"fmi{one}" for one in (2, 3) if one != fmi)
+    return [path for path in sorted(SHIM.iterdir()) if not path.name.startswith(others)]
+
+
+def shim_sources(fmi: int = 2) -> list[Path]:
+    """Return those of these files that are compiled, not included by others."""
+    return [path for path in shim_files(fmi) if path.suffix == ".c"]
+
+
+def shim_digest(fmi: int = 2) -> str:
+    """Return the digest of the C that native FMUs of a version share, and of what compiles it."""
+    content = hashlib.sha256(zig.tools().encode())
+    for path in shim_files(fmi):
+        content.update(path.name.encode() + path.read_bytes())
+    return content.hexdigest()
+
+
+def functions_text(what: Plan, functions: str) -> Path:
+    """Return the file with the C of a component's functions, compiled if need be.
+
+    Parameters
+    ----------
+    what : Plan
+    functions : str
+        Their digest.
+
+    Raises
+    ------
+    BuildError
+        If the compiler refuses a function; if the cache cannot be written.
+    """
+    from filelock import FileLock
+
+    kept = zig.folder() / f"{functions}.c"
+    if kept.is_file():
+        return kept
+    with FileLock(kept.with_suffix(".lock")):  # two who need it do not both compile it
+
+        def compile_text(path: Path) -> None:
+            tell(f"compiling the functions of {what.name}, once")
+            compile_functions(what, functions, path)
+
+        return keep(kept, compile_text)
+
+
+def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2) -> bytes:
+    """Return the bytes of a component's library for a platform.
+
+    Parameters
+    ----------
+    name : str
+        Of the FMU.
+    text : Path
+        The C of its functions.
+    table : str
+        C source of its tables.
+    platform : Platform
+    fmi : int
+        2 or 3: the version of FMI whose functions it exports.
+
+    Raises
+    ------
+    BuildError
+        If it cannot be compiled; if the cache cannot be written.
+    """
+    content = hashlib.sha256()
+    for part in (zig.tools(), platform.target, text.stem, name, table, shim_digest(fmi)):
+        content.update(part.encode())
+    kept = zig.folder() / f"{content.hexdigest()[:24]}{platform.suffix}"
+    if kept.is_file():
+        return kept.read_bytes()
+    functions = keep(
+        zig.folder() / f"{_object_digest(text, platform)}.o",
+        lambda path: zig.compile_object(text, path, platform),
+    )
+
+    def link(path: Path) -> None:
+        source = path.parent / "tables.c"
+        source.write_text(table, encoding="utf-8")
+        own = path.parent / f"{name}{platform.suffix}"
+        sources = [*shim_sources(fmi), source, functions]
+        zig.link(sources, SHIM, own, platform)
+        own.replace(path)
+
+    return keep(kept, link).read_bytes()
+
+
+def _object_digest(text: Path, platform: Platform) -> str:
+    return hashlib.sha256(f"{zig.tools()} {platform.target} {text.stem}".encode()).hexdigest()[:24]
+
+
+def keep(path: Path, make: Callable[[Path], None]) -> Path:
+    """Return a file of the cache; if it is not there, `make` writes it into a folder of its own."""
+    if not path.is_file():
+        with tempfile.TemporaryDirectory(dir=path.parent) as temporary:
+            part = Path(temporary) / path.name
+            make(part)
+            part.replace(path)
+    return path
+
+
+def libraries(
+    name: str, text: Path, table: str, platforms: Sequence[Platform], fmi: int = 2
+) -> dict[Platform, bytes]:
+    """Return the libraries of a component for several platforms, compiled side by side.
+
+    Parameters
+    ----------
+    name, text, table, fmi
+        As in `library`.
+    platforms : sequence of Platform
+
+    Raises
+    ------
+    BuildError
+        What is wrong with the first platform that fails, once all are done.
+    """
+    tell(f"compiling {name} for {len(platforms)} platform(s)")
+    count = Count(f"{name}: library", len(platforms))
+
+    def counted(one: Platform) -> bytes:
+        made = library(name, text, table, one, fmi)
+        count.done(one.name)
+        return made
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        runs = [pool.submit(counted, one) for one in platforms]
+    return {one: run.result() for one, run in zip(platforms, runs, strict=True)}
+
+
+# The C of a native FMU in its archive, for hosts that compile it themselves.
+
+FOLDER = "sources"
+FUNCTIONS, TABLES = "functions.c", "tables.c"
+
+
+def source_members(text: Path, table: str, fmi: int) -> dict[str, bytes]:
+    """Return what goes into the archive, by its path there.
+
+    Parameters
+    ----------
+    text : Path
+        The C of the component's functions.
+    table : str
+        That of its tables.
+    fmi : int
+        2 or 3: the version of FMI.
+    """
+    members = {path.name: path.read_bytes() for path in shim_files(fmi)}
+    members |= {FUNCTIONS: text.read_bytes(), TABLES: table.encode()}
+    return {f"{FOLDER}/{name}": data for name, data in members.items()}
+
+
+def described(description: str, members: dict[str, bytes], fmi: int) -> dict[str, bytes]:
+    """Return the files of an archive that tell a host what to compile, by their path.
+
+    FMI 2.0 has the list in the model description, FMI 3.0 in a file of its own.
+
+    Parameters
+    ----------
+    description : str
+        The model description without the list.
+    members : dict
+        As `source_members` returns them.
+    fmi : int
+        2 or 3: the version of FMI.
+    """
+    names = sorted(Path(path).name for path in members if path.endswith(".c"))
+    root = fromstring(description)
+    simulation = root.find("CoSimulation")
+    assert simulation is not None  # every component is for co-simulation
+    if fmi == 2:
+        files = Element("SourceFiles")
+        for name in names:
+            SubElement(files, "File", name=name)
+        simulation.insert(0, files)
+        return {"modelDescription.xml": text_of(root).encode()}
+    about = Element("fmiBuildDescription", fmiVersion="3.0")
+    model = simulation.get("modelIdentifier", "")
+    configuration = SubElement(about, "BuildConfiguration", modelIdentifier=model)
+    files = SubElement(configuration, "SourceFileSet", language="C11")
+    for name in names:
+        SubElement(files, "SourceFile", name=name)
+    return {
+        "modelDescription.xml": description.encode(),
+        f"{FOLDER}/buildDescription.xml": text_of(about).encode(),
+    }
+
+
+# One library for the two processors of a Mac, as FMI 2.0 has one folder for both.
+
+_FAT, _THIN = 0xCAFEBABE, 0xFEEDFACF
+_ALIGN = 14  # slices begin at pages of 16 KiB, the larger of both processors'
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """Return libraries for several processors as one that each of them loads.
+
+    Parameters
+    ----------
+    libraries : sequence of bytes
+        Libraries of 64 bits for macOS, each for another processor; one alone stays as it is.
+    """
+    if len(libraries) == 1:
+        return libraries[0]
+    entries, body = [], b""
+    size = 1 << _ALIGN
+    at = size
+    for library in libraries:
+        magic, machine, kind = struct.unpack("<3I", library[:12])
+        if magic != _THIN:
+            raise ValueError("no library of 64 bits for macOS")
+        entries.append(struct.pack(">5I", machine, kind, at, len(library), _ALIGN))
+        body += library + bytes(-len(library) % size)
+        at = size + len(body)
+    head = struct.pack(">2I", _FAT, len(libraries)) + b"".join(entries)
+    return head + bytes(size - len(head)) + body
+
 
 _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold

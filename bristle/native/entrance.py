@@ -17,17 +17,17 @@ from typing import Any
 import numpy as np
 
 from ..component.clock import ORIGIN
+from ..core.jit import RefusedError, library_text
 from ..errors import BuildError
-from ..jit import RefusedError, library_text
-from ..physics.rows import row
-from .c_text import c_text
+from ..physics.linear import row
+from .c_functions import c_text
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
 """Functions that a component must have, see `bristle.component`."""
 OPTIONAL = ("bind", "follow", "discretise", "scale_samples")
 """Functions that it may have."""
 
-INLINE = ("rows.row",)
+INLINE = ("linear.row",)
 """Callees that must become part of their callers: they return rows. Functions name their own as
 `INLINED`."""
 

@@ -11,18 +11,16 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core.jit import digest
 from ..errors import BristleError, BuildError
 from ..fmu import catalogue
+from ..fmu.build import PACKAGE, Plan
 from ..fmu.component import ComponentSlave
 from ..fmu.controller import SampledSlave
 from ..fmu.own_controller import COMPILED_MAY_USE, OwnController
-from ..fmu.plan import PACKAGE, Plan
-from ..jit import digest
 from . import entrance
-from .description import description
-from .description_fmi3 import description_fmi3
+from .description import description, description_fmi3, tables
 from .entrance import entrance_of, functions_in_c
-from .tables import tables
 
 GUID = "00000000-0000-0000-0000-000000000000"
 """Stands for the guid until that is known."""

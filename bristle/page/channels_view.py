@@ -10,18 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..core.text import scale
 from ..data.guess import Guess, guess_channels
 from ..data.measurement import Measurement
 from ..errors import StudyError
-from ..quantity import scale
-from ..study.channel_file import spec_text
-from ..study.channel_proposal import devices_of, first_table, proposed
+from ..study.history import results_of
 from ..study.new import parse_channel
-from ..study.reading import read_runs
-from ..study.run_file import TEST
-from ..study.set_aside import results_of
-from ..study.settings import Settings
+from ..study.read_again import devices_of, first_table, proposed
+from ..study.runs import read_runs
 from ..study.study import Study
+from ..study.study_file import TEST, Settings, spec_text
 from .columns_view import columns_of, known_channels
 from .data_view import thinned
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.checks.clipping import LONG, stretches
 from ..data.checks.finding import grouped, sentence
+from ..data.cut_off import LONG, stretches
 from ..study.data_check import check_data
 from ..study.study import Study
 from .data_view import Array, spans

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..batch.passive import G
+from ..campaign.best_constant import G
+from ..core.files import read_json
 from ..data import list_ground_motions
-from ..data.files import read_json
 from ..errors import BristleError
 from ..study.study import Study
-from .asked import records
-from .comparisons import FOLDER, MEMBERS, MOTIONS, PEAK, numbers_of
-from .controls import library_controllers
-from .designs import FOLDER as DESIGNS
-from .designs import names_of
+from .orders import COMPARED_MOTIONS, COMPARED_PEAK, COMPARISONS, MEMBERS, names_of, numbers_of
+from .orders import FOLDER as DESIGNS
+from .simulate_view import library_controllers, records
 
 ANSWER, REPORT = "answer.json", "report.html"
 """What `bristle controllers` leaves in its folder, beside tables."""
@@ -42,7 +40,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         "controllers": list(library_controllers()),
         "designs": [n for n in names_of(folder) if (folder / DESIGNS / f"{n}.json").is_file()],
         "buildings": _buildings(folder),
-        "most": {"motions": MOTIONS, "members": MEMBERS, "peak": PEAK},
+        "most": {"motions": COMPARED_MOTIONS, "members": MEMBERS, "peak": COMPARED_PEAK},
         "next": max(numbers, default=0) + 1,
         "comparisons": [found for number in numbers if (found := _comparison(folder, number))],
     }
@@ -50,7 +48,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 def _comparison(folder: Path, number: int) -> dict[str, Any] | None:
     """Return a comparison with its files; None where it failed or was cancelled."""
-    own = folder / FOLDER / str(number)
+    own = folder / COMPARISONS / str(number)
     file = own / ANSWER
     if not file.is_file():
         return None

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.checks.clipping import stretches
+from ..core.text import scale
 from ..data.checks.motion import velocity_of_run
+from ..data.cut_off import stretches
 from ..data.measurement import Measurement
-from ..quantity import scale
-from ..study.place import Place, place_of_damper
-from ..study.reading import place_of_run
-from ..study.run_file import TEST
+from ..study.rig import Place, place_of_damper
+from ..study.runs import place_of_run
 from ..study.study import Study
+from ..study.study_file import TEST
 
 Array = NDArray[np.float64]
 

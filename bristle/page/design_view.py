@@ -8,22 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from ..batch.passive import OUTPUT, G
-from ..batch.passive import SCENARIO as PASSIVE
+from ..campaign.best_constant import OUTPUT, G
+from ..campaign.best_constant import SCENARIO as PASSIVE
 from ..core.config import toml_content
-from ..data.files import read_json
-from ..design import implausible, read_task, task_from_data
-from ..design.responses import task_curves
+from ..core.files import read_json
+from ..engine.coupled import simulate
 from ..errors import DesignError, ScenarioError, StudyError
 from ..physics.drive import VOLTAGE
 from ..physics.law import base_and_variant
-from ..scenario.scenario import Scenario, load_scenario
-from ..simulate.coupled import simulate
 from ..study.study import Study
-from .asked import Asked, damper_of, record_of, records
-from .comparisons import peak_of, record_name
-from .controls import stock_file
-from .designs import (
+from ..synthesis import implausible, read_task, task_from_data
+from ..synthesis.analysis import task_curves
+from ..system.scenario import Scenario, load_scenario
+from .orders import (
     FIELDS,
     FOLDER,
     KINDS,
@@ -33,9 +30,12 @@ from .designs import (
     design_name,
     kind_of_design,
     names_of,
+    peak_of,
+    record_name,
     values_of,
 )
-from .message import RequestError
+from .requests import RequestError
+from .simulate_view import Asked, damper_of, record_of, records, stock_file
 
 ANSWER = "passive/passive.json"
 """What `bristle optimise passive` leaves in the folder of designs."""

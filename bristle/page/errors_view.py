@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..compare.comparison import Comparison
-from ..compare.coordinates import shown
-from ..compare.names import name_of, site_name
-from ..compare.patterns import ResidualPattern
-from ..compare.prediction import RunPrediction
+from ..comparison.comparison import Comparison
+from ..comparison.names import name_of, site_name
+from ..comparison.patterns import ResidualPattern
+from ..comparison.predictions import RunPrediction, shown
 from ..errors import StudyError
-from ..study.comparison import compare_study
-from ..study.run_file import ROLES, TEST
+from ..study.steps import compare_study
 from ..study.study import Study
+from ..study.study_file import ROLES, TEST
 
 MOST = 250_000
 """Samples of all runs that are sent; of more every second, third ... is."""

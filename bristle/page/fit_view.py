@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..data.files import read_json
-from ..data.model import StudyModel
+from ..core.files import read_json
+from ..model.model import StudyModel
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, base_and_variant
-from ..study.added_runs import other_data
+from ..study.changes import other_data
 from ..study.study import Study
 
 ANSWER = "identify.json"

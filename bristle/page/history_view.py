@@ -7,13 +7,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..data.model import read_model
 from ..errors import BristleError, TrustError
+from ..model.model_file import read_model
 from ..physics.effect import EFFECTS
 from ..report.reproduce import commands
-from ..study.history import Step
-from ..study.joining import as_named_here, refuse_effect
-from ..study.staircase import CLOSE, HistoryStep, history_steps
+from ..study.history import CLOSE, HistoryStep, Step, history_steps
+from ..study.identify import as_named_here, refuse_effect
 from ..study.study import Study
 from .fit_view import rows_of
 

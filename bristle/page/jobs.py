@@ -21,11 +21,11 @@ from itertools import count
 from pathlib import Path
 from typing import IO, Any
 
-from .. import snapshots
-from ..interrupt import INTERRUPTED
-from ..progress import LINES
-from .commands import Order
-from .message import RequestError
+from ..core import progress
+from ..core.interrupt import INTERRUPTED
+from ..core.progress import LINES
+from .orders import Order
+from .requests import RequestError
 
 KEPT_LINES = 500
 """Lines of progress that are kept of a job."""
@@ -146,7 +146,7 @@ class Jobs:
             process = subprocess.Popen(
                 program(order), cwd=self._folder, stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                env={**os.environ, LINES: "lines", snapshots.VARIABLE: "lines"}, **_own_group(),
+                env={**os.environ, LINES: "lines", progress.VARIABLE: "lines"}, **_own_group(),
             )  # fmt: skip
             job = Job(self._count, order, process, time.monotonic())
             self._jobs[job.number] = job
@@ -216,7 +216,7 @@ class Jobs:
 
     def _sort(self, text: str, job: Job, wrong: list[str]) -> None:
         """Keep snapshots, and progress, which ends in dots, apart from what is wrong."""
-        if (snapshot := snapshots.read(text)) is not None:
+        if (snapshot := progress.read(text)) is not None:
             job.showed(snapshot, next(self._snapshots))
         elif text.endswith(" ..."):
             job.told(text.removesuffix(" ..."))

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..web.module import module
+from ..export.web_module import module
 
 
 def answer(folder: Path, arguments: Mapping[str, Any]) -> bytes:

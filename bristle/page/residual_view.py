@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..compare.errors import run_error
-from ..compare.names import site_name
-from ..compare.prediction import RunPrediction
-from ..study.before_after import before_after, predictions
+from ..comparison.misfit import run_error
+from ..comparison.names import site_name
+from ..comparison.predictions import RunPrediction
+from ..study.steps import before_after, predictions
 from ..study.study import Study
 from .errors_view import every_of
 

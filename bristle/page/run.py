@@ -12,10 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
+from ..core.files import state_folder
 from ..errors import not_usable
-from ..resources import state_folder
-from .app import App
-from .server import PageServer
+from .app import App, PageServer
 
 
 def serve(app: App, port: int, ready: Callable[[str], None]) -> None:

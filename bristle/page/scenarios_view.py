@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..scenario.scenario import stock_scenarios
-from .asked import records
+from ..system.scenario import stock_scenarios
+from .simulate_view import records
 
 
 def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:

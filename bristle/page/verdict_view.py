@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..data.files import read_json
-from ..diagnose.view import verdict_view, worst
+from ..core.files import read_json
+from ..diagnosis.view import verdict_view, worst
 from ..errors import BristleError
-from ..plan.folder import read_plan
+from ..planning.folder import read_plan
 from ..study.study import Study
 from ..view.page_data import page_data
 from .data_view import thinned

@@ -59,7 +59,7 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
     folder : of the study, or with the studies
     arguments : what the page asks for
     """
-    from ..physics.user import unload_effects
+    from ..user_code.load import unload_effects
     from ..view.page_data import pack
 
     try:

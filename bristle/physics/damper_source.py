@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
-from .codegen import Functions, Sets, Slots, switched, switched_laws
 from .effect import Effect, effects_of
+from .generate import Functions, Sets, Slots, switched, switched_laws
 from .law import LAWS, Law, laws_of
 from .tuples import FACTORS, FORM_OF_LAW, law_state, law_values
 

@@ -10,30 +10,208 @@ building's, the plain name means the first of `Effect.sites`; `NAME@SITE` means 
 test bench, which has one site, the plain name does.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import new_class
+from typing import Any, ClassVar, NamedTuple
+
+from ..errors import PhysicsError
+from . import laws as _laws  # noqa: F401  (importing it registers the laws)
+from .law import LAWS, PARTS, Law, laws_of
+from .parameter import (
+    ANY_BY_NAME,
+    GRIDS,
+    PARAMETERS,
+    SWITCH,
+    TABLES,
+    TEXT,
+    TEXT_BY_NAME,
+    TEXTS,
+    all_parameters,
+    check_fields,
+    check_numbers,
+    fields_of,
+    named,
+    told,
+)
+from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
+from .parameter import Table as Table
+from .parameter import bilinear as bilinear
+from .parameter import interpolate as interpolate
+
+# What the class data of an effect must be for a search to begin from and a verdict to rest on.
+
+MIMICKED = ("force_bias", "late_drive", "limited_drive")
+"""Faults of a sensor that an effect may look like: the force's zero, a drive on record late, or one
+that was limited in slew or range behind its record."""
+
+
+FIELDS = {
+    **dict.fromkeys(("name", "site", "kind", "shows", "source", "expect"), TEXT),
+    **dict.fromkeys(("family", "absorbed_by", "offset", "mass", "amount"), TEXT),
+    **dict.fromkeys(("acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
+    **dict.fromkeys(("sites", "excludes", "start_ties", "mimics", "faults"), TEXTS),
+    **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
+    **dict.fromkeys(("states", "starts", "lookalikes", "labels", "label_means"), TEXT_BY_NAME),
+    "channels": TEXT_BY_NAME,
+    **dict.fromkeys(("start_grid", "start_limits"), ANY_BY_NAME),
+    "parameters": PARAMETERS,
+    "tables": TABLES,
+    "start_shares": GRIDS,
+}
+"""The class data of an effect, and of which kind each is."""
+
+
+def check_sites(
+    effect: type[Effect], where: str, known: tuple[str, ...],
+    shared: tuple[tuple[str, ...], tuple[str, ...]],
+) -> None:  # fmt: skip
+    """Refuse sites that there are not, and what an effect of several cannot use at all of them.
+
+    Parameters
+    ----------
+    effect, where : the class, and how a message begins
+    known : the sites that there are
+    shared : the hooks and the signals that a damper and a structure both have
+    """
+    if not (isinstance(effect.sites, tuple) and effect.sites):
+        raise PhysicsError(f"{where}: sites = {effect.sites!r}; a tuple of {known} is right.")
+    for site in effect.sites:
+        if site not in known:
+            raise PhysicsError(f"{where}: site {site!r} is none of {known}.")
+    if len(effect.sites) == 1:
+        return
+    if len(set(effect.sites)) < len(effect.sites) or "sensor" in effect.sites:
+        raise PhysicsError(f'{where}: sites = {effect.sites}; each once, and "sensor" alone.')
+    for what, used, both in (
+        ("defines", tuple(effect.hooks()), shared[0]),
+        ("needs", effect.needs, shared[1]),
+    ):
+        wrong = [one for one in used if one not in both]
+        if wrong:
+            raise PhysicsError(
+                f"{where}: {what} {wrong}, which not all of its sites have; {list(both)} they do."
+            )
+
+
+def check_search(effect: type[Effect], where: str) -> None:
+    """Refuse starts that a search could not begin from."""
+    grids: list[tuple[str, Mapping[str, tuple[float, ...]]]] = [
+        ("start_grid", effect.start_grid),
+        ("start_limits", effect.start_limits),
+    ]
+    grids += [("start_shares", grid) for grid in effect.start_shares]
+    grids += [("start_ties", dict.fromkeys(effect.start_ties, (0.0,)))]
+    for field, grid in grids:
+        unknown = [name for name in grid if name not in effect.parameters]
+        if unknown:
+            raise PhysicsError(
+                f"{where}: {field} names {unknown}; its parameters are {list(effect.parameters)}."
+            )
+        if not all(isinstance(values, tuple) and values for values in grid.values()):
+            raise PhysicsError(f"{where}: {field} holds a tuple of numbers for each parameter.")
+    told = [name for name in (*effect.labels, *effect.label_means) if name not in effect.assumed]
+    if told:
+        raise PhysicsError(f"{where}: labels names {told}, which assumed must name as well.")
+    told = [n for n in effect.channels if n not in effect.assumed or n not in effect.parameters]
+    if told:
+        raise PhysicsError(
+            f"{where}: channels names {told}; parameters that assumed names as well are right."
+        )
+    if effect.channels and effect.sites != ("damper",):
+        raise PhysicsError(f"{where}: channels are what an effect of the damper alone may follow.")
+    wrong = [name for name in effect.channels.values() if not name.isidentifier()]
+    if wrong:
+        raise PhysicsError(f"{where}: channels names {wrong}; letters, digits and _ are right.")
+    if effect.start_grid and effect.start_shares:
+        raise PhysicsError(f"{where}: start_grid or start_shares is right, not both.")
+    for name, limits in effect.start_limits.items():
+        if len(limits) != 2 or not limits[0] < limits[1]:
+            raise PhysicsError(f"{where}: start_limits of {name} = {limits}; low, high is right.")
+    if bool(effect.start_ties) != hasattr(effect, "tie"):
+        raise PhysicsError(f"{where}: start_ties and a static method tie(p, sizes) go together.")
+
+
+def check_verdict(effect: type[Effect], where: str) -> None:
+    """Refuse class data that a verdict could not be made from."""
+    for field, given, known in (
+        ("mimics", effect.mimics, MIMICKED),
+        ("absorbed_by", [effect.absorbed_by] if effect.absorbed_by else [], PARTS),
+    ):
+        wrong = [one for one in given if one not in known]
+        if wrong:
+            raise PhysicsError(f"{where}: {field} names {wrong}; there are {list(known)}.")
+    for field, name, unit in (("offset", effect.offset, "N"), ("mass", effect.mass, "kg")):
+        if name and (name not in effect.parameters or effect.parameters[name].unit != unit):
+            raise PhysicsError(f"{where}: {field} = {name!r}; a parameter in {unit} is right.")
+    if effect.amount and effect.amount.removeprefix("1/") not in effect.parameters:
+        raise PhysicsError(
+            f'{where}: amount = {effect.amount!r}; a parameter, or "1/" and a parameter, is right: '
+            f"there are {list(effect.parameters)}."
+        )
+    others = [parameter for name, parameter in effect.parameters.items() if name != effect.offset]
+    if effect.offset and not all(p.bounds[0] <= 0.0 <= p.bounds[1] for p in others):
+        raise PhysicsError(f"{where}: offset asks that all other parameters may be zero.")
+    if effect.faults and effect.site != "sensor":
+        raise PhysicsError(f"{where}: faults are those of a sensor's effect.")
+    if not all(isinstance(why, str) and why for why in effect.lookalikes.values()):
+        raise PhysicsError(f"{where}: lookalikes holds a sentence for each.")
+
+
+# The names of effects: NAME, and NAME@SITE at another site than its first.
+
+AT = "@"
+"""Stands between an effect's name and a site that is not its first."""
+
+
+class Registry(dict[str, "type[Effect]"]):
+    """The effects by name; NAME@SITE gives an effect as it is at another one of its sites.
+
+    Iteration goes over the plain names.
+    """
+
+    def __missing__(self, key: str) -> type[Effect]:
+        name, _, site = key.partition(AT)
+        if name != key and name in self and site in self[name].sites[1:]:
+            return self[name].at(site)
+        raise KeyError(key)
+
+    def __contains__(self, key: object) -> bool:
+        if super().__contains__(key):
+            return True
+        name, at, site = str(key).partition(AT)
+        return bool(at) and super().__contains__(name) and site in self[name].sites[1:]
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return the effect of a name, or of NAME@SITE; the default where there is none."""
+        try:
+            return self[key]
+        except KeyError:
+            return default
+
+
+EFFECTS: Registry = Registry()
+
+
+def plain_name(key: str) -> str:
+    """Return the effect's name of NAME, NAME@SITE, or of either with a parameter behind it."""
+    name, dot, parameter = key.partition(".")
+    return name.partition(AT)[0] + dot + parameter
+
+
+def exclude(one: str, other: str) -> bool:
+    """Return whether two effects, by a model's names, cannot be together at one site."""
+    first, second = EFFECTS[one], EFFECTS[other]
+    if (AT in one or AT in other) and first.site != second.site:
+        return False
+    return second.name in first.excludes or first.name in second.excludes
+
+
 # Longer than 400 lines: the class data of an effect are described one by one.
 
 # Longer than 300 lines: a docstring says of every attribute and hook what it means.
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from types import new_class
-from typing import Any, Callable, ClassVar, NamedTuple
-
-from ..errors import PhysicsError
-from . import laws as _laws  # noqa: F401  (importing it registers the laws)
-from .effect_check import FIELDS, check_search, check_sites, check_verdict
-from .effect_names import AT as AT  # the rest of the package takes these from here
-from .effect_names import EFFECTS as EFFECTS
-from .effect_names import exclude as exclude
-from .effect_names import plain_name as plain_name
-from .field_check import check_fields, told
-from .law import LAWS, PARTS, Law, laws_of
-from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
-from .parameter import Table as Table
-from .parameter import all_parameters, check_numbers, fields_of, named
-from .parameter import bilinear as bilinear
-from .parameter import interpolate as interpolate
 
 SITES = ("damper", "structure", "sensor")
 

@@ -1,4 +1,4 @@
-"""Small dense linear algebra on flat row-major sequences, in the standard library alone.
+"""Small dense algebra and packed rows on flat sequences, in the standard library alone.
 
 FMUs must not import numpy (it can abort native hosts at exit), and n is small here: at most
 twice the number of floors.
@@ -6,7 +6,7 @@ twice the number of floors.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..errors import PhysicsError
@@ -194,3 +194,58 @@ def add_to_diagonal(a: Row, n: int, value: float) -> None:
     """Add a number to each diagonal entry of a (n, n), in place."""
     for i in range(0, n * n, n + 1):
         a[i] += value
+
+
+# Rows packed one behind the other in a flat sequence, each behind its length.
+#
+# What is fixed when a component is built, and what its parameters imply, lie so: in lists inside
+# FMUs, in arrays in compiled code, with sizes that nobody has to know beforehand.
+
+
+def packed(*rows: Iterable[float]) -> list[float]:
+    """Return rows of numbers as one flat list; `row` finds them again."""
+    flat: list[float] = []
+    for one in rows:
+        numbers = [float(value) for value in one]
+        flat.append(float(len(numbers)))
+        flat.extend(numbers)
+    return flat
+
+
+def place(flat: Row, k: int) -> int:
+    """Return where row k begins: the index of its first number."""
+    at = 0
+    for _ in range(k):
+        at += int(flat[at]) + 1
+    return at + 1
+
+
+def row(flat: Row, k: int) -> Row:
+    """Return row k; in compiled code it is a view."""
+    begin = place(flat, k)
+    return flat[begin : begin + int(flat[begin - 1])]
+
+
+def open_row(flat: Row, k: int, count: int) -> int:
+    """Make room for row k, the rows before it being there; return the index of its first number.
+
+    Parameters
+    ----------
+    flat : the packed rows, long enough
+    k : number of the row
+    count : how many numbers it has
+    """
+    begin = place(flat, k)
+    flat[begin - 1] = float(count)
+    return begin
+
+
+# Sums over rows, in plain Python so that `jit` compiles them into what asks for them.
+
+
+def dot(a: Any, b: Any) -> float:
+    """Return the product of two rows of one length, in the product of their units."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total

@@ -1,4 +1,4 @@
-"""Test signals: what a source gives at time t, and how fast it changes.
+"""Test signals and instruments: what they give at time t, and how fast it changes.
 
 `value` and `rate` are one source for both paths: the numbers come as a flat sequence in the order
 of `PARAMETERS`, the samples of the kinds "steps" and "csv" as two sequences.
@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, isfinite, pi, sin
+from typing import Any
 
 from ..errors import PhysicsError
-from .effect import Parameter
-from .record import interpolate
+from .effect import Effect
+from .generate import Slots, call, generate, q_source
+from .motion_file import interpolate
+from .parameter import Parameter
 
 CONSTANT = 0
 SINE = 1
@@ -157,3 +160,27 @@ def read_steps(text: str) -> tuple[list[float], list[float]]:
     if not times:
         raise PhysicsError('steps: no pair; give TIME:VALUE pairs such as "0:0 1.5:4 3:0".')
     return times, values
+
+
+# An instrument: what the channel of a sensor's effect shows, one sample after the other.
+
+
+def _source(effect: type[Effect], slots: Slots) -> str:
+    q = q_source(value="value", dt="dt")
+    places = slots.places(effect)
+    lines = ["def show(value, dt, z, p):", f"    q = {q}"]
+    if places:
+        targets = "".join(f"z[{place}], " for place in places)
+        lines.append(f"    {targets}= {call(effect, 'advance', slots, 'q')}")
+    lines.append(f"    return {call(effect, 'channel', slots, 'q')}")
+    return "\n".join(lines)
+
+
+def instrument(effect: type[Effect]) -> tuple[Any, Slots]:
+    """Return the function show(value, dt, z, p) of a sensor's effect, and where its numbers lie.
+
+    It takes the next sample of the signal, advances the states `z` in place and returns what the
+    instrument shows then.
+    """
+    slots = Slots((), (effect,))
+    return generate("show", _source(effect, slots), slots), slots

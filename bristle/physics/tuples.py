@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .command import chosen_source, rising
 from .forms import choosable
+from .linear import Row
 from .parameter import climb, fields_of
 
 if TYPE_CHECKING:
     from .law import Law
+
 
 record = tuple.__new__
 """Makes a named tuple from a tuple, in half the time of calling its class; `jit` knows it too."""
@@ -88,3 +90,46 @@ def _maker(law: type[Law]) -> Any:
     """Return what makes the `p` of a law's hooks from its flat parameters and the voltage."""
     names = {"record": record, "climb": climb, "rising": rising, f"{law.base.name}_P": law.Values}
     return eval(f"lambda p, V: {law_values(law, felt='')}", names)
+
+
+# What a damper is given: its inputs at one moment, and how it was set up.
+
+
+class Inputs(NamedTuple):
+    """What acts on a damper at one moment, and the step that leads there.
+
+    `stick_force` is the force that would bring the motion to rest within the step, `sticks` says
+    whether it is known. The hooks of a law take this record as `q`: motion and voltage are then
+    those across the fluid, behind the effects that change them.
+    """
+
+    x: Any  # m; a float, or of a whole motion (n,), and so the next three
+    v: Any  # m/s
+    a: Any  # m/s2
+    V: Any  # V
+    dt: float  # s
+    energy: float  # J, dissipated so far
+    stick_force: float  # N
+    sticks: bool
+
+
+class Setup(NamedTuple):
+    """A damper as its functions need it: numbers that stay over a run.
+
+    `law` is the code of the law, `p` the flat parameters of law and effects, `on` the switches;
+    `moving` lists the slots of the states that move by `rate`, `n_moving` says how many; `advances`
+    whether an effect moves its states by `advance`; `n_own` how many states, the first ones, the
+    law itself moves by `advance`; `signed` whether its friction jumps with direction; `active`
+    whether more than the law is at work; `lags` whether the command lags by a state of the law.
+    """
+
+    law: int
+    p: Row
+    on: Any
+    moving: Any
+    n_moving: int
+    advances: bool
+    n_own: int
+    signed: bool
+    active: bool
+    lags: bool

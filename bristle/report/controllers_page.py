@@ -5,18 +5,16 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from ..controllers.entry import BEST, LIMIT
-from ..controllers.folder import ENSEMBLES, SCENARIOS, plain_name
-from ..controllers.view import draw_levels, draw_motion, motion_table
-from ..draw.style import png
-from ..findings import command
-from ..quantity import plain, quantity
+from ..controller_comparison.setting import BEST, ENSEMBLES, LIMIT, SCENARIOS, plain_name
+from ..controller_comparison.view import draw_levels, draw_motion, motion_table
+from ..core.text import command, plain, quantity
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Figure, Text
+from ..view.style import png
 
 if TYPE_CHECKING:
-    from ..controllers.result import ControllerComparison
+    from ..controller_comparison.result import ControllerComparison
 
 
 def controllers_report(found: ControllerComparison) -> str:

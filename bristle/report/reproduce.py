@@ -5,11 +5,11 @@ from __future__ import annotations
 import shlex
 from typing import TYPE_CHECKING
 
-from ..data.model import read_model
-from ..findings import command
+from ..core.text import command
+from ..model.model_file import read_model
 from ..physics.forms import split_form
-from ..study.channel_proposal import devices_of
-from ..study.run_file import TEST
+from ..study.read_again import devices_of
+from ..study.study_file import TEST
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec

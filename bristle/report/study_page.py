@@ -3,29 +3,239 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import platform
-from dataclasses import replace
-from typing import TYPE_CHECKING
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from ..compare.names import site_name
-from ..compare.view import band_table, headline, pattern_table, run_table, site_table, sites_page
-from ..diagnose.view import verdict_view
-from ..findings import command
+from ..comparison.names import site_name
+from ..comparison.view import band_table, headline, pattern_table, run_table, site_table, sites_page
+from ..core.progress import counted, tell
+from ..core.text import command, short_z
+from ..diagnosis.view import verdict_view
+from ..errors import BristleError
+from ..model.equations import equations
+from ..physics.drive import DRIVES
 from ..physics.forms import shown_law
-from ..quantity import short_z
-from ..study.run_file import TEST
+from ..planning.folder import FILE, PlanFolder, read_plan
+from ..planning.outcome import OUTCOMES
+from ..planning.performed import shows
+from ..study.budget_picture import budgets, draw_budget, sentence
+from ..study.history import HistoryStep, history_steps
+from ..study.study_file import TEST
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
+from .figures import curves_section, data_table, data_words, parameter_table
 from .reproduce import commands
-from .study_content import Content, gather
-from .study_curves import curves_section
-from .study_model import model_section
-from .study_plan import plan_section
-from .study_tables import data_table, data_words, parameter_table
 
 if TYPE_CHECKING:
+    from ..comparison.comparison import Comparison, RigComparer
+    from ..identification.rig_fit import SiteModel
+    from ..model.model import StudyModel
+    from ..study.history import Step
     from ..study.study import Study
+
+
+# What the report of a study tells: everything that is read and computed for it.
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a report tells: everything that was read and computed for it.
+
+    `now` is the present model on held-out runs, `before` the model before the last effect that was
+    added, `test` the present one on the test runs; None where there is none. `trouble` says why the
+    model could not be compared. `what_if` is the section with sliders and `linked` that of
+    pictures in which samples can be chosen, "" without; `damper` the damper with what predicts it,
+    None where the model could not be compared.
+    """
+
+    study: Study
+    model: StudyModel
+    verdict: dict[str, Any] | None
+    steps: tuple[Step, ...]
+    history_steps: tuple[HistoryStep, ...]
+    now: Comparison | None
+    before: Comparison | None
+    added: str
+    notes: tuple[str, ...]
+    trouble: str
+    test: Comparison | None = None
+    what_if: str = ""
+    linked: str = ""
+    damper: SiteModel | None = None
+
+
+def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Content:
+    """Return what the report of a study tells; it compares the models before and after.
+
+    `open_test` False leaves test runs closed; else the study counts that they were opened.
+    `what_if` adds sliders that compute the model in the page, which needs zig.
+    """
+    from ..model.model_file import read_model
+    from ..study.identify import as_model
+    from ..study.steps import compare_study, comparer
+    from .what_if import what_if_section
+
+    moved = what_if_section(study) if what_if else ""  # first: it may lack its compiler
+    model, steps = study.model(to_show=True), tuple(study.steps())
+    runs = study.runs()
+    now = before = test = damper = None
+    trouble, added = "", ""
+    found = history_steps(steps)
+    try:
+        study.model()  # raises where the code of an effect waits for consent
+        against = comparer(study)
+        now, damper = against.compare(as_model(model)), against.damper(as_model(model))
+        for step in reversed(steps):
+            gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
+            if step.number == 0 or not gone <= set(model.effects):
+                break
+            earlier = read_model(study.history.model_file(step.number - 1), study.folder)
+            new = [name for name in model.effects if name not in earlier.effects]
+            if new:
+                tell("the model before its last effect")
+                before, added = against.compare(as_model(earlier)), " and ".join(new)
+                break
+        found = [_with_error(one, against, study) for one in counted(found, "step")]
+        if open_test and study.files(TEST):
+            test = compare_study(study, role=TEST)
+    except BristleError as error:
+        trouble = str(error)
+    return Content(
+        study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble,
+        test, moved, damper=damper,
+    )  # fmt: skip
+
+
+def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> HistoryStep:
+    """Return a step with its z where the history does not tell it: an edit by hand."""
+    import numpy as np
+
+    from ..identification.search import z_scale
+    from ..model.model_file import read_model
+    from ..study.identify import as_model
+
+    if step.z is not None or step.number == 0:
+        return step  # the model that a study begins with is nobody's guess of this damper
+    then = read_model(study.history.model_file(step.number), study.folder)
+    runs = against.predictions(as_model(then))
+    if not all(one.noise_known for one in runs):
+        return step
+    return replace(step, z=z_scale(np.concatenate([one.normalised for one in runs])))
+
+
+# The model in a study's report: its equations with numbers, and what makes its force.
+
+
+def model_section(content: Content) -> str:
+    """Return the section: equations with intervals, the force budget; "" where there is neither."""
+    parts = [*_equations(content), *_budget(content)]
+    return html.section("The model", *parts) if parts else ""
+
+
+def _equations(content: Content) -> list[str]:
+    found = equations(content.model)
+    if not found:
+        return []
+    drive = DRIVES[content.model.drive]
+    parts: list[str] = []
+    for of in dict.fromkeys(one.of for one in found):
+        parts.append(f"<h3>{html.escape(of)}</h3>")
+        parts += [html.formula(one.intervals) for one in found if one.of == of]
+    acts = any(re.search(rf"\b{drive.symbol}(_felt)?\b", one.intervals) for one in found)
+    command = f"{drive.symbol} is the {drive.name} [{drive.unit}], " if acts else ""
+    note = (
+        f"In SI units; {command}x and v are displacement "
+        "and velocity of the rod. The numbers are those of the present model with half of their "
+        "95 % intervals; a number without one was held, or these data do not identify it."
+    )
+    return [*parts, html.paragraphs(note, kind="soft")]
+
+
+def _budget(content: Content) -> list[str]:
+    at = content.damper
+    if at is None:
+        return []
+    from ..view.style import png
+
+    problem = at.site.holdout or at.site.train
+    page, said = draw_budget(problem, at.model), sentence(budgets(problem, at.model))
+    if page is None or not said:
+        return []
+    caption = (
+        "The parts of the model's force in single cycles, stacked: what resists above and below "
+        "zero, their sum the line. An effect's part is what the force loses without it."
+    )
+    return [
+        "<h3>The force budget</h3>",
+        html.paragraphs(said),
+        html.figure(png(page), said, caption),
+    ]
+
+
+# The newest plan of a study in its report: the next tests, and what they will show.
+
+
+def plan_section(study: Study) -> str:
+    """Return the section of the newest plan in a study's folder, "" where there is none."""
+    folders = sorted(study.folder.glob(f"plan*/{FILE}"), key=lambda file: file.stat().st_mtime)
+    if not folders:
+        return ""
+    folder = folders[-1].parent
+    try:
+        plan = read_plan(folder)
+        told = json.loads((folder / OUTCOMES).read_text(encoding="utf-8"))
+        header, rows = told["header"], told["rows"]
+    except (BristleError, OSError, ValueError, KeyError, TypeError) as error:
+        return html.section("Next tests", html.paragraphs(f"{folder.name} cannot be read: {error}"))
+    performed = _performed(study, plan, others=len(folders) > 1)
+    lead = (
+        f"The tests of {folder.name} are measured: their runs are in this study."
+        if performed
+        else f"{folder.name} holds tests for the rig's controller, one file each."
+    )
+    runs = [
+        [run.name, "training" if run.role == "train" else "held out", run.about]
+        for run in plan.runs
+    ]
+    return html.section(
+        "Planned tests" if performed else "Next tests",
+        html.paragraphs(lead, kind="lead"),
+        html.table(["run", "for", "what"], runs),
+        html.table(header, rows, numbers=(2, 3)),
+        *(() if performed else _pictures(folder, plan)),
+    )
+
+
+def _performed(study: Study, plan: PlanFolder, others: bool) -> bool:
+    """Return whether the runs of a plan are in a study.
+
+    Where there are `others`, names are not enough: plans that are made before any is measured call
+    their runs alike.
+    """
+    there = {Path(run.file).stem for run in study.settings.runs}
+    if not all(run.name in there for run in plan.runs):
+        return False
+    if not others:
+        return True
+    measured = [(Path(run.source).stem, run) for run in study.read()]
+    return all(
+        any(name == planned.name and shows(run, planned, plan.motion) for name, run in measured)
+        for planned in plan.runs
+    )
+
+
+def _pictures(folder: Path, plan: PlanFolder) -> list[str]:
+    found = []
+    for run in plan.runs:
+        file = folder / f"{run.name}.png"
+        if file.is_file():
+            found.append(html.figure(file.read_bytes(), run.about, f"{run.name}: {run.about}."))
+    return found
 
 
 def study_report(study: Study) -> str:
@@ -127,8 +337,8 @@ def _where(content: Content) -> str:
     now = content.now
     if now is None:
         return html.section("Error of the present model", html.paragraphs(content.trouble))
-    from ..draw.style import png
-    from .study_pictures import error_page
+    from ..view.style import png
+    from .figures import error_page
 
     along = "the two coordinates that it depends on most"
     if now.second:
@@ -170,7 +380,7 @@ def _sites(content: Content) -> list[str]:
     now = content.now
     if now is None or not now.sites:
         return []
-    from ..draw.style import png
+    from ..view.style import png
 
     rings = f" Rings: without {content.added}." if content.before else ""
     worst = now.sites[0]
@@ -198,8 +408,8 @@ def _history(content: Content) -> str:
     ]  # fmt: skip
     picture = ""
     if with_z:
-        from ..draw.style import png
-        from ..study.staircase_picture import staircase_page
+        from ..study.pictures import staircase_page
+        from ..view.style import png
 
         fall = " → ".join(_or_dash(one.z) for one in with_z)
         # Their forces are low-passed, and those of the rest of the page are not: z tells it all.
@@ -216,8 +426,8 @@ def _history(content: Content) -> str:
 def _before_after(content: Content) -> str:
     if content.now is None or content.now.unit != "N":
         return ""
-    from ..draw.style import png
-    from .study_pictures import loops_page, maps_page
+    from ..view.style import png
+    from .figures import loops_page, maps_page
 
     names = (f"without {content.added}", f"with {content.added}")
     if content.before is None:

@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..bridge.export import write_editable
+from ..prediction.export import write_editable
 from ..view import html
 
 if TYPE_CHECKING:
+    from ..export.web import Shown
     from ..study.study import Study
-    from ..web.export import Shown
 
 
 class Movable(NamedTuple):
@@ -34,7 +34,7 @@ def movable(study: Study) -> Iterator[Movable]:
     StudyError, RecordError
         If the model or its run cannot be read.
     """
-    from ..web.export import Shown
+    from ..export.web import Shown
 
     with tempfile.TemporaryDirectory() as folder:
         found = write_editable(study, Path(folder))
@@ -53,9 +53,8 @@ def what_if_section(study: Study) -> str:
     ScenarioError, StudyError, RecordError
         If the study has no model, or its scenario cannot be compiled.
     """
-    from ..web.export import body, described
-    from ..web.module import module
-    from ..web.numbers import Numbers
+    from ..export.web import body, described
+    from ..export.web_module import Numbers, module
 
     with movable(study) as found:
         numbers = Numbers(found.scenario)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from ..data.model import StudyModel, Value, new_model, read_model
-from ..data.model_text import write_model
 from ..errors import StudyError
-from .create import Created, create_study
+from ..model.model import StudyModel, Value, new_model
+from ..model.model_file import read_model, write_model
 from .history import Step
-from .run_file import RunFile
 from .runs import Runs
-from .settings import Settings
+from .steps import Created, create_study
 from .study import Study
+from .study_file import RunFile, Settings
 
 __all__ = [
     "Created",

@@ -8,18 +8,18 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ..compare.loops import OneCycle, chosen_cycles
-from ..compare.prediction import run_predictions
-from ..draw.style import BLUE, GREEN, GREY, INK, PALE, PURPLE, VERMILION, Page, look
-from ..identify.budget import Share, force_budget
+from ..comparison.panels import OneCycle, chosen_cycles
+from ..comparison.predictions import run_predictions
+from ..core.text import percent, scale
+from ..identification.error_table import Share, force_budget
 from ..physics.forms import shown_law
 from ..physics.laws import LAWS
-from ..quantity import percent, scale
+from ..view.style import BLUE, GREEN, GREY, INK, PALE, PURPLE, VERMILION, Page, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..identify.model import Model, Problem
+    from ..identification.problem import Model, Problem
 
 Array = NDArray[np.float64]
 Budgets = dict[str, list[Share]]

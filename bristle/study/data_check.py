@@ -8,32 +8,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data.checks.channels import check_channels
+from ..core.text import command, plain, scale
+from ..data.checks.channels import check_channels, check_sizes
 from ..data.checks.differing_runs import check_differing_runs
 from ..data.checks.finding import Finding, grouped, sentence
-from ..data.checks.labels import check_labels
 from ..data.checks.motion import (
     check_force,
     check_motion,
     velocity_of_run,
 )
 from ..data.checks.recording import check_recording
-from ..data.checks.runs import Excitation, check_runs, excitation_of
-from ..data.checks.sizes import check_sizes
+from ..data.checks.runs import Excitation, check_labels, check_runs, excitation_of
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
-from ..findings import command
-from ..quantity import plain, scale
 from ..view import Viewable
-from .openings import runs_for_test
-from .place import Place, place_of_damper
-from .reading import read_runs
-from .run_file import TEST
+from .rig import Place, place_of_damper
+from .runs import read_runs
+from .steps import runs_for_test
 from .study import Study
+from .study_file import TEST
 
 if TYPE_CHECKING:
-    from ..draw.style import Page
+    from ..view.style import Page
 
 _HEADINGS = {"error": "Errors", "warning": "Warnings", "note": "Notes"}
 
@@ -49,7 +46,7 @@ class DataCheck(Viewable):
 
     def page(self) -> Page:
         """Return the picture of all runs, drawn and not yet written."""
-        from ..draw.data_check import draw_data_check
+        from .pictures import draw_data_check
 
         return draw_data_check([self.place.seen(run) for run in self.runs], self.place.level)
 

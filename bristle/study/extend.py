@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from ..core.files import write_whole
+from ..core.progress import counted
+from ..core.text import listed
 from ..data.channels import DRIVE
-from ..data.files import write_whole
 from ..data.guess import Guess
 from ..data.measurement import measurements_of
 from ..data.pieces import pieces_of
@@ -16,18 +18,14 @@ from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import StudyError
-from ..findings import listed
-from ..progress import counted
-from .added_runs import FILE as ADDED
-from .added_runs import note_addition
+from .changes import FILE as ADDED
+from .changes import note_addition
 from .new import refuse_other_columns, remarks_on
-from .reading import read_runs
 from .roles import roles_added
 from .run_facts import RunChoices, facts_of
-from .run_file import EXCLUDE, RunFile
-from .settings import read_draft
-from .settings_text import with_runs
+from .runs import read_runs
 from .study import Study
+from .study_file import EXCLUDE, RunFile, read_draft, with_runs
 
 
 @dataclass(frozen=True)

@@ -1,26 +1,25 @@
-"""An identification as blocks: parameters with intervals, equations, errors, and how laws do."""
+"""Figures of an identification: fits, and the parts of a model's force."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from ..compare.loops import chosen_cycles
-from ..compare.panels import draw_error, draw_history, worst_window
-from ..compare.prediction import run_predictions
-from ..compare.view import LOOPS, loop_panels
-from ..data.equation import equations, symbols
-from ..draw.style import Page, look, short_z
-from ..identify.rig import DAMPER, ROLES
+from ..comparison.panels import chosen_cycles, draw_error, draw_history, worst_window
+from ..comparison.predictions import run_predictions
+from ..comparison.view import LOOPS, loop_panels
+from ..core.text import percent, plain, quantity, short_z
+from ..identification.rig import DAMPER, ROLES
+from ..model.equations import equations, symbols
 from ..physics.drive import DRIVES
 from ..physics.forms import shown_law, split_form
 from ..physics.laws import base_and_variant
-from ..quantity import percent, plain, quantity
 from ..view.blocks import Figure, Formula, Table, Text, View, view_of
+from ..view.style import Page, look
 from .identified import Identified
 
 if TYPE_CHECKING:
-    from ..identify.rig_fit import RigErrors
+    from ..identification.rig_fit import RigErrors
 
 _RUNS = 6
 """Runs that cycles are sought in."""
@@ -47,8 +46,8 @@ def identified_view(found: Identified) -> View:
     )  # fmt: skip
     laws: tuple[Table, ...] = ()
     if found.laws:
-        from ..diagnose.law_verdict import rows_of  # takes long: most identify one law
-        from ..diagnose.view import law_block
+        from ..diagnosis.law_choice import rows_of  # takes long: most identify one law
+        from ..diagnosis.view import law_block
 
         laws = (law_block(rows_of(found.laws)),)
     starts = f"{found.fit.agreed} of {found.fit.starts} starts agree."

@@ -1,25 +1,42 @@
-"""Which form of the command the runs carry, and a model brought into another form."""
+"""Laws and forms of the command compared on the runs of a study."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data.checks.levels import LEAST_LEVELS, command_levels, drives_of
+from ..core.files import read_json
+from ..core.interrupt import keeps
+from ..core.progress import tell
+from ..core.text import command, unknown
+from ..data.checks.runs import LEAST_LEVELS, command_levels, drives_of, tells_a_bend
 from ..data.measurement import Measurement
-from ..data.model import StudyModel, new_model
-from ..errors import PhysicsError, StudyError
-from ..findings import unknown
+from ..errors import BristleError, PhysicsError, StudyError
+from ..identification.problem import Model
+from ..identification.rig import DAMPER, Rig
+from ..model.model import StudyModel, new_model
+from ..model.model_file import model_text
 from ..physics.command import MOST_KNOTS
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS
 from ..physics.forms import FORMS, LINEAR_FORM, TABLE_FORM, joined_form, split_form
-from ..physics.laws import base_and_variant
+from ..physics.laws import DEFAULT, base_and_variant
 from ..units import convert
+from ..version import __version__
+from .runs import Runs
+from .study import Study
+from .study_file import ALL as ALL_STUDY_FILE
+
+if TYPE_CHECKING:
+    from ..diagnosis.law_trials import LawTrial
+
 
 ALL = "all"
 """The word for all forms."""
@@ -192,3 +209,155 @@ def _numbers(at: Any, knots: Sequence[float], top: float) -> Iterator[float]:
 def _bounds(model: StudyModel, name: str) -> tuple[float, float]:
     own, unit = model.flat()[name], model.declared(name).unit
     return convert(own.low, own.unit, unit), convert(own.high, own.unit, unit)
+
+
+# The fits of a search for the law, kept as they are made: an interrupted one goes on there.
+
+NAME = "law_fits.json"
+"""Where they are, in reports/."""
+
+
+class LawFits:
+    """The fits of laws to a study's training runs: what is known of them, and where more go.
+
+    Those of other data, of another model or code, or of another version of bristle do not count.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    model : the present one, whose effects the laws have
+    """
+
+    def __init__(self, study: Study, model: StudyModel) -> None:
+        self._study = study
+        self._key = _key(study, model)
+        self.known: dict[str, dict[str, float]] = _read(study, self._key)
+        self._lock = threading.Lock()
+
+    def keep(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
+        """Write the values of laws [SI] by law and name, beside those that are there."""
+        with self._lock:
+            self.known |= {law: dict(values) for law, values in fitted.items()}
+            content = {"schema": 1, "key": self._key, "laws": self.known}
+            self._study.write_report(NAME, json.dumps(content, indent=1) + "\n")
+            count = len(self.known)
+        keeps(
+            f"The fit{'s' * (count > 1)} of {count} law{'s' * (count > 1)} "
+            f"{'are' if count > 1 else 'is'} kept, the search for effects is not: the same command "
+            "goes on there."
+        )
+
+
+def _read(study: Study, key: str) -> dict[str, dict[str, float]]:
+    path = study.reports_folder / NAME
+    try:
+        found = read_json(path) if path.is_file() else {}
+        if found.get("key") != key:
+            return {}
+        return {
+            str(law): {str(n): float(v) for n, v in values.items()}
+            for law, values in found["laws"].items()
+        }
+    except (BristleError, KeyError, TypeError, ValueError, AttributeError):
+        return {}  # a file that somebody changed: the fits are made anew
+
+
+def _key(study: Study, model: StudyModel) -> str:
+    whole = hashlib.sha256(f"{__version__} {study.data} {model_text(model)}".encode())
+    for folder in (study.laws_folder, study.effects_folder):
+        for path in sorted(folder.glob("*.py")) if folder.is_dir() else ():
+            whole.update(path.read_bytes())
+    return whole.hexdigest()[:16]
+
+
+# All laws against the runs of a study: how each does, and a model brought to another law.
+
+
+def refuse_in_building(law: str | None, in_building: bool) -> None:
+    """Refuse to compare all laws, without their effects, on a rig that is no test bench.
+
+    Raises
+    ------
+    StudyError
+        If all laws were asked for and the damper is in a building.
+    """
+    if law == ALL_STUDY_FILE and in_building:
+        raise StudyError(
+            "identify compares all laws on a test bench alone: in a building the law decides "
+            "which samples its fit and z take. Name one law, or let diagnose seek it "
+            "with its effects (--law all)."
+        )
+
+
+def law_or_all(study: Study, law: str | None) -> str | None:
+    """Return what was asked for; where nothing was, "all" as long as nobody chose a law.
+
+    A study that was made without a law begins with a stand-in. Once its model has another law, or
+    an effect, that is what somebody or a verdict chose.
+    """
+    if law is not None or study.settings.law != ALL_STUDY_FILE or study.settings.has_building:
+        return law
+    model = study.model()
+    return None if model.law != DEFAULT or model.effects else ALL_STUDY_FILE
+
+
+def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
+    """Return how every law does on a bench, the best on held-out runs first.
+
+    Parameters
+    ----------
+    rig : the bench with its runs
+    runs : the measurements that it was made of, whose command decides on quadratic forms
+    present : the model as it is; each law has those of its effects that can join it
+
+    Raises
+    ------
+    StudyError
+        If the rig is a building.
+    """
+    from ..diagnosis.law_trials import try_laws  # takes long: most identify one law
+
+    refuse_in_building(ALL_STUDY_FILE, rig.building is not None)
+    tell("trying every law")
+    site = rig.sites(present)[DAMPER]
+    held_out = site.train if site.holdout is None else site.holdout
+    return try_laws(site.train, held_out, present, bends=tells_a_bend(runs.train))
+
+
+def left_out_notes(rig: Rig, present: Model) -> tuple[str, ...]:
+    """Return the sentence that tells which laws `all_laws` leaves out, none where it tries all.
+
+    Parameters
+    ----------
+    rig : the bench with its runs
+    present : the model as it is
+    """
+    from ..diagnosis.law_trials import not_finite
+    from ..diagnosis.words import left_out
+
+    unfit = not_finite(rig.sites(present)[DAMPER].train, present)
+    return (left_out(unfit),) if unfit else ()
+
+
+def with_law(model: StudyModel, law: str) -> StudyModel:
+    """Return a model with another law, such as "lugre[quadratic]", and the effects that can join.
+
+    Raises
+    ------
+    PhysicsError
+        If there is no such law.
+    """
+    base, _ = base_and_variant(law)
+    kept = {
+        name: values
+        for name, values in model.effects.items()
+        if base.site not in EFFECTS[name].sites or EFFECTS[name].joins(base)
+    }
+    return replace(new_model(law, (), model.building, model.drive), effects=kept)
+
+
+def law_command(folder: object, law: str, *others: str) -> str:
+    """Return the command that identifies a study's model with a law, in the law's form."""
+    plain, form, _ = split_form(law)
+    words: Sequence[str] = ("--command", form) if form not in ("", LINEAR_FORM) else ()
+    return command("identify", folder, "--law", plain, *words, *others)

@@ -1,4 +1,4 @@
-"""The steps of a study's model: each a folder with the model and why it came to be.
+"""The steps of a study's model, results set aside, and how the error fell.
 
 A change touches several files. What is about to happen is written down first (`history/.pending`),
 so that a process that is killed on its way leaves a change that the next one completes.
@@ -9,17 +9,217 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import count, takewhile
+from math import log10, sqrt
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..core.config import other_schema
-from ..data.files import read_json, write_json, write_whole
+from ..core.config import other_schema, toml_content
+from ..core.files import read_json, write_json, write_whole
+from ..core.text import percent, plain, quantity, short_z
 from ..errors import StudyError
 from ..version import __version__
-from .set_aside import free_number, kept_folder, set_aside
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+
+# What a study found from its data, set aside when the data are read in another way.
+#
+# Fits, verdicts, reports and learned curves of the channels as they were are no result on the
+# channels as they are. They are kept together in `history/before_channels_1/`, with the study.toml
+# that they belong to. The model is again the last one that no measurement had changed.
+
+DRAFT = ".study.toml"
+"""The study.toml that is about to take the place of the present one."""
+KEPT = "before_channels_{}"
+"""The folder in history/ where results are set aside; the first one has the number 1."""
+LEARNED = "learned from the runs of"
+"""What stands in the file of an effect that `bristle learn` wrote."""
+
+BESIDE = ("plan*", "export", "design", "comparisons")
+"""Folders of what was made from a model."""
+
+_STEP = re.compile(r"\d{3,}")
+_OF_A_STEP = ("model.toml", "step.json")
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a study found from its data.
+
+    `first` is the number of the first step whose model or errors are from the data, None where no
+    step is; `steps` what these steps did; `verdict` whether there is one, on whatever model;
+    `reports` the files in reports/; `effects` the learned ones, by name; `beside` the folders that
+    were made from the model and stay: a plan, an export, designs, comparisons.
+    """
+
+    first: int | None
+    steps: tuple[str, ...]
+    verdict: bool
+    reports: tuple[str, ...]
+    effects: tuple[str, ...]
+    beside: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.steps or self.verdict or self.reports or self.effects)
+
+    def sentences(self) -> list[str]:
+        """Return what is no longer of the data, one thing a line."""
+        out = []
+        if self.steps:
+            counted = "1 step" if len(self.steps) == 1 else f"{len(self.steps)} steps"
+            out.append(f"{counted} of the history: {', '.join(self.steps)}")
+        if self.verdict:
+            out.append("the verdict")
+        if self.reports:
+            out.append(f"reports: {', '.join(self.reports)}")
+        if self.effects:
+            out.append(f"learned effects: {', '.join(self.effects)}")
+        return out
+
+    def beside_text(self) -> str:
+        """Return the sentence about what stays and is of the model before, "" where nothing is."""
+        names = ", ".join(f"{name}/" for name in self.beside)
+        return f"Made of the model before, and left as it is: {names}." if names else ""
+
+
+def results_of(study: Path) -> Results:
+    """Return what a study found from its data.
+
+    Parameters
+    ----------
+    study : its folder
+    """
+    folders = list(_steps(study))
+    first = next((int(one.name) for one in folders[1:] if _from_data(one)), None)
+    kept = [one for one in folders if first is None or int(one.name) < first]
+    named = {name for one in kept for name in _effects_in(one / "model.toml")}
+    moved = [one for one in folders if one not in kept]
+    verdicts = [study / "verdict.json", *(one / "verdict.json" for one in folders)]
+    reports = study / "reports"
+    return Results(
+        first, tuple(str(read_json(one / "step.json").get("what", "")) for one in moved),
+        any(one.is_file() for one in verdicts),
+        tuple(sorted(one.name for one in reports.iterdir() if one.is_file()))
+        if reports.is_dir() else (),
+        tuple(sorted(one.stem for one in _learned(study) if one.stem not in named)),
+        tuple(sorted(
+            one.name for name in BESIDE for one in study.glob(name)
+            if one.is_dir() and any(one.iterdir())
+        )),
+    )  # fmt: skip
+
+
+def free_number(study: Path) -> int:
+    """Return the number of the next folder of results that are set aside."""
+    number = 1
+    while kept_folder(study, number).exists():
+        number += 1
+    return number
+
+
+def kept_folder(study: Path, number: int) -> Path:
+    """Return the folder of that number."""
+    return study / "history" / KEPT.format(number)
+
+
+def set_aside(study: Path, number: int, first: int) -> None:
+    """Move all results into a folder of the history, and make the draft the study.toml.
+
+    It may be called again where a process was killed in it: what is moved stays moved.
+
+    Parameters
+    ----------
+    study : its folder
+    number : of the folder
+    first : the number of the first step whose model is from the data
+    """
+    kept = kept_folder(study, number)
+    kept.mkdir(parents=True, exist_ok=True)
+    if not (kept / "study.toml").is_file():
+        write_whole(kept / "study.toml", (study / "study.toml").read_bytes())
+    last = max((one for one in _steps(study) if int(one.name) < first), key=_number)
+    text = (last / "model.toml").read_bytes()
+    named = {*_effects_in(last / "model.toml"), _building_in(last / "model.toml")}
+    for one in [*_learned(study)]:
+        if one.stem not in named:
+            _move(one, kept / "effects" / one.name)
+    for one in [*_steps(study)]:
+        if int(one.name) >= first:
+            building = study / f"building_{int(one.name)}.toml"
+            if building.name not in named:
+                _move(building, kept / building.name)
+            _move(one, kept / one.name)
+            continue
+        for file in [file for file in one.iterdir() if file.name not in _OF_A_STEP]:
+            _move(file, kept / one.name / file.name)
+    for file in [*(study / "reports").glob("*")]:
+        _move(file, kept / "reports" / file.name)
+    _move(study / "history" / "undone", kept / "undone")
+    for name in ("verdict.json", "added_runs.json"):
+        _move(study / name, kept / name)
+    write_whole(study / "model.toml", text)
+    draft = study / DRAFT
+    if draft.is_file():
+        draft.replace(study / "study.toml")
+
+
+def _move(path: Path, place: Path) -> None:
+    """Move a file or a folder; nothing where there is none."""
+    if path.exists():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        path.replace(place)
+
+
+def _number(step: Path) -> int:
+    return int(step.name)
+
+
+def _steps(study: Path) -> Iterator[Path]:
+    """Yield the folders of the steps, the first one first."""
+    history = study / "history"
+    if history.is_dir():
+        found = (one for one in history.iterdir() if one.is_dir() and _STEP.fullmatch(one.name))
+        yield from sorted(found, key=_number)
+
+
+def _from_data(step: Path) -> bool:
+    """Return whether a step holds errors of runs, or a model with an identified value."""
+    about = read_json(step / "step.json")
+    return bool(about.get("before") or about.get("after")) or _identified(
+        toml_content(step / "model.toml")
+    )
+
+
+def _identified(part: Any) -> bool:
+    """Return whether a table of a model.toml, or one within it, was identified."""
+    if isinstance(part, list):
+        return any(map(_identified, part))
+    if not isinstance(part, dict):
+        return False
+    return part.get("origin") == "identified" or any(map(_identified, part.values()))
+
+
+def _effects_in(model: Path) -> list[str]:
+    found = toml_content(model).get("effects", {})
+    return list(found) if isinstance(found, dict) else []
+
+
+def _building_in(model: Path) -> str:
+    return str(toml_content(model).get("building", ""))
+
+
+def _learned(study: Path) -> Iterator[Path]:
+    """Yield the files of the effects that `bristle learn` wrote."""
+    for file in sorted((study / "effects").glob("*.py")):
+        with suppress(OSError, ValueError):
+            if LEARNED in file.read_text(encoding="utf-8"):
+                yield file
+
 
 _NUMBER = re.compile(r"\d{3,}")
 
@@ -250,3 +450,150 @@ class History:
         verdict = self.study / "verdict.json"
         if verdict.is_file() and self.path(number).is_dir():
             write_whole(self.path(number) / "verdict.json", verdict.read_bytes())
+
+
+# The staircase of a study's history, for the terminal: the error of each model, step by step.
+
+WIDTH = 40
+"""Characters of the longest bar."""
+NAME = 40
+"""Characters of the longest step's name."""
+CLOSE = 1.1
+"""z up to which an error is drawn as being on the noise floor."""
+
+
+@dataclass(frozen=True)
+class HistoryStep:
+    """One step of the staircase: what was done, and z and error [N] of the model after it.
+
+    `share` is the error on held-out runs over the force's RMS [1]. A step of a version that knew
+    the low-passed error alone has that one: `cut_off` [Hz] of its low-pass is then not 0, or None
+    where the step does not tell it.
+    """
+
+    number: int
+    what: str
+    z: float | None
+    z_train: float | None
+    rms: float | None
+    share: float | None = None
+    cut_off: float | None = None
+
+    @property
+    def missed(self) -> float:
+        """The share of the force that the model misses beyond noise; 0 where noise is all."""
+        if self.z is None or self.share is None or self.z <= CLOSE:
+            return 0.0
+        return self.share * sqrt(1.0 - 1.0 / self.z**2)
+
+
+@dataclass(frozen=True)
+class Staircase:
+    """The steps of a history; `str` gives plain text, rich prints it in colour.
+
+    `floor` is the z that noise alone explains; `cut_off` [Hz] of the low-pass on the forces whose
+    RMS errors are told where a step does not tell, 0 for none.
+    """
+
+    history_steps: tuple[HistoryStep, ...]
+    floor: float = 1.0
+    unit: str = "N"
+    cut_off: float = 0.0
+
+    def __str__(self) -> str:
+        return "\n".join("".join(text for text, _ in line).rstrip() for line in self._lines("#"))
+
+    def __rich__(self) -> Text:
+        from rich.text import Text
+
+        lines = [Text.assemble(*parts) for parts in self._lines("█")]
+        return Text("\n").join(lines)
+
+    def _lines(self, mark: str) -> list[list[tuple[str, str]]]:
+        """Return the lines as pairs of text and style."""
+        if not self.history_steps:
+            return [[("The history is empty.", "")]]
+        names = [_cut(f"{one.number} {one.what}") for one in self.history_steps]
+        wide = max(len(name) for name in [*names, "  noise floor"])
+        known = [one.z for one in self.history_steps if one.z is not None]
+        top = max([*known, 2.0 * self.floor])
+        title = "error / noise (z) on held-out runs"
+        lines = [[(f"{'':{wide}}  {title}", "dim")]]
+        for name, one in zip(names, self.history_steps, strict=True):
+            lines.append([(f"{name:{wide}}  ", "bold"), *self._line(one, top, mark)])
+        lines.append([(f"{'  noise floor':{wide}}  ", "dim"), (f"| {plain(self.floor)}", "green")])
+        return lines
+
+    def _size(self) -> float:
+        return max((one.rms for one in self.history_steps if one.rms is not None), default=0.0)
+
+    def _line(self, one: HistoryStep, top: float, mark: str) -> list[tuple[str, str]]:
+        if one.z is None:
+            if one.share is None:
+                return [("not judged", "dim")]
+            return [(f"z not known, {100.0 * one.share:.1f} % of the force is missed", "dim")]
+        done = one.z <= CLOSE * self.floor
+        share = log10(max(one.z / self.floor, 1.0)) / log10(top / self.floor)
+        bar = mark * max(1, round(WIDTH * share))
+        colour = "green" if done else "dark_orange"
+        cut_off = self.cut_off if one.cut_off is None else one.cut_off
+        low = f" below {cut_off:g} Hz" if cut_off else ""
+        of_force = f" ({percent(one.share)})" if one.share is not None else ""
+        size = f"{quantity(one.rms or 0.0, self.unit, 4, self._size())}{of_force}{low}"
+        about = [] if one.rms is None else [f"error {size}"]
+        about += [] if one.z_train is None else [f"training z = {short_z(one.z_train)}"]
+        tail = f"   {', '.join(about)}" if about else ""
+        return [(bar, colour), (f" {short_z(one.z)}", f"bold {colour}"), (tail, "dim")]
+
+
+def staircase(steps: Sequence[Step], noise_floor: float = 1.0, cut_off: float = 0.0) -> Staircase:
+    """Return the staircase of a history, to print as it is or to show live.
+
+    Parameters
+    ----------
+    steps : list of Step
+        Their `after` holds "z_holdout", "z_train", "error_holdout" [N]; a step without is "not
+        judged", unless the next one's `before` holds them. Of steps with a low-passed error
+        alone, "rms_holdout", the staircase says so.
+    noise_floor : float
+        z that noise alone explains.
+    cut_off : float
+        Hz, of the low-pass behind a step's "rms_holdout" where the step does not tell it; 0 for
+        none.
+
+    Examples
+    --------
+    >>> from bristle.study import Step
+    >>> print(staircase([Step(0, "identify", "", {}, {"z_holdout": 4.0})]))
+                   error / noise (z) on held-out runs
+    0 identify     ######################################## 4.00
+      noise floor  | 1
+    """
+    return Staircase(tuple(history_steps(steps)), noise_floor, cut_off=cut_off)
+
+
+def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
+    """Return the steps of a history: what each step's `after` says, or the next one's `before`."""
+    out = []
+    for k, step in enumerate(steps):
+        errors: dict[str, Any] = {**step.after}
+        if not errors and k + 1 < len(steps):
+            errors = {**steps[k + 1].before}
+        new = "error_holdout" in errors
+        names = (
+            ("error_holdout", "error_share_holdout") if new else ("rms_holdout", "share_holdout")
+        )
+        keys = ("z_holdout", "z_train", *names)
+        z, z_train, rms, share = (_staircase_number(errors.get(key)) for key in keys)
+        low = 0.0 if new else _staircase_number(errors.get("cut_off"))
+        out.append(HistoryStep(step.number, step.what, z, z_train, rms, share, low))
+    return out
+
+
+def _cut(name: str) -> str:
+    """Return a step's name, no longer than `NAME`."""
+    return name if len(name) <= NAME else f"{name[: NAME - 3]}..."
+
+
+def _staircase_number(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and value == value else None

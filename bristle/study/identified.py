@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..data.model import StudyModel
 from ..errors import StudyError
-from ..identify.error import ForceError
-from ..identify.fit import Fit, Problem
-from ..identify.rig_fit import RigErrors, SiteModel
-from ..identify.table import LawError
+from ..identification.error import ForceError
+from ..identification.error_table import LawError
+from ..identification.fit import Fit
+from ..identification.problem import Problem
+from ..identification.rig_fit import RigErrors, SiteModel
+from ..model.model import StudyModel
 from ..physics.forms import split_form
 from ..view import Viewable
 from .forms import FormError, finite, form_of
@@ -19,7 +20,7 @@ from .history import Step
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..diagnose.law_trials import LawTrial
+    from ..diagnosis.law_trials import LawTrial
 
 
 def is_identified(model: StudyModel) -> bool:
@@ -146,7 +147,7 @@ class Identified(Viewable):
         rows = {row["name"]: row for row in self.parameters()}
         laws: dict[str, Any] = {}
         if self.laws:
-            from ..diagnose.law_verdict import rows_of  # takes long: most identify one law
+            from ..diagnosis.law_choice import rows_of  # takes long: most identify one law
 
             laws["laws"] = rows_of(self.laws)
         return {

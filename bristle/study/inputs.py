@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.text import listed, unknown, written
 from ..data.building_file import read_building
 from ..data.channels import ChannelSpec, channel_unit, device_channel, is_channel
 from ..data.guess import Guess, guess_channels, specs
-from ..data.measurement import Measurement, measurements_of, stem_of
-from ..data.model import StudyModel, new_model, read_model
+from ..data.measurement import Measurement, is_part, measurements_of, names_of_files, stem_of
 from ..data.read import files_in, read_table
-from ..data.run_names import is_part, names_of_files
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
-from ..findings import listed, unknown, written
+from ..model.model import StudyModel, new_model
+from ..model.model_file import read_model
 from ..physics.building import Building, with_damper
 from ..physics.effect import EFFECTS
 from ..physics.laws import law_names
 from .identified import Identified
-from .joining import refuse_effect
+from .identify import refuse_effect
 from .new import parse_channel
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 

@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..core.progress import counted
+from ..core.text import capital, command, listed, plain
 from ..data.building_file import read_building
 from ..data.channels import (
     DRIVE,
@@ -22,30 +24,26 @@ from ..data.channels import (
     no_device,
 )
 from ..data.decimate import FAST, RATE
-from ..data.extra import found_in
+from ..data.extra_channels import found_in
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
 from ..data.measurement import measurements_of
-from ..data.model import new_model
-from ..data.model_text import model_text
 from ..data.pieces import pieces_of
 from ..data.raw_signals import raw_signals
 from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import BristleError, StudyError, UnitError
-from ..findings import capital, command, listed
+from ..model.model import new_model
+from ..model.model_file import model_text
 from ..physics.building import Building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
-from ..progress import counted
-from ..quantity import plain
 from ..units import canonical
 from .history import History, Step
-from .reading import names_of_runs
 from .roles import for_test, roles_of
 from .run_facts import Facts, RunChoices, facts_of
-from .run_file import EXCLUDE, ROLES, TEST, RunFile
-from .settings import ALL, Settings, write_settings
+from .runs import names_of_runs
+from .study_file import ALL, EXCLUDE, ROLES, TEST, RunFile, Settings, write_settings
 
 _REMARKS = 6
 """Remarks on files that are printed at most."""
@@ -83,7 +81,7 @@ def make_folder(
     Parameters
     ----------
     folder, files, rig, building, channels, title, law, runs, device, without : see
-        `bristle.study.create.create_study`
+        `bristle.study.steps.create_study`
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """A study: a folder with measurements, the model held against them, and how it came to be."""
 
-# Longer than 300 lines: whatever reads or writes the folder is one class, for one lock guards it.
-
 from __future__ import annotations
 
 import hashlib
@@ -14,31 +12,91 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
+from ..core.files import read_json, write_json, write_whole
+from ..core.text import command, shown, written
 from ..data.channels import ChannelSpec
 from ..data.corrections import Correction
-from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement
-from ..data.model import StudyModel, read_model
-from ..data.model_text import model_text
 from ..errors import StudyError
-from ..findings import command, written
-from ..physics.user import Loaded, waiting
-from ..shown import shown
+from ..model.model import StudyModel
+from ..model.model_file import model_text, read_model
 from ..trust import can_do_without, load
+from ..user_code.load import Loaded, waiting
 from ..version import __version__
 from ..view import Viewable
-from .added_runs import additions, behind_data, note_undone
-from .data_digest import building_in, data_digest, other_than
+from .changes import additions, behind_data, building_in, data_digest, note_undone, other_than
 from .history import History, Step
-from .joined_corrections import joined_corrections
 from .new import make_folder, parse_channel
-from .old_reports import keep_reports, make_room
-from .reading import place_of_run, read_runs
-from .role_changes import refuse_too_few, roles_by_place
-from .run_file import EXCLUDE, ROLES, TEST
-from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import Settings, read_draft, read_settings
-from .settings_text import with_corrections, with_excluded, with_mask, with_roles
+from .roles import refuse_too_few, roles_by_place
+from .runs import (
+    Runs,
+    joined_corrections,
+    place_of_run,
+    read_runs,
+    refuse_twins,
+    split_in_time,
+    twins_within,
+    usable,
+)
+from .study_file import (
+    EXCLUDE,
+    ROLES,
+    TEST,
+    Settings,
+    read_draft,
+    read_settings,
+    with_corrections,
+    with_excluded,
+    with_mask,
+    with_roles,
+)
+
+# Reports of models that are no longer the present one: each step has a folder for its own.
+
+OF_MODEL = (
+    "identify.png", "identify.json", "force_budget.png", "compare.png", "diagnose.png",
+    "report.html",
+)  # fmt: skip
+"""Reports that show a model: they are set aside when another becomes the present one."""
+
+
+def keep_reports(reports: Path, number: int, before: float = inf) -> None:
+    """Put the reports of a step's model into a folder of that step.
+
+    Parameters
+    ----------
+    reports : the folder of a study's reports; the caller holds the lock
+    number : of the step
+    before : ns, a date of files: those that are not older stay
+    """
+    for name in OF_MODEL:
+        old = reports / name
+        if old.is_file() and old.stat().st_mtime_ns < before:
+            kept = reports / f"step_{max(number, 0):03d}"
+            kept.mkdir(exist_ok=True)
+            old.replace(kept / name)
+
+
+def make_room(reports: Path, number: int, undone: str) -> None:
+    """Put the reports of a step that was undone aside, for another step has its number now.
+
+    Parameters
+    ----------
+    reports : the folder of a study's reports; the caller holds the lock
+    number : of the step
+    undone : the name under which the history keeps the step that was undone
+    """
+    kept = reports / f"step_{number:03d}"
+    if kept.is_dir():
+        place = reports / "undone" / undone
+        while place.exists():
+            place = place.with_name(f"{place.name}_")
+        place.parent.mkdir(exist_ok=True)
+        kept.replace(place)
+
+
+# Longer than 300 lines: whatever reads or writes the folder is one class, for one lock guards it.
+
 
 if TYPE_CHECKING:
     pass
@@ -149,7 +207,7 @@ class Study(Viewable):
         TrustError
             If the model has one whose code must not run yet.
         """
-        from ..check.user_effects import usable
+        from ..user_code.compiled import usable
 
         laws, effects = load(self.laws_folder, "law"), load(self.effects_folder)
         for one in (*laws, *effects):
@@ -245,7 +303,7 @@ class Study(Viewable):
 
     @property
     def data(self) -> str:
-        """A digest of what a fit and its judge see, as they are now: see `study.data_digest`."""
+        """A digest of what a fit and its judge see, as they are now: see `study.changes`."""
         return data_digest(self.folder, self.settings, building_in(self.folder / "model.toml"))
 
     @property
@@ -401,7 +459,7 @@ class Study(Viewable):
         RecordError
             If a file has no such column, or cannot be read by it.
         """
-        from .channel_changes import correct_channels
+        from .read_again import correct_channels
 
         given = {
             name: where if isinstance(where, ChannelSpec) else parse_channel(f"{name}={where}")[1]
@@ -437,7 +495,7 @@ class Study(Viewable):
         StudyError
             If the file is damaged, or of a schema that this version does not know.
         """
-        from ..diagnose.verdict_file import current
+        from ..diagnosis.verdict import current
 
         path = self.folder / "verdict.json"
         if not path.is_file():

@@ -1,19 +1,18 @@
-"""A study, its data check and its identifications as blocks."""
+"""Figures and tables of a study: its data, runs and history."""
 
 from __future__ import annotations
 
+from ..core.text import plain, short_z
 from ..data.checks.finding import grouped, sentence
-from ..draw.style import Page, short_z
 from ..errors import RecordError
-from ..quantity import plain
 from ..view.blocks import Figure, Table, Text, View, view_of
+from ..view.style import Page
 from .data_check import DataCheck
 from .fit_view import identified_view as identified_view
-from .run_file import TEST
-from .run_picture import draw_run
-from .staircase import HistoryStep, history_steps
-from .staircase_picture import staircase_page
+from .history import HistoryStep, history_steps
+from .pictures import draw_run, staircase_page
 from .study import Study
+from .study_file import TEST
 
 
 @view_of(DataCheck)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from ..core.text import shown
 from ..errors import RunError
-from ..shown import shown
 from .blocks import VIEWS, Figure, Text, View
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
-    from ..draw.style import Page
+    from .style import Page
 
 
 class Text(NamedTuple):

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from ..draw.mathml import formula_html as formula
 from .blocks import Block, Figure, Formula, Table, Text, View
+from .formula import formula_html as formula
 
 __all__ = [
     "CSS",
@@ -52,7 +52,7 @@ def fragment(title: str, *parts: str) -> str:
 
 def notebook(view: View) -> str:
     """Return what a notebook shows of a result: the whole of its view."""
-    from ..draw.figure import DPI
+    from .style import DPI
 
     return fragment(view.title, blocks((*view.blocks, *view.details), dpi=DPI))
 
@@ -96,7 +96,7 @@ def _block(block: Block, dpi: int) -> str:
         cells = table(block.header, block.rows, block.numbers, block.strong)
         return head + cells + paragraphs(block.note, kind="soft")
     if isinstance(block, Figure):
-        from ..draw.style import png
+        from .style import png
 
         return figure(png(block.draw(), dpi), block.alt, block.caption)
     return ""

@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle.batch import cluster, read_ensemble
-from bristle.batch.plan import Outcome, Plan
+from bristle.campaign import cluster, read_ensemble
+from bristle.campaign.plan import Outcome, Plan
 from bristle.cli import main
 from bristle.errors import EnsembleError
 

@@ -11,11 +11,11 @@ import pytest
 from PIL import Image
 
 import bristle
-from bristle.batch import read_ensemble
-from bristle.batch.view import correlations, draw_ensemble, varying_numbers
-from bristle.batch.worker import prepare
+from bristle.campaign import read_ensemble
+from bristle.campaign.campaign import prepare
+from bristle.campaign.view import correlations, draw_ensemble, varying_numbers
 from bristle.cli import main
-from bristle.draw.style import look
+from bristle.view.style import look
 
 Write = Callable[..., Path]
 
@@ -134,7 +134,7 @@ def test_the_figure_says_how_many_runs_failed(write: Write) -> None:
 
 
 def test_an_output_that_never_differs_is_drawn(write: Write, tmp_path: Path) -> None:
-    from bristle.batch.view import ensemble_figure
+    from bristle.campaign.view import ensemble_figure
 
     path = write(
         ('"damper.sigma_a" = { normal = [650.0, 65.0], within = [500.0, 800.0] }', ""),

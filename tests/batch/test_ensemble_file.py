@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from bristle import trust
-from bristle.batch import read_ensemble, stock_ensembles
-from bristle.batch.distributions import Distribution, share
-from bristle.batch.file import resolve_ensemble
+from bristle.campaign import read_ensemble, stock_ensembles
+from bristle.campaign.distributions import Distribution, share
+from bristle.campaign.ensemble_file import resolve_ensemble
 from bristle.errors import EnsembleError, TrustError
-from bristle.scenario.scenario import resolve_scenario
+from bristle.system.scenario import resolve_scenario
 
 OWN_LAW = '''
 from bristle.physics.law import Law, Parameter

@@ -16,13 +16,12 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle import resources
-from bristle.batch import Ensemble, pool, read_ensemble, worker
-from bristle.batch.plan import Outcome, Output, Plan
-from bristle.batch.quantiles import LEVELS, failures
-from bristle.batch.table import RunsTable
+from bristle.campaign import Ensemble, campaign, pool, read_ensemble
+from bristle.campaign.plan import Outcome, Output, Plan
+from bristle.campaign.table import LEVELS, RunsTable, failures
+from bristle.core import files
 from bristle.errors import EnsembleError, RunError
-from bristle.scenario.scenario import load_scenario
+from bristle.system.scenario import load_scenario
 
 Write = Callable[..., Path]
 ROOT = Path(__file__).parents[2]
@@ -61,7 +60,7 @@ def test_a_scenario_that_changed_is_read_again_in_the_same_process(
     write: Write, tmp_path: Path
 ) -> None:
     mine = tmp_path / "mine_scenario.toml"
-    stock = (resources.scenarios_folder() / "half_sine_pulse.toml").read_text()
+    stock = (files.scenarios_folder() / "half_sine_pulse.toml").read_text()
     mine.write_text(stock)
     path = write(
         ("half_sine_pulse", mine.name),
@@ -69,11 +68,11 @@ def test_a_scenario_that_changed_is_read_again_in_the_same_process(
         ('"structure.building.masses.2" = { uniform = [1.1, 1.4] }\n', ""),
     )
     before = read_ensemble(path)
-    assert worker.scenario_of(before, before.values(0), tmp_path).stop == 10.0
+    assert campaign.scenario_of(before, before.values(0), tmp_path).stop == 10.0
     mine.write_text(re.sub(r"(?m)^stop = .*$", "stop = 1.0", stock))
     after = read_ensemble(path)
     assert after.digest() != before.digest()
-    assert worker.scenario_of(after, after.values(0), tmp_path).stop == 1.0
+    assert campaign.scenario_of(after, after.values(0), tmp_path).stop == 1.0
 
 
 def test_records_steps_and_components_may_vary(write: Write, tmp_path: Path) -> None:
@@ -104,7 +103,7 @@ def test_runs_are_the_same_on_one_process_and_on_two(write: Write, tmp_path: Pat
         assert len(found.runs) == 12
         files.append((tmp_path / str(workers) / "runs.csv").read_bytes())
     assert files[0] == files[1]
-    again = worker.run_one(found.plan, 7)
+    again = campaign.run_one(found.plan, 7)
     assert again.numbers == tuple(found.runs.loc[7, [o.name for o in found.plan.outputs]])
 
 
@@ -182,10 +181,10 @@ def test_what_a_component_raises_is_a_failed_run(
         raise ZeroDivisionError("somebody's effect")
 
     plan = read_ensemble(write())
-    monkeypatch.setattr(worker, "_numbers", broken)
-    assert worker.run_one(plan, 3).reason == "ZeroDivisionError: somebody's effect"
-    monkeypatch.setattr(worker, "_numbers", lambda plan, scenario: (1.0, float("nan"), 2.0))
-    reason = worker.run_one(plan, 3).reason
+    monkeypatch.setattr(campaign, "_numbers", broken)
+    assert campaign.run_one(plan, 3).reason == "ZeroDivisionError: somebody's effect"
+    monkeypatch.setattr(campaign, "_numbers", lambda plan, scenario: (1.0, float("nan"), 2.0))
+    reason = campaign.run_one(plan, 3).reason
     assert reason == "RunError: rms structure.floor2_acceleration_absolute is not finite."
 
 
@@ -205,7 +204,7 @@ def test_quantiles_are_those_of_the_runs(write: Write) -> None:
 )  # fmt: skip
 def test_statistics(how: str, number: float) -> None:
     values = np.array([2.0, -3.0, 1.0])
-    assert worker.statistic(Output("a.b", how), values) == pytest.approx(number)
+    assert campaign.statistic(Output("a.b", how), values) == pytest.approx(number)
 
 
 def _dies(plan: Plan, run: int) -> Outcome:
@@ -267,7 +266,7 @@ def test_a_kill_leaves_what_there_was_and_no_process(write: Write, tmp_path: Pat
     table = RunsTable(read_ensemble(path), out / "runs.csv")
     assert len(table.outcomes) >= 5
     run, outcome = next(iter(table.outcomes.items()))
-    assert worker.run_one(table.plan, run) == outcome
+    assert campaign.run_one(table.plan, run) == outcome
     table.close(complete=False)
 
 
@@ -335,7 +334,7 @@ def test_a_scenario_that_cannot_be_compiled_is_refused_at_once(
     def cannot(scenario: object) -> None:
         raise ScenarioError("cannot be compiled")
 
-    monkeypatch.setattr("bristle.simulate.coupled.simulate", cannot)
+    monkeypatch.setattr("bristle.engine.coupled.simulate", cannot)
     with pytest.raises(ScenarioError, match="cannot be compiled"):
         bristle.ensemble(write(), out=tmp_path / "a")
 

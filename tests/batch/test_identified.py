@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.batch import read_ensemble, worker
-from bristle.batch.identified import Places, _fixed
-from bristle.batch.plan import Plan
-from bristle.batch.quantiles import LEVELS, VARIES, notes, quantiles
-from bristle.batch.worker import scenario_of
+from bristle.campaign import campaign, read_ensemble
+from bristle.campaign.campaign import scenario_of
+from bristle.campaign.identified import Places, _fixed
+from bristle.campaign.plan import Plan
+from bristle.campaign.table import LEVELS, VARIES, notes, quantiles
 from bristle.cli import main
-from bristle.data.model import StudyModel, new_model
-from bristle.data.model_text import model_text
 from bristle.errors import BristleError, EnsembleError, RunError
-from bristle.physics.user import defined
-from bristle.scenario.scenario import Scenario
+from bristle.model.model import StudyModel, new_model
+from bristle.model.model_file import model_text
+from bristle.system.scenario import Scenario
+from bristle.user_code.load import defined
 
 Write = Callable[..., Path]
 MASSES = '"structure.building.masses.2" = { uniform = [1.1, 1.4] }\n'
@@ -191,14 +191,14 @@ def test_a_limit_of_the_sampling_joins_no_run(
 
 def failing(monkeypatch: pytest.MonkeyPatch, above: float, error: Exception) -> None:
     """Let runs with a gas spring stiffer than `above` [N/m] fail."""
-    made = worker._numbers
+    made = campaign._numbers
 
     def numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
         if scenario.component("damper").parameters.get("gas_spring.k", 0.0) > above:
             raise error
         return made(plan, scenario)
 
-    monkeypatch.setattr(worker, "_numbers", numbers)
+    monkeypatch.setattr(campaign, "_numbers", numbers)
 
 
 def test_why_an_effect_could_not_be_simulated_is_kept(
@@ -206,7 +206,7 @@ def test_why_an_effect_could_not_be_simulated_is_kept(
 ) -> None:
     a_study(tmp_path, None, SPRING)
     path = with_study(write, (MASSES, ""), (STEADY, ""))
-    made = worker._numbers
+    made = campaign._numbers
     failing(monkeypatch, 80.0, RunError("it stops.\n  A shorter step would be right."))
     asked: dict[str, Any] = {"out": tmp_path / "out", "workers": 1, "with_limits": True}
     for _ in range(2):  # the second time from the table
@@ -217,7 +217,7 @@ def test_why_an_effect_could_not_be_simulated_is_kept(
         assert found.parts[PEAK] == {VARIES: 1.0}
         assert "(it stops)" in found.notes[0]
         assert found.notes[0] in repr(found)
-    monkeypatch.setattr(worker, "_numbers", made)
+    monkeypatch.setattr(campaign, "_numbers", made)
     found = bristle.ensemble(path, runs=8, retry=True, **asked)
     assert 0 < found.continued < 8
     assert set(found.runs["reason"]) == {""}
@@ -229,7 +229,7 @@ def test_what_an_effect_raises_costs_only_the_run_with_it(
     a_study(tmp_path, None, SPRING)
     failing(monkeypatch, 0.0, ZeroDivisionError("somebody's effect"))
     plan = read_ensemble(with_study(write, (MASSES, ""), (STEADY, "")), 4, with_limits=True)
-    found = worker.run_one(plan, 1)
+    found = campaign.run_one(plan, 1)
     assert (found.reason, found.lost) == ("", "ZeroDivisionError: somebody's effect")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.batch.passive import Motion, Passive, optimise_passive
+from bristle.campaign.best_constant import Motion, Passive, optimise_passive
 from bristle.cli import main
 from bristle.errors import BristleError
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import tomlkit
 
-from bristle.bridge.in_building import House, Shaking, loads, write_scenario
-from bristle.bridge.scenario_files import part_text
-from bristle.data.model import new_model
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.physics import user
+from bristle.learning.curve import Curve
+from bristle.learning.effect_file import effect_text
+from bristle.model.model import new_model
 from bristle.physics.building import paper_building
+from bristle.prediction.model_system import House, Shaking, loads, write_scenario
+from bristle.system.toml import part_text
 from bristle.trust import load_file
+from bristle.user_code import load
 
 TIME = 0.01 * np.arange(200)
 
@@ -28,7 +28,7 @@ def spring(tmp_path):
     file.write_text(effect_text("learned_1", curve, "made for a test, 2026"), encoding="utf-8")
     load_file(file, trust=True)
     yield file
-    user.unload_effects()
+    load.unload_effects()
 
 
 def test_the_structure_is_given_the_effect_s_file_and_values(spring, tmp_path):

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.bridge.export import export_study
-from bristle.bridge.on_bench import AGREEMENT, prediction
 from bristle.cli import main
 from bristle.fmu.description import read_description
-from bristle.identify.bench import Bench
-from bristle.identify.prepare import prepare
-from bristle.scenario.scenario import load_scenario
+from bristle.identification.histories import Bench
+from bristle.identification.prepare import prepare
+from bristle.prediction.export import export_study
+from bristle.prediction.model_system import AGREEMENT, prediction
 from bristle.study.study import Study
+from bristle.system.scenario import load_scenario
 
 STEP, LENGTH = 0.002, 1.5
 OWN = '''
@@ -255,8 +255,8 @@ def test_what_cannot_be_exported_is_said(
 def test_a_bad_effect_of_ones_own_is_left_out_with_a_note(
     bench: Study, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bristle.diagnose import Diagnosis
-    from bristle.study import learning
+    from bristle.diagnosis import Diagnosis
+    from bristle.study import steps as learning
 
     (bench.effects_folder / "own_spring.py").write_text(OWN.replace("p.k * q.x", "p.k / q.x"))
     said: list[str] = []

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from bristle import units
-from bristle.bridge.fmu import compare_fmu
-from bristle.bridge.ports import map_ports
 from bristle.cli import main
 from bristle.errors import FmuError, RecordError, RunError
 from bristle.fmu.build import ensure
 from bristle.fmu.description import Description, Variable
-from bristle.identify.bench import Bench
+from bristle.identification.histories import Bench
+from bristle.prediction.compare_fmu import compare_fmu
+from bristle.prediction.fmu_ports import map_ports
 
 DT = 0.002
 N = 1500

@@ -17,23 +17,21 @@ from shaken import building, shake
 from study.house_made import study_of
 from study.made import write_runs
 
-from bristle.bridge.closed_loop import closed_loop, closed_loop_in
-from bristle.bridge.closed_loop_figures import Figures
-from bristle.bridge.closed_loop_input import house_of, trials_in
-from bristle.bridge.closed_loop_result import ClosedLoop, Predicted
-from bristle.bridge.closed_loop_runs import Trial
-from bristle.bridge.draws import Simulator
-from bristle.bridge.in_building import House, Shaking
 from bristle.cli import main
-from bristle.data.model import StudyModel, new_model
-from bristle.data.model_draws import drawn_models
 from bristle.errors import StudyError
+from bristle.model.draws import drawn_models
+from bristle.model.model import StudyModel, new_model
 from bristle.physics.building import paper_building
 from bristle.physics.drive import drive_named
 from bristle.physics.effect import EFFECTS
 from bristle.physics.forms import joined_form
+from bristle.prediction.closed_loop import closed_loop, closed_loop_in
+from bristle.prediction.closed_loop_result import ClosedLoop, Predicted
+from bristle.prediction.excitation import Trial, house_of, trials_in
+from bristle.prediction.model_system import House, Shaking
+from bristle.prediction.monte_carlo import Figures, Simulator
 from bristle.study import Study, create_study
-from bristle.study.openings import openings
+from bristle.study.steps import openings
 
 DRAG = 8.0  # N s/m
 

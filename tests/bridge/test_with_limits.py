@@ -15,13 +15,13 @@ from bridge.test_in_closed_loop import DRAG, damper, viscous
 from shaken import building, shake
 from study.house_made import study_of
 
-from bristle.bridge import left_open
-from bristle.bridge.closed_loop import closed_loop
-from bristle.bridge.closed_loop_figures import Figures
-from bristle.bridge.closed_loop_result import ClosedLoop, Predicted
 from bristle.cli import main
-from bristle.data.model import StudyModel
 from bristle.errors import RunError, StudyError
+from bristle.model.model import StudyModel
+from bristle.prediction import monte_carlo
+from bristle.prediction.closed_loop import closed_loop
+from bristle.prediction.closed_loop_result import ClosedLoop, Predicted
+from bristle.prediction.monte_carlo import Figures
 from bristle.study import Study
 
 STIFF = 60.0  # N/m, of a spring that may be beside the damper: 4 % of the isolation's
@@ -182,14 +182,14 @@ def test_an_effect_with_which_nothing_can_be_simulated_is_in_no_band(
     rig: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Study(rig).write_verdict(verdict(SPRING, SMALL))
-    simulated = left_open._figures
+    simulated = monte_carlo._figures
 
     def figures(model: StudyModel, *rest: Any) -> Any:
         if "quadratic_damping" in model.effects:
             raise RunError("it does not come to rest.")
         return simulated(model, *rest)
 
-    monkeypatch.setattr(left_open, "_figures", figures)
+    monkeypatch.setattr(monte_carlo, "_figures", figures)
     found = closed_loop(Study(rig), draws=6, with_limits=True)
     assert found.notes[-1] == (
         "with quadratic_damping the building cannot be simulated at each of its sizes (it does not "
@@ -202,13 +202,13 @@ def test_an_effect_that_stops_one_of_its_draws_is_left_out_whole(
     rig: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Study(rig).write_verdict(verdict(SPRING, SMALL))
-    simulated = left_open._figures
+    simulated = monte_carlo._figures
 
     def figures(model: StudyModel, *rest: Any) -> Any:
         found = simulated(model, *rest)
         return ["it stops", *found[1:]] if "gas_spring" in model.effects else found
 
-    monkeypatch.setattr(left_open, "_figures", figures)
+    monkeypatch.setattr(monte_carlo, "_figures", figures)
     found = closed_loop(Study(rig), draws=6, with_limits=True)
     assert "gas_spring" not in row(found).parts
     assert any("with gas_spring" in note and "(it stops)" in note for note in found.notes)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from bristle.compare.coordinates import coordinates_of
-from bristle.compare.prediction import RunPrediction
+from bristle.comparison.predictions import RunPrediction, coordinates_of
 
 DT = 0.002
 

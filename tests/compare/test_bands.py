@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from bristle.compare.bands import spectrum
-from bristle.compare.prediction import RunPrediction
+from bristle.comparison.predictions import RunPrediction
+from bristle.comparison.spectrum import spectrum
 
 NOISE = 0.1
 

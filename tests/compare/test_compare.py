@@ -12,16 +12,16 @@ import pytest
 from matplotlib.figure import Figure
 from predictions_made import DT, motion, predictions_with
 
-from bristle.compare import compare, compare_predictions
-from bristle.compare.panels import draw_pattern, residual_map, worst_window
-from bristle.compare.prediction import halved, run_predictions
-from bristle.compare.regimes import Regime
-from bristle.compare.sentences import _where_right
+from bristle.comparison import compare, compare_predictions
+from bristle.comparison.conditions import Regime
+from bristle.comparison.panels import draw_pattern, residual_map, worst_window
+from bristle.comparison.predictions import halved, run_predictions
+from bristle.comparison.words import _where_right
 from bristle.data.left_out import MISSING
 from bristle.errors import RecordError
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem, Run
-from bristle.identify.smooth import posterior_draws, smooth
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.smoothing import posterior_draws, smooth
 
 VALUES = {"f_c": 1.2, "f_v": 0.7, "c_0": 20.0, "c_v": 6.0, "v_n": 0.1}
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from bristle import run
-from bristle.compare.prediction import run_predictions
-from bristle.identify.model import Model
-from bristle.identify.structure import StructureProblem, structure_run
+from bristle.comparison.predictions import run_predictions
+from bristle.identification.building_sites import StructureProblem, structure_run
+from bristle.identification.problem import Model
 from bristle.study import create_study
-from bristle.study.comparison import compare_study
+from bristle.study.steps import compare_study
 
 LEVELS = ("base", "floor1", "floor2")
 KINDS = ("displacement", "velocity", "acceleration_absolute")

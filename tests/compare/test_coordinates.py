@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.compare.coordinates import (
+from bristle.comparison.predictions import (
     coordinates_of,
     cut,
     late_speed,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bristle.compare.labels import LabelError, label_sentence
+from bristle.comparison.conditions import LabelError, label_sentence
 
 
 def told(z: Mapping[float, float], runs: int = 1) -> str:

@@ -5,9 +5,9 @@ import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from bristle.compare.loops import chosen_cycles, draw_cycle, ribbon, under
-from bristle.compare.prediction import RunPrediction
-from bristle.draw.cycles import by_level, cycles, largest, steady
+from bristle.comparison.panels import chosen_cycles, draw_cycle, ribbon, under
+from bristle.comparison.predictions import RunPrediction
+from bristle.data.cycles import by_level, cycles, largest, steady
 
 DT = 1e-3  # s
 TIME = np.arange(0.0, 4.0, DT)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from predictions_made import coloured, motion, predictions_with
 
-from bristle.compare.comparison import compare_predictions
-from bristle.compare.coordinates import coordinates_of
-from bristle.compare.patterns import (
+from bristle.comparison.comparison import compare_predictions
+from bristle.comparison.patterns import (
     Finder,
     block_length,
     correlation_time,
     dependence,
     residual_patterns,
 )
+from bristle.comparison.predictions import coordinates_of
 
 DT = 0.002
 

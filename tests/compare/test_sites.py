@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from predictions_made import predictions_with
 
-from bristle.compare import compare_sites
-from bristle.compare.names import site_names
-from bristle.compare.sites import site_errors
+from bristle.comparison import compare_sites
+from bristle.comparison.comparison import site_errors
+from bristle.comparison.names import site_names
 
 
 def spring(along):

@@ -13,8 +13,7 @@ from bristle.component import structure
 from bristle.data.building_file import read_building
 from bristle.errors import PhysicsError
 from bristle.fmu.catalogue import describe
-from bristle.physics.building import Building, from_data, paper_building
-from bristle.physics.device import Device, driven_mass
+from bristle.physics.building import Building, Device, driven_mass, from_data, paper_building
 
 TOWER: dict[str, Any] = {
     "schema": 1,
@@ -285,7 +284,7 @@ def test_a_device_tells_its_place_and_what_it_acts_across() -> None:
 
 
 def test_a_batch_writes_the_devices_of_a_building(tmp_path: Path) -> None:
-    from bristle.batch.buildings import write
+    from bristle.campaign.ensemble_file import write
 
     data = {**TOWER, "devices": [BRACE, TIE]}
     write(data, tmp_path / "tower.toml")

@@ -14,8 +14,8 @@ from test_conform_native import COMPILER, pytestmark
 
 from bristle.cli import main
 from bristle.conformance import conform
+from bristle.conformance.probe import in_fmi3
 from bristle.conformance.probes import PROBES
-from bristle.conformance.wording import in_fmi3
 from bristle.errors import FmuError
 from bristle.fmu.archive import library_member
 

@@ -13,18 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-import bristle.control
-from bristle.control import inverse, linear, sensing, switching
-from bristle.jit import compiled
+import bristle.component
+from bristle.component import control_laws
+from bristle.core.jit import compiled
 from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
 
 P = [parameter.value for parameter in LuGre.parameters.values()]
 BINGHAM_P = [1.3, 0.83, 100.0, 20.0, 0.02, 1.0]
 BINGHAM, LUGRE = law_code("bingham"), law_code("lugre")
-LIMITS = (inverse.STILL, inverse.LEAST_SLOPE, 8.0)
+LIMITS = (control_laws.STILL, control_laws.LEAST_SLOPE, 8.0)
 
-speeds = st.floats(inverse.STILL, 0.5)
+speeds = st.floats(control_laws.STILL, 0.5)
 signs = st.sampled_from([-1.0, 1.0])
 
 # Command, velocity, deflection, voltage, force: the reconstructed inverse law, to 10 digits.
@@ -42,9 +42,9 @@ INVERSE_TABLE = [
 
 @pytest.mark.parametrize(("u", "v", "z", "voltage", "force"), INVERSE_TABLE)
 def test_lugre_inverse_table(u: float, v: float, z: float, voltage: float, force: float) -> None:
-    V = inverse.voltage_of_law(LUGRE, P, u, v, [z], LIMITS)
+    V = control_laws.voltage_of_law(LUGRE, P, u, v, [z], LIMITS)
     assert pytest.approx(voltage, abs=5e-9) == V
-    assert inverse.force_of_law(LUGRE, P, v, V, [z]) == pytest.approx(force, abs=5e-9)
+    assert control_laws.force_of_law(LUGRE, P, v, V, [z]) == pytest.approx(force, abs=5e-9)
 
 
 @given(v=speeds, sign=signs, share=st.floats(-1.0, 1.0), V=st.floats(0.0, 8.0))
@@ -52,39 +52,41 @@ def test_lugre_inverse_gives_back_the_voltage(
     v: float, sign: float, share: float, V: float
 ) -> None:
     v, z = sign * v, share / 500.0
-    slope = inverse.force_of_law(LUGRE, P, v, 1.0, [z]) - inverse.force_of_law(
+    slope = control_laws.force_of_law(LUGRE, P, v, 1.0, [z]) - control_laws.force_of_law(
         LUGRE, P, v, 0.0, [z]
     )
-    found = inverse.voltage_of_law(
-        LUGRE, P, inverse.force_of_law(LUGRE, P, v, V, [z]), v, [z], LIMITS
+    found = control_laws.voltage_of_law(
+        LUGRE, P, control_laws.force_of_law(LUGRE, P, v, V, [z]), v, [z], LIMITS
     )
-    if abs(slope) >= inverse.LEAST_SLOPE:
-        assert found == pytest.approx(V, abs=1e-12 * 10.0 / inverse.LEAST_SLOPE)
+    if abs(slope) >= control_laws.LEAST_SLOPE:
+        assert found == pytest.approx(V, abs=1e-12 * 10.0 / control_laws.LEAST_SLOPE)
     else:
         assert 0.0 <= found <= V * (1.0 + 1e-12) + 1e-12
 
 
 @given(v=speeds, sign=signs, V=st.floats(0.0, 8.0))
 def test_bingham_inverse_gives_back_the_voltage(v: float, sign: float, V: float) -> None:
-    force = inverse.force_of_law(BINGHAM, BINGHAM_P, sign * v, V, [0.0])
-    found = inverse.voltage_of_law(BINGHAM, BINGHAM_P, force, sign * v, [0.0], LIMITS)
+    force = control_laws.force_of_law(BINGHAM, BINGHAM_P, sign * v, V, [0.0])
+    found = control_laws.voltage_of_law(BINGHAM, BINGHAM_P, force, sign * v, [0.0], LIMITS)
     assert found == pytest.approx(V, abs=1e-10)
 
 
 @given(u=st.floats(0.0, 1e3), v=speeds, sign=signs)
 def test_no_inverse_asks_a_damper_to_push(u: float, v: float, sign: float) -> None:
     z = sign / 500.0
-    assert inverse.voltage_of_law(LUGRE, P, -sign * u, sign * v, [z], LIMITS) == 0.0
-    assert inverse.voltage_of_law(BINGHAM, BINGHAM_P, -sign * u, sign * v, [0.0], LIMITS) == 0.0
+    assert control_laws.voltage_of_law(LUGRE, P, -sign * u, sign * v, [z], LIMITS) == 0.0
+    assert (
+        control_laws.voltage_of_law(BINGHAM, BINGHAM_P, -sign * u, sign * v, [0.0], LIMITS) == 0.0
+    )
 
 
 def test_estimated_deflection_is_exact_and_bounded() -> None:
     z, v, h = [0.0], 0.3, 0.02  # a_0 v h = 3: explicit Euler would diverge
     for k in range(50):
-        inverse.estimate_states(LUGRE, P, v, 4.0, h, z)
+        control_laws.estimate_states(LUGRE, P, v, 4.0, h, z)
         assert z[0] == pytest.approx((1.0 - exp(-500.0 * v * h * (k + 1))) / 500.0, rel=1e-12)
     z = [1e-3]
-    inverse.estimate_states(LUGRE, P, 0.0, 4.0, h, z)
+    control_laws.estimate_states(LUGRE, P, 0.0, 4.0, h, z)
     assert z == [1e-3]
 
 
@@ -93,29 +95,29 @@ def test_estimated_deflection_is_exact_and_bounded() -> None:
     [(5, 3, 8), (3, 5, 0), (-5, 3, 0), (-5, -3, 8), (-3, -5, 0), (0.4, 0.2, 0), (5, 0, 0)],
 )
 def test_truth_table_of_the_clipped_law(u: float, f: float, voltage: float) -> None:
-    assert switching.clipped_voltage(u, f, 0.5, 8.0) == voltage
+    assert control_laws.clipped_voltage(u, f, 0.5, 8.0) == voltage
 
 
 def test_clipped_law_does_not_answer_a_command_of_exactly_the_threshold() -> None:
-    assert switching.clipped_voltage(0.5, 0.2, 0.5, 8.0) == 0.0
-    assert switching.clipped_voltage(0.5, 0.2, 0.0, 8.0) == 8.0
+    assert control_laws.clipped_voltage(0.5, 0.2, 0.5, 8.0) == 0.0
+    assert control_laws.clipped_voltage(0.5, 0.2, 0.0, 8.0) == 8.0
 
 
 @given(w=st.floats(-1e6, 1e6), v=st.floats(-1.0, 1.0), v_max=st.floats(0.1, 1e3))
 def test_signed_voltage_stays_in_its_limits_and_maps_back(w: float, v: float, v_max: float) -> None:
-    V = switching.signed_voltage(w, v, v_max)
+    V = control_laws.signed_voltage(w, v, v_max)
     assert 0.0 <= V <= v_max
     same_side = w * (1.0 if v >= 0.0 else -1.0)
     if 0.0 <= same_side <= v_max:
-        assert switching.applied_signed(V, v) == w
+        assert control_laws.applied_signed(V, v) == w
     else:
         assert V in (0.0, v_max)
 
 
 def test_signed_voltage_takes_rest_as_forward() -> None:
-    assert switching.signed_voltage(3.0, 0.0, 8.0) == 3.0
-    assert switching.signed_voltage(-3.0, -0.0, 8.0) == 0.0
-    assert switching.signed_voltage(-3.0, -0.1, 8.0) == 3.0
+    assert control_laws.signed_voltage(3.0, 0.0, 8.0) == 3.0
+    assert control_laws.signed_voltage(-3.0, -0.0, 8.0) == 0.0
+    assert control_laws.signed_voltage(-3.0, -0.1, 8.0) == 3.0
 
 
 @pytest.mark.parametrize(
@@ -123,7 +125,7 @@ def test_signed_voltage_takes_rest_as_forward() -> None:
     [(0.0, 0), (2.4e-4, 0), (2.6e-4, 1), (-0.1, 200), (0.29999, 600), (0.3, 600), (-7.0, 600)],
 )
 def test_table_row_is_the_nearest_within_the_table(v: float, row: int) -> None:
-    assert linear.table_row(v, 0.3, 601) == row
+    assert control_laws.table_row(v, 0.3, 601) == row
 
 
 def test_linear_controller_is_its_matrices() -> None:
@@ -133,8 +135,8 @@ def test_linear_controller_is_its_matrices() -> None:
     x = rng.normal(size=n)
     flat = [matrix.ravel().tolist() for matrix in (A, B, W, C)]
     state, spare = x.tolist(), [0.0] * n
-    assert linear.command(n, flat[3], row, state) == pytest.approx(C[row] @ x)
-    linear.advance(n, *flat[:3], row, state, (0.7, -0.3), spare)
+    assert control_laws.command(n, flat[3], row, state) == pytest.approx(C[row] @ x)
+    control_laws.advance(n, *flat[:3], row, state, (0.7, -0.3), spare)
     assert state == pytest.approx(A[row] @ x + 0.7 * B[row] - 0.3 * W[row])
 
 
@@ -143,7 +145,7 @@ def test_low_pass_is_exact_for_a_signal_linear_between_samples() -> None:
     samples = [0.0, 1.0, -0.5, 0.25, 2.0, 2.0]
     filtered = 0.0
     for k in range(1, len(samples)):
-        filtered = sensing.low_passed(filtered, samples[k - 1], samples[k], corner, h)
+        filtered = control_laws.low_passed(filtered, samples[k - 1], samples[k], corner, h)
         exact = 0.0
         for j in range(k):
             slope = (samples[j + 1] - samples[j]) / h
@@ -160,41 +162,41 @@ def test_velocity_of_filtered_displacement_has_the_filters_gain_and_lag() -> Non
     filtered, before = 0.0, 0.0
     for k in range(1, 2001):
         now = 0.01 * sin(omega * k * h)
-        filtered = sensing.low_passed(filtered, before, now, corner, h)
+        filtered = control_laws.low_passed(filtered, before, now, corner, h)
         before = now
     t = 2000 * h
     response = 1j * omega * corner / (1j * omega + corner)
     exact = 0.01 * (response.real * sin(omega * t) + response.imag * cos(omega * t))
-    velocity = sensing.filtered_velocity(filtered, before, corner)
+    velocity = control_laws.filtered_velocity(filtered, before, corner)
     assert velocity == pytest.approx(exact, abs=1e-3 * 0.01 * omega)
 
 
 def test_leaky_integral_of_a_constant_is_exact() -> None:
     corner, h, total = 0.5, 0.02, 0.0
     for _ in range(100):
-        total = sensing.leaky_integral(total, 3.0, 3.0, corner, h)
+        total = control_laws.leaky_integral(total, 3.0, 3.0, corner, h)
     assert total == pytest.approx(3.0 / corner * (1.0 - exp(-corner * 2.0)), rel=1e-12)
 
 
 def test_skyhook_brakes_and_never_pushes() -> None:
-    assert sensing.skyhook_command(-0.2, 50.0) == -10.0
-    assert sensing.skyhook_switch(0.1, 0.2, 8.0) == 8.0
-    assert sensing.skyhook_switch(-0.1, -0.2, 8.0) == 8.0
-    assert sensing.skyhook_switch(0.1, -0.2, 8.0) == 0.0
-    assert sensing.skyhook_switch(0.1, 0.0, 8.0) == 0.0
+    assert control_laws.skyhook_command(-0.2, 50.0) == -10.0
+    assert control_laws.skyhook_switch(0.1, 0.2, 8.0) == 8.0
+    assert control_laws.skyhook_switch(-0.1, -0.2, 8.0) == 8.0
+    assert control_laws.skyhook_switch(0.1, -0.2, 8.0) == 0.0
+    assert control_laws.skyhook_switch(0.1, 0.0, 8.0) == 0.0
 
 
-voltage_of_law, force_of_law = inverse.voltage_of_law, inverse.force_of_law
-estimate_states = inverse.estimate_states
+voltage_of_law, force_of_law = control_laws.voltage_of_law, control_laws.force_of_law
+estimate_states = control_laws.estimate_states
 clipped, signed, applied = (
-    switching.clipped_voltage,
-    switching.signed_voltage,
-    switching.applied_signed,
+    control_laws.clipped_voltage,
+    control_laws.signed_voltage,
+    control_laws.applied_signed,
 )
-row_of, command, advance = linear.table_row, linear.command, linear.advance
-low_passed, filtered_velocity = sensing.low_passed, sensing.filtered_velocity
-leaky_integral, skyhook_command = sensing.leaky_integral, sensing.skyhook_command
-skyhook_switch = sensing.skyhook_switch
+row_of, command, advance = control_laws.table_row, control_laws.command, control_laws.advance
+low_passed, filtered_velocity = control_laws.low_passed, control_laws.filtered_velocity
+leaky_integral, skyhook_command = control_laws.leaky_integral, control_laws.skyhook_command
+skyhook_switch = control_laws.skyhook_switch
 
 
 def every_law(u, v, z, p, bingham_p, A, B, W, C, x, spare, bent, out):  # type: ignore[no-untyped-def]
@@ -248,7 +250,7 @@ def test_python_and_numba_agree() -> None:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(Path(bristle.control.__file__).parent.glob("*.py")), ids=lambda path: path.stem
+    "path", sorted(Path(bristle.component.__file__).parent.glob("*.py")), ids=lambda path: path.stem
 )
 def test_bundled_code_is_python_3_9_and_standard_library(path: Path) -> None:
     tree = ast.parse(path.read_text(), feature_version=(3, 9))

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from bristle.control import controller as file
-from bristle.control.controller import Controller, parse_controller, read_controller
+from bristle.component import controller_file as file
+from bristle.component.controller_file import Controller, parse_controller, read_controller
 from bristle.errors import DesignError
 from bristle.physics.building import paper_building
 

@@ -7,8 +7,8 @@ from math import erfc, sqrt
 import numpy as np
 import pytest
 
-from bristle.control.noise import random_words, standard_normal
-from bristle.jit import compiled
+from bristle.component.sensors import random_words, standard_normal
+from bristle.core.jit import compiled
 
 N = 100_000
 

@@ -13,17 +13,23 @@ import pytest
 
 import bristle
 from bristle.cli import main
-from bristle.control.controller import read_controller
-from bristle.controllers import ControllerComparison, Spread, compare_controllers
-from bristle.controllers.anew import task_for
-from bristle.controllers.dampers import damper_from
-from bristle.controllers.entry import BEST, LIMIT, OFF, ON
-from bristle.controllers.folder import Folder, plain_name
-from bristle.controllers.site import site_from
-from bristle.design import design
+from bristle.component.controller_file import read_controller
+from bristle.controller_comparison import ControllerComparison, Spread, compare_controllers
+from bristle.controller_comparison.candidates import task_for
+from bristle.controller_comparison.setting import (
+    BEST,
+    LIMIT,
+    OFF,
+    ON,
+    Folder,
+    damper_from,
+    plain_name,
+    site_from,
+)
 from bristle.fmu.build import build, plan
 from bristle.physics.building import PAPER
 from bristle.report.controllers_page import controllers_report
+from bristle.synthesis import design
 
 TOWER = """schema = 1
 name = "tower"

@@ -7,17 +7,21 @@ from pathlib import Path
 import pytest
 
 from bristle.cli import main
-from bristle.controllers.choice import choice_of, choices_of
-from bristle.controllers.dampers import DEFAULT, damper_from
-from bristle.controllers.entries import Maker
-from bristle.controllers.folder import Folder
-from bristle.controllers.site import site_from
-from bristle.design import design
+from bristle.controller_comparison.candidates import Maker
+from bristle.controller_comparison.setting import (
+    DEFAULT,
+    Folder,
+    choice_of,
+    choices_of,
+    damper_from,
+    site_from,
+)
 from bristle.errors import ScenarioError
 from bristle.fmu.build import build, plan
+from bristle.synthesis import design
 
 MOTION = "el_centro_1940_ns,stop=1"
-DESIGN = Path(__file__).parents[2] / "bristle" / "control" / "data" / "lqg.json"
+DESIGN = Path(__file__).parents[2] / "bristle" / "component" / "data" / "lqg.json"
 WINDY = '''"""FMU: a controller that asks for the wind."""
 
 from bristle.fmu.own_controller import OwnController

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from bristle.control.controller import read_controller
-from bristle.controllers import compare_controllers
-from bristle.design import design
+from bristle.component.controller_file import read_controller
+from bristle.controller_comparison import compare_controllers
 from bristle.fmu import catalogue
 from bristle.physics.building import PAPER
 from bristle.physics.laws import LAWS
+from bristle.synthesis import design
 
 MOTION = "el_centro_1940_ns,peak=0.4g,factor=0.45,stop=4"
 

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from bristle.data.channels import ChannelSpec
-from bristle.data.derived import derived_velocity
+from bristle.data.cut_off import derived_velocity
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.corrected import corrected
-from bristle.diagnose.sensors import sensor_faults
-from bristle.identify.prepare import prepare
+from bristle.diagnosis.prepared import corrected
+from bristle.diagnosis.sensor_faults import sensor_faults
+from bristle.identification.prepare import prepare
 
 DT = 0.01
 T = np.arange(1500) * DT

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from bristle.data.equation import equations, formulas, symbols
-from bristle.data.study_model import StudyModel, Value
+from bristle.model.equations import equations, formulas, symbols
+from bristle.model.model import StudyModel, Value
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
 

@@ -7,7 +7,7 @@ import pytest
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.checks.channels import check_channels
-from bristle.data.extra import MOST, found_in, refused_name, unit_of
+from bristle.data.extra_channels import MOST, found_in, refused_name, unit_of
 from bristle.data.guess import guess_channels
 from bristle.data.measurement import Known, Measurement, measurements_of
 from bristle.data.table import Table, from_arrays

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from bristle import data
 from bristle.data import fema, synthetic
 from bristle.errors import RecordError
-from bristle.physics.record import HEADER, read_two_column
+from bristle.physics.motion_file import HEADER, read_two_column
 
 G = 9.80665
 SHARED = Path(__file__).parents[2] / "../shared/data/ground_motion"
@@ -305,7 +305,7 @@ def test_a_conversion_that_no_fmu_would_read_is_refused(
     write: Write, tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     name = write(AT2, "a.AT2")
-    monkeypatch.setattr("bristle.data.motion.LARGEST", 100)
+    monkeypatch.setattr("bristle.data.ground_motion.LARGEST", 100)
     with pytest.raises(RecordError, match=r"these 7 samples take .* above the limit"):
         data.ground_motion_file(name, tmp_path)
     assert not cache.exists()

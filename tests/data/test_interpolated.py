@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.data.checks.recording import check_recording
-from bristle.data.interpolated import interpolated
+from bristle.data.checks.recording import check_recording, interpolated
 from bristle.data.measurement import measurements_of_frame
 
 T = 0.002 * np.arange(4000)

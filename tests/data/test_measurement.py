@@ -17,8 +17,8 @@ from bristle.data.measurement import (
     read_measurements,
 )
 from bristle.data.table import from_arrays
+from bristle.engine.results import Column, Table, to_frame, write_csv, write_parquet
 from bristle.errors import RecordError
-from bristle.simulate.results import Column, Table, to_frame, write_csv, write_parquet
 
 N = 1000
 TIME = np.arange(N) * 0.002

@@ -14,12 +14,12 @@ import pytest
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of
+from bristle.data.noise import spikes_of
 from bristle.data.pieces import pieces_of
 from bristle.data.read import read_table
-from bristle.data.spikes import spikes_of
 from bristle.data.table import Table, from_arrays, table_from_frame
 from bristle.errors import RecordError, StudyError
-from bristle.study.create import create_study
+from bristle.study.steps import create_study
 
 T = 0.01 * np.arange(120)
 TITLES = ["time [s]", "x [mm]", "F [N]"]

@@ -8,18 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.data.model import new_model
-from bristle.data.model_draws import has_covariance, joint_errors
-from bristle.data.open_effects import (
+from bristle.errors import StudyError
+from bristle.model.draws import (
     LeftOpen,
     OpenEffect,
+    has_covariance,
     in_short,
+    joint_errors,
     left_open,
     open_effects,
     simulated_whole,
     widest,
 )
-from bristle.errors import StudyError
+from bristle.model.model import new_model
 
 SPRING = {
     "effect": "gas_spring", "parameter": "k", "unit": "N/m", "side": "below", "limit95": 40.0,

@@ -7,9 +7,9 @@ import pytest
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.corrections import Correction
+from bristle.data.decimate import in_time
 from bristle.data.measurement import Known, measurements_of
 from bristle.data.read import read_table
-from bristle.data.timing import in_time
 
 
 def placed(channels, corrections, step=0.002, begin=0.0):

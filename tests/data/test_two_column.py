@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bristle.errors import PhysicsError
-from bristle.physics import record
-from bristle.physics.record import HEADER, Motion, interpolate, read_two_column
+from bristle.physics import motion_file
+from bristle.physics.motion_file import HEADER, Motion, interpolate, read_two_column
 
 Write = Callable[..., Path]
 
@@ -169,15 +169,15 @@ def test_search_takes_few_looks_at_the_times(spacing: str) -> None:
 
 
 def test_gap_is_measured_against_the_median() -> None:
-    assert record.median([3.0, 1.0, 2.0]) == 2.0
-    assert record.median([4.0, 1.0, 2.0, 3.0]) == 2.5
+    assert motion_file.median([3.0, 1.0, 2.0]) == 2.0
+    assert motion_file.median([4.0, 1.0, 2.0, 3.0]) == 2.5
     times = [0.0, 1.0, 2.0, 3.6, 5.2, 6.8]  # median 1.6
     assert max(after - before for before, after in pairwise(times)) < 1.5 * 1.6
-    record.check_times(times, range(2, 8), "file")
+    motion_file.check_times(times, range(2, 8), "file")
 
 
 def test_source_is_of_python_3_9_and_the_standard_library() -> None:
-    tree = ast.parse(Path(record.__file__).read_text("utf-8"), feature_version=(3, 9))
+    tree = ast.parse(Path(motion_file.__file__).read_text("utf-8"), feature_version=(3, 9))
     imported = {
         node.module if isinstance(node, ast.ImportFrom) else alias.name
         for node in ast.walk(tree)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bristle.design import DesignResult, Task, design
+from bristle.synthesis import DesignResult, Task, design
 
 
 @pytest.fixture(scope="session")

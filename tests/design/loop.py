@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.control import inverse, linear, switching
-from bristle.control.controller import Controller
+from bristle.component import control_laws
+from bristle.component.controller_file import Controller
+from bristle.core.jit import compiled
 from bristle.data import read_ground_motion
-from bristle.jit import compiled
 from bristle.physics.building import paper_building
 from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
@@ -33,14 +33,14 @@ PASSIVE, CLIPPED, INVERSE, BINGHAM_INVERSE, LPV, LQG = range(6)
 P = tuple(parameter.value for parameter in LuGre.parameters.values())
 BINGHAM_P = (1.3, 0.83, 100.0, 20.0, 0.02, 1.0)
 
-clipped_voltage = switching.clipped_voltage
-signed_voltage = switching.signed_voltage
-applied_signed = switching.applied_signed
+clipped_voltage = control_laws.clipped_voltage
+signed_voltage = control_laws.signed_voltage
+applied_signed = control_laws.applied_signed
 LUGRE_CODE, BINGHAM_CODE = law_code("lugre"), law_code("bingham")
-voltage_of_law, force_of_law = inverse.voltage_of_law, inverse.force_of_law
-estimate_states = inverse.estimate_states
-table_row, command, advance = linear.table_row, linear.command, linear.advance
-STILL, LEAST_SLOPE = inverse.STILL, inverse.LEAST_SLOPE
+voltage_of_law, force_of_law = control_laws.voltage_of_law, control_laws.force_of_law
+estimate_states = control_laws.estimate_states
+table_row, command, advance = control_laws.table_row, control_laws.command, control_laws.advance
+STILL, LEAST_SLOPE = control_laws.STILL, control_laws.LEAST_SLOPE
 
 
 def plant_force(z, v, V):  # type: ignore[no-untyped-def]

@@ -20,8 +20,8 @@ from loop import (
     run,
 )
 
-from bristle.control.controller import Controller, read_controller
-from bristle.design import DesignResult
+from bristle.component.controller_file import Controller, read_controller
+from bristle.synthesis import DesignResult
 
 EL_CENTRO, SYLMAR = "el_centro_1940_ns", "northridge_1994_sylmar_360"
 NEWHALL = "northridge_1994_newhall_360_peer_rsn1044.csv"

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from bristle.design import Task, design
-from bristle.design.lpv import plants_at
-from bristle.design.plant import structure
-from bristle.design.sliding import Damper, coefficients
 from bristle.physics.building import paper_building
+from bristle.synthesis import Task, design
+from bristle.synthesis.damper import Damper, coefficients
+from bristle.synthesis.kinds import plants_at
+from bristle.synthesis.plant import structure
 
 GRID = np.array([0.0, 0.01, 0.1, 0.3])
 GAS = Damper("lugre", {"gas_spring.k": 400.0}, ("gas_spring",))

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bristle.design import Task, Weight, damper_from_model, read_task
 from bristle.errors import DesignError, PhysicsError
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
+from bristle.synthesis import Task, Weight, damper_from_model, read_task
 
 HEAD = 'schema = 1\nkind = "lpv"\n'
 

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bristle.design import Task, design
-from bristle.design.passive import Share
-from bristle.design.plant import structure
 from bristle.errors import DesignError, PhysicsError
 from bristle.physics.building import Building, from_data, paper_building
+from bristle.synthesis import Task, design
+from bristle.synthesis.plant import Share, structure
 
 TOWER: dict[str, Any] = {
     "schema": 1,

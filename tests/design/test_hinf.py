@@ -9,24 +9,23 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from bristle.control.controller import parse_controller
-from bristle.design import (
+from bristle.component.controller_file import parse_controller
+from bristle.errors import DesignError
+from bristle.physics.building import Building, from_data, paper_building
+from bristle.synthesis import (
     Damper,
     DesignResult,
     LqgWeights,
     Task,
     Weight,
     Weights,
+    analysis,
     design,
     lmi,
-    verify,
 )
-from bristle.design.norms import hinf_norm
-from bristle.design.plant import Plant, balancing, generalized, structure
-from bristle.design.responses import responses
-from bristle.design.table import Bank, sampled
-from bristle.errors import DesignError
-from bristle.physics.building import Building, from_data, paper_building
+from bristle.synthesis.analysis import hinf_norm, responses
+from bristle.synthesis.plant import Plant, balancing, generalized, structure
+from bristle.synthesis.sampling import Bank, sampled
 
 STILL = np.zeros(1)
 
@@ -222,7 +221,7 @@ def test_a_wrong_solution_is_refused_with_numbers(
     with pytest.raises(DesignError, match="least eigenvalue"):
         lmi._certified(replace(solution, X0=-solution.X0), [balanced])
     with pytest.raises(DesignError, match="above the bound"):
-        verify.check_bound(np.array([5.0, 6.1]), 6.0, np.array([0.0, 0.1]))
+        analysis.check_bound(np.array([5.0, 6.1]), 6.0, np.array([0.0, 0.1]))
 
 
 def test_a_solution_that_does_not_hold_is_sought_again_with_a_margin(
@@ -250,9 +249,9 @@ def test_a_solution_that_does_not_hold_is_sought_again_with_a_margin(
 def test_an_unstable_loop_is_refused(hinf: DesignResult) -> None:
     turned = hinf.bank._replace(C=-20.0 * hinf.bank.C)
     with pytest.raises(DesignError, match="closed loop is unstable"):
-        verify.closed_loop_norms(hinf.plants, turned, STILL)
+        analysis.closed_loop_norms(hinf.plants, turned, STILL)
     with pytest.raises(DesignError, match=r"sampled at 0\.002 s"):
-        verify.check_sampled_loop(hinf.plants, sampled(turned, 0.002), STILL, 0.002)
+        analysis.check_sampled_loop(hinf.plants, sampled(turned, 0.002), STILL, 0.002)
 
 
 def test_lqg_is_the_optimal_regulator(lqg: DesignResult) -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from bristle.control.controller import Controller
-from bristle.design import Damper, DesignResult, Scheduling, Task, design, lmi
-from bristle.design.lpv import _frame, gammas, plants_at
-from bristle.design.responses import responses
-from bristle.design.table import reconstruct
+from bristle.component.controller_file import Controller
 from bristle.errors import DesignError
+from bristle.synthesis import Damper, DesignResult, Scheduling, Task, design, lmi
+from bristle.synthesis.analysis import responses
+from bristle.synthesis.kinds import _frame, gammas, plants_at
+from bristle.synthesis.sampling import reconstruct
 
 FINE = (0.0, 0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.08, 0.15, 0.3)
 

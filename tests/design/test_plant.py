@@ -8,8 +8,11 @@ import control
 import numpy as np
 import pytest
 
-from bristle.design.norms import gains, hinf_norm, least_gamma
-from bristle.design.plant import (
+from bristle.errors import DesignError
+from bristle.physics.building import Building, frequencies, from_data, paper_building
+from bristle.synthesis.analysis import gains, hinf_norm, least_gamma
+from bristle.synthesis.damper import Damper, coefficients, stiffness
+from bristle.synthesis.plant import (
     Plant,
     StateSpace,
     balancing,
@@ -18,10 +21,7 @@ from bristle.design.plant import (
     generalized,
     structure,
 )
-from bristle.design.sliding import Damper, coefficients, stiffness
-from bristle.design.weights import Weight, Weights
-from bristle.errors import DesignError
-from bristle.physics.building import Building, frequencies, from_data, paper_building
+from bristle.synthesis.weights import Weight, Weights
 
 GRID = np.array([0.0, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3])
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from bristle.cli import main
-from bristle.control.controller import KINDS
-from bristle.design import Damper, LqgWeights, Scheduling, Task, Weight, Weights, implausible
+from bristle.component.controller_file import KINDS
 from bristle.errors import DesignError
 from bristle.physics.building import frequencies, paper_building
+from bristle.synthesis import Damper, LqgWeights, Scheduling, Task, Weight, Weights, implausible
 
 FASTEST = frequencies(paper_building())[-1]
 MILLION = 1e6

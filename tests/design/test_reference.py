@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from benchmarks.paper import reference
-from bristle.control.controller import Controller, read_controller
-from bristle.design import DesignResult, Task
+from bristle.component.controller_file import Controller, read_controller
 from bristle.errors import DesignError
 from bristle.physics.building import paper_building
+from bristle.synthesis import DesignResult, Task
 
 
 @pytest.mark.parametrize("kind", ["hinf", "lpv", "lqg"])
@@ -77,7 +77,9 @@ def test_a_failing_design_answers_2(
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "seconds"), [("hinf", 5.0), ("lpv", 15.0)])
 def test_a_design_in_a_fresh_process_is_quick(kind: str, seconds: float) -> None:
-    code = f"from bristle.design import Task, design; print(design(Task({kind!r})).facts['gamma'])"
+    code = (
+        f"from bristle.synthesis import Task, design; print(design(Task({kind!r})).facts['gamma'])"
+    )
     begin = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert time.perf_counter() - begin < seconds

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from shaken import building, measured, shake
 
-from bristle.diagnose.building_prior import moved, moved_numbers, within_prior
-from bristle.diagnose.rule import BENCH
-from bristle.identify.fit import Model
-from bristle.identify.response import responses
-from bristle.identify.site_fit import fit_damper
-from bristle.identify.structure import problems_of
+from bristle.diagnosis.building_numbers import moved, moved_numbers, within_prior
+from bristle.diagnosis.rule import BENCH
+from bristle.identification.building_motion import responses
+from bristle.identification.building_sites import problems_of
+from bristle.identification.problem import Model
+from bristle.identification.rig_fit import fit_damper
 
 
 def dashpot(x, v):

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from bristle.diagnose import candidates
-from bristle.progress import telling
+from bristle.core.progress import telling
+from bristle.diagnosis import trials
 
 COSTS = {"gas_spring": 0.5, "stribeck": 1.9}
 
@@ -34,12 +34,12 @@ def test_what_each_effect_leaves_of_the_cost_is_told(monkeypatch: pytest.MonkeyP
         "ranked_guesses": lambda *_: [], "short_search": searched, "judge": judged,
         "refine": lambda model, *_: model,
     }.items():  # fmt: skip
-        monkeypatch.setattr(candidates, name, made)
+        monkeypatch.setattr(trials, name, made)
     said: list[str] = []
     held_out: Any = SimpleNamespace(expectation=lambda _: None)
     base: Any = Model()
     with telling(said.append):
-        candidates.try_all(base, held_out, held_out)
+        trials.try_all(base, held_out, held_out)
     text = "\n".join(said)
     assert re.search(r"effect \d of 2, gas_spring; 25 % of the cost remains; best so far", text)
     assert re.search(r"effect \d of 2, stribeck; 95 % of the cost remains", text)

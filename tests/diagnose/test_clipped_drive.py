@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 from test_starts import LAW, recorded_rig
 
-from bristle.diagnose import opening
-from bristle.diagnose.corrected import corrected
-from bristle.diagnose.diagnosis import diagnose
-from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.opening import _left
+from bristle.diagnosis import prepared
+from bristle.diagnosis.diagnosis import diagnose
+from bristle.diagnosis.prepared import _left, corrected
+from bristle.diagnosis.sensor_faults import SensorFault
 
 
 def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
@@ -25,7 +24,7 @@ def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
 def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
     runs = recorded_rig((), {})
     cut = SensorFault("voltage", "clipping", 1.0, 0.0, "The voltage stands at its end.")
-    monkeypatch.setattr(opening, "sensor_faults", lambda _runs: [cut])
+    monkeypatch.setattr(prepared, "sensor_faults", lambda _runs: [cut])
     every = [replace(run, channels={**run.channels, "voltage": np.ones(3000)}) for run in runs]
     found = diagnose(every[:2], every[2:], law="bingham", values=LAW)
     assert found.kind == "insufficient"

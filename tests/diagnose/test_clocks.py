@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from shaken import measured
 
-from bristle.diagnose.candidates import judge
-from bristle.diagnose.clocks import clock_faults, clocks_of
-from bristle.diagnose.corrected import corrected
-from bristle.diagnose.faults import SensorFault, instruments_of
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem, Run, fit
+from bristle.diagnosis.clocks import clock_faults, clocks_of
+from bristle.diagnosis.prepared import corrected
+from bristle.diagnosis.sensor_faults import SensorFault, instruments_of
+from bristle.diagnosis.trials import judge
+from bristle.identification.fit import fit
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
 
 STEP = 0.002  # s
 T = STEP * np.arange(5000)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.decision import decide, missing
-from bristle.diagnose.rule import BENCH
-from bristle.identify.fit import Model
+from bristle.diagnosis.decision import decide, missing
+from bristle.diagnosis.rule import BENCH
+from bristle.diagnosis.trials import Trial
+from bristle.identification.problem import Model
 
 SAMPLES = 6000
 NOISE = np.random.default_rng(1).standard_normal(SAMPLES) ** 2

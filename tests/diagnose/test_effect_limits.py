@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from bristle.cli.diagnose import _not_excited
-from bristle.diagnose.effect_limits import NO_AMOUNT, EffectLimit, effect_limits, limit_of
-from bristle.diagnose.effect_size import Known, Sized
-from bristle.diagnose.resolved_size import STANDS_OUT, resolved
-from bristle.diagnose.verdict_text import limit_rows
-from bristle.diagnose.view import verdict_view
-from bristle.identify.fit import Model, intervals_of
-from bristle.identify.residuals import residuals
-from bristle.identify.search import HUBER
-from bristle.identify.search_context import refine
+from bristle.diagnosis.effect_limits import NO_AMOUNT, EffectLimit, effect_limits, limit_of
+from bristle.diagnosis.effect_size import STANDS_OUT, Known, Sized, resolved
+from bristle.diagnosis.view import verdict_view
+from bristle.diagnosis.words import limit_rows
+from bristle.identification.fit import intervals_of
+from bristle.identification.problem import Model, residuals
+from bristle.identification.search import HUBER
+from bristle.identification.start_grid import refine
 from bristle.physics.effect import EFFECTS
 from bristle.view.blocks import Table
 from tests.diagnose.test_limits import VALUES, T, problem_of, steady, steps

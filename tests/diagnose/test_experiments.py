@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from test_starts import LAW, recorded_rig
 
-from bristle.diagnose.corrected import corrected
-from bristle.diagnose.experiments import _contrast, _plans, _run, separating
-from bristle.identify.fit import Model, Problem, Run
-from bristle.identify.prepare import prepare
+from bristle.diagnosis.experiments import _contrast, _plans, _run, separating
+from bristle.diagnosis.prepared import corrected
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem, Run
 
 N = 1000
 FORCE, SLOPE = np.random.default_rng(3).standard_normal((2, N))
@@ -81,7 +81,7 @@ def _sine(amplitude: float, frequency: float, dt: float) -> Run:
 
 
 def _run_of(samples: int):
-    from bristle.diagnose.experiments import Experiment
+    from bristle.diagnosis.experiments import Experiment
 
     whole = _run(Experiment(0.01, 1.0, 1.0, (0.0, 0.0), 1.0), 12.0 / (samples - 1), 1.0)
     assert len(whole.x) == samples

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.finding import Finding
-from bristle.diagnose.gains import gains_of
-from bristle.diagnose.verdict_text import sentences
-from bristle.identify.fit import Model
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.trials import Trial
+from bristle.diagnosis.verdict import gains_of
+from bristle.diagnosis.words import sentences
+from bristle.identification.problem import Model
 
 NOISE = np.random.default_rng(1).standard_normal(6000) ** 2
 

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from bristle.cli.diagnose import _next
-from bristle.diagnose.candidates import judge
-from bristle.diagnose.conclusion import About, conclude
-from bristle.diagnose.decision import OTHER_FORM
-from bristle.diagnose.finding import Finding
-from bristle.diagnose.inconsistent_runs import contradicted, groups, inconsistent_runs
-from bristle.diagnose.odd_run import odd_run
-from bristle.diagnose.opening import Opening
-from bristle.identify.fit import fit, identify
-from bristle.identify.site_fit import joined
+from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.decision import OTHER_FORM
+from bristle.diagnosis.inconsistent_runs import contradicted, groups, inconsistent_runs, odd_run
+from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.trials import judge
+from bristle.identification.fit import fit, identify
+from bristle.identification.rig_fit import joined
 from tests.identify.truths import hidden_case, true_case
 
 

@@ -7,26 +7,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.finding import Finding
-from bristle.diagnose.law_choice import (
+from bristle.diagnosis.law_choice import (
+    LawVerdict,
     Pair,
     as_good,
     best_of,
     choose,
     clearly_worse,
     equivalents,
+    rows_of,
     search,
     simplest,
     survivors,
 )
-from bristle.diagnose.law_text import law_sentences, law_table
-from bristle.diagnose.law_trials import LawTrial
-from bristle.diagnose.law_verdict import LawVerdict, rows_of
-from bristle.diagnose.rule import BENCH
-from bristle.diagnose.verdict_text import headline
-from bristle.identify.error import ForceError
-from bristle.identify.fit import Model
+from bristle.diagnosis.law_trials import LawTrial
+from bristle.diagnosis.rule import BENCH
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.trials import Trial
+from bristle.diagnosis.words import headline, law_sentences, law_table
+from bristle.identification.error import ForceError
+from bristle.identification.problem import Model
 from bristle.physics.laws import base_and_variant
 
 SAMPLES = 6000

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from shaken import building, measured, shake
 
-from bristle.diagnose import law_trials
-from bristle.diagnose.equilibrium import BuildingRuns
-from bristle.diagnose.law_free import diagnose_laws
-from bristle.diagnose.opening import silent
+from bristle.diagnosis import law_trials
+from bristle.diagnosis.joint_search import diagnose_laws
+from bristle.diagnosis.prepared import silent
+from bristle.diagnosis.rig_runs import BuildingRuns
 from bristle.errors import RecordError
-from bristle.identify.model import Model
-from bristle.identify.structure import ANY_LAW, blind_at_rest
+from bristle.identification.building_sites import ANY_LAW, blind_at_rest
+from bristle.identification.problem import Model
 
 HOUSE = building(1, True, 3)
 FEW = ("tanh", "dahl")

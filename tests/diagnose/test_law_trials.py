@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.data.checks.levels import tells_a_bend
-from bristle.diagnose import law_trials
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.law_text import left_out
-from bristle.diagnose.law_trials import LawTrial, better_law, not_finite, try_laws
-from bristle.identify.error import ForceError
-from bristle.identify.fit import Model, Problem
-from bristle.identify.rig import bench_rig
+from bristle.data.checks.runs import tells_a_bend
+from bristle.diagnosis import law_trials
+from bristle.diagnosis.law_trials import LawTrial, better_law, not_finite, try_laws
+from bristle.diagnosis.trials import Trial
+from bristle.diagnosis.words import left_out
+from bristle.identification.error import ForceError
+from bristle.identification.problem import Model, Problem
+from bristle.identification.rig import bench_rig
 from bristle.study.inputs import measurements
 from tests.study.made import bench_run
 

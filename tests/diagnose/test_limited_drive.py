@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.data.command_limits import limited
-from bristle.data.corrections import Correction, set_right, wrong_value
-from bristle.diagnose.candidates import judge
-from bristle.diagnose.corrected import corrected
-from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.limited_drive import limited_drive
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem, Run, fit
+from bristle.data.corrections import Correction, limited, set_right, wrong_value
+from bristle.diagnosis.command_range import limited_drive
+from bristle.diagnosis.prepared import corrected
+from bristle.diagnosis.sensor_faults import SensorFault
+from bristle.diagnosis.trials import judge
+from bristle.identification.fit import fit
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
 
 DT, N, NOISE = 0.002, 2500, 0.05
 T = DT * np.arange(N)

@@ -8,11 +8,11 @@ import pytest
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.limits import detectable, untestable
-from bristle.diagnose.rule import BENCH
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem
-from bristle.identify.prepare import prepare
+from bristle.diagnosis.effect_limits import detectable, untestable
+from bristle.diagnosis.rule import BENCH
+from bristle.identification.histories import Bench
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem
 
 STEP = 0.002
 T = STEP * np.arange(3000)

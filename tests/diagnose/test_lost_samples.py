@@ -7,12 +7,11 @@ import pytest
 
 from bristle.data.cut_off import beyond_range
 from bristle.data.left_out import MISSING
-from bristle.diagnose.candidates import judge
-from bristle.diagnose.decision import missing
-from bristle.diagnose.limits import detectable
-from bristle.identify.model import Model, Problem, Run
-from bristle.identify.residuals import robust_z
-from bristle.identify.table import error_rms
+from bristle.diagnosis.decision import missing
+from bristle.diagnosis.effect_limits import detectable
+from bristle.diagnosis.trials import judge
+from bristle.identification.error_table import error_rms
+from bristle.identification.problem import Model, Problem, Run, robust_z
 
 DT = 0.002
 T = np.arange(0.0, 24.0, DT)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.finding import Finding
-from bristle.diagnose.low_pass import low_pass_text
-from bristle.identify.fit import Model
+from bristle.diagnosis.load_cell import low_pass_text
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.trials import Trial
+from bristle.identification.problem import Model
 from bristle.physics.effects.delay import Delay
 
 

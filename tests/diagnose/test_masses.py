@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
-from bristle.diagnose.load_cell import load_cell
-from bristle.diagnose.masses import Shaken, suited_masses, text_of_masses, with_masses
-from bristle.diagnose.rule import SITE
-from bristle.diagnose.sites import look_at
-from bristle.identify.response import responses
+from bristle.diagnosis.building_numbers import Shaken, suited_masses, text_of_masses, with_masses
+from bristle.diagnosis.load_cell import load_cell
+from bristle.diagnosis.rule import SITE
+from bristle.diagnosis.site import look_at
+from bristle.identification.building_motion import responses
 
 DOUBTS = (
     [0.02, -0.03, 0.025],

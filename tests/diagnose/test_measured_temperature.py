@@ -13,16 +13,17 @@ import pytest
 from bristle.data.guess import guess_channels
 from bristle.data.measurement import Known, measurements_of
 from bristle.data.table import table_from_frame
-from bristle.diagnose.candidates import joinable, judge
-from bristle.diagnose.effect_words import effect_words
-from bristle.diagnose.finding import Finding
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.trials import joinable, judge
+from bristle.diagnosis.words import effect_words
 from bristle.errors import PhysicsError
 from bristle.fmu.model_description import unit_definitions
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem, Run, fit
-from bristle.identify.search_context import refine
-from bristle.identify.start_grid import initial_guesses
-from bristle.physics.effect import EFFECTS, Effect, Parameter
+from bristle.identification.fit import fit
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.start_grid import initial_guesses, refine
+from bristle.physics.effect import EFFECTS, Effect
+from bristle.physics.parameter import Parameter
 
 NAME = "measured_temperature"
 DT, N, NOISE = 0.002, 2000, 0.05

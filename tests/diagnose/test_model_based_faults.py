@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.diagnose.candidates import judge
-from bristle.diagnose.inconsistent_runs import inconsistent_runs
-from bristle.diagnose.model_based_faults import model_based_fault
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem, Run, identify
+from bristle.diagnosis.inconsistent_runs import inconsistent_runs
+from bristle.diagnosis.model_faults import model_based_fault
+from bristle.diagnosis.trials import judge
+from bristle.identification.fit import identify
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
 
 DT, N, NOISE = 0.002, 3000, 0.03
 T = DT * np.arange(N)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bristle.diagnose.opening import ENOUGH, FEWEST, MANY, part_of
-from bristle.identify.fit import Problem, Run
+from bristle.diagnosis.prepared import ENOUGH, FEWEST, MANY, part_of
+from bristle.identification.problem import Problem, Run
 
 
 def runs(count, samples):

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bristle.diagnose.view import draw_verdict
+from bristle.diagnosis.view import draw_verdict
 
 LAWS = {"law": "dahl", "command": "quadratic", "laws": [{"law": "dahl", "command": "quadratic"}]}
 PAIR: dict[str, Any] = {

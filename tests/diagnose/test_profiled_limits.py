@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.diagnose.effect_limits import EffectLimit, limit_of
-from bristle.diagnose.effect_size import Known, Sized
-from bristle.diagnose.profiled_limits import profiled
-from bristle.identify.model import Model, Problem, Run
-from bristle.identify.search_context import refine
+from bristle.diagnosis.effect_limits import EffectLimit, limit_of, profiled
+from bristle.diagnosis.effect_size import Known, Sized
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.start_grid import refine
 
 TRUE = Model("bingham", values={"f_c": 5.0, "c_0": 20.0, "v_n": 100.0}, fixed=("f_v", "c_v", "v_n"))
 
@@ -100,7 +99,7 @@ def test_what_has_no_size_stays_as_it_is(known: Known) -> None:
 
 def test_the_command_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from bristle.cli import main
-    from bristle.study import learning
+    from bristle.study import steps as learning
 
     asked: dict[str, object] = {}
 

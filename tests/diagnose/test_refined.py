@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnose import Diagnosis
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.finding import Finding
-from bristle.identify.model import Model
+from bristle.diagnosis import Diagnosis
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.trials import Trial
+from bristle.identification.problem import Model
 
 EMPTY = np.zeros(0)
 BEFORE = Trial(Model("bingham", (), {"f_c": 1.0}), 5.0, 5.0, 1.0, EMPTY, EMPTY)

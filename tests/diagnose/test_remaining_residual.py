@@ -7,14 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bristle.compare.patterns import LEVEL, ResidualPattern
+from bristle.comparison.patterns import LEVEL, ResidualPattern
 from bristle.data.left_out import MISSING
-from bristle.diagnose import remaining_residual
-from bristle.diagnose.conclusion import About, conclude
-from bristle.diagnose.finding import Finding
-from bristle.diagnose.remaining_residual import most_telling, patterns_of, ringing
-from bristle.diagnose.rule import BENCH
-from bristle.identify.model import Problem, Run
+from bristle.diagnosis import remaining
+from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.remaining import most_telling, patterns_of, ringing
+from bristle.diagnosis.rule import BENCH
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.identification.problem import Problem, Run
 
 NONE = np.zeros(0)
 
@@ -31,7 +31,7 @@ def rings(monkeypatch: pytest.MonkeyPatch):
     """Return what sets the share of a residual's power in a narrow band."""
 
     def answer(share: float) -> None:
-        monkeypatch.setattr(remaining_residual, "ringing", lambda trial, held_out: share)
+        monkeypatch.setattr(remaining, "ringing", lambda trial, held_out: share)
 
     answer(0.0)
     return answer

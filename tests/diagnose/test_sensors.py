@@ -9,13 +9,12 @@ import pandas as pd
 import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
+from bristle.core.text import quantity
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.clipping import clipped
-from bristle.diagnose.corrected import corrected
-from bristle.diagnose.sensors import sensor_faults
-from bristle.diagnose.verdict_text import fault_rows
-from bristle.quantity import quantity
+from bristle.diagnosis.prepared import corrected
+from bristle.diagnosis.sensor_faults import clipped, sensor_faults
+from bristle.diagnosis.words import fault_rows
 
 STEP, SECONDS, NOISE = 0.002, 10.0, 0.01
 T = STEP * np.arange(round(SECONDS / STEP))

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.candidates import joinable, short_search
-from bristle.identify.fit import Model, Problem, identify
-from bristle.identify.prepare import prepare
-from bristle.identify.search_context import refine
-from bristle.identify.start_grid import SearchContext, initial_guesses, ranked_guesses
+from bristle.diagnosis.trials import joinable, short_search
+from bristle.identification.fit import identify
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem
+from bristle.identification.start_grid import SearchContext, initial_guesses, ranked_guesses, refine
 from bristle.physics.effect import EFFECTS
 
 DT, RATE = 0.002, 500.0

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
-from bristle.diagnose import damper as of_damper
-from bristle.diagnose import diagnose_rig, equilibrium, trials
-from bristle.diagnose.candidates import Trial, judge
-from bristle.diagnose.conclusion import About, conclude, lookalikes
-from bristle.diagnose.decision import Decision
-from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.finding import Finding, of_decision
-from bristle.diagnose.inconsistent_runs import kind_of
-from bristle.diagnose.load_cell import load_cell
-from bristle.diagnose.opening import IN_BUILDING, Opening
-from bristle.diagnose.rule import BENCH, INSIDE
-from bristle.diagnose.sites import look_at, shortened
+from bristle.diagnosis import diagnose_rig, rig_runs
+from bristle.diagnosis import site as of_damper
+from bristle.diagnosis.conclusion import About, conclude, lookalikes
+from bristle.diagnosis.decision import Decision
+from bristle.diagnosis.inconsistent_runs import kind_of
+from bristle.diagnosis.load_cell import load_cell
+from bristle.diagnosis.prepared import IN_BUILDING, Opening
+from bristle.diagnosis.rule import BENCH, INSIDE
+from bristle.diagnosis.sensor_faults import SensorFault
+from bristle.diagnosis.site import look_at, shortened
+from bristle.diagnosis.site_diagnosis import Finding, of_decision
+from bristle.diagnosis.trials import Trial, judge
 from bristle.errors import RecordError
-from bristle.identify.fit import Model
-from bristle.identify.response import responses
-from bristle.identify.structure import StructureProblem, problems_of
+from bristle.identification.building_motion import responses
+from bristle.identification.building_sites import StructureProblem, problems_of
+from bristle.identification.problem import Model
 from bristle.physics.effect import EFFECTS
 
 
@@ -303,7 +303,7 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
         asked.append(given)
         return [trial(("gas_spring",), z)]
 
-    monkeypatch.setattr(trials, "try_all", search)
+    monkeypatch.setattr(of_damper, "try_all", search)
     none = StructureProblem([])
     inside = Opening(trial((), z, train), none, none, part=none, rule=INSIDE, scope=IN_BUILDING)
     found, _ = of_damper.look_at_damper(inside)
@@ -363,10 +363,10 @@ def test_a_load_cell_that_rounds_is_put_on_the_model_and_not_taken_back():
     def told(effect, z):
         return Finding("force", "effect", (effect,), 4.0, z, 0.9, 0.01, coordinate="0.0125 s")
 
-    assert equilibrium._rounded(told("delay", 1.9))
-    assert not equilibrium._rounded(told("delay", 1.02)), "moved ahead it fits: a plain delay"
-    assert not equilibrium._rounded(told("force_gain", 1.9))
-    model = equilibrium._late(Model("lugre", ("gas_spring",)), told("delay", 1.9))
+    assert rig_runs._rounded(told("delay", 1.9))
+    assert not rig_runs._rounded(told("delay", 1.02)), "moved ahead it fits: a plain delay"
+    assert not rig_runs._rounded(told("force_gain", 1.9))
+    model = rig_runs._late(Model("lugre", ("gas_spring",)), told("delay", 1.9))
     assert model.effects == ("gas_spring", "delay")
     assert model.value("delay.time") == 0.0125
 

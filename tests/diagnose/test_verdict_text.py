@@ -6,18 +6,11 @@ import json
 
 import pytest
 
-from bristle.diagnose.conclusion import About, conclude
-from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.finding import Finding
-from bristle.diagnose.verdict_file import current
-from bristle.diagnose.verdict_text import (
-    TONES,
-    fault_rows,
-    fault_texts,
-    headline,
-    sentences,
-    untestable,
-)
+from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.sensor_faults import SensorFault
+from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.verdict import current
+from bristle.diagnosis.words import TONES, fault_rows, fault_texts, headline, sentences, untestable
 from bristle.errors import StudyError
 from bristle.study.history import History
 from bristle.study.study import Study

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from test_model_based_faults import problems
 
-from bristle.diagnose import damper as of_damper
-from bristle.diagnose.candidates import judge
-from bristle.diagnose.decision import Decision
-from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.opening import Opening
-from bristle.diagnose.zero import free_zero, renewed_zero, zero_fault
-from bristle.identify.fit import Model, identify
-from bristle.identify.residuals import errors, has_offset, robust_z, zero_of
+from bristle.diagnosis import site as of_damper
+from bristle.diagnosis.decision import Decision
+from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.sensor_faults import SensorFault
+from bristle.diagnosis.site import free_zero, renewed_zero, zero_fault
+from bristle.diagnosis.trials import judge
+from bristle.identification.fit import identify
+from bristle.identification.problem import Model, errors, has_offset, robust_z, zero_of
 
 OFFSET = 0.6
 HIDDEN = {"effects": ("stribeck",), "values": {"stribeck.rise": 0.5}}

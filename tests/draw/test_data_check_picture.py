@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from bristle.data.measurement import measurements_of_frame
-from bristle.draw.data_check import draw_data_check
+from bristle.study.pictures import draw_data_check
 
 DT = 0.01
 

@@ -5,10 +5,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from bristle.data.equation import formulas
-from bristle.draw.mathml import formula_html
+from bristle.model.equations import formulas
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
+from bristle.view.formula import formula_html
 
 
 def tree(formula: str) -> ElementTree.Element:

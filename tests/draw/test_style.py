@@ -1,6 +1,6 @@
 """Headings of figures: lines that fit, and no unit alone on the last one."""
 
-from bristle.draw.style import Page
+from bristle.view.style import Page
 
 HEADING = "plan_3: sine of 15 mm at 1.79 Hz, voltage in steps of 0.888 s between 0 and 4.57 V"
 

@@ -12,12 +12,10 @@ import pytest
 
 from bristle.cli import main
 from bristle.errors import StudyError
-from bristle.example import bench, excitation, make, rigs, tower
-from bristle.example.damper import Damper, in_library_names
-from bristle.example.hidden import HIDDEN, UNITS, Scales, able, choose
-from bristle.example.make import Choice, make_bench, make_building
-from bristle.example.rigs import CENTRE
-from bristle.example.sealed import FILE, seal, unseal
+from bristle.examples import make, rigs
+from bristle.examples.hidden import FILE, HIDDEN, UNITS, Scales, able, choose, seal, unseal
+from bristle.examples.make import Choice, make_bench, make_building
+from bristle.examples.rigs import CENTRE, Damper, in_library_names
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 from tests.test_imports import ROOT, imported
@@ -25,13 +23,13 @@ from tests.test_imports import ROOT, imported
 SCALES = Scales(10.0, 0.18, 0.02, 0.02, drift=5e-3)
 TABLE = CENTRE["bingham"]
 SHORT = 1.5  # s
-STEADY = excitation.Programme(lambda _t: 3.0)
-STEPPED = excitation.Programme(lambda t: 6.0 if 0.5 <= t + 1e-9 < 1.0 else 1.0, (0.5, 1.0))
+STEADY = rigs.Programme(lambda _t: 3.0)
+STEPPED = rigs.Programme(lambda t: 6.0 if 0.5 <= t + 1e-9 < 1.0 else 1.0, (0.5, 1.0))
 
 
-def motion(seed: int = 1) -> excitation.Motion:
+def motion(seed: int = 1) -> rigs.Motion:
     rng = np.random.default_rng(seed)
-    return excitation.bench_motion("multisine", SHORT, 0.02, 0.18, rng)
+    return rigs.bench_motion("multisine", SHORT, 0.02, 0.18, rng)
 
 
 def secret(name: str) -> dict[str, float]:
@@ -46,10 +44,10 @@ def steady_state(law: str, w: float, volts: float) -> float:
 
 
 def test_the_equations_use_no_law_no_effect_and_no_fit() -> None:
-    for name in ("damper", "hidden", "excitation", "solve", "bench", "tower"):
-        path = ROOT / "bristle" / "example" / f"{name}.py"
+    for name in ("rigs", "hidden"):
+        path = ROOT / "bristle" / "examples" / f"{name}.py"
         ours = {one for one in imported(path) if one.startswith("bristle.")}
-        assert {one.split(".")[1] for one in ours} <= {"errors", "findings", "example"}
+        assert {one.split(".")[1] for one in ours} <= {"errors", "core", "examples"}
 
 
 def test_what_is_not_outside_has_the_name_of_an_effect_of_the_library() -> None:
@@ -58,7 +56,7 @@ def test_what_is_not_outside_has_the_name_of_an_effect_of_the_library() -> None:
 
 
 def test_a_bingham_damper_has_its_closed_form() -> None:
-    run = bench.perform(Damper("bingham", TABLE), motion(), STEPPED, SCALES)
+    run = rigs.perform(Damper("bingham", TABLE), motion(), STEPPED, SCALES)
     for k in (100, 300, 400, 650):
         expected = steady_state("bingham", run["velocity"][k], run["voltage"][k])
         assert run["force"][k] == pytest.approx(expected, rel=1e-12)
@@ -66,19 +64,19 @@ def test_a_bingham_damper_has_its_closed_form() -> None:
 
 
 def test_a_lugre_damper_slides_like_a_bingham_damper() -> None:
-    t = excitation.times(1.0)
-    slide = excitation.Motion(t, lambda q: (0.05 * q, 0.05, 0.0))
-    run = bench.perform(Damper("lugre", CENTRE["lugre"]), slide, STEADY, SCALES)
+    t = rigs.times(1.0)
+    slide = rigs.Motion(t, lambda q: (0.05 * q, 0.05, 0.0))
+    run = rigs.perform(Damper("lugre", CENTRE["lugre"]), slide, STEADY, SCALES)
     assert run["force"][-1] == pytest.approx(steady_state("lugre", 0.05, 3.0), rel=1e-5)
 
 
 def test_a_sine_of_the_yield_force_alone_has_the_area_four_f_x() -> None:
-    t = excitation.times(1.0)
-    wave = excitation.Motion(
+    t = rigs.times(1.0)
+    wave = rigs.Motion(
         t, lambda q: (0.01 * np.sin(2 * pi * q), 0.02 * pi * np.cos(2 * pi * q), 0.0)
     )
     dry = Damper("bingham", TABLE | {"D_0": 0.0, "D_1": 0.0})
-    run = bench.perform(dry, wave, excitation.Programme(lambda _t: 0.0), SCALES)
+    run = rigs.perform(dry, wave, rigs.Programme(lambda _t: 0.0), SCALES)
     area = np.trapezoid(run["force"] * run["velocity"], t)
     assert area == pytest.approx(4 * TABLE["Y_0"] * 0.01, rel=1e-4)
 
@@ -90,29 +88,29 @@ def test_whatever_is_hidden_on_a_bench_changes_the_force_and_does_not_swamp_it(
 ) -> None:
     hidden = Damper(law, CENTRE[law], secret(name))
     bare = Damper(law, CENTRE[law])
-    runs = [bench.perform(one, motion(), STEPPED, SCALES) for one in (hidden, bare)]
+    runs = [rigs.perform(one, motion(), STEPPED, SCALES) for one in (hidden, bare)]
     assert np.all(np.isfinite(runs[0]["force"]))
     if name != "temperature":  # it needs longer than this run to warm up
-        assert 0.05 < bench.share(runs[:1], runs[1:]) < 0.9
+        assert 0.05 < rigs.share(runs[:1], runs[1:]) < 0.9
 
 
 def test_a_gas_spring_adds_its_own_force_and_nothing_else() -> None:
     values = secret("gas_spring")
-    with_it = bench.perform(Damper("bingham", TABLE, values), motion(), STEADY, SCALES)
-    without = bench.perform(Damper("bingham", TABLE), motion(), STEADY, SCALES)
+    with_it = rigs.perform(Damper("bingham", TABLE, values), motion(), STEADY, SCALES)
+    without = rigs.perform(Damper("bingham", TABLE), motion(), STEADY, SCALES)
     x, length, n = with_it["displacement"], values["gas_length"], values["gas_power"]
     gas = values["gas_k"] * length / n * ((1 - x / length) ** -n - 1)
     assert with_it["force"] - without["force"] == pytest.approx(gas, abs=1e-9)
 
 
-def a_tower(**hidden: float) -> tower.Tower:
-    frame = tower.frame(np.array(rigs.MASSES), np.array(rigs.STIFFNESSES))
-    return tower.Tower(frame, Damper("lugre", CENTRE["lugre"]), hidden, SCALES)
+def a_tower(**hidden: float) -> rigs.Tower:
+    frame = rigs.frame(np.array(rigs.MASSES), np.array(rigs.STIFFNESSES))
+    return rigs.Tower(frame, Damper("lugre", CENTRE["lugre"]), hidden, SCALES)
 
 
-def shaken(rig: tower.Tower) -> bench.Signals:
+def shaken(rig: rigs.Tower) -> rigs.Signals:
     rng = np.random.default_rng(4)
-    return rig.perform(8.0 * excitation.ground("quake", 3.0, rng), STEPPED)
+    return rig.perform(8.0 * rigs.ground("quake", 3.0, rng), STEPPED)
 
 
 def test_a_tower_is_in_equilibrium_with_its_damper() -> None:
@@ -121,7 +119,7 @@ def test_a_tower_is_in_equilibrium_with_its_damper() -> None:
     f = rig.frame
     inertia = sum(
         m * (run[f"{level}_acceleration_absolute"] + f.alpha * run[f"{level}_velocity"])
-        for m, level in zip(f.masses, tower.LEVELS, strict=True)
+        for m, level in zip(f.masses, rigs.LEVELS, strict=True)
     )
     layer = f.stiffnesses[0] * (run["base_displacement"] + f.beta * run["base_velocity"])
     assert np.max(np.abs(run["force"])) > 1.0
@@ -144,7 +142,7 @@ def test_what_is_hidden_in_a_building_moves_it_otherwise(name: str) -> None:
 
 def test_half_the_tolerance_changes_the_response_by_far_less_than_its_noise() -> None:
     rig, rng = a_tower(), np.random.default_rng(4)
-    acceleration = 8.0 * excitation.ground("quake", 3.0, rng)
+    acceleration = 8.0 * rigs.ground("quake", 3.0, rng)
     rough, fine = (rig.perform(acceleration, STEPPED, rtol) for rtol in (1e-6, 1e-8))
     for name in ("force", "base_acceleration_absolute"):
         change = np.sqrt(np.mean((rough[name] - fine[name]) ** 2))

@@ -13,15 +13,13 @@ import pytest
 from bristle.cli import main
 from bristle.data.measurement import read_measurement
 from bristle.errors import StudyError
-from bristle.example import bench, excitation, rigs, tower
-from bristle.example.damper import Damper, in_library_names
-from bristle.example.make import Choice, make_bench
-from bristle.example.perform import perform_plan
-from bristle.example.planned import ground_of, motion_of, programme_of, seconds_of
-from bristle.example.recorder import instruments, write_csv
-from bristle.example.sealed import seal, unseal
-from bristle.plan.folder import PlanFolder, PlannedRun, write_plan
-from bristle.study.create import create_study
+from bristle.examples import rigs
+from bristle.examples.hidden import seal, unseal
+from bristle.examples.make import Choice, make_bench
+from bristle.examples.perform import ground_of, motion_of, perform_plan, programme_of, seconds_of
+from bristle.examples.rigs import Damper, in_library_names, instruments, write_csv
+from bristle.planning.folder import PlanFolder, PlannedRun, write_plan
+from bristle.study.steps import create_study
 from bristle.study.study import Study
 
 T = np.arange(1001) / 500.0
@@ -160,8 +158,8 @@ def test_slow_ramps_of_a_command_that_begins_at_zero_reach_the_coil() -> None:
     volts = programme_of(t, ramps)
     assert not volts.jumps
     damper = Damper("bingham", rigs.CENTRE["bingham"], {"coil_tau": 0.03})
-    slide = excitation.Motion(t, lambda q: (0.02 * q, 0.02, 0.0))
-    run = bench.perform(damper, slide, volts, rigs.scales_of("bench", "bingham"))
+    slide = rigs.Motion(t, lambda q: (0.02 * q, 0.02, 0.0))
+    run = rigs.perform(damper, slide, volts, rigs.scales_of("bench", "bingham"))
     yields = damper.values["Y_1"] * 5.0  # what the largest command adds
     assert np.ptp(run["force"]) > 0.7 * yields
 
@@ -175,7 +173,7 @@ def test_a_motion_goes_through_its_samples() -> None:
     assert v == pytest.approx((SINE[501] - SINE[499]) / 0.004, rel=1e-3)
 
 
-def a_tower(folder: Path) -> tuple[Path, tower.Tower]:
+def a_tower(folder: Path) -> tuple[Path, rigs.Tower]:
     """Return a short example of a building, sealed as `make_building` seals it, and its rig."""
     draw = rigs.streams(4)[0]
     values, frame = rigs.draw_damper("lugre", draw), rigs.draw_frame(draw)

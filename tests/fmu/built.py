@@ -43,7 +43,7 @@ def built(component: str) -> Path:
 def built_native(component: str) -> Path:
     """Return a built-in component's FMU that needs no Python, for this machine."""
     from bristle.native.build import build as build_native
-    from bristle.native.platforms import here
+    from bristle.native.zig import here
 
     return build_native(build.plan(component), folder() / "native", [here()])
 

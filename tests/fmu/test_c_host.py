@@ -16,8 +16,8 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from bristle.fmu import build, catalogue
-from bristle.fmu.archive import library_member
-from bristle.fmu.description import Description, extract, read_description
+from bristle.fmu.archive import extract, library_member
+from bristle.fmu.description import Description, read_description
 
 SOURCE = Path(__file__).with_name("host.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")

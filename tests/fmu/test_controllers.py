@@ -14,22 +14,23 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from bristle.cli import main
+from bristle.component import control_laws
 from bristle.component.clock import COMING
+from bristle.component.controller_file import Controller, building_digest, read_controller
 from bristle.component.sensors import reading
-from bristle.control import inverse, linear, switching
-from bristle.control.controller import Controller, building_digest, read_controller
+from bristle.engine.run import run
 from bristle.errors import BuildError, DesignError
 from bristle.fmu import build, catalogue
+from bristle.fmu.archive import extract
+from bristle.fmu.build import PACKAGE
 from bristle.fmu.controller import MEASURED
-from bristle.fmu.description import extract, read_description
-from bristle.fmu.plan import PACKAGE
+from bristle.fmu.description import read_description
 from bristle.fmu.slave import Slave
 from bristle.physics.building import paper_building
 from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
-from bristle.scenario.scenario import load_scenario
-from bristle.scenario.text import scenario_text
-from bristle.simulate.run import run
+from bristle.system.scenario import load_scenario
+from bristle.system.toml import scenario_text
 
 H = 0.002
 CONTROLLERS = ("ClippedOptimal", "HinfInverse", "LqgClipped", "Lpv", "Skyhook", "TrainedPolicy")
@@ -261,14 +262,14 @@ def test_inverse_law_gives_the_commanded_force_where_it_can() -> None:
     lugre, exact, z = law_code("lugre"), 0, [0.0]
     for k in range(500):
         _, _, v, _ = measured = motion((k + 1) * H)
-        inverse.estimate_states(lugre, p, slave["scheduling"], 0.0, H, z)
+        control_laws.estimate_states(lugre, p, slave["scheduling"], 0.0, H, z)
         slave.set_real(slave._inputs, measured)
         assert slave.do_step(k * H, H)
         V, u, rho = slave.get_real(slave._outputs)
         assert rho == v
-        given = [inverse.force_of_law(lugre, p, v, at, z) for at in (0.0, 1.0, V)]
+        given = [control_laws.force_of_law(lugre, p, v, at, z) for at in (0.0, 1.0, V)]
         slope = given[1] - given[0]
-        if 0.0 < V < 8.0 and abs(slope) >= inverse.LEAST_SLOPE:
+        if 0.0 < V < 8.0 and abs(slope) >= control_laws.LEAST_SLOPE:
             assert given[2] == pytest.approx(u, rel=1e-9)
             exact += 1
     assert exact > 20
@@ -276,16 +277,16 @@ def test_inverse_law_gives_the_commanded_force_where_it_can() -> None:
 
 def test_lpv_looks_its_matrices_up_by_the_speed_and_feeds_back_what_is_applied() -> None:
     slave = started("Lpv", anti_windup=200.0)
-    c = read_controller(PACKAGE / "control" / "data" / "lpv.json")
+    c = read_controller(PACKAGE / "component" / "data" / "lpv.json")
     x, spare = [0.0] * c.n, [0.0] * c.n
     for k in range(200):
         y, _, v, _ = motion(k * H) if k else [0.0] * 4
-        row = linear.table_row(v, c.v_top, c.rows)
-        w = linear.command(c.n, c.C, row, x)
-        V = switching.signed_voltage(w, v, 8.0)
+        row = control_laws.table_row(v, c.v_top, c.rows)
+        w = control_laws.command(c.n, c.C, row, x)
+        V = control_laws.signed_voltage(w, v, 8.0)
         assert slave.get_real(slave._outputs) == [V, w, v]
         inputs = y, 200.0 * ((V if v >= 0 else -V) - w)
-        linear.advance(c.n, c.A, c.B, c.W, row, x, inputs, spare)
+        control_laws.advance(c.n, c.A, c.B, c.W, row, x, inputs, spare)
         slave.set_real(slave._inputs, motion((k + 1) * H))
         assert slave.do_step(k * H, H)
 

@@ -8,7 +8,7 @@ from threading import Event
 from types import ModuleType
 
 import bristle
-from bristle.fmu import modules
+from bristle.fmu import binary
 
 
 def test_who_removes_modules_waits_for_who_imports(monkeypatch) -> None:
@@ -18,10 +18,10 @@ def test_who_removes_modules_waits_for_who_imports(monkeypatch) -> None:
 
     def leave() -> None:
         begun.set()
-        modules.forget(lambda name, _: name == "of_an_fmu")
+        binary.forget(lambda name, _: name == "of_an_fmu")
 
     with ThreadPoolExecutor(1) as pool:
-        with modules.LOCK:
+        with binary.LOCK:
             left = pool.submit(leave)
             begun.wait()
             assert "of_an_fmu" in sys.modules

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Run
-from bristle.identify.smooth import posterior_draws, smooth
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Run
+from bristle.identification.smoothing import posterior_draws, smooth
 from bristle.physics.laws import LAWS
 
 DT, N = 0.002, 4000

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle import jit
-from bristle.identify import bench
-from bristle.identify.ahead import Ahead, begun
-from bristle.physics.inputs import Inputs
+from bristle.core import jit
+from bristle.identification import histories
+from bristle.identification.histories import Ahead, begun
+from bristle.physics.tuples import Inputs
 
 
 def test_a_process_that_knows_other_functions_ends_without_compiling() -> None:
@@ -28,12 +28,12 @@ def test_where_no_process_can_be_begun_nothing_waits(monkeypatch: pytest.MonkeyP
 
 def test_what_is_kept_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jit, "kept", lambda _: True)
-    monkeypatch.setattr(bench, "begun", lambda *_: pytest.fail("it begins a process"))
-    bench.compile_ahead()
+    monkeypatch.setattr(histories, "begun", lambda *_: pytest.fail("it begins a process"))
+    histories.compile_ahead()
 
 
 def test_strided_motions_take_the_same_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    law = bench.Bench("bingham", [])
+    law = histories.Bench("bingham", [])
     x, v, a, V = np.random.default_rng(3).normal(size=(50, 4)).T
     plain = law.force(x.copy(), v.copy(), a.copy(), V.copy(), 0.01, {})
     assert np.array_equal(law.force(x, v, a, V, 0.01, {}), plain)
@@ -48,8 +48,8 @@ def test_another_process_keeps_what_fits_need(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path))
-    monkeypatch.setattr(bench, "_ahead", {})
-    bench.compile_ahead("lugre")
-    bench._ahead["law_history"].wait()
-    assert jit.kept(bench.law_history)
-    assert not jit.kept(bench.force_history)
+    monkeypatch.setattr(histories, "_ahead", {})
+    histories.compile_ahead("lugre")
+    histories._ahead["law_history"].wait()
+    assert jit.kept(histories.law_history)
+    assert not jit.kept(histories.force_history)

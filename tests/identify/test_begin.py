@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from bristle.data.measurement import measurements_of_frame
-from bristle.identify.begin import SETTLING, under_load_text
-from bristle.identify.model import Model, Problem, Run
-from bristle.identify.prepare import prepare
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.run_start import SETTLING, under_load_text
 
 DT, NOISE = 0.002, 0.02
 MODEL = Model(

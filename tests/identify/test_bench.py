@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bristle import jit
-from bristle.identify.bench import Bench, before_jump, compiled_history
-from bristle.physics.damper import LIBRARY
+from bristle.core import jit
+from bristle.identification.histories import Bench, before_jump, compiled_history
+from bristle.physics.damper_source import LIBRARY
 from bristle.physics.law import laws_of
 from tests.physics.rigs import force_at
 

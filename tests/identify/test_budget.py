@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from bristle.identify.budget import force_budget
-from bristle.identify.model import Model, Problem, Run
+from bristle.identification.error_table import force_budget
+from bristle.identification.problem import Model, Problem, Run
 from bristle.physics.laws import laws_of
 from bristle.study.budget_picture import draw_budget
 

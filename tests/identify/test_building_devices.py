@@ -9,17 +9,13 @@ from braced import BRACE, brace, noisy, shake, tie, tower
 import bristle
 from bristle.data.channels import at_device, channel_unit, no_device
 from bristle.errors import PhysicsError, RecordError, StudyError
-from bristle.identify.building import identify_structure
-from bristle.identify.building_file import building_text
-from bristle.identify.equilibrium_system import equations_of
-from bristle.identify.model import Model
-from bristle.identify.reconstructed import reconstructed
-from bristle.identify.response import respond
-from bristle.identify.rig import building_rig
-from bristle.identify.simulated import stiffness_matrix
-from bristle.identify.structure import motion_across, sliding, storey_run
-from bristle.physics.building import with_damper
-from bristle.physics.device import GROUND, Device
+from bristle.identification.building_fit import building_text, identify_structure
+from bristle.identification.building_motion import respond
+from bristle.identification.building_sites import motion_across, sliding, storey_run
+from bristle.identification.equilibrium import equations_of, reconstructed, stiffness_matrix
+from bristle.identification.problem import Model
+from bristle.identification.rig import building_rig
+from bristle.physics.building import GROUND, Device, with_damper
 from bristle.study.inputs import measurements
 
 STOREY = {"name": "brace", "at": "storey2"}

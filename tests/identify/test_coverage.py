@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from truths import hidden_case, true_case
 
-from bristle.identify.fit import fit, identify, multistart_refit
-from bristle.identify.residuals import robust_z
+from bristle.identification.fit import fit, identify, multistart_refit
+from bristle.identification.problem import robust_z
 
 RIGS = ("bench_10N", "bench_2kN")
 NOISES = (0.01, 0.03)

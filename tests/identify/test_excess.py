@@ -9,17 +9,19 @@ import pytest
 from known_runs import bench_run, truth_of
 from scipy.optimize import least_squares
 
-from bristle.identify.fit import Model, Problem, Scaled, identify
-from bristle.identify.residuals import (
+from bristle.identification.fit import Scaled, identify
+from bristle.identification.problem import (
     EXPLAINS,
+    Model,
+    Problem,
     errors,
     excess_of,
     in_noises,
     residuals,
     robust_z,
 )
-from bristle.identify.rig import DAMPER, ROLES, Site
-from bristle.identify.site_fit import fit_site
+from bristle.identification.rig import DAMPER, ROLES, Site
+from bristle.identification.rig_fit import fit_site
 
 LAW = "bingham"
 

@@ -10,10 +10,10 @@ from known_runs import DT, N, T, bench_run, motion, truth_of
 
 from bristle.data.measurement import measurements_of_frame
 from bristle.errors import RecordError
-from bristle.identify.drive import smooth_steps
-from bristle.identify.fit import Model, Problem, fit, identify
-from bristle.identify.prepare import prepare
-from bristle.identify.smooth import smooth
+from bristle.identification.fit import fit, identify
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem
+from bristle.identification.smoothing import smooth, smooth_steps
 from bristle.physics.laws import LAWS, laws_of
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.identify.kalman import Samples, kalman_smooth, room
+from bristle.identification.kalman import Samples, kalman_smooth, room
 
 N, DT = 400, 0.01
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.identify.instruments import earlier, pure_delay
-from bristle.identify.model import Model, Problem, Run
+from bristle.identification.problem import Model, Problem, Run, earlier, pure_delay
 
 DT = 0.002
 LAW = {"f_c": 1.3, "f_v": 0.8, "c_0": 100.0, "c_v": 20.0, "v_n": 0.02, "exponent": 1.0}

@@ -11,9 +11,9 @@ from shaken import building, friction, measured, shake
 
 from bristle.data.decimate import decimated
 from bristle.data.sampling import Even
-from bristle.identify.building import equilibrium, identify_structure
-from bristle.identify.response import responses
-from bristle.identify.structure import damper_run, storey_run
+from bristle.identification.building_fit import equilibrium, identify_structure
+from bristle.identification.building_motion import responses
+from bristle.identification.building_sites import damper_run, storey_run
 
 HOUSE = building(2, True, 1)
 STRETCH = slice(3000, 3300)

@@ -7,9 +7,9 @@ from math import inf
 import numpy as np
 import pytest
 
-from bristle.identify.fit import Fit
-from bristle.identify.model import Model
-from bristle.identify.rig_fit import RigFit
+from bristle.identification.fit import Fit
+from bristle.identification.problem import Model
+from bristle.identification.rig_fit import RigFit
 
 NAME = "storey_softening.d_half"
 

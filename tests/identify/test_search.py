@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from bristle.identify.search import descend, jacobian
+from bristle.identification.search import descend, jacobian
 
 T = np.linspace(0.0, 1.0, 400)
 WIDE = np.array([-50.0, -50.0, -50.0])

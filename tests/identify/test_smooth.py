@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.identify.smooth import GROUP, posterior_draws, smooth
+from bristle.identification.smoothing import GROUP, posterior_draws, smooth
 
 DT, N, INSIDE = 0.002, 6000, slice(25, -25)
 T = DT * np.arange(N)

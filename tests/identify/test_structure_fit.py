@@ -7,7 +7,7 @@ import pytest
 from shaken import building, friction, measured, shake
 
 from bristle.errors import RecordError
-from bristle.identify.building import identify_structure
+from bristle.identification.building_fit import identify_structure
 from bristle.physics.building import frequencies
 
 

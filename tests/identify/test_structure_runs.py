@@ -8,18 +8,12 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
-from bristle.compare.prediction import coordinates_of_run
-from bristle.data.extra import Extra
-from bristle.diagnose.sites import shortened
+from bristle.comparison.predictions import coordinates_of_run
+from bristle.data.extra_channels import Extra
+from bristle.diagnosis.site import shortened
 from bristle.errors import RecordError
-from bristle.identify.level import jumps
-from bristle.identify.line import at_bound, fit_line
-from bristle.identify.model import Model
-from bristle.identify.reconstructed import reconstructed
-from bristle.identify.response import respond, responses, shear
-from bristle.identify.rig import Site
-from bristle.identify.rig_fit import RigFit
-from bristle.identify.structure import (
+from bristle.identification.building_motion import jumps, respond, responses, shear
+from bristle.identification.building_sites import (
     StructureProblem,
     damper_run,
     damping_below,
@@ -30,6 +24,10 @@ from bristle.identify.structure import (
     structure_problems,
     thinned,
 )
+from bristle.identification.equilibrium import reconstructed
+from bristle.identification.problem import Model
+from bristle.identification.rig import Site
+from bristle.identification.rig_fit import RigFit, at_bound, fit_line
 from bristle.physics.laws.linear_layer import LinearLayer
 
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from bristle.errors import RecordError
-from bristle.identify import table
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Problem, Run
-from bristle.identify.table import error_table, low_pass
+from bristle.identification import error_table
+from bristle.identification.error_table import error_table as error_table_error_table
+from bristle.identification.error_table import low_pass
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Problem, Run
 from bristle.physics.laws import law_names
 
 DT, N = 0.004, 3000
@@ -46,10 +47,10 @@ def test_searches_on_a_part_of_the_samples_end_where_those_on_all_do(law, monkey
     train, held = problem(law, {}, 1), problem(law, {}, 2)
     laws = (law, f"{law}_standard", "dahl")
     asked = {"cutoff": 5.0, "laws": laws, "starts": 2}
-    whole = error_table(train, held, **asked)
-    monkeypatch.setattr(table, "ENOUGH", 500)  # of 3000, every sixth is kept
-    assert len(table._thinned(train, 5.0).runs[0].force) == N // 6
-    for one, other in zip(error_table(train, held, **asked), whole, strict=True):
+    whole = error_table_error_table(train, held, **asked)
+    monkeypatch.setattr(error_table, "ENOUGH", 500)  # of 3000, every sixth is kept
+    assert len(error_table._thinned(train, 5.0).runs[0].force) == N // 6
+    for one, other in zip(error_table_error_table(train, held, **asked), whole, strict=True):
         assert one.train == pytest.approx(other.train, rel=1e-3)
         assert one.holdout == pytest.approx(other.holdout, rel=5e-3)
         assert one.starts == other.starts
@@ -57,13 +58,13 @@ def test_searches_on_a_part_of_the_samples_end_where_those_on_all_do(law, monkey
 
 def test_few_samples_and_a_force_without_a_filter_are_kept_whole():
     made = problem("bingham", {}, 1)
-    assert table._thinned(made, 18.0) is made
-    assert table._thinned(made, 0.0) is made
+    assert error_table._thinned(made, 18.0) is made
+    assert error_table._thinned(made, 0.0) is made
 
 
 def test_the_law_that_made_the_data_has_the_least_error():
     train, held = problem("lugre", {}, 1), problem("lugre", {}, 2)
-    rows = {row.law: row for row in error_table(train, held, starts=2)}
+    rows = {row.law: row for row in error_table_error_table(train, held, starts=2)}
     assert tuple(rows) == law_names()
     assert min(rows.values(), key=lambda row: row.holdout).law == "lugre"
     assert rows["lugre"].share < 0.01
@@ -77,7 +78,7 @@ def test_a_standard_law_gains_nothing_from_the_exponential():
     values = {"exponent": 0.0}
     rows = {
         row.law: row
-        for row in error_table(
+        for row in error_table_error_table(
             problem("bingham", values, 3), None, laws=("bingham", "bingham_standard")
         )
     }

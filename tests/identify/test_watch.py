@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from known_runs import bench_run, truth_of
 
+from bristle.core.progress import watched_by
 from bristle.data.left_out import MISSING
-from bristle.identify import table, watch
-from bristle.identify.fit import Fit, Model, Problem, fit, identify
-from bristle.identify.search import z_of
-from bristle.identify.table import error_table
-from bristle.identify.watch import LAW, MODEL, series, watched
-from bristle.snapshots import watched_by
+from bristle.identification import error_table, watch
+from bristle.identification.error_table import error_table as error_table_error_table
+from bristle.identification.fit import Fit, fit, identify
+from bristle.identification.problem import Model, Problem
+from bristle.identification.search import z_of
+from bristle.identification.watch import LAW, MODEL, series, watched
 
 Seen = list[Mapping[str, Any]]
 
@@ -100,16 +101,18 @@ def test_a_fit_is_the_same_to_the_last_bit_whether_it_is_watched_or_not(problem:
 
 
 @pytest.mark.usefixtures("every_step")
-@pytest.mark.parametrize("enough", [table.ENOUGH, 400])  # all samples, then a part of them first
+@pytest.mark.parametrize(
+    "enough", [error_table.ENOUGH, 400]
+)  # all samples, then a part of them first
 def test_laws_side_by_side_are_each_told_of_and_end_with_their_best(
     problem: Problem, enough: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table, "ENOUGH", enough)
+    monkeypatch.setattr(error_table, "ENOUGH", enough)
     laws = ("bingham", "tanh", "bingham_standard")
-    alone = error_table(problem, None, laws=laws, starts=2)
+    alone = error_table_error_table(problem, None, laws=laws, starts=2)
     seen: Seen = []
     with watched_by(seen.append):
-        found = error_table(problem, None, laws=laws, starts=2)
+        found = error_table_error_table(problem, None, laws=laws, starts=2)
     assert [row.as_dict() | {"holdout": 0} for row in found] == [
         row.as_dict() | {"holdout": 0} for row in alone
     ]

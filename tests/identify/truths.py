@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 
 from bristle.data.measurement import Measurement, measurements_of_frame
-from bristle.identify.fit import Model, Problem
-from bristle.identify.prepare import prepare
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Model, Problem
 from tests.independent.generate import UNITS, make_case
 
 

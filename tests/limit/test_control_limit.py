@@ -10,15 +10,14 @@ import pytest
 
 import bristle
 from bristle.cli import main
+from bristle.core.files import scenarios_folder
+from bristle.engine.coupled import simulate
 from bristle.errors import BristleError
-from bristle.limit import Limit, limit, problem, search
-from bristle.limit.bound import bound_of, largest_force
-from bristle.limit.case import case_of
-from bristle.limit.problem import Problem
-from bristle.limit.search import descended, levelled, value_of
-from bristle.resources import scenarios_folder
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
+from bristle.optimal_control import Limit, case, limit, search
+from bristle.optimal_control.bound import bound_of, largest_force
+from bristle.optimal_control.case import Problem, case_of
+from bristle.optimal_control.search import descended, levelled, value_of
+from bristle.system.scenario import load_scenario
 
 PULSE, Y = "half_sine_pulse", "structure.floor2_acceleration_absolute"
 BRACE = """
@@ -48,7 +47,7 @@ parameters = { voltage = 3.0 }
 @pytest.fixture
 def in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute without numba: short responses take less than to compile."""
-    monkeypatch.setattr(problem, "compiled", lambda function: function)
+    monkeypatch.setattr(case, "compiled", lambda function: function)
 
 
 def made(stop: float, every: int = 1, output: str = Y, **values: object) -> Problem:

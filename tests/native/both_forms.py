@@ -16,12 +16,12 @@ import pytest
 
 from bristle.conformance.native import BlackBox, Instance, Library
 from bristle.fmu.archive import extract, library_member
+from bristle.fmu.build import plan
 from bristle.fmu.description import read_description
-from bristle.fmu.plan import plan
 from bristle.fmu.slave import Slave
 from bristle.native.build import build
-from bristle.native.platforms import here
 from bristle.native.prepare import component_of
+from bristle.native.zig import here
 
 KINDS = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
 SIZES = {"m": 0.01, "m/s": 0.2, "m/s2": 3.0, "N": 8.0, "V": 5.0}

@@ -11,12 +11,12 @@ import numpy as np
 from both_forms import KINDS, Native, folder
 from numpy.typing import NDArray
 
-from bristle.composite.export import export_composite
 from bristle.conformance.native import Instance
+from bristle.engine.coupled import simulate
+from bristle.export.composite import export_composite
 from bristle.native.build import build
-from bristle.native.platforms import here
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
+from bristle.native.zig import here
+from bristle.system.scenario import load_scenario
 
 Array = NDArray[np.float64]
 Given = Callable[[float, float], Mapping[str, float]]

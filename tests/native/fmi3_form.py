@@ -12,10 +12,10 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 
 from bristle.fmu.archive import extract
+from bristle.fmu.build import plan
 from bristle.fmu.description import read_description
-from bristle.fmu.plan import plan
 from bristle.native.build import build
-from bristle.native.platforms import here
+from bristle.native.zig import here
 
 LIGHT = "ClippedOptimal"
 WARNING, ERROR = 1, 3

@@ -13,13 +13,12 @@ import numba
 import numpy as np
 import pytest
 
+from bristle.core.jit import library_text
 from bristle.errors import BuildError
-from bristle.jit import library_text
 from bristle.native import zig
-from bristle.native.c_lines import Line, needed
-from bristle.native.c_text import c_text
+from bristle.native.c_functions import Line, c_text, needed
 from bristle.native.entrance import NAME, plain_text
-from bristle.native.platforms import here
+from bristle.native.zig import here
 
 pytest.importorskip("ziglang")
 

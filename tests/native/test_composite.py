@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.composite import functions
-from bristle.composite.assembly import Assembly
-from bristle.composite.export import plan_of
+from bristle.engine.coupled import System, symmetric_eigenvalues
 from bristle.errors import BuildError, ScenarioError, StudyError
+from bristle.export import composite_functions
+from bristle.export.composite import Assembly, plan_of
 from bristle.fmu.build import ensure
 from bristle.native.entrance import entrance_of
 from bristle.native.prepare import component_of, prepare
-from bristle.scenario.scenario import load_scenario, stock_scenarios
-from bristle.simulate.pushed import symmetric_eigenvalues
-from bristle.simulate.system import System
+from bristle.system.scenario import load_scenario, stock_scenarios
 
 PASSIVE = "el_centro_lugre_passive"
 SWITCHED = "el_centro_0p6g_lpv_sensors"
@@ -70,14 +68,14 @@ def velocity_after_a_step(begin: float, end: float, monkeypatch: pytest.MonkeyPa
     """Return the base's velocity behind one step of a ground acceleration, in plain Python."""
     slave = component_of(plan_of(PASSIVE, None, ["structure.ground_acceleration"]))
     call = entrance_of(slave.flat_functions())
-    whole = functions.opened
+    whole = composite_functions.opened
 
     def opened(state: Any, baked: Any) -> Any:  # records with attributes, as compiled code has them
         run = whole(state, baked)
         kinds = ("sources", "dampers", "structures", "sampled")
         return run._replace(**{kind: getattr(run, kind).view(np.recarray) for kind in kinds})
 
-    monkeypatch.setattr(functions, "opened", opened)
+    monkeypatch.setattr(composite_functions, "opened", opened)
     values, given = np.array(slave.flat_values()), np.array(slave.inputs_set())
     baked, dt = np.array(slave.bake()), 0.002
     played = [one.samples() for one in slave.assembly.parts.values() if one.played()]

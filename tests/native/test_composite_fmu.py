@@ -18,14 +18,14 @@ from composites import Composite, built, compared
 
 from benchmarks import _hosts
 from bristle.cli import main
-from bristle.composite.export import export_composite
 from bristle.conformance import conform
+from bristle.engine.coupled import simulate
+from bristle.engine.run import run
+from bristle.export.composite import export_composite
 from bristle.fmu.archive import library_member
 from bristle.native.build import build
-from bristle.native.platforms import here
-from bristle.scenario.scenario import load_scenario, stock_scenarios
-from bristle.simulate.coupled import simulate
-from bristle.simulate.run import run
+from bristle.native.zig import here
+from bristle.system.scenario import load_scenario, stock_scenarios
 
 pytestmark = [needs_zig, pytest.mark.slow]  # the functions take minutes to compile
 

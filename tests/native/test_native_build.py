@@ -16,13 +16,13 @@ from bristle.cli import main
 from bristle.conformance import conform
 from bristle.errors import BuildError
 from bristle.fmu import build as python_fmus
+from bristle.fmu.build import plan
 from bristle.fmu.description import read_description
-from bristle.fmu.plan import plan
-from bristle.native import parts, zig
-from bristle.native.build import build
+from bristle.native import build, zig
+from bristle.native.build import build as build_build
+from bristle.native.description import quoted
 from bristle.native.entrance import plain_text
-from bristle.native.platforms import PLATFORMS, chosen, here
-from bristle.native.tables import quoted
+from bristle.native.zig import PLATFORMS, chosen, here
 
 pytestmark = needs_zig
 
@@ -66,24 +66,24 @@ def test_two_builds_are_identical_whatever_the_cache(
     found = []
     for name in ("one", "two"):
         monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path / name))
-        found.append(build(plan("ConstantVoltage"), tmp_path / f"{name}_out", platforms))
+        found.append(build_build(plan("ConstantVoltage"), tmp_path / f"{name}_out", platforms))
     assert found[0].read_bytes() == found[1].read_bytes()
 
 
 def test_what_stands_there_already_is_kept_unless_a_platform_is_missing(tmp_path: Path) -> None:
     what = plan("ConstantVoltage")
-    path = build(what, tmp_path, [here()])
+    path = build_build(what, tmp_path, [here()])
     before = path.stat().st_mtime_ns
-    assert build(what, tmp_path, [here()]).stat().st_mtime_ns == before
+    assert build_build(what, tmp_path, [here()]).stat().st_mtime_ns == before
     other = PLATFORMS["aarch64-linux" if here().name != "aarch64-linux" else "linux64"]
-    with zipfile.ZipFile(build(what, tmp_path, [here(), other])) as archive:
+    with zipfile.ZipFile(build_build(what, tmp_path, [here(), other])) as archive:
         folders = {name.split("/")[1] for name in archive.namelist() if name[:3] == "bin"}
     assert folders == {here().folder, other.folder}
 
 
 def test_a_changed_start_value_is_another_fmu_with_the_same_functions(tmp_path: Path) -> None:
     what = plan("ConstantVoltage", name="Three", starts={"level": 3.0})
-    about = read_description(build(what, tmp_path, [here()]))
+    about = read_description(build_build(what, tmp_path, [here()]))
     assert about.variables["level"].start == 3.0
     assert about.guid != native("ConstantVoltage").about.guid
 
@@ -137,7 +137,7 @@ def test_an_unknown_platform_is_named(capsys: pytest.CaptureFixture[str]) -> Non
 def test_a_platform_that_fails_leaves_no_archive(tmp_path: Path) -> None:
     broken = replace(here(), name="broken", target="x86_64-nowhere-none")
     with pytest.raises(BuildError, match=r"^broken: zig cannot compile this: "):
-        build(plan("ConstantVoltage"), tmp_path / "out", [here(), broken])
+        build_build(plan("ConstantVoltage"), tmp_path / "out", [here(), broken])
     assert not (tmp_path / "out").exists()
 
 
@@ -145,7 +145,7 @@ def test_a_cache_that_is_a_file_is_named(tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "cache").write_text("")
     monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path / "cache"))
     with pytest.raises(BuildError, match="cannot be written"):
-        build(plan("ConstantVoltage"), tmp_path / "out", [here()])
+        build_build(plan("ConstantVoltage"), tmp_path / "out", [here()])
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root writes anywhere")
@@ -156,7 +156,7 @@ def test_a_cache_that_is_read_only_is_named(
     (tmp_path / "cache" / "native").chmod(0o500)
     monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path / "cache"))
     with pytest.raises(BuildError, match=r"cannot be written \(read-only\)"):
-        build(plan("ConstantVoltage"), tmp_path / "out", [here()])
+        build_build(plan("ConstantVoltage"), tmp_path / "out", [here()])
 
 
 def test_a_full_disk_is_one_message_and_no_half_archive(
@@ -167,7 +167,7 @@ def test_a_full_disk_is_one_message_and_no_half_archive(
 
     monkeypatch.setattr(zipfile.ZipFile, "writestr", full)
     with pytest.raises(BuildError, match=r"ConstantVoltage.fmu: .* \(No space left on device\)"):
-        build(plan("ConstantVoltage"), tmp_path, [here()])
+        build_build(plan("ConstantVoltage"), tmp_path, [here()])
     assert list(tmp_path.iterdir()) == []
 
 
@@ -175,10 +175,10 @@ def test_a_full_cache_is_one_message(tmp_path: Path, monkeypatch: pytest.MonkeyP
     def full(*_: object) -> Path:
         raise OSError(28, "No space left on device", str(tmp_path / "cache"))
 
-    monkeypatch.setattr(parts, "keep", full)
+    monkeypatch.setattr(build, "keep", full)
     what = plan("ConstantVoltage", name="Other")
     with pytest.raises(BuildError, match=r"cache: cannot be written \(No space left on device\)"):
-        build(what, tmp_path / "out", [here()])
+        build_build(what, tmp_path / "out", [here()])
 
 
 def test_text_that_calls_what_no_host_has_is_refused() -> None:

@@ -8,9 +8,9 @@ import pytest
 from both_forms import needs_zig
 
 from bristle.cli import main
+from bristle.engine.run import run
 from bristle.fmu.description import read_description
-from bristle.native.platforms import here
-from bristle.simulate.run import run
+from bristle.native.zig import here
 
 pytestmark = needs_zig
 

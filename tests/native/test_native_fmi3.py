@@ -21,18 +21,16 @@ from fmpy.validation import validate_fmu
 
 import bristle
 from bristle.cli import main
+from bristle.engine.run import Output, execute
 from bristle.fmu import catalogue
 from bristle.fmu.archive import library_member
-from bristle.fmu.build import built_guid
+from bristle.fmu.build import built_guid, plan
 from bristle.fmu.description import read_description
-from bristle.fmu.plan import plan
 from bristle.native import build as native_build
 from bristle.native.build import build, ensure
-from bristle.native.description_fmi3 import TYPES
-from bristle.native.platforms import PLATFORMS, here
-from bristle.scenario.scenario import stock_scenarios
-from bristle.simulate.output import Output
-from bristle.simulate.run import execute
+from bristle.native.description import TYPES
+from bristle.native.zig import PLATFORMS, here
+from bristle.system.scenario import stock_scenarios
 
 pytestmark = needs_zig
 

@@ -17,10 +17,10 @@ from test_native_platforms import ARM, FAR, QEMU, WINE
 
 from bristle.fmu import catalogue
 from bristle.fmu.archive import extract
+from bristle.fmu.build import plan
 from bristle.fmu.description import read_description
-from bristle.fmu.plan import plan
 from bristle.native.build import build
-from bristle.native.platforms import PLATFORMS, Platform, here
+from bristle.native.zig import PLATFORMS, Platform, here
 
 pytestmark = [
     needs_zig,

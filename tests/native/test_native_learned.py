@@ -11,21 +11,17 @@ import pytest
 from both_forms import Both, Native, folder, needs_zig
 
 import bristle
-from bristle.bridge.export import export_study
 from bristle.cli import main
-from bristle.diagnose.learned.along import ALONG
-from bristle.diagnose.learned.closed import closed_forms, formula_of
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.parts import PARTS, may_change, parts_at
-from bristle.diagnose.learned.place import AT_DAMPER, Place
-from bristle.diagnose.learned.ring import RING
-from bristle.diagnose.learned.slip import SLIP
-from bristle.fmu.plan import plan
-from bristle.identify.bench import Bench
+from bristle.fmu.build import plan
+from bristle.identification.histories import Bench
+from bristle.learning.closed_forms import closed_forms, formula_of
+from bristle.learning.curve import AT_DAMPER, PARTS, Curve, Place, may_change, parts_at
+from bristle.learning.effect_file import effect_text
+from bristle.learning.signals import ALONG, RING, SLIP
 from bristle.native.build import build
-from bristle.native.platforms import here
 from bristle.native.prepare import component_of
+from bristle.native.zig import here
+from bristle.prediction.export import export_study
 from bristle.study.study import Study
 from tests.diagnose.learned.test_curve import curve_of, slip_of
 from tests.diagnose.learned.test_line_curves import LAYER, STOREY

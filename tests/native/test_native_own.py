@@ -8,12 +8,11 @@ import pytest
 from both_forms import Both, Native, folder, needs_zig
 
 from bristle.cli import main
-from bristle.fmu.build import Plan
-from bristle.fmu.plan import plan
+from bristle.fmu.build import Plan, plan
 from bristle.native.build import build
-from bristle.native.platforms import here
 from bristle.native.prepare import component_of, prepare
-from bristle.physics.user import load_effect, load_law
+from bristle.native.zig import here
+from bristle.user_code.load import load_effect, load_law
 
 pytestmark = [needs_zig, pytest.mark.slow]
 

@@ -14,14 +14,13 @@ import fmpy
 import pytest
 from both_forms import folder, needs_zig
 
-from bristle.composite.export import plan_of
+from bristle.export.composite import plan_of
 from bristle.fmu import catalogue
 from bristle.fmu.archive import extract
+from bristle.fmu.build import plan
 from bristle.fmu.description import read_description
-from bristle.fmu.plan import plan
-from bristle.native.build import build
-from bristle.native.platforms import PLATFORMS, Platform, here
-from bristle.native.universal import universal
+from bristle.native.build import build, universal
+from bristle.native.zig import PLATFORMS, Platform, here
 
 SOURCE = Path(__file__).with_name("far_host.c")
 MOTION = {"V": (4.0, 3.0), "m": (0.0, 5e-3), "m/s": (0.0, 0.1), "m/s2": (0.0, 2.0), "N": (0.0, 1.0)}

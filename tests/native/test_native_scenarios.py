@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from both_forms import needs_zig
 
-from bristle.batch import ensemble
+from bristle.campaign import ensemble
 from bristle.cli import main
+from bristle.engine.run import run
 from bristle.errors import RunError
-from bristle.scenario.scenario import stock_scenarios
-from bristle.simulate.run import run
+from bristle.system.scenario import stock_scenarios
 
 pytestmark = needs_zig
 

@@ -15,9 +15,9 @@ from fmpy.validation import validate_fmu
 
 from bristle.cli import main
 from bristle.errors import BuildError
-from bristle.fmu.plan import plan
+from bristle.fmu.build import plan
 from bristle.native.build import build
-from bristle.native.platforms import here
+from bristle.native.zig import here
 
 pytest.importorskip("ziglang")
 needs_compiler = pytest.mark.skipif(

@@ -14,11 +14,10 @@ from typing import Any
 
 import pytest
 
-from bristle import snapshots
+from bristle.core import progress
 from bristle.page import jobs
-from bristle.page.app import App
+from bristle.page.app import App, PageServer
 from bristle.page.run import serving
-from bristle.page.server import PageServer
 
 
 @dataclass(frozen=True)
@@ -125,10 +124,10 @@ def commands_that_tell(
     monkeypatch: pytest.MonkeyPatch, told: list[dict[str, Any]], then: str = "time.sleep(60)"
 ) -> None:
     """Let the page start, in place of a command, what tells of a fit and then does more."""
-    lines = [snapshots.SEPARATOR + json.dumps(one) for one in told]
+    lines = [progress.SEPARATOR + json.dumps(one) for one in told]
     code = f"""
 import os, sys, time
-assert os.environ[{snapshots.VARIABLE!r}] == "lines"
+assert os.environ[{progress.VARIABLE!r}] == "lines"
 for text in ["fitting bingham: start 1 of 4 ...", *{lines!r}]:
     print(text, file=sys.stderr, flush=True)
 {then}

@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "compare"))
 from predictions_made import predictions_with
 
-from bristle.compare.comparison import compare_predictions
+from bristle.comparison.comparison import compare_predictions
 from bristle.page.embedded import linked_section, script
 from bristle.view.html import page as whole_page
 from bristle.view.page_data import unpack

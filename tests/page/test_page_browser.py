@@ -16,7 +16,7 @@ from page.browsing import Watched, needs_browser, shots
 from page.served import commands_that_tell, fit_told, page_on
 from study.made import write_runs
 
-from bristle.example.make import Choice, make_bench
+from bristle.examples.make import Choice, make_bench
 from bristle.study import Study, create_study
 
 VIEWS = (

@@ -13,8 +13,8 @@ from study.house_made import study_of
 from study.made import write_runs
 
 from bristle.page import controllers_view
-from bristle.page.commands import order_of
-from bristle.page.message import RequestError
+from bristle.page.orders import order_of
+from bristle.page.requests import RequestError
 from bristle.study import create_study
 from bristle.view.page_data import unpack
 

@@ -17,23 +17,23 @@ from page.served import page_on
 from study.made import write_runs
 
 import bristle
-from bristle.design import read_task
 from bristle.errors import StudyError
 from bristle.page import design_view
-from bristle.page.commands import order_of
-from bristle.page.designs import (
+from bristle.page.orders import (
     FIELDS,
     MOTIONS,
     content_of,
     design_name,
     names_of,
+    order_of,
     values_of,
     write_design,
 )
-from bristle.page.message import RequestError
+from bristle.page.requests import RequestError
 from bristle.page.worker import answer
-from bristle.scenario.scenario import load_scenario, parse_overrides
 from bristle.study import Study, create_study
+from bristle.synthesis import read_task
+from bristle.system.scenario import load_scenario, parse_overrides
 from bristle.view.page_data import unpack
 
 SHAKEN: dict[str, Any] = {"motions": list(MOTIONS), "peak": 0.3}

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from page.served import Client, page_on
 
-from bristle.page.guard import Guard
-from bristle.page.server import static_parts
+from bristle.page.app import static_parts
+from bristle.page.requests import Guard
 
 FOREIGN = "https://foreign.example"
 

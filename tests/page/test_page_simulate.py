@@ -15,14 +15,13 @@ from study.made import write_runs
 
 import bristle
 from bristle.data import read_ground_motion
+from bristle.engine.results import spectra
 from bristle.errors import BristleError, BuildError, RecordError, RunError, ScenarioError
 from bristle.native import zig
 from bristle.page import answers, module_view, scenarios_view, simulate_view
-from bristle.page.asked import LONGEST, asked_for, damper_of
-from bristle.page.controls import controls, stock_file
-from bristle.scenario.scenario import load_scenario, parse_overrides, stock_scenarios
-from bristle.simulate.spectra import spectra
+from bristle.page.simulate_view import LONGEST, asked_for, controls, damper_of, stock_file
 from bristle.study import Study, create_study
+from bristle.system.scenario import load_scenario, parse_overrides, stock_scenarios
 from bristle.view.page_data import unpack
 
 BENCH = "bench_sine_bingham"

@@ -11,8 +11,8 @@ import pytest
 from study.made import bench_run, write, write_runs
 
 from bristle.data.channels import ChannelSpec
-from bristle.data.model_value import Value
 from bristle.errors import StudyError
+from bristle.model.model import Value
 from bristle.page import (
     channels_view,
     check_view,
@@ -26,9 +26,8 @@ from bristle.page import (
 )
 from bristle.page.worker import VIEWS, answer, function_of
 from bristle.study import Study, create_study
-from bristle.study.before_after import before_after, predictions
-from bristle.study.comparison import compare_study
 from bristle.study.data_check import check_data
+from bristle.study.steps import before_after, compare_study, predictions
 from bristle.view.page_data import pack, unpack
 
 

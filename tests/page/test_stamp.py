@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 from study.made import bench_run, write, write_runs
 
-from bristle.page.answers import Answers
-from bristle.page.stamp import stamp
+from bristle.page.answers import Answers, stamp
 from bristle.study import create_study
 
 

@@ -37,8 +37,8 @@ from benchmarks.paper.comparison.identification import NOISE, gain
 from benchmarks.paper.comparison.make import Report
 from benchmarks.paper.comparison.tables import MARK, beyond_stroke
 from benchmarks.paper.runs import Runs
-from bristle.draw.style import look
 from bristle.errors import RecordError
+from bristle.view.style import look
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "ground_motion"
 AT_NEWHALL = DATA / "northridge_1994_newhall_360_peer_rsn1044.csv"

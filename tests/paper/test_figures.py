@@ -14,10 +14,10 @@ from matplotlib.colors import to_rgb
 from benchmarks.paper import stiction
 from benchmarks.paper.command import main
 from benchmarks.paper.figures import make, paper_figures
-from bristle.draw.style import COLOURS, ramp
+from bristle.engine.summary import summarise
+from bristle.engine.view import draw_run, run_figure
 from bristle.errors import RunError, ScenarioError
-from bristle.simulate.summary import summarise
-from bristle.simulate.view import draw_run, run_figure
+from bristle.view.style import COLOURS, ramp
 
 # The sine loops at 2 Hz, 0.1 m/s: largest force [N] and energy per cycle [J] of an independent
 # integration at tight tolerance.

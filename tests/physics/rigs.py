@@ -11,8 +11,8 @@ import numpy as np
 
 from bristle.physics import damper
 from bristle.physics.damper import DamperModel
-from bristle.physics.inputs import Inputs
 from bristle.physics.laws import laws_of
+from bristle.physics.tuples import Inputs
 
 HOUSE = """
 schema = 1

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from bristle.component.structure import StructureModel
-from bristle.identify.bench import Tracks, compiled_history, force_history
-from bristle.jit import compiled
+from bristle.core.jit import compiled
+from bristle.identification.histories import Tracks, compiled_history, force_history
 from bristle.physics import damper, structure
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, effects_of
-from bristle.physics.inputs import Inputs
 from bristle.physics.laws import laws_of
 from bristle.physics.signals import KINDS, PARAMETERS, rate, value
+from bristle.physics.tuples import Inputs
 
 DAMPER_CASES = [
     (law, effects)

@@ -17,12 +17,12 @@ from rigs import HOUSE, LAWS, NO_LAW, Bench, force_at, loop_energy, sine
 
 from bristle import units
 from bristle.component.structure import StructureModel
+from bristle.engine.run import run
 from bristle.errors import ScenarioError
 from bristle.fmu.catalogue import component_of_law
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, HOOKS, SITES, Effect, Q, effects_of, laws_joined
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.run import run
+from bristle.system.scenario import load_scenario
 
 LIBRARY = {
     "damper": (

@@ -9,13 +9,13 @@ import pytest
 from rigs import LAWS as NAMES
 from rigs import Bench, force_at, loop_energy, sine
 
-from bristle.check.law_conformance import examine_law
 from bristle.physics import damper
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 from bristle.physics.laws.bouc_wen import yielded
 from bristle.physics.laws.modified_bouc_wen import excess, inner_velocity, mean_share
-from bristle.physics.user import defined
+from bristle.user_code.conformance import examine_law
+from bristle.user_code.load import defined
 
 NEW = ("bouc_wen", "dahl", "modified_bouc_wen", "tanh")
 DT = 5e-4

@@ -10,17 +10,10 @@ import bristle
 from bristle.errors import PhysicsError
 from bristle.physics import damper, structure
 from bristle.physics.damper import DamperModel
-from bristle.physics.effect import (
-    EFFECTS,
-    Effect,
-    Parameter,
-    effects_of,
-    exclude,
-    laws_joined,
-    plain_name,
-)
+from bristle.physics.effect import EFFECTS, Effect, effects_of, exclude, laws_joined, plain_name
 from bristle.physics.effects.duffing import Duffing
 from bristle.physics.effects.end_stop import EndStop
+from bristle.physics.parameter import Parameter
 
 SHARED = [effect for effect in EFFECTS.values() if len(effect.sites) > 1]
 SHORT = {"end_stop.clearance": 0.006, "end_stop.k": 2e4, "end_stop.c": 20.0}
@@ -259,7 +252,7 @@ def test_fmu_and_coupled_engine_agree(tmp_path, damper: str) -> None:
 
 
 def test_compiled_and_plain_python_agree() -> None:
-    from bristle.identify.bench import Bench as Fast
+    from bristle.identification.histories import Bench as Fast
     from bristle.physics.laws import LAWS as CLASSES
 
     t = 0.002 * np.arange(300)

@@ -12,13 +12,14 @@ import pytest
 from rigs import LAWS, NO_LAW, Bench, force_at, sine
 from scipy.integrate import solve_ivp
 
-from bristle.check.channel import shown
 from bristle.component.structure import StructureModel
 from bristle.errors import PhysicsError
 from bristle.physics.building import paper_building
 from bristle.physics.damper import DamperModel, setup_of
-from bristle.physics.effect import EFFECTS, Effect, Parameter, Q, effects_of
+from bristle.physics.effect import EFFECTS, Effect, Q, effects_of
 from bristle.physics.law import LAWS as ALL_LAWS
+from bristle.physics.parameter import Parameter
+from bristle.user_code.compiled import shown
 
 all_laws = pytest.mark.parametrize("law", LAWS)
 both_laws = pytest.mark.parametrize("law", ["bingham", "lugre"])  # whose forces are known by hand

@@ -13,23 +13,15 @@ from rigs import Bench
 from bristle import units
 from bristle.errors import PhysicsError
 from bristle.physics import damper
-from bristle.physics.codegen import generate
-from bristle.physics.command import MOST_KNOTS, chosen_source, rising
+from bristle.physics.command import MOST_KNOTS, Constant, Linear, chosen_source, rising
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import effects_of
 from bristle.physics.forms import choosable, joined_form, split_form
-from bristle.physics.law import (
-    Constant,
-    Law,
-    Linear,
-    Parameter,
-    base_and_variant,
-    forget_law,
-    law_code,
-    law_names,
-)
+from bristle.physics.generate import generate
+from bristle.physics.law import Law, base_and_variant, forget_law, law_code, law_names
 from bristle.physics.laws import LAWS, laws_of
-from bristle.physics.probe_law import cycle
+from bristle.physics.parameter import Parameter
+from bristle.user_code.trial import cycle
 
 NAMES = [law.name for law in laws_of("damper")]
 KNOTS = (0.0, 1.5, 4.0)

@@ -8,15 +8,16 @@ from types import FunctionType
 import numpy as np
 import pytest
 
-from bristle.identify import bench
-from bristle.identify.bench import Bench, force_history
-from bristle.jit import compiled, digest
+from bristle.core.jit import compiled, digest
+from bristle.engine import time_loop
+from bristle.engine.coupled import linked
+from bristle.identification import histories
+from bristle.identification.histories import Bench, force_history
 from bristle.physics import damper
-from bristle.physics.codegen import Link
-from bristle.physics.effect import EFFECTS, Effect, Parameter
+from bristle.physics.effect import EFFECTS, Effect
+from bristle.physics.generate import Link
 from bristle.physics.law import LAWS
-from bristle.simulate import time_loop
-from bristle.simulate.coupled import linked
+from bristle.physics.parameter import Parameter
 
 T = 0.002 * np.arange(150)
 MOTION = 0.01 * np.sin(9.0 * T), 0.09 * np.cos(9.0 * T), -0.81 * np.sin(9.0 * T), 4.0 + 0.0 * T
@@ -60,8 +61,8 @@ def test_the_library_and_its_machine_code_stay_as_they_are(own: type[Effect]) ->
 def test_one_set_of_everything_serves_a_diagnosis(
     own: type[Effect], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench, "begun", lambda *_: None)
-    bench.compile_ahead()
+    monkeypatch.setattr(histories, "begun", lambda *_: None)
+    histories.compile_ahead()
     functions = [damper.functions_of(law, ["leak"]) for law in ("bingham", "lugre")]
     functions.append(damper.functions_of("lugre", ["leak", "gas_spring"]))
     assert len(set(functions)) == 1

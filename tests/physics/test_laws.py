@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 
 from bristle.physics.damper import DamperModel
 from bristle.physics.falling import falling
-from bristle.physics.inputs import Inputs
 from bristle.physics.laws.bingham import Bingham
 from bristle.physics.laws.lugre import LuGre
+from bristle.physics.tuples import Inputs
 
 BINGHAM = SimpleNamespace(**{k: v.value for k, v in Bingham.parameters.items()})
 LUGRE = SimpleNamespace(**{k: v.value for k, v in LuGre.parameters.items()})

@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 from rigs import Bench, force_at
 
-from bristle.data.model import new_model, read_model
-from bristle.data.model_text import model_text
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
 from bristle.fmu.controller import invertible
-from bristle.identify.bench import Bench as CompiledBench
-from bristle.identify.fit import Model, Problem, Run, identify
-from bristle.identify.starts import start_models
-from bristle.identify.table import error_table
+from bristle.identification.error_table import error_table
+from bristle.identification.fit import identify
+from bristle.identification.histories import Bench as CompiledBench
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.starts import start_models
+from bristle.model.model import new_model
+from bristle.model.model_file import model_text, read_model
 from bristle.physics import damper
 from bristle.physics.command import Linear
 from bristle.physics.effect import EFFECTS, Effect, effects_of, laws_joined

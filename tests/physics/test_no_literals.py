@@ -12,7 +12,7 @@ from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS, law_names
 
 PACKAGE = Path(__file__).resolve().parents[2] / "bristle"
-EXEMPT = ("physics", "paper", "example")
+EXEMPT = ("physics", "paper", "examples")
 """Where laws and effects are at home, where a published model is rebuilt, where one is hidden."""
 
 KINDS = {
@@ -20,22 +20,20 @@ KINDS = {
     "laws": {*law_names("damper"), *law_names("structure")},
 }
 ELSEWHERE = {
-    ("compare/coordinates.py", "temperature"): "a label of a run",
-    ("data/labels.py", "temperature"): "a label of a run",
+    ("comparison/predictions.py", "temperature"): "a label of a run",
+    ("data/channels.py", "temperature"): "a label of a run",
     ("data/corrections.py", "delay"): "a fault of a channel that can be set right",
     ("data/checks/motion.py", "delay"): "a kind of finding: a channel that comes late",
-    ("diagnose/clocks.py", "delay"): "a kind of sensor fault",
-    ("data/timing.py", "delay"): "a kind of sensor fault",
-    ("diagnose/faults.py", "delay"): "a kind of sensor fault",
-    ("diagnose/load_cell.py", "delay"): "a kind of sensor fault",
-    ("diagnose/model_based_faults.py", "delay"): "a kind of sensor fault",
-    ("diagnose/sensors.py", "delay"): "a kind of sensor fault",
-    ("diagnose/building_sensors.py", "delay"): "a kind of sensor fault",
+    ("diagnosis/clocks.py", "delay"): "a kind of sensor fault",
+    ("data/decimate.py", "delay"): "a kind of sensor fault",
+    ("diagnosis/sensor_faults.py", "delay"): "a kind of sensor fault",
+    ("diagnosis/load_cell.py", "delay"): "a kind of sensor fault",
+    ("diagnosis/model_faults.py", "delay"): "a kind of sensor fault",
+    ("diagnosis/rig_runs.py", "delay"): "a kind of sensor fault",
     ("component/sensors.py", "delay"): "a property of an instrument",
-    ("controllers/robust.py", "delay"): "a property of an instrument",
+    ("controller_comparison/worst_case.py", "delay"): "a property of an instrument",
     ("cli/controllers.py", "delay"): "an option: a property of an instrument",
-    ("simulate/records.py", "delay"): "a field of the engine's record: a source's parameter",
-    ("simulate/layout.py", "delay"): "a field of the engine's record: a source's parameter",
+    ("engine/records.py", "delay"): "a field of the engine's record: a source's parameter",
 }
 """Files in which such a word means something else, and what."""
 

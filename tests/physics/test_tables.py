@@ -11,20 +11,22 @@ import numpy as np
 import pytest
 from rigs import force_at
 
-from bristle.check.conformance import examine
-from bristle.data.model import new_model, read_model
-from bristle.data.model_text import model_text
-from bristle.design.file import damper_from_model
 from bristle.errors import PhysicsError, StudyError
 from bristle.fmu import catalogue
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem, Run, identify
-from bristle.identify.starts import start_models
-from bristle.physics import damper, user
+from bristle.identification.fit import identify
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.starts import start_models
+from bristle.model.model import new_model
+from bristle.model.model_file import model_text, read_model
+from bristle.physics import damper
 from bristle.physics.command import Linear, Monotone, Quadratic
-from bristle.physics.effect import EFFECTS, Effect, Parameter, Table, interpolate
+from bristle.physics.effect import EFFECTS, Effect
 from bristle.physics.law import Law, Shape, forget_law
-from bristle.physics.parameter import climb
+from bristle.physics.parameter import Parameter, Table, climb, interpolate
+from bristle.synthesis.design_file import damper_from_model
+from bristle.user_code import load
+from bristle.user_code.conformance import examine
 
 DT = 2e-3
 KNOTS = (-0.01, 0.0, 0.005, 0.01)  # m
@@ -254,13 +256,13 @@ def test_a_file_of_a_users_own_may_have_a_table(tmp_path: Path) -> None:
     path = tmp_path / "curved.py"
     path.write_text(FILE)
     try:
-        found = user.load_effect(path)
+        found = load.load_effect(path)
         assert found.own
         known = damper.functions_of("bingham", ["curved"]).slots.parameters
         assert "curved.curve[3]" in known
         assert force_at("bingham", x=0.01, effects=["curved"]) == pytest.approx(1.0)
     finally:
-        user.unload_effects()
+        load.unload_effects()
 
 
 # -- a law

@@ -8,18 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.check.user_effects import refused, usable
 from bristle.cli import main
-from bristle.cli._effect_template import template
-from bristle.diagnose.candidates import joinable
-from bristle.diagnose.conclusion import lookalikes
+from bristle.diagnosis.conclusion import lookalikes
+from bristle.diagnosis.trials import joinable
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
-from bristle.identify.model import REFERENCE, Model, Problem, Run
-from bristle.identify.start_grid import initial_guesses
-from bristle.physics import damper, user
+from bristle.identification.problem import REFERENCE, Model, Problem, Run
+from bristle.identification.start_grid import initial_guesses
+from bristle.physics import damper
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import EFFECTS
+from bristle.user_code import load
+from bristle.user_code.compiled import refused, usable
+from bristle.user_code.templates import effect_template
 
 
 @pytest.fixture(autouse=True)
@@ -30,13 +31,13 @@ def library(tmp_path: Path) -> Iterator[None]:
     for file in tmp_path.rglob("*.py"):
         file.unlink()
     for folder in [tmp_path, *tmp_path.rglob("*/")]:
-        user.load_effects(folder)
+        load.load_effects(folder)
     assert set(EFFECTS) == before
 
 
 def written(folder: Path, name: str = "seal", **changes: str) -> Path:
     """Write the template's effect, some of its text replaced (old to new)."""
-    text = template(name)
+    text = effect_template(name)
     for old, new in changes.items():
         assert old in text, old
         text = text.replace(old, new)
@@ -47,10 +48,10 @@ def written(folder: Path, name: str = "seal", **changes: str) -> Path:
 
 def test_an_effect_joins_the_library_and_the_law(tmp_path: Path) -> None:
     written(tmp_path)
-    (loaded,) = user.load_effects(tmp_path)
+    (loaded,) = load.load_effects(tmp_path)
     assert loaded.error == ""
     assert EFFECTS["seal"] is loaded.effect
-    assert user.own_effects() == {"seal": (tmp_path / "seal.py").resolve()}
+    assert load.own_effects() == {"seal": (tmp_path / "seal.py").resolve()}
     plain = DamperModel("lugre").force(0.0, 0.1, 0.0, 4.0, 0.002, 0.0, 0.0, False)
     model = DamperModel("lugre", {"seal.f_s": 1.5}, ["seal"])
     force = model.force(0.0, 0.1, 0.0, 4.0, 0.002, 0.0, 0.0, False)
@@ -59,15 +60,15 @@ def test_an_effect_joins_the_library_and_the_law(tmp_path: Path) -> None:
 
 def test_an_edited_file_replaces_its_effect_and_a_gone_one_takes_it_away(tmp_path: Path) -> None:
     file = written(tmp_path)
-    first = user.load_effects(tmp_path)[0].effect
-    assert user.load_effects(tmp_path)[0].effect is first
+    first = load.load_effects(tmp_path)[0].effect
+    assert load.load_effects(tmp_path)[0].effect is first
     written(tmp_path, **{"Parameter(0.2,": "Parameter(0.7,"})
-    second = user.load_effects(tmp_path)[0].effect
+    second = load.load_effects(tmp_path)[0].effect
     assert second is not first
     assert second is not None
     assert second.parameters["f_s"].value == 0.7
     file.unlink()
-    assert user.load_effects(tmp_path) == []
+    assert load.load_effects(tmp_path) == []
     assert "seal" not in EFFECTS
     assert "seal.f_s" not in damper.LIBRARY.slots.parameters
 
@@ -76,13 +77,13 @@ def test_of_two_folders_the_one_read_last_stays(tmp_path: Path) -> None:
     for name, value in (("one", "0.3"), ("two", "0.4")):
         (tmp_path / name).mkdir()
         written(tmp_path / name, **{"Parameter(0.2,": f"Parameter({value},"})
-        user.load_effects(tmp_path / name)
+        load.load_effects(tmp_path / name)
         assert EFFECTS["seal"].parameters["f_s"].value == float(value)
 
 
 def test_stock_components_do_not_know_it_unless_they_are_told(tmp_path: Path) -> None:
     file = written(tmp_path)
-    user.load_effects(tmp_path)
+    load.load_effects(tmp_path)
     assert "seal.on" not in catalogue.describe("LuGreDamper").variables
     told = catalogue.describe("LuGreDamper", effects=[file]).variables
     assert told["seal.f_s"].unit == "N"
@@ -131,16 +132,16 @@ def test_a_bad_effect_is_left_out_with_file_line_and_reason(
 ) -> None:
     file = written(tmp_path, **changes)
     before = set(EFFECTS)
-    (loaded,) = user.load_effects(tmp_path)
+    (loaded,) = load.load_effects(tmp_path)
     assert loaded.effect is None
     assert says in loaded.error
     assert loaded.error.count("\n") == 0
     line = next(
-        (k for k, row in enumerate(template("seal").splitlines(), 1) if at and at in row), 0
+        (k for k, row in enumerate(effect_template("seal").splitlines(), 1) if at and at in row), 0
     )
     assert loaded.error.startswith(f"{file}, line {line}:" if line else f"{file}")
     assert set(EFFECTS) == before
-    assert user.why_left_out(file) == loaded.error
+    assert load.why_left_out(file) == loaded.error
     assert main(["check", str(file)]) == 2
     assert says in capsys.readouterr().err
 
@@ -149,7 +150,7 @@ def test_a_bad_effect_leaves_the_good_ones_in(tmp_path: Path) -> None:
     written(tmp_path)
     written(tmp_path, "leaking", **{FORCE: "return p.f_s / q.v"})
     (tmp_path / "no_text.py").write_bytes(b"\xff\xfe\x00")
-    loaded = {one.name: one for one in user.load_effects(tmp_path)}
+    loaded = {one.name: one for one in load.load_effects(tmp_path)}
     assert loaded["seal"].effect is EFFECTS["seal"]
     assert "cannot be read" in loaded["no_text"].error
     assert "leaking" not in EFFECTS
@@ -157,7 +158,7 @@ def test_a_bad_effect_leaves_the_good_ones_in(tmp_path: Path) -> None:
 
 def test_what_numba_refuses_is_left_out_too(tmp_path: Path) -> None:
     written(tmp_path, **{FORCE: "return float(str(p.f_s)) * tanh(q.v / p.v_s)"})
-    loaded = user.load_effects(tmp_path)
+    loaded = load.load_effects(tmp_path)
     assert loaded[0].effect is not None  # Python runs it
     (checked,) = usable(loaded)
     assert checked.effect is None
@@ -199,9 +200,9 @@ def test_a_promise_that_does_not_hold_is_found(
 
 
 def test_one_file_is_loaded_by_name_or_refused(tmp_path: Path) -> None:
-    assert user.load_effect(written(tmp_path)).name == "seal"
+    assert load.load_effect(written(tmp_path)).name == "seal"
     with pytest.raises(PhysicsError, match="there is no such file"):
-        user.load_effect(tmp_path / "gone.py")
+        load.load_effect(tmp_path / "gone.py")
 
 
 SEARCHED = """    start_grid = {"v_s": (0.3, 1.0, 3.0)}
@@ -224,7 +225,7 @@ SEARCHED = """    start_grid = {"v_s": (0.3, 1.0, 3.0)}
 
 def test_the_search_and_the_verdict_take_what_an_effect_says_of_itself(tmp_path: Path) -> None:
     written(tmp_path, **{"    @staticmethod\n    def force(": SEARCHED})
-    (loaded,) = user.load_effects(tmp_path)
+    (loaded,) = load.load_effects(tmp_path)
     assert loaded.error == ""
     t = 0.002 * np.arange(2000)
     x, v = 0.01 * np.sin(6.0 * t), 0.06 * np.cos(6.0 * t)
@@ -261,7 +262,7 @@ def test_what_an_effect_says_wrongly_of_itself_is_refused(
     tmp_path: Path, line: str, word: str
 ) -> None:
     written(tmp_path, **{"    passive = True\n": f"    passive = True\n    {line}\n"})
-    (loaded,) = user.load_effects(tmp_path)
+    (loaded,) = load.load_effects(tmp_path)
     assert loaded.effect is None
     assert word in loaded.error
 
@@ -275,5 +276,5 @@ def test_a_tie_that_gives_no_start_is_refused(tmp_path: Path, body: str, word: s
     tie += f"        {body}\n\n"
     begin = "    @staticmethod\n    def force("
     written(tmp_path, **{begin: tie + begin})
-    (loaded,) = user.load_effects(tmp_path)
+    (loaded,) = load.load_effects(tmp_path)
     assert word in loaded.error

@@ -15,28 +15,31 @@ import pytest
 from numpy.typing import NDArray
 
 import bristle
-from bristle.bridge.in_building import House
 from bristle.cli import main
+from bristle.data.ground_motion import GroundMotion, read_ground_motion
 from bristle.data.measurement import Measurement
-from bristle.data.motion import GroundMotion, read_ground_motion
 from bristle.errors import RecordError, StudyError
-from bristle.example.make import Choice, make_building
-from bristle.example.perform import perform_plan
-from bristle.plan.added_sensors import Added
-from bristle.plan.building_plan import ONE_FORCE, BuildingPlan
-from bristle.plan.building_sites import are_twins, default_wishes, twins_of
-from bristle.plan.folder import ROLES, read_plan
-from bristle.plan.ground import displacement_of, records_at_hand, scalable
-from bristle.plan.motions import Command, Waveform, shape_of
-from bristle.plan.outcome import Outcome
-from bristle.plan.planned_test import Signals, Test
-from bristle.plan.rig_file import read_rig
-from bristle.plan.rig_limits import RESERVE, RigLimits
-from bristle.plan.seen import Goal
-from bristle.plan.shaking_limits import limits_of_shaking
-from bristle.plan.shaking_table import Columns, ShakingTable
-from bristle.plan.table_planner import TablePlanner
-from bristle.study.create import create_study
+from bristle.examples.make import Choice, make_building
+from bristle.examples.perform import perform_plan
+from bristle.planning.added_sensors import Added
+from bristle.planning.building import ONE_FORCE, BuildingPlan, limits_of_shaking
+from bristle.planning.folder import ROLES, read_plan
+from bristle.planning.information import Goal
+from bristle.planning.limits import RESERVE, RigLimits, Signals, Test, read_rig
+from bristle.planning.outcome import Outcome
+from bristle.planning.shaking_table import Columns, ShakingTable
+from bristle.planning.site_questions import are_twins, default_wishes, twins_of
+from bristle.planning.table_planner import TablePlanner
+from bristle.planning.waveforms import (
+    Command,
+    Waveform,
+    displacement_of,
+    records_at_hand,
+    scalable,
+    shape_of,
+)
+from bristle.prediction.model_system import House
+from bristle.study.steps import create_study
 from tests.shaken import building, friction, measured, shake
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bristle.errors import BristleError, StudyError
-from bristle.plan.folder import PlanFolder, PlannedRun, read_plan, write_plan
+from bristle.planning.folder import PlanFolder, PlannedRun, read_plan, write_plan
 
 T = np.arange(1001) / 500.0
 SINE = 0.012 * np.sin(2.0 * np.pi * T) * np.sin(np.pi * T / T[-1]) ** 2

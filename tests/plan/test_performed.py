@@ -14,9 +14,9 @@ from bristle.cli import main
 from bristle.data.measurement import Measurement, measurements_of
 from bristle.data.table import from_arrays
 from bristle.errors import StudyError
-from bristle.plan.folder import PlanFolder, PlannedRun, write_plan
-from bristle.plan.performed import _in_order, compared, performed, planned_for
-from bristle.study.create import create_study
+from bristle.planning.folder import PlanFolder, PlannedRun, write_plan
+from bristle.planning.performed import _in_order, compared, performed, planned_for
+from bristle.study.steps import create_study
 from bristle.study.study import Study
 
 Array = NDArray[np.float64]

@@ -13,28 +13,45 @@ from scipy.ndimage import uniform_filter1d
 
 import bristle
 from bristle.cli import main
-from bristle.diagnose.bench import BenchRuns
-from bristle.diagnose.opening import Opening
-from bristle.diagnose.rule import BENCH
+from bristle.core.text import quantity
+from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.rig_runs import BenchRuns
+from bristle.diagnosis.rule import BENCH
 from bristle.errors import StudyError
-from bristle.example.make import Choice, make_bench
-from bristle.identify.fit import intervals_of
-from bristle.identify.model import Model, Problem, Run
-from bristle.plan.folder import read_plan
-from bristle.plan.goal import Measured, Purposes, stated
-from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
-from bristle.plan.motions import Command, Waveform
-from bristle.plan.outcome import Outcome, outcomes
-from bristle.plan.planned_test import Test
-from bristle.plan.purposes import LEAST, Figure, cost_of, seen
-from bristle.plan.questions import effects_beside, open_parts
-from bristle.plan.rig_limits import RigLimits
-from bristle.plan.search import Planner
-from bristle.plan.seen import Goal, Seen, roles_of
-from bristle.plan.wish import Wish, default_wish, notes_of_change
-from bristle.quantity import quantity
+from bristle.examples.make import Choice, make_bench
+from bristle.identification.fit import intervals_of
+from bristle.identification.problem import Model, Problem, Run
+from bristle.planning.folder import read_plan
+from bristle.planning.information import (
+    Asked,
+    Evidence,
+    Goal,
+    Known,
+    Question,
+    Rival,
+    Seen,
+    roles_of,
+)
+from bristle.planning.limits import RigLimits, Test
+from bristle.planning.outcome import Outcome, outcomes
+from bristle.planning.questions import (
+    LEAST,
+    Figure,
+    Measured,
+    Purposes,
+    Wish,
+    cost_of,
+    default_wish,
+    effects_beside,
+    notes_of_change,
+    open_parts,
+    seen,
+    stated,
+)
+from bristle.planning.search import Planner
+from bristle.planning.waveforms import Command, Waveform
 from bristle.study.extend import extend_study
-from bristle.study.identification import as_model
+from bristle.study.identify import as_model
 
 SHEET = """schema = 1
 [damper]
@@ -371,7 +388,7 @@ def test_a_command_that_does_not_move_shows_no_lag_and_is_said_to(sheet: Path) -
 def test_a_folder_that_is_there_is_refused_before_the_search(
     sheet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    public = import_module("bristle.plan.public")
+    public = import_module("bristle.planning.api")
     monkeypatch.setattr(public, "plan", lambda *_, **__: pytest.fail("searched"))
     assert main(["plan", "--new", str(sheet), "-o", str(tmp_path)]) == 2
     assert "is there already" in capsys.readouterr().err

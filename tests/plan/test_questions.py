@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bristle.diagnose.effect_limits import NO_AMOUNT
+from bristle.diagnosis.effect_limits import NO_AMOUNT
 from bristle.errors import StudyError
-from bristle.identify.model import Model
+from bristle.identification.problem import Model
 from bristle.physics.effect import EFFECTS
-from bristle.plan.questions import refuse_unable
+from bristle.planning.questions import refuse_unable
 
 MODEL = Model("bingham", ("gas_spring",))
 

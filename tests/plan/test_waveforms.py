@@ -10,10 +10,16 @@ import numpy as np
 import pytest
 
 from bristle.errors import StudyError
-from bristle.plan.motions import COMMANDS, MOTIONS, Command, Waveform, command_of, shape_of
-from bristle.plan.planned_test import Test
-from bristle.plan.rig_file import limits_given, read_quantity, read_rig
-from bristle.plan.rig_limits import RESERVE, RigLimits, with_given
+from bristle.planning.limits import (
+    RESERVE,
+    RigLimits,
+    Test,
+    limits_given,
+    read_quantity,
+    read_rig,
+    with_given,
+)
+from bristle.planning.waveforms import COMMANDS, MOTIONS, Command, Waveform, command_of, shape_of
 
 LIMITS = RigLimits(
     stroke=20e-3, speed=0.25, acceleration=8.0, command=(0.0, 5.0), duration=5.0, rate=200.0

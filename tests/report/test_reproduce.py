@@ -11,7 +11,8 @@ import pytest
 from study.made import bench_run, write
 
 from bristle.cli import build_parser, main
-from bristle.data.model import new_model, read_model
+from bristle.model.model import new_model
+from bristle.model.model_file import read_model
 from bristle.report.reproduce import AGAIN, commands
 from bristle.study import Study, create_study
 

@@ -13,9 +13,9 @@ import pytest
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of
 from bristle.data.table import from_arrays
-from bristle.plan.folder import PlanFolder, PlannedRun, read_plan, write_plan
-from bristle.plan.outcome import OUTCOMES
-from bristle.report.study_plan import plan_section
+from bristle.planning.folder import PlanFolder, PlannedRun, read_plan, write_plan
+from bristle.planning.outcome import OUTCOMES
+from bristle.report.study_page import plan_section
 
 
 @pytest.fixture

@@ -16,11 +16,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "study"))
 from made import write_runs
 
 from bristle.cli import main
-from bristle.data.model import StudyModel, Value
-from bristle.report.study_content import gather
-from bristle.report.study_curves import curves_section
-from bristle.report.study_page import render, study_report
-from bristle.report.study_tables import parameter_table, with_interval
+from bristle.core.text import with_interval
+from bristle.model.model import StudyModel, Value
+from bristle.report.figures import curves_section, parameter_table
+from bristle.report.study_page import gather, render, study_report
 from bristle.study import Study, create_study
 
 VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.01, "v_n": 5.0, "exponent": 0.0}

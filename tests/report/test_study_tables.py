@@ -11,7 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "study"))
 from made import bench_run, write
 
-from bristle.report.study_tables import data_table
+from bristle.report.figures import data_table
 from bristle.study import Study, create_study
 from bristle.study.run_facts import RunChoices
 

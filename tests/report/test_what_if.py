@@ -16,13 +16,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "study"))
 from made import write_runs
 
 import bristle
-from bristle.bridge.export import export_study
 from bristle.cli import main
 from bristle.errors import BuildError
+from bristle.export import web_module
 from bristle.native import zig
+from bristle.prediction.export import export_study
 from bristle.report.what_if import movable
 from bristle.study import Study, create_study
-from bristle.web import module
 
 VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 2.0, "v_n": 5.0, "exponent": 0.0}
 
@@ -49,7 +49,7 @@ def test_it_is_the_run_of_the_exported_fmu(study: Study, tmp_path: Path) -> None
 def test_the_report_has_sliders_for_the_numbers_of_the_model(
     study: Study, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(module, "module", lambda: b"\0asm")
+    monkeypatch.setattr(web_module, "module", lambda: b"\0asm")
     assert main(["report", str(study.folder), "--what-if"]) == 0
     page = (study.folder / "reports" / "report.html").read_text()
     assert "What if: the model in run_2, with other numbers" in page

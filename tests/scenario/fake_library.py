@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bristle.errors import FmuError, PhysicsError, RecordError
 from bristle.fmu.description import Description, Variable
-from bristle.scenario.library import Library, damper_of, law_of
+from bristle.system.library import Library, damper_of, law_of
 
 BASE_MASS = 1.9693563369446  # kg
 

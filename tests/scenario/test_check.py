@@ -5,9 +5,9 @@ import json
 import pytest
 from fake_library import VALID
 
-from bristle import resources
 from bristle.cli import main
-from bristle.scenario.schema import build_schema, schema_text
+from bristle.core import files
+from bristle.system.schema import build_schema, schema_text
 
 PLAIN = VALID.replace('parameters = { "gas_spring.on" = true, "gas_spring.k" = 80.0 }\n', "")
 
@@ -108,7 +108,7 @@ def test_the_schema_in_the_repository_is_the_one_that_the_code_makes(capsys):
     assert main(["check", "--schema"]) == 0
     printed = capsys.readouterr().out
     assert printed == schema_text()
-    stored = resources.scenarios_folder() / "scenario.schema.json"
+    stored = files.scenarios_folder() / "scenario.schema.json"
     assert stored.read_text(encoding="utf-8") == printed, (
         "renew it: bristle check --schema > scenarios/scenario.schema.json"
     )
@@ -169,7 +169,7 @@ def test_an_editor_marks_what_is_wrong(validator, old, new):
 def test_an_editor_takes_every_stock_scenario(validator):
     import tomllib
 
-    from bristle.scenario.scenario import stock_scenarios
+    from bristle.system.scenario import stock_scenarios
 
     for file in stock_scenarios():
         errors = list(validator.iter_errors(tomllib.loads(file.read_text(encoding="utf-8"))))

@@ -12,13 +12,11 @@ import pytest
 
 from bristle.errors import ScenarioError
 from bristle.fmu.build import ensure
-from bristle.scenario.import_ssp import import_ssp
-from bristle.scenario.scenario import Scenario, check_scenario, load_scenario
-from bristle.scenario.text import scenario_text
-from bristle.ssp.conversion import Measure, convert
-from bristle.ssp.package import open_package
-from bristle.ssp.structure import read_structure
-from bristle.units import parse
+from bristle.system.scenario import Scenario, check_scenario, load_scenario
+from bristle.system.ssp_import import import_ssp
+from bristle.system.ssp_read import convert, open_package, read_structure
+from bristle.system.toml import scenario_text
+from bristle.units import Measure, parse
 
 FOREIGN = Path(__file__).parents[2].parent / "shared" / "fmi" / "ssp"
 HEAD = (

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from fake_library import FAKE, VALID
 
-from bristle.scenario.naming import LONGEST_NAME, run_name
-from bristle.scenario.scenario import load_scenario
+from bristle.system.library import LONGEST_NAME, run_name
+from bristle.system.scenario import load_scenario
 
 
 @pytest.fixture

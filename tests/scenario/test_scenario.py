@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fake_library import FAKE, VALID
 
-from bristle import resources
+from bristle.core import files
 from bristle.errors import ScenarioError
-from bristle.scenario.scenario import (
+from bristle.system.scenario import (
     Connection,
     check_scenario,
     fmu_parameters,
@@ -297,7 +297,7 @@ def test_what_takes_a_list_is_given_one():
 
 
 def test_a_stock_scenario_is_found_by_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(resources, "scenarios_folder", lambda: tmp_path)
+    monkeypatch.setattr(files, "scenarios_folder", lambda: tmp_path)
     monkeypatch.chdir(tmp_path.parent)
     stock = tmp_path / "half_sine.toml"
     stock.write_text(VALID)
@@ -316,7 +316,7 @@ def test_a_file_here_goes_before_a_stock_scenario(tmp_path, monkeypatch):
     for folder in (stock, here):
         folder.mkdir()
         (folder / "a.toml").write_text(VALID)
-    monkeypatch.setattr(resources, "scenarios_folder", lambda: stock)
+    monkeypatch.setattr(files, "scenarios_folder", lambda: stock)
     monkeypatch.chdir(here)
     assert resolve_scenario("a.toml") == here / "a.toml"
     assert resolve_scenario("a") == stock / "a.toml"

@@ -3,9 +3,9 @@
 import pytest
 from fake_library import BASE_MASS, FAKE, VALID
 
-from bristle.scenario.scenario import check_scenario, load_scenario
-from bristle.scenario.stability import longest_step
-from bristle.simulate.run import run
+from bristle.engine.run import run
+from bristle.system.advice import longest_step
+from bristle.system.scenario import check_scenario, load_scenario
 
 GROUND = VALID[VALID.index("[components.ground]") : VALID.index("[components.structure]")]
 BINGHAM = {"damper.fmu": "BinghamDamper"}

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.control.controller import Controller, building_digest, read_controller
+from bristle.component.controller_file import Controller, building_digest, read_controller
 from bristle.data.building_file import read_building
+from bristle.engine.run import run
 from bristle.errors import ScenarioError
 from bristle.physics.building import paper_building
-from bristle.scenario.scenario import check_scenario, load_scenario, stock_scenarios
-from bristle.scenario.text import scenario_text
-from bristle.simulate.run import run
+from bristle.system.scenario import check_scenario, load_scenario, stock_scenarios
+from bristle.system.toml import scenario_text
 
 FROZEN = Path(__file__).parents[1] / "reference" / "controllers"
 STOCK = next(path for path in stock_scenarios() if path.stem == "el_centro_0p6g_lpv")

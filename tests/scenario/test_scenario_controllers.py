@@ -10,7 +10,7 @@ from bristle.cli import main
 from bristle.errors import ScenarioError
 from bristle.fmu.build import build, plan
 from bristle.physics.building import PAPER
-from bristle.scenario.scenario import check_scenario, load_scenario
+from bristle.system.scenario import check_scenario, load_scenario
 
 DESIGNED = ("el_centro_0p6g_lpv", "el_centro_0p6g_hinf", "el_centro_0p6g_clipped")
 

@@ -14,10 +14,10 @@ from bristle.cli import main
 from bristle.errors import PhysicsError, ScenarioError, TrustError
 from bristle.physics.damper import DamperModel
 from bristle.physics.laws import LAWS
-from bristle.physics.user import unload_effects
-from bristle.scenario.library import damper_of
-from bristle.scenario.scenario import load_scenario
-from bristle.scenario.text import scenario_text
+from bristle.system.library import damper_of
+from bristle.system.scenario import load_scenario
+from bristle.system.toml import scenario_text
+from bristle.user_code.load import unload_effects
 
 OWN = '''
 """A law of my own."""

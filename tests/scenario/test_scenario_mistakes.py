@@ -7,7 +7,7 @@ import pytest
 from fake_library import FAKE, VALID
 
 from bristle.errors import ScenarioError
-from bristle.scenario.scenario import check_scenario, load_scenario
+from bristle.system.scenario import check_scenario, load_scenario
 
 DAMPER = 'fmu = "LuGreDamper"'
 PARAMETERS = 'parameters = { "gas_spring.on" = true, "gas_spring.k" = 80.0 }'

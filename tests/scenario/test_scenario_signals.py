@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bristle.physics.signals import KINDS, PARAMETERS, TAKEN
-from bristle.scenario.scenario import check_scenario
+from bristle.system.scenario import check_scenario
 
 SCENARIO = """
 schema = 1

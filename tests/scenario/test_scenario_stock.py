@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from bristle.scenario.library import installed
-from bristle.scenario.scenario import check_scenario, load_scenario, stock_scenarios
+from bristle.system.library import installed
+from bristle.system.scenario import check_scenario, load_scenario, stock_scenarios
 
 STOCK = {file.stem: file for file in stock_scenarios()}
 EL_CENTRO = {"0p2": 0.2, "0p4": 0.4, "0p6": 0.6, "0p8": 0.8}

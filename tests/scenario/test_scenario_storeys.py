@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from bristle.findings import Finding
-from bristle.scenario.scenario import check_scenario
+from bristle.core.text import Finding
+from bristle.system.scenario import check_scenario
 
 SCENARIO = """
 schema = 1

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bristle.engine.coupled import simulate
 from bristle.errors import ScenarioError
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
+from bristle.system.scenario import load_scenario
 
 # Half-sine pulse, integrated to 1e-10 (physics reference, derived): max |x_b| [m],
 # |x_2 - x_1| [m], |base acceleration|, |y| [m/s2], |v| [m/s], |f| [N], x_b(10 s) [m].

@@ -15,19 +15,18 @@ from toys import Maker
 
 from bristle import load_results, run
 from bristle.cli import main
-from bristle.errors import RunError, ScenarioError
-from bristle.scenario.scenario import Scenario, load_scenario
-from bristle.simulate.coupling_error import (
+from bristle.engine.coupling_error import (
     against,
     discrete_outputs,
     estimate,
     extrapolated,
+    find_step,
     without_doubtful,
 )
-from bristle.simulate.nodes import make_nodes
-from bristle.simulate.run import run_quietly
-from bristle.simulate.schedule import held_inputs
-from bristle.simulate.tolerance import find_step
+from bristle.engine.run import run_quietly
+from bristle.engine.schedule import held_inputs, make_nodes
+from bristle.errors import RunError, ScenarioError
+from bristle.system.scenario import Scenario, load_scenario
 
 T = np.linspace(0.0, 3.0, 301)
 EXACT = np.sin(T)

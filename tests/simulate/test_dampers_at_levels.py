@@ -12,16 +12,14 @@ from scipy.signal import lsim
 
 from bristle import run
 from bristle.data.building_file import read_building
+from bristle.engine.coupled import room, sharing, simulate
+from bristle.engine.coupling_error import bond_names
+from bristle.engine.schedule import make_nodes
 from bristle.fmu import catalogue
-from bristle.physics.building import Building
-from bristle.physics.device import Device
-from bristle.scenario.library import driven_mass
-from bristle.scenario.scenario import check_scenario, load_scenario
-from bristle.scenario.stock import copy_scenario
-from bristle.simulate.coupled import simulate
-from bristle.simulate.nodes import make_nodes
-from bristle.simulate.power import bond_names
-from bristle.simulate.pushed import room, sharing
+from bristle.physics.building import Building, Device
+from bristle.system.library import driven_mass
+from bristle.system.scenario import check_scenario, load_scenario
+from bristle.system.stock import copy_scenario
 
 STOCK = "dampers_at_two_levels"
 BUILDING = """

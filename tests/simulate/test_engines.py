@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 
 from bristle import run
+from bristle.engine.coupled import simulate
+from bristle.engine.results import load_results
+from bristle.engine.run import IncompleteRunError
 from bristle.fmu.catalogue import component_of_law
 from bristle.physics.laws import laws_of
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
-from bristle.simulate.results import load_results
-from bristle.simulate.run import IncompleteRunError
+from bristle.system.scenario import load_scenario
 
 BUILDINGS = {
     "fixed": """

@@ -17,13 +17,12 @@ import pandas as pd
 import pytest
 
 from bristle import run
+from bristle.engine.coupling_error import expect
+from bristle.engine.run import run_quietly
 from bristle.errors import ScenarioError
 from bristle.fmu.description import read_description
-from bristle.scenario.export_ssp import export_ssp
-from bristle.scenario.scenario import Scenario, load_scenario
-from bristle.simulate.elsewhere import expect
-from bristle.simulate.run import run_quietly
-from bristle.ssp.write import WrittenConnection, WrittenSystem, osp_text
+from bristle.system.scenario import Scenario, load_scenario
+from bristle.system.ssp_write import WrittenConnection, WrittenSystem, export_ssp, osp_text
 
 SCENARIO = """
 schema = 1
@@ -311,7 +310,7 @@ def test_a_step_that_the_order_promises_and_a_run_does_not_keep_is_halved(scenar
 def test_where_no_step_is_short_enough_the_error_at_the_shortest_is_told(
     scenario: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bristle.simulate.elsewhere.MOST_STEPS", 1000)  # 250 in the scenario
+    monkeypatch.setattr("bristle.engine.coupling_error.MOST_STEPS", 1000)  # 250 in the scenario
     for one in expect(load_scenario(scenario), sampled(1.0)):
         assert (one.step, one.tried) == (None, 0.002 / 4)
         assert one.tried_error == pytest.approx(0.1 / 4, rel=0.05)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import bristle
+from bristle.engine.run import IncompleteRunError
 from bristle.errors import FmuError, ScenarioError
-from bristle.fmu import description_fmi3
+from bristle.fmu import description
 from bristle.fmu.archive import platform_folder
 from bristle.fmu.description import read_description
-from bristle.simulate.run import IncompleteRunError
 
 REFERENCE = Path(__file__).parents[2].parent / "shared" / "fmi" / "reference_fmus"
 needs_fmus = pytest.mark.skipif(
@@ -199,7 +199,7 @@ DESCRIPTION = """
 
 
 def test_a_description_is_read_as_in_fmi_2() -> None:
-    found = description_fmi3.describe(ElementTree.fromstring(DESCRIPTION))
+    found = description.describe_fmi3(ElementTree.fromstring(DESCRIPTION))
     assert (found.version, found.guid, found.identifier) == ("3.0", "{x}", "Plant")
     assert found.capabilities == {"canGetAndSetFMUstate": "true"}
     assert list(found.variables) == ["u", "y", "n", "s"]  # arrays and binaries are no ports here
@@ -229,7 +229,7 @@ def test_a_description_is_read_as_in_fmi_2() -> None:
 def test_contradictions_are_refused(old: str, new: str, words: str) -> None:
     assert old in DESCRIPTION
     with pytest.raises(FmuError) as refusal:
-        description_fmi3.describe(ElementTree.fromstring(DESCRIPTION.replace(old, new)))
+        description.describe_fmi3(ElementTree.fromstring(DESCRIPTION.replace(old, new)))
     assert words in str(refusal.value)
 
 

@@ -12,9 +12,8 @@ from test_master_schedule import GROUND, LOOP, STRUCTURE, calls
 from test_midpoint import STANDING, told
 
 from bristle.component import HELD, LINEAR
-from bristle.simulate.operations import Node
-from bristle.simulate.run import IncompleteRunError, run
-from bristle.simulate.schedule import make_schedule
+from bristle.engine.run import IncompleteRunError, run
+from bristle.engine.schedule import Node, make_schedule
 
 __all__ = ["pytestmark"]  # this module is skipped where that one is
 

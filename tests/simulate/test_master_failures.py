@@ -11,9 +11,9 @@ import pytest
 from toys import Maker
 
 from bristle import run
+from bristle.engine.run import IncompleteRunError
 from bristle.errors import FmuError, RunError
 from bristle.fmu.build import ensure
-from bristle.simulate.run import IncompleteRunError
 
 
 def failing(scenario_of: Maker, how: str, at: float = 0.5) -> Path:
@@ -146,8 +146,8 @@ def test_unsettled_algebraic_loop_is_named(scenario_of: Maker) -> None:
 def test_fmu_of_another_platform_is_explained(scenario_of: Maker, tmp_path: Path) -> None:
     import zipfile
 
+    from bristle.engine.instance import Instance, Unpacked
     from bristle.fmu.description import read_description
-    from bristle.simulate.session import Instance, Unpacked
 
     bare = tmp_path / "bare.fmu"
     with zipfile.ZipFile(scenario_of.toys["Ramp"]) as old, zipfile.ZipFile(bare, "w") as new:
@@ -165,8 +165,8 @@ def test_fmu_of_another_platform_is_explained(scenario_of: Maker, tmp_path: Path
 def test_fmu_that_raises_while_it_is_made_says_why(scenario_of: Maker, tmp_path: Path) -> None:
     import zipfile
 
+    from bristle.engine.instance import Instance, Unpacked
     from bristle.fmu.description import read_description
-    from bristle.simulate.session import Instance, Unpacked
 
     broken = tmp_path / "broken.fmu"
     with zipfile.ZipFile(scenario_of.toys["Ramp"]) as old, zipfile.ZipFile(broken, "w") as new:
@@ -188,8 +188,8 @@ def test_ctrl_c_while_an_fmu_is_made_is_no_failure_of_it(
 ) -> None:
     import zipfile
 
+    from bristle.engine import instance as session
     from bristle.fmu.description import read_description
-    from bristle.simulate import session
 
     slow = tmp_path / "slow.fmu"
     signals = b"import os\nimport signal\nos.kill(os.getpid(), signal.SIGINT)\n"

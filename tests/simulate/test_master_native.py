@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.simulate.results import load_results
-from bristle.simulate.run import IncompleteRunError, run
+from bristle.engine.results import load_results
+from bristle.engine.run import IncompleteRunError, run
 
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 pytestmark = pytest.mark.skipif(

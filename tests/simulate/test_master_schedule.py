@@ -6,9 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from bristle.fmu.description import Variable
-from bristle.simulate.graph import find_loop
-from bristle.simulate.operations import (
+from bristle.engine.schedule import (
     Keep,
     Node,
     Ramp,
@@ -19,8 +17,10 @@ from bristle.simulate.operations import (
     Shift,
     Step,
     Write,
+    find_loop,
+    make_schedule,
 )
-from bristle.simulate.schedule import make_schedule
+from bristle.fmu.description import Variable
 
 
 def node(

@@ -12,11 +12,10 @@ from toys import Maker
 
 from bristle import run
 from bristle.component import LINEAR, SAMPLED
+from bristle.engine.schedule import Node, held_inputs, make_schedule
 from bristle.errors import ScenarioError
 from bristle.fmu.description import Variable
-from bristle.scenario.scenario import check_scenario, resolve_scenario
-from bristle.simulate.operations import Node
-from bristle.simulate.schedule import held_inputs, make_schedule
+from bristle.system.scenario import check_scenario, resolve_scenario
 
 H = 0.1
 T = np.arange(11) / 10

@@ -11,9 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.errors import RunError
-from bristle.simulate import results
-from bristle.simulate.results import (
+from bristle.engine import results
+from bristle.engine.results import (
     Column,
     CsvWriter,
     Table,
@@ -23,6 +22,7 @@ from bristle.simulate.results import (
     write_csv,
     write_parquet,
 )
+from bristle.errors import RunError
 
 MADE: dict[str, Any] = {
     "version": "0.1.0",

@@ -19,12 +19,12 @@ import pytest
 from toys import Maker
 
 import bristle
+from bristle.engine import cosimulation
+from bristle.engine.results import load_results
+from bristle.engine.run import RunInterrupted, run
 from bristle.errors import RunError
-from bristle.scenario.scenario import load_scenario, stock_scenarios
-from bristle.scenario.text import scenario_text
-from bristle.simulate import master
-from bristle.simulate.results import load_results
-from bristle.simulate.run import RunInterrupted, run
+from bristle.system.scenario import load_scenario, stock_scenarios
+from bristle.system.toml import scenario_text
 
 PACKAGE = Path(bristle.__file__).resolve().parent.parent
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(PACKAGE)}
@@ -216,7 +216,7 @@ def test_overrides_of_numpy_and_paths_are_written(fine: Path, tmp_path: Path) ->
 def test_package_runs_as_a_function_whatever_was_imported(fine: Path) -> None:
     assert bristle.run(fine).equals(run(fine))
     code = "import bristle, sys; print(len(bristle.run(sys.argv[1])))"
-    for before in ("", "import bristle.simulate.run; ", "from bristle.simulate.run import run; "):
+    for before in ("", "import bristle.engine.run; ", "from bristle.engine.run import run; "):
         done = subprocess.run(
             [sys.executable, "-c", before + code, str(fine)],
             env=ENVIRONMENT, capture_output=True, text=True, timeout=60,
@@ -355,14 +355,14 @@ def test_ctrl_c_ends_a_component_that_hangs(scenario_of: Maker, tmp_path: Path) 
 
 def test_ctrl_c_in_the_last_block_of_steps_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """The run is whole, and a caller's loop of runs ends all the same."""
-    advance = master.Master.advance
+    advance = cosimulation.Master.advance
 
-    def last(self: master.Master, count: int) -> None:
+    def last(self: cosimulation.Master, count: int) -> None:
         advance(self, count)
         if self.rows > self.steps:
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(master.Master, "advance", last)
+    monkeypatch.setattr(cosimulation.Master, "advance", last)
     with pytest.raises(RunInterrupted, match="after the last step") as caught:
         run("bench_sine_bingham", {"run.stop": 0.05})
     assert len(caught.value.frame) == 101

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bristle.engine.coupled import simulate
+from bristle.engine.run import run
 from bristle.fmu import catalogue
 from bristle.fmu.controller import MEASURED
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import simulate
-from bristle.simulate.run import run
+from bristle.system.scenario import load_scenario
 
 PLANT = """
 schema = 1

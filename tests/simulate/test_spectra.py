@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from bristle.cli import main
+from bristle.engine.results import spectra, write_spectra
 from bristle.errors import RunError
-from bristle.simulate.spectra import spectra, write_spectra
 
 
 def test_the_command_writes_the_spectra_of_ground_and_floors(

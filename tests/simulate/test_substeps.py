@@ -13,8 +13,7 @@ from toys import Maker
 
 from bristle import run
 from bristle.component import HELD, LINEAR, SAMPLED
-from bristle.simulate.operations import ALONG, Node, Step, Write
-from bristle.simulate.schedule import make_schedule
+from bristle.engine.schedule import ALONG, Node, Step, Write, make_schedule
 
 SEQUENTIAL = ("gauss-seidel", "midpoint", "midpoint-iterated")
 H, PARTS = 0.1, 4

@@ -10,7 +10,7 @@ import numpy as np
 from shaken import building, shake
 
 from bristle.data.channels import channel_unit
-from bristle.study.create import create_study
+from bristle.study.steps import create_study
 from bristle.study.study import Study
 
 STIFF = 1.5e7  # N/m3, of a cubic spring that the files may hide

@@ -13,8 +13,7 @@ import pytest
 from bristle import cli
 from bristle.data.building_file import read_building
 from bristle.fmu.catalogue import describe
-from bristle.identify.building import StructureFit
-from bristle.identify.building_file import building_text
+from bristle.identification.building_fit import StructureFit, building_text
 from bristle.physics.building import from_data
 from bristle.study.study import Study
 

@@ -12,16 +12,16 @@ import pytest
 from made import bench_run, write
 
 import bristle
-from bristle.bridge.export import export_study
 from bristle.cli import main
-from bristle.compare.labels import LabelError, label_sentence
+from bristle.comparison.conditions import LabelError, label_sentence
 from bristle.data.channels import ChannelSpec
 from bristle.errors import StudyError
 from bristle.fmu.description import read_description
 from bristle.physics.drive import DRIVES, VOLTAGE, declared_for, text_for, unit_for
 from bristle.physics.effect import EFFECTS
-from bristle.study.create import create_study
+from bristle.prediction.export import export_study
 from bristle.study.run_facts import RunChoices, facts_of, rows_of_table
+from bristle.study.steps import create_study
 from bristle.study.study import Study
 
 RATE = 200.0
@@ -87,7 +87,7 @@ def test_compare_says_on_which_runs_the_error_is(lab, tmp_path) -> None:
     worst = max((one for one in comparison.labels if one.name == "current"), key=lambda one: one.z)
     assert (worst.value, worst.text) == (1.0, "1 A")
     assert comparison.as_dict()["labels"][0].keys() == {"label", "value", "z", "runs"}
-    from bristle.compare.view import run_table
+    from bristle.comparison.view import run_table
 
     header, rows = run_table(comparison)[:2]
     assert set(header[-3:]) == {"amplitude", "frequency", "current"}
@@ -184,8 +184,8 @@ def test_numbers_that_count_files_are_no_levels(tmp_path) -> None:
 
 
 def test_the_report_tells_what_is_known_of_runs_and_how_to_make_them_again(lab, tmp_path) -> None:
+    from bristle.report.figures import data_table
     from bristle.report.reproduce import commands
-    from bristle.report.study_tables import data_table
 
     study = Study.create(tmp_path / "rig", files(lab)[:4])
     header, rows = data_table(study, study.read())
@@ -384,8 +384,8 @@ ABOUT_FIELD = ("coil_lag", "saturation", "remanence")
 
 
 def test_a_verdict_speaks_of_its_own_command() -> None:
-    from bristle.diagnose.verdict_text import about, drive_of
-    from bristle.diagnose.view import verdict_view
+    from bristle.diagnosis.view import verdict_view
+    from bristle.diagnosis.words import about, drive_of
     from bristle.view.blocks import Table
 
     floor = {"force": 1.0, "current": 0.0}

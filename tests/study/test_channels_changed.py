@@ -15,11 +15,11 @@ from study.made import bench_run, write
 from bristle.cli import main
 from bristle.data.corrections import Correction
 from bristle.errors import BristleError, StudyError
-from bristle.study import Study, channel_changes, create_study, set_aside
-from bristle.study.added_runs import FILE as ADDED
-from bristle.study.channel_changes import correct_channels
+from bristle.study import Study, create_study, history, read_again
+from bristle.study.changes import FILE as ADDED
 from bristle.study.extend import extend_study
 from bristle.study.new import parse_channel
+from bristle.study.read_again import correct_channels
 
 RIGHT = ("force=-F [N]@kN",)
 """The title says N, and means kN; the sensor pulls where the damper pushes."""
@@ -87,7 +87,7 @@ def identified(folder: Path) -> Study:
     study.add_step("add gas_spring", "by hand", model.with_effect("gas_spring"))
     study.undo()
     study.write_report("identify.json", '{"step": 1}')
-    (folder / "effects" / "learned_1.py").write_text(f'source = "{set_aside.LEARNED} rig, 2026"\n')
+    (folder / "effects" / "learned_1.py").write_text(f'source = "{history.LEARNED} rig, 2026"\n')
     (folder / "effects" / "own.py").write_text("# by the lab\n")
     return study
 
@@ -248,7 +248,7 @@ def test_a_command_that_is_stopped_while_it_reads_changes_nothing(
 ) -> None:
     study, before = Study(found), content(found)
     with monkeypatch.context() as patch:
-        patch.setattr(channel_changes, at, killed)
+        patch.setattr(read_again, at, killed)
         with pytest.raises(KeyboardInterrupt):
             correct_channels(study, given(*RIGHT))  # type: ignore[arg-type]
     assert content(found) == before
@@ -259,7 +259,7 @@ def test_a_process_that_is_killed_while_it_writes_leaves_a_change_that_is_comple
     both: tuple[Path, Path], found: Path, moves: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study, rig, left = Study(found), found, [moves]
-    move: Callable[[Path, Path], None] = set_aside._move
+    move: Callable[[Path, Path], None] = history._move
 
     def some(path: Path, place: Path) -> None:
         if left[0] == 0:
@@ -268,7 +268,7 @@ def test_a_process_that_is_killed_while_it_writes_leaves_a_change_that_is_comple
         move(path, place)
 
     with monkeypatch.context() as patch:
-        patch.setattr(set_aside, "_move", some)
+        patch.setattr(history, "_move", some)
         try:
             correct_channels(study, given(*RIGHT))  # type: ignore[arg-type]
         except KeyboardInterrupt:

@@ -10,14 +10,15 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle.bridge.export import export_study
-from bristle.bridge.on_bench import AGREEMENT, prediction
 from bristle.cli import main
-from bristle.data.model import new_model, read_model
 from bristle.errors import StudyError
-from bristle.identify.bench import Bench
-from bristle.identify.prepare import prepare
+from bristle.identification.histories import Bench
+from bristle.identification.prepare import prepare
+from bristle.model.model import new_model
+from bristle.model.model_file import read_model
 from bristle.physics.damper import DamperModel
+from bristle.prediction.export import export_study
+from bristle.prediction.model_system import AGREEMENT, prediction
 from bristle.report.reproduce import _other_law
 from bristle.study.forms import forms_asked, in_form, knots_of
 from bristle.study.inputs import measurements

@@ -11,21 +11,20 @@ import pytest
 
 from bristle.cli import main
 from bristle.cli.learn import _of_command
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.learned.closed import formula_of
-from bristle.diagnose.learned.closed_fit import Closed
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.fit import LearnedCurve
-from bristle.diagnose.opening import Opening
-from bristle.diagnose.verdict_file import SCHEMA
+from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.trials import Trial
+from bristle.diagnosis.verdict import SCHEMA
 from bristle.errors import StudyError
-from bristle.identify.fit import Model, Problem
+from bristle.identification.problem import Model, Problem
+from bristle.learning.closed_forms import Closed, formula_of
+from bristle.learning.curve import Curve
+from bristle.learning.curve_picture import draw_curve
+from bristle.learning.fit import LearnedCurve
 from bristle.physics.effect import EFFECTS
-from bristle.study import curves
-from bristle.study.curve_picture import draw_curve
-from bristle.study.curves import learn_effect
-from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects
+from bristle.study import learn as curves
+from bristle.study.identify import identify_study
+from bristle.study.learn import learn_effect
+from bristle.study.steps import add_effects
 from bristle.study.study import Study
 
 OPENED = curves._opened

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.study.comparison import compare_study
-from bristle.study.identification import identify_study
+from bristle.study.identify import identify_study
+from bristle.study.steps import compare_study
 from bristle.study.study import Study
 
 DT = 0.004

@@ -12,10 +12,9 @@ from made import bench_run, write, write_runs
 
 from bristle.data.corrections import Correction
 from bristle.errors import StudyError
-from bristle.study.added_runs import other_data
-from bristle.study.create import create_study
-from bristle.study.curves import _written
-from bristle.study.data_digest import data_digest
+from bristle.study.changes import data_digest, other_data
+from bristle.study.learn import _written
+from bristle.study.steps import create_study
 from bristle.study.study import Study
 
 VERDICT = {"schema": 2, "kind": "none", "effects": []}

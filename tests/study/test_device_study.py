@@ -11,16 +11,16 @@ import pytest
 from braced import BRACE, DT, brace, noisy, shake, tie, tower
 
 import bristle
-from bristle.bridge.closed_loop_input import house_of
-from bristle.bridge.in_building import others_of, shaking_of
 from bristle.cli import main
 from bristle.data.channels import channel_unit
 from bristle.errors import PhysicsError, StudyError
 from bristle.page import channels_view
+from bristle.prediction.excitation import house_of
+from bristle.prediction.model_system import others_of, shaking_of
 from bristle.report.reproduce import commands
-from bristle.study.building import identify_building_alone
 from bristle.study.data_check import check_data
 from bristle.study.rig import building_of
+from bristle.study.steps import identify_building_alone
 from bristle.study.study import Study
 
 BUILDING = """

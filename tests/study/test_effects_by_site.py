@@ -8,22 +8,21 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.data.model import new_model, read_model
-from bristle.data.model_text import write_model
-from bristle.design.file import damper_from_model as read_damper
-from bristle.diagnose.candidates import joinable
-from bristle.diagnose.conclusion import lookalikes
-from bristle.diagnose.limits import untestable
+from bristle.diagnosis.conclusion import lookalikes
+from bristle.diagnosis.effect_limits import untestable
+from bristle.diagnosis.trials import joinable
 from bristle.errors import StudyError
-from bristle.identify.assigned import at_site
-from bristle.identify.bench import Bench
-from bristle.identify.model import Model, Problem, Run
-from bristle.identify.rig import Rig, Site
-from bristle.identify.site_fit import fit_site
-from bristle.identify.structure import StructureProblem, structure_run
+from bristle.identification.building_sites import StructureProblem, structure_run
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.rig import Rig, Site, at_site
+from bristle.identification.rig_fit import fit_site
+from bristle.model.model import new_model
+from bristle.model.model_file import read_model, write_model
 from bristle.physics.building import paper_building
-from bristle.study.learning import add_effects
+from bristle.study.steps import add_effects
 from bristle.study.study import Study
+from bristle.synthesis.design_file import damper_from_model as read_damper
 
 BOTH = ("end_stop", "end_stop@damper")
 VALUES = {

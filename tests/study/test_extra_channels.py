@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from made import bench_run, write
 
-from bristle.bridge.export import export_study
 from bristle.cli import main
-from bristle.compare import compare
-from bristle.data.model import new_model
+from bristle.comparison import compare
 from bristle.errors import RecordError, StudyError
 from bristle.fmu.description import read_description
-from bristle.identify.fit import Problem
-from bristle.identify.prepare import prepare
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Problem
+from bristle.model.model import new_model
+from bristle.prediction.export import export_study
 from bristle.study import Study, create_study
-from bristle.study.curves import learn_effect
 from bristle.study.data_check import check_data
-from bristle.study.identification import as_model, identify_study
-from bristle.study.learning import add_effects
+from bristle.study.identify import as_model, identify_study
+from bristle.study.learn import learn_effect
+from bristle.study.steps import add_effects
 
 NAMES = ("train_1", "train_2", "train_3", "valid_1")
 SLOPE = 0.12  # N/bar

@@ -13,11 +13,11 @@ import pytest
 from bristle.cli import identify as command
 from bristle.cli import main
 from bristle.errors import RecordError, StudyError
-from bristle.identify.bench import Bench
-from bristle.identify.error import ForceError
-from bristle.study.create import create_study
-from bristle.study.identification import identify_study
-from bristle.study.public import identify
+from bristle.identification.error import ForceError
+from bristle.identification.histories import Bench
+from bristle.study.api import identify
+from bristle.study.identify import identify_study
+from bristle.study.steps import create_study
 from bristle.study.study import Study
 from bristle.view.blocks import Next
 

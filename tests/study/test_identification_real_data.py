@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.study.public import identify
+from bristle.study.api import identify
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"  # ../shared/data
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the reference data are not there")

@@ -12,7 +12,7 @@ from made import bench_run, write, write_runs
 from bristle.cli import main
 from bristle.data.corrections import Correction
 from bristle.errors import StudyError
-from bristle.study.joined_corrections import joined_corrections
+from bristle.study.runs import joined_corrections
 from bristle.study.study import Study
 
 SIZES = {"odd (1 of 2)": 1500, "odd (2 of 2)": 500}

@@ -10,13 +10,9 @@ import pytest
 from bristle.cli import main
 from bristle.data.channels import ChannelSpec
 from bristle.data.checks.differing_runs import check_differing_runs
-from bristle.data.checks.recording import check_recording
-from bristle.data.corrections import Correction, after, set_right, wrong_value
-from bristle.data.line_removal import without_lines
-from bristle.data.mains import mains_of
+from bristle.data.checks.recording import check_recording, mains_of, moving_average, spectral_lines
+from bristle.data.corrections import Correction, after, set_right, without_lines, wrong_value
 from bristle.data.measurement import Measurement, measurements_of
-from bristle.data.moving_average import moving_average
-from bristle.data.spectral_lines import spectral_lines
 from bristle.data.table import table_from_frame
 from bristle.errors import StudyError
 from bristle.study.study import Study

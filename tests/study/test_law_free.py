@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.data.model import new_model
-from bristle.diagnose.candidates import Trial
+from bristle.diagnosis.trials import Trial
 from bristle.errors import StudyError
-from bristle.identify.fit import Model
+from bristle.identification.problem import Model
+from bristle.model.model import new_model
 from bristle.physics.building import paper_building
-from bristle.study import completion
-from bristle.study.completion import MOST_EFFECTS, complete
-from bristle.study.create import create_study
-from bristle.study.laws import law_command, law_or_all, with_law
-from bristle.study.learning import diagnose_study
-from bristle.study.public import diagnose, identify
+from bristle.study import auto
+from bristle.study.api import diagnose, identify
+from bristle.study.auto import MOST_EFFECTS, complete
+from bristle.study.forms import law_command, law_or_all, with_law
+from bristle.study.steps import create_study, diagnose_study
 from bristle.study.study import Study
 from tests.independent.generate import make_case
 from tests.study.made import bench_run, write_runs
@@ -65,14 +64,14 @@ def folder(monkeypatch):
         study.names += names
         return SimpleNamespace(step=f"add {names[0]}")
 
-    monkeypatch.setattr(completion, "add_effects", add)
+    monkeypatch.setattr(auto, "add_effects", add)
     return made
 
 
 def told(monkeypatch, answers):
     """Let the diagnoses be these, one after the other."""
     found = iter(answers)
-    monkeypatch.setattr(completion, "diagnose_study", lambda _study, **_given: next(found))
+    monkeypatch.setattr(auto, "diagnose_study", lambda _study, **_given: next(found))
 
 
 def test_greedy_adds_what_gains_most_until_nothing_gains(folder, monkeypatch):
@@ -98,7 +97,7 @@ def test_of_effects_that_gain_about_alike_the_one_that_is_better_identified_is_a
     told(monkeypatch, answers)
     after = {"stribeck": 4.0, "drift": 3.8}
     monkeypatch.setattr(
-        completion,
+        auto,
         "identify_with",
         lambda _study, names, _begin: SimpleNamespace(z=after[names[0]]),
     )

@@ -11,16 +11,20 @@ import pytest
 
 from bristle.cli import main
 from bristle.cli.add import text
-from bristle.diagnose import Diagnosis
+from bristle.diagnosis import Diagnosis
 from bristle.errors import RecordError, StudyError
-from bristle.study import learning
-from bristle.study.before_after import before_after, predictions
-from bristle.study.comparison import compare_study
-from bristle.study.completion import complete
-from bristle.study.create import create_study
-from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, diagnose_study
-from bristle.study.public import diagnose
+from bristle.study import steps
+from bristle.study.api import diagnose
+from bristle.study.auto import complete
+from bristle.study.identify import identify_study
+from bristle.study.steps import (
+    add_effects,
+    before_after,
+    compare_study,
+    create_study,
+    diagnose_study,
+    predictions,
+)
 from bristle.study.study import Study
 from tests.independent.generate import make_case
 
@@ -84,7 +88,7 @@ def test_the_verdict_file_holds_what_a_program_needs(study):
 
 def test_a_channel_that_the_study_turns_is_told_with_the_verdict(study, monkeypatch):
     nothing = lambda *_given, **_more: Diagnosis("none", (), ("Nothing is missing.",))  # noqa: E731
-    monkeypatch.setattr(learning, "diagnose_rig", nothing)
+    monkeypatch.setattr(steps, "diagnose_rig", nothing)
     path = study.folder / "study.toml"
     text = path.read_text()
     begin = text.index("[channels.force]")
@@ -231,7 +235,7 @@ def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch
     def killed(*_arguments, **_choices):
         raise Killed
 
-    monkeypatch.setattr(learning, "diagnose_rig", killed)
+    monkeypatch.setattr(steps, "diagnose_rig", killed)
     with pytest.raises(Killed):
         complete(study)
     assert Study(study.folder).model().effects == {}

@@ -15,9 +15,8 @@ from made import bench_run, write_runs
 from matplotlib.figure import Figure
 
 import bristle
-from bristle.data.equation import equations
 from bristle.data.measurement import read_measurements
-from bristle.diagnose.faults import SensorFault
+from bristle.diagnosis.sensor_faults import SensorFault
 from bristle.errors import (
     BristleError,
     DesignError,
@@ -26,6 +25,7 @@ from bristle.errors import (
     RunError,
     StudyError,
 )
+from bristle.model.equations import equations
 from bristle.study.data_check import check_data
 
 NAMED = {"time": "s", "displacement": "m", "velocity": "m/s", "force": "N", "voltage": "V"}

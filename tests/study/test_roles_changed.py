@@ -15,7 +15,7 @@ from bristle.data.corrections import Correction
 from bristle.errors import StudyError
 from bristle.study import Study, create_study
 from bristle.study.history import EARLIER
-from bristle.study.identification import identify_study
+from bristle.study.identify import identify_study
 
 
 @pytest.fixture

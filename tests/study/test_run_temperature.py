@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from made import bench_run, write
 
-from bristle.bridge.export import export_study
 from bristle.fmu.description import read_description
-from bristle.study.create import create_study
-from bristle.study.learning import add_effects
+from bristle.prediction.export import export_study
 from bristle.study.run_facts import RunChoices
+from bristle.study.steps import add_effects, create_study
 
 WARM = {"train_1": 18.0, "train_2": 26.0, "train_3": 34.0, "valid_1": 30.0}
 SHARE = 0.012

@@ -10,16 +10,15 @@ import pytest
 from made import RATE, bench_run, write
 
 from bristle.cli import main
-from bristle.data.decimate import decimated
-from bristle.data.finer import Finer
+from bristle.data.decimate import Finer, decimated
+from bristle.data.noise import find_spikes
 from bristle.data.sampling import Even, Sampling
-from bristle.data.spikes import find_spikes
 from bristle.errors import RecordError, StudyError
-from bristle.study.create import create_study
 from bristle.study.data_check import check_data
 from bristle.study.run_facts import RunChoices
-from bristle.study.settings_text import with_mask
+from bristle.study.steps import create_study
 from bristle.study.study import Study
+from bristle.study.study_file import with_mask
 
 
 def joined(path: Path, count: int = 4) -> Path:

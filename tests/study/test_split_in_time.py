@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made import bench_run, write
 
-from bristle.identify.prepare import prepare
+from bristle.identification.prepare import prepare
 from bristle.study import Study
 
 

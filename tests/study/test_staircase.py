@@ -7,7 +7,7 @@ from io import StringIO
 from rich.console import Console
 
 from bristle.study import Step
-from bristle.study.staircase import staircase
+from bristle.study.history import staircase
 
 STEPS = [
     Step(0, "begin with lugre", "made"),

@@ -11,8 +11,8 @@ from house_made import STIFF, study_of
 
 from bristle.cli import main
 from bristle.report.study_page import study_report
-from bristle.study.comparison import compare_study, comparer
-from bristle.study.identification import as_model, identify_study
+from bristle.study.identify import as_model, identify_study
+from bristle.study.steps import compare_study, comparer
 from bristle.study.study import Study
 
 

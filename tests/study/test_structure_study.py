@@ -10,16 +10,20 @@ from house_made import study_of
 from shaken import building, friction
 
 from bristle.cli import diagnose as diagnose_command
-from bristle.diagnose.conclusion import About, conclude
-from bristle.diagnose.finding import Finding
+from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.site_diagnosis import Finding
 from bristle.errors import StudyError
-from bristle.identify.assigned import at_site, unassigned
-from bristle.identify.model import Model
+from bristle.identification.problem import Model
+from bristle.identification.rig import at_site, unassigned
 from bristle.physics.effect import EFFECTS
-from bristle.study.before_after import before_after, predictions
-from bristle.study.comparison import compare_study
-from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, diagnose_study
+from bristle.study.identify import identify_study
+from bristle.study.steps import (
+    add_effects,
+    before_after,
+    compare_study,
+    diagnose_study,
+    predictions,
+)
 
 
 def test_hidden_spring_is_found_added_and_the_error_falls(tmp_path, capsys):

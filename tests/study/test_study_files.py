@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from made import write_runs
 
+from bristle.core.files import read_json, write_json, write_whole
 from bristle.data.channels import ChannelSpec
-from bristle.data.files import read_json, write_json, write_whole
 from bristle.study import StudyError, create_study, new_model, read_model, write_model
-from bristle.study.run_file import RunFile
-from bristle.study.settings import Settings, read_settings, write_settings
+from bristle.study.study_file import RunFile, Settings, read_settings, write_settings
 
 STUDY = """schema = 1
 title = "rig A"

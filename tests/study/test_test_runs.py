@@ -15,8 +15,8 @@ from bristle.errors import RecordError, StudyError
 from bristle.report.study_page import study_report
 from bristle.study import Study, create_study
 from bristle.study.data_check import check_data
-from bristle.study.openings import FILE, openings
 from bristle.study.run_facts import RunChoices
+from bristle.study.steps import FILE, openings
 
 SECONDS = 2.0
 
@@ -117,8 +117,8 @@ def test_a_damaged_or_repeated_test_run_is_refused_when_the_study_is_made(tmp_pa
 def test_fits_and_verdicts_do_not_read_a_test_run(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bristle.diagnose import Diagnosis
-    from bristle.study import learning
+    from bristle.diagnosis import Diagnosis
+    from bristle.study import steps as learning
 
     study.files("test")[0].write_text("not a measurement")
     found = bristle.identify(study)

@@ -11,8 +11,8 @@ from study.made import write_runs
 from bristle.cli import main
 from bristle.cli.diagnose import _next
 from bristle.data.corrections import Correction
-from bristle.diagnose.correctable import corrections_of
-from bristle.diagnose.verdict_file import SCHEMA
+from bristle.diagnosis.conclusion import corrections_of
+from bristle.diagnosis.verdict import SCHEMA
 from bristle.study import Study, create_study
 
 LATE = {"channel": "force", "fault": "delay", "value": 0.004, "words": "late", "run": "run_2"}

@@ -14,12 +14,12 @@ from benchmarks.training.estimator import estimator
 from benchmarks.training.runs import Loop, Run
 from benchmarks.training.train import main
 from benchmarks.training.training import PolicyTask, Training, same_motion
-from bristle.control.policy import hidden_units, policy_inputs, voltage_share, weight_count
-from bristle.data.motion import GroundMotion
-from bristle.design import Damper
-from bristle.design.plant import structure
+from bristle.component.control_laws import hidden_units, policy_inputs, voltage_share, weight_count
+from bristle.data.ground_motion import GroundMotion
 from bristle.errors import DesignError
 from bristle.physics.building import paper_building
+from bristle.synthesis import Damper
+from bristle.synthesis.plant import structure
 
 H = 0.002
 MOTIONS = "[motions]\nsynthetic = 8\n"

@@ -14,14 +14,13 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.engine.coupled import simulate
 from bristle.errors import BuildError, ScenarioError
+from bristle.export.web import body, chosen, described, export_component, export_web
+from bristle.export.web_module import Numbers, Slider
 from bristle.fmu import catalogue
 from bristle.native import zig
-from bristle.scenario.scenario import load_scenario, stock_scenarios
-from bristle.simulate.coupled import simulate
-from bristle.web.component import export_component
-from bristle.web.export import body, chosen, described, export_web
-from bristle.web.numbers import Numbers, Slider
+from bristle.system.scenario import load_scenario, stock_scenarios
 
 PASSIVE = "el_centro_lugre_passive"
 AGREE = 1e-12

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bristle.draw.style import GREY, INK, PALE, Page
+from bristle.view.style import GREY, INK, PALE, Page
 
 from .experiment import CLIPPED, EL_CENTRO, HINF, LPV, NONE, ZERO, Comparison
 from .pictures import COLOUR, NOTE, mark, short, strong_part

@@ -13,7 +13,7 @@ from bristle.physics.laws.lugre import LuGre
 from .experiment import Motion
 
 if TYPE_CHECKING:
-    from bristle.design import Controller
+    from bristle.synthesis import Controller
 
 SPEEDS = tuple(float(v) for v in np.linspace(0.0025, 0.2, 80))
 """m/s, at which the steady force is taken."""
@@ -53,7 +53,7 @@ def facts(designs: dict[str, Controller], motions: list[Motion]) -> dict[str, An
 
 def steady_force(v: float, V: float) -> float:
     """Return the LuGre force [N] in steady sliding at v [m/s] and V [V]."""
-    from bristle.control.inverse import force_of_law
+    from bristle.component.control_laws import force_of_law
 
     p = [parameter.value for parameter in LuGre.parameters.values()]
     bent = 1.0 / LuGre.parameters["a_0"].value

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bristle.control.inverse import estimate_states
+from bristle.component.control_laws import estimate_states
 from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
 

@@ -14,11 +14,11 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bristle.control.controller import read_controller
-from bristle.draw.style import Page, look
+from bristle.component.controller_file import read_controller
+from bristle.core.progress import Progress, counted
 from bristle.errors import DesignError, not_usable
-from bristle.progress import Progress, counted
 from bristle.version import __version__
+from bristle.view.style import Page, look
 
 from .. import optimum, stiction
 from ..figures import prepare

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bristle.draw.style import BLUE, GREEN, GREY, INK, PALE, RECONSTRUCTED, VERMILION, Page, label
+from bristle.view.style import BLUE, GREEN, GREY, INK, PALE, RECONSTRUCTED, VERMILION, Page, label
 
 from .experiment import (
     CLIPPED,

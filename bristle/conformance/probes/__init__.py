@@ -1,6 +1,6 @@
 """All probes, in the order of the table."""
 
-from ..registry import PROBES as _ENTERED
+from ..probe import PROBES as _ENTERED
 from . import derivatives, ending, faults, file, instances, order, run, state, values
 
 __all__ = ["PROBES"]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from ctypes import c_void_p
 
-from ..bench import Bench, Values, good, not_finite, some
+from ..bench import Bench, Plan, Values, good, not_finite, some
 from ..native import Instance
-from ..plan import Plan
-from ..registry import Finding, failed, passed, probe, unless_claimed
+from ..probe import Finding, failed, passed, probe, unless_claimed
 from .order import forbidden
 
 _FLAG = "canInterpolateInputs"

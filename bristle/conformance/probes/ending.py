@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..bench import Bench, good, some
-from ..registry import Finding, failed, noted, passed, probe, unless_single
+from ..probe import Finding, failed, noted, passed, probe, unless_single
 
 
 @probe(

@@ -10,7 +10,7 @@ from pathlib import Path
 from ...fmu.archive import extract
 from ..bench import GOOD, Bench, Values, good
 from ..native import FatalAnswerError, Instance
-from ..registry import Finding, UnexpectedError, failed, noted, passed, probe, unless_single
+from ..probe import Finding, UnexpectedError, failed, noted, passed, probe, unless_single
 
 
 @probe(

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from ...fmu.description import Variable
 from ..bench import GOOD, Bench, good, not_finite, some, status_name
 from ..native import FatalAnswerError, Instance
-from ..registry import Finding, failed, noted, passed, probe, unless_claimed, unless_single
+from ..probe import Finding, failed, noted, passed, probe, unless_claimed, unless_single
 
 _ORDER = (
     "FMI 2.0 section 4.2.4: the environment must not; the answer is left open, Error being the "

@@ -8,7 +8,7 @@ import time
 from ...fmu.description import Value
 from ..bench import Bench, good, not_finite, some
 from ..native import DISCARD
-from ..registry import Finding, failed, noted, passed, probe
+from ..probe import Finding, failed, noted, passed, probe
 
 _MOST_STEPS = 20_000
 

@@ -7,7 +7,7 @@ from ctypes import c_void_p
 from pathlib import Path
 
 from ..bench import Bench, good
-from ..registry import (
+from ..probe import (
     Finding,
     UnexpectedError,
     failed,

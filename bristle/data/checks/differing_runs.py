@@ -14,7 +14,7 @@ from math import log
 
 import numpy as np
 
-from ...quantity import plain, quantity
+from ...core.text import plain, quantity
 from ..corrections import LEFT_OUT, Correction
 from ..force_shapes import RunForces, fitted_forces, force_parts
 from ..measurement import Measurement

@@ -8,8 +8,8 @@ from math import log10
 
 import numpy as np
 
-from ...quantity import plain
-from ..derived import numerical_derivative
+from ...core.text import plain
+from ..cut_off import numerical_derivative
 from ..measurement import Measurement
 from ..relation import (
     Relation,

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ...core.text import plain, quantity
 from ...physics.drive import DRIVES
-from ...quantity import plain, quantity
 from ..measurement import Measurement
 from ..noise import is_switched
 from ..table import Array
+from ..tone import label_doubt, tone_of
 from .finding import Finding
 from .motion import velocity_of_run
 
@@ -315,3 +316,65 @@ def _steps(runs: list[Measurement]) -> Iterator[Finding]:
         yield Finding(
             "rates", "note", f"runs are sampled at {', '.join(f'{one:g}' for one in rates)} Hz."
         )
+
+
+# What is known of whole runs, held against the motion that was measured.
+
+
+def check_labels(runs: Sequence[Measurement]) -> Iterator[Finding]:
+    """Yield the runs on a bench whose frequency or amplitude is another one than their label's."""
+    for run in runs:
+        tone = tone_of(run) if {"frequency", "amplitude"} & {*run.labels} else None
+        text = "" if tone is None else label_doubt(run.labels, tone)
+        if text:
+            yield Finding(
+                "label", "warning",
+                f"{text}: what was told of the run by its name or a table is doubtful, the level "
+                "of a command as well.",
+                "Correct labels and levels in its [[runs]] of study.toml.", run.name,
+            )  # fmt: skip
+
+
+# The levels that the command of runs keeps to, and whether they tell more than a straight line.
+
+LEAST_LEVELS = 3
+"""Levels of the command that tell more than a straight line."""
+
+_APART = 0.02  # of the largest level: closer ones are one
+
+
+def drives_of(runs: Sequence[Measurement]) -> list[tuple[Measurement, str]]:
+    """Return the runs that have a command, each with the name of its channel."""
+    return [(run, run.drive) for run in runs if run.drive]
+
+
+def command_levels(runs: Sequence[Measurement]) -> list[float] | None:
+    """Return the levels [V, or A] that the command keeps to, None where it moves continuously.
+
+    Empty where no run has a command.
+    """
+    drives = drives_of(runs)
+    found = [drive_levels(run[name], run.step, run.noise[name]) for run, name in drives]
+    if not found:
+        return []
+    if not all(found):
+        return None
+    return _merged(sorted(level for one in found for level, _ in one))
+
+
+def tells_a_bend(runs: Sequence[Measurement]) -> bool:
+    """Return whether the command of runs has so many levels that a parabola has a meaning."""
+    levels = command_levels(runs)
+    return levels is None or len(levels) >= LEAST_LEVELS
+
+
+def _merged(levels: list[float]) -> list[float]:
+    """Return levels that differ, each the mean of those that are nearly one."""
+    apart = _APART * max(map(abs, levels))
+    groups: list[list[float]] = [[levels[0]]]
+    for level in levels[1:]:
+        if level - groups[-1][0] > apart:
+            groups.append([level])
+        else:
+            groups[-1].append(level)
+    return [float(np.mean(group)) for group in groups]

@@ -9,9 +9,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.text import listed, plain
 from ...errors import RecordError
-from ...findings import listed
-from ...quantity import plain
 from ..noise import SHORTEST, is_switched
 from ..sampling import between, covered
 from ..table import Array

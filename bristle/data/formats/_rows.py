@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecordError
-from ...physics.record import shortened
+from ...physics.motion_file import shortened
 from ..table import Array
 
 _MISSING = frozenset(

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...quantity import plain
+from ...core.text import plain
 from ..columns import Column
 from ..table import Array
 from ._rows import Body, Layout, is_grouped, plain_number, without_groups

@@ -16,8 +16,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.text import listed
 from ...errors import RecordError
-from ...findings import listed
 from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
 from ..noise import SHORTEST

@@ -13,9 +13,9 @@ from itertools import islice
 
 import numpy as np
 
+from ...core.text import listed
 from ...errors import RecordError
-from ...findings import listed
-from ...physics.record import shortened, without_end_mark
+from ...physics.motion_file import shortened, without_end_mark
 from ...units import parse as parse_unit
 from ..columns import Column
 from ..table import Table

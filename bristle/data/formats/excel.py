@@ -15,8 +15,8 @@ from datetime import date, datetime, time
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+from ...core.text import listed
 from ...errors import RecordError
-from ...findings import listed
 from ...units import parse as parse_unit
 from ..channels import meaning, quantity_of_unit
 from ..noise import SHORTEST

@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core.text import listed, plain
 from ...errors import RecordError
-from ...findings import listed
-from ...quantity import plain
 from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
 from ..table import Array, Table, from_arrays

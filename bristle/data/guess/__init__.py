@@ -12,18 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...quantity import plain
+from ...core.text import plain
 from ...units import parse as parse_unit
-from ..channels import ChannelSpec, device_channel, meaning, quantity_of_unit
+from ..channels import TEMPERATURE, ChannelSpec, device_channel, meaning, quantity_of_unit
 from ..columns import Column
-from ..extra import unit_as_written
-from ..labels import TEMPERATURE
+from ..extra_channels import unit_as_written
 from ..raw_signals import raw_signals
 from ..table import Table
-from .bench import bench_guesses
-from .candidates import Search, candidate_of, joined
-from .fitting import fit_signs, fit_units
-from .levels import structure_guesses
+from .by_data import bench_guesses, fit_signs, fit_units
+from .by_name import Search, candidate_of, joined, structure_guesses
 
 _KELVIN = parse_unit("K").dimension
 _AT_DAMPER = frozenset({"damper", "oil", "fluid", "mrf", "mr", "housing"})

@@ -1,6 +1,6 @@
 /* The samples of a CSV of two columns, time [s] and value.
 
-   What is refused, and in which words, is as in Python: see bristle/physics/record.py. */
+   What is refused, and in which words, is as in Python: see bristle/physics/motion_file.py. */
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 """A damper that resists one direction more than the other."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 
 class Asymmetry(Effect):

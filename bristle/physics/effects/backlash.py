@@ -1,6 +1,7 @@
 """Play in the joint between rod and structure."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 RISE = 0.02  # of the gap: indentation over which the damping sets in
 LEAST = 1e-9  # m, the same where there is no gap

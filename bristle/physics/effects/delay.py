@@ -2,7 +2,8 @@
 
 from math import cos, exp, sin, sqrt
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 SLOTS = 64  # samples that the ring holds
 LAST = SLOTS - 1.001

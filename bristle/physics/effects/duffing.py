@@ -1,6 +1,7 @@
 """Isolation springs that stiffen or soften."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 X_REF = 0.01  # m; keeps the unit of k_3 for every shape
 

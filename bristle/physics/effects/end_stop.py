@@ -1,6 +1,7 @@
 """The base meets its stops."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 D_REF = 1e-3  # m; keeps the unit of k for every shape
 

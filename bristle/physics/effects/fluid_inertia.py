@@ -2,7 +2,8 @@
 
 from math import exp
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 # Rates [1/s] of exponentials that make up the memory 1/sqrt(pi t), a decade apart, and their
 # weights (2/pi) sqrt(rate) ln(10)/2 [1/s^0.5], at the unit frequency of 20 rad/s.

@@ -1,6 +1,7 @@
 """The gas cushion of the accumulator, which carries the damper's rod volume."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 
 class GasSpring(Effect):

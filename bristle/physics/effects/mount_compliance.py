@@ -1,6 +1,7 @@
 """The mount between rod and structure gives way."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 S_REF = 1e-3  # m
 

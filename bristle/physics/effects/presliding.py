@@ -2,7 +2,8 @@
 
 from math import exp
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 
 class Presliding(Effect):

@@ -1,6 +1,7 @@
 """Orifice damping that grows faster than the speed."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 V_REF = 0.1  # m/s; keeps the unit of c_2 for every shape
 

@@ -1,6 +1,7 @@
 """Steel that stays magnetised after the voltage has gone."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 
 def play(at, V, width):

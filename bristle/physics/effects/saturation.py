@@ -1,6 +1,7 @@
 """Magnetic saturation of the steel and the fluid."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 
 class Saturation(Effect):

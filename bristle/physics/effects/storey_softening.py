@@ -1,6 +1,7 @@
 """Storeys that lose stiffness as they sway, elastically or by yielding."""
 
-from ..effect import Effect, Parameter
+from ..effect import Effect
+from ..parameter import Parameter
 
 
 class StoreySoftening(Effect):

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from bristle.batch import read_ensemble
+from bristle.campaign import read_ensemble
 from bristle.data.building_file import read_building
-from bristle.design import read_task
 from bristle.errors import BristleError
-from bristle.plan.folder import read_plan
-from bristle.plan.new_rig import read_new_rig
-from bristle.scenario.scenario import load_scenario
+from bristle.planning.data_sheet import read_new_rig
+from bristle.planning.folder import read_plan
 from bristle.study import read_model
-from bristle.study.settings import read_settings
+from bristle.study.study_file import read_settings
+from bristle.synthesis import read_task
+from bristle.system.scenario import load_scenario
 
 FILES: dict[str, tuple[Callable[[Path], object], str]] = {
     "scenario.toml": (load_scenario, """schema = 1

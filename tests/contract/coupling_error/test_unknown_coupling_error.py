@@ -13,11 +13,10 @@ import pytest
 from toys import Maker
 
 from bristle.cli import main
+from bristle.engine.coupling_error import expect, find_step
+from bristle.engine.summary import judged_by
 from bristle.errors import ScenarioError
-from bristle.scenario.scenario import load_scenario
-from bristle.simulate.elsewhere import expect
-from bristle.simulate.summary import judged_by
-from bristle.simulate.tolerance import find_step
+from bristle.system.scenario import load_scenario
 
 SHORT = ["el_centro_0p6g_clipped", "--set", "run.stop=1.2"]
 """A controller that switches: with Jacobi the force jumps a step late, however short the step."""

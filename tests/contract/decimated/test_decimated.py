@@ -10,7 +10,7 @@ from scipy.signal import butter, sosfilt
 
 import bristle
 from bristle.cli import main
-from bristle.identify.prepare import prepare
+from bristle.identification.prepare import prepare
 from bristle.study.run_facts import RunChoices
 
 SECONDS = 6.0

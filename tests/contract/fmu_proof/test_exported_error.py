@@ -97,8 +97,8 @@ def test_the_check_has_the_recorder_of_the_force(
 
 
 def test_without_a_proof_the_reason_is_told(tmp_path: Path) -> None:
-    from bristle.bridge.held_out import Proof
-    from bristle.identify.error import error_of
+    from bristle.identification.error import error_of
+    from bristle.prediction.held_out import Proof
 
     told = error_of(np.ones(50), np.zeros(50), {})
     lines = Proof(told, 5e-4, why="no library for this platform.").lines(tmp_path)

@@ -11,7 +11,7 @@ from described import component, port, write_fmu, write_scenario, write_ssp
 
 import bristle
 from bristle.cli import main
-from bristle.scenario.scenario import load_scenario
+from bristle.system.scenario import load_scenario
 
 STOP = '<d:DefaultExperiment startTime="0" stopTime="0.5"/>'
 STEP = (

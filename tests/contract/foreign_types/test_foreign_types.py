@@ -22,7 +22,7 @@ from toys import Maker
 import bristle
 from bristle.cli import main
 from bristle.errors import ScenarioError
-from bristle.scenario.parts import ALGORITHMS
+from bristle.system.model import ALGORITHMS
 
 COUNTERS = {
     "b.number": "a.count", "a.number": "b.count", "b.flag": "a.flipped", "a.flag": "b.flipped",

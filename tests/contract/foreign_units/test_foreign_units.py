@@ -12,7 +12,7 @@ import pytest
 from described import component, connection, port, unit, write_fmu, write_scenario, write_ssp
 
 from bristle.cli import main
-from bristle.scenario.scenario import load_scenario
+from bristle.system.scenario import load_scenario
 
 NEWTON = 'kg="1" m="1" s="-2"'
 JOULE = 'kg="1" m="2" s="-2"'

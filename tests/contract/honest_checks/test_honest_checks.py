@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.data.spectral_lines import SpectralLine, of_one_mains
-from bristle.data.spikes import spikes_of
+from bristle.data.checks.recording import SpectralLine, of_one_mains
+from bristle.data.noise import spikes_of
 
 RATE = 500.0
 T = np.arange(4000) / RATE
@@ -79,8 +79,8 @@ def test_lines_of_both_mains_are_of_the_one_that_has_more() -> None:
 
 
 def test_a_sign_that_the_study_turns_is_a_note_and_no_fault(tmp_path) -> None:
-    from bristle.diagnose.conclusion import Diagnosis
-    from bristle.study.learning import verdict_of
+    from bristle.diagnosis.verdict import Diagnosis
+    from bristle.study.steps import verdict_of
     from bristle.study.study import Study
 
     columns = bench()

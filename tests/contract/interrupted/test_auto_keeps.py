@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from bristle.cli import main
-from bristle.diagnose import law_free, law_trials
-from bristle.study.law_fits import NAME
+from bristle.diagnosis import joint_search, law_trials
+from bristle.study.forms import NAME
 from bristle.study.study import Study
 
 
@@ -45,7 +45,7 @@ def auto(rig: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, monkeypatch):
     with monkeypatch.context() as stopped:
-        stopped.setattr(law_free, "bench_data", interrupt)
+        stopped.setattr(joint_search, "bench_data", interrupt)
         told = auto(rig, capsys)
     assert told == "interrupted. The study is as it was. The same command begins anew."
     assert not (rig / "reports" / NAME).exists()
@@ -58,7 +58,7 @@ def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, mo
         return whole(model, *given, **named)
 
     monkeypatch.setattr(law_trials, "refine", refine)
-    monkeypatch.setattr(law_free, "_sought", interrupt)  # the search for effects
+    monkeypatch.setattr(joint_search, "_sought", interrupt)  # the search for effects
     told = auto(rig, capsys)
     known = json.loads((rig / "reports" / NAME).read_text())["laws"]
     assert len(known) == len(fitted) > 5
@@ -84,7 +84,7 @@ def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, mo
 
 
 def test_a_step_is_there_when_it_is_told(rig, capsys, monkeypatch):
-    monkeypatch.setattr("bristle.study.completion.diagnose_study", interrupt)
+    monkeypatch.setattr("bristle.study.auto.diagnose_study", interrupt)
     capsys.readouterr()
     assert main(["study", "auto", str(rig), "--law", "bingham"]) == 130
     told = capsys.readouterr().err.splitlines()[-1]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.core.text import cut_short, listed
 from bristle.data.read import read_table
 from bristle.errors import RecordError
-from bristle.findings import cut_short, listed
 
 ROWS = np.random.default_rng(0).normal(size=(20, 20000))
 

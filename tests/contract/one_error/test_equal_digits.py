@@ -13,8 +13,8 @@ import pytest
 
 import bristle
 from bristle.cli import main
-from bristle.diagnose import Diagnosis
-from bristle.identify.error import ForceError
+from bristle.diagnosis import Diagnosis
+from bristle.identification.error import ForceError
 from bristle.page import history_view
 from bristle.study.study import Study
 
@@ -66,7 +66,7 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
         "none", (), ("Nothing was sought.",)
     )  # the search would take a minute
     monkeypatch.setattr(
-        "bristle.study.learning.diagnose_rig", lambda *_given, **_named: verdict_of_none
+        "bristle.study.steps.diagnose_rig", lambda *_given, **_named: verdict_of_none
     )
     folder = str(rig)
     order = ["identify", folder, "--no-table", "--starts", "1", "--details"]

@@ -10,10 +10,10 @@ import pytest
 
 from bristle.data.left_out import LOADED, MASKED, MISSING, SATURATED, SETTLING
 from bristle.errors import RecordError
-from bristle.identify.error import ForceError, error_of, pooled, refuse_empty
-from bristle.identify.model import Model, Problem, Run
-from bristle.identify.rig import Site
-from bristle.identify.rig_fit import SiteModel, force_errors
+from bristle.identification.error import ForceError, error_of, pooled, refuse_empty
+from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.rig import Site
+from bristle.identification.rig_fit import SiteModel, force_errors
 
 N = 10_000
 LAW = Model("bingham")

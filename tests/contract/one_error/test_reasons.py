@@ -11,10 +11,10 @@ import pytest
 from shaken import building, friction, measured, shake
 
 from bristle.cli import main
-from bristle.identify.error import errors_by_run
-from bristle.identify.model import Model
-from bristle.identify.rig import DAMPER, building_rig
-from bristle.identify.structure import StructureRun
+from bristle.identification.building_sites import StructureRun
+from bristle.identification.error import errors_by_run
+from bristle.identification.problem import Model
+from bristle.identification.rig import DAMPER, building_rig
 
 HOUSE = building(2)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Problem, Run
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Problem, Run
 
 STEP = 0.002  # s
 T = STEP * np.arange(3000)

@@ -9,17 +9,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bristle.diagnose.learned.centred import fitted_about
-from bristle.diagnose.learned.closed import (
+from bristle.learning.closed_forms import (
+    CENTRED,
+    FORMS,
+    MAPS,
     closed_forms,
+    fitted_about,
     formula_of,
     in_words,
     name_of,
     nearest_of,
 )
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import MATH
-from bristle.diagnose.learned.forms import CENTRED, FORMS, MAPS
+from bristle.learning.curve import Curve
+from bristle.learning.effect_file import MATH
 
 KNOTS = np.linspace(-0.015, 0.015, 13)  # m
 GAP = 0.004  # m

@@ -9,19 +9,17 @@ from math import log
 import numpy as np
 import pytest
 
-from bristle.check.conformance import examine
-from bristle.diagnose.learned.along import ALONG
-from bristle.diagnose.learned.closed import closed_forms, formula_of
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.fit import begun
-from bristle.diagnose.learned.parts import PARTS, may_change
-from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.errors import PhysicsError
-from bristle.identify.fit import Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.learning.closed_forms import closed_forms, formula_of
+from bristle.learning.curve import PARTS, Curve, may_change
+from bristle.learning.effect_file import effect_text
+from bristle.learning.fit import begun
+from bristle.learning.signals import ALONG, SLIP, slips
 from bristle.physics.effect import EFFECTS, Q
-from bristle.physics.probe import probe
-from bristle.physics.user import defined
+from bristle.user_code.conformance import examine
+from bristle.user_code.load import defined
+from bristle.user_code.trial import probe
 
 STEP = 0.002  # s
 T = STEP * np.arange(1500)

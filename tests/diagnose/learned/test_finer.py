@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bristle.diagnose.candidates import Trial
-from bristle.diagnose.learned import fit
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.fit import Fitted
-from bristle.diagnose.learned.rule import LEARN
-from bristle.diagnose.learned.slip import SLIP
-from bristle.identify.fit import Model
+from bristle.diagnosis.trials import Trial
+from bristle.identification.problem import Model
+from bristle.learning import fit
+from bristle.learning.curve import Curve
+from bristle.learning.fit import Fitted
+from bristle.learning.rule import LEARN
+from bristle.learning.signals import SLIP
 
 CURVE = Curve("yield", "speed", (), (0.0, 0.1, 0.4), (0.0, 2.0, -1.0), held=(0, 2))
 NONE = np.zeros(0)

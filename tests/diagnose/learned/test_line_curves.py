@@ -7,21 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.check.conformance import examine
-from bristle.diagnose.learned.along import ALONG
-from bristle.diagnose.learned.closed import closed_forms, formula_of, in_words
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.normal import Normal
-from bristle.diagnose.learned.parts import may_change, parts_at
-from bristle.diagnose.learned.place import Place
-from bristle.diagnose.learned.residual import residual_of
-from bristle.diagnose.learned.screen import promises
-from bristle.identify.line import fit_line
-from bristle.identify.structure import StructureProblem, structure_run
+from bristle.identification.building_sites import StructureProblem, structure_run
+from bristle.identification.rig_fit import fit_line
+from bristle.learning.closed_forms import closed_forms, formula_of, in_words
+from bristle.learning.curve import Curve, Place, may_change, parts_at
+from bristle.learning.effect_file import effect_text
+from bristle.learning.normal import Normal, residual_of
+from bristle.learning.screen import promises
+from bristle.learning.signals import ALONG
 from bristle.physics.effect import EFFECTS, Q
 from bristle.physics.laws import law_of_part
-from bristle.physics.user import defined
+from bristle.user_code.conformance import examine
+from bristle.user_code.load import defined
 
 STEP, NOISE = 0.004, 0.03  # s, N
 T = STEP * np.arange(1500)

@@ -7,15 +7,15 @@ import pytest
 from scipy.signal import lsim
 from test_screen import STEP, VALUES, T, runs
 
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.residual import residual_of
-from bristle.diagnose.learned.ring import RING, frequencies, response, ringing
-from bristle.diagnose.learned.screen import promises
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, fit
-from bristle.identify.instruments import shown_force
-from bristle.physics.user import defined
+from bristle.identification.fit import fit
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, shown_force
+from bristle.learning.curve import Curve
+from bristle.learning.effect_file import effect_text
+from bristle.learning.normal import residual_of
+from bristle.learning.screen import promises
+from bristle.learning.signals import RING, frequencies, response, ringing
+from bristle.user_code.load import defined
 
 FREQUENCY, DAMPING, SHARE = 9.3, 0.03, 0.2  # Hz, 1, 1
 MODE = Curve(RING, RING, (("frequency", FREQUENCY), ("damping", DAMPING)), (0.0,), (SHARE,))

@@ -8,20 +8,17 @@ import numpy as np
 import pytest
 from bingham_runs import NOISE, NOWHERE, STEP, VALUES, T, runs
 
-from bristle.data.extra import Extra
-from bristle.diagnose.learned.along import rebuilt
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.normal import Normal, hats_at
-from bristle.diagnose.learned.promise import distinct
-from bristle.diagnose.learned.residual import residual_of
-from bristle.diagnose.learned.rule import LEARN
-from bristle.diagnose.learned.screen import knots_of, promises, signals
-from bristle.diagnose.learned.slip import SLIP, slips
+from bristle.data.extra_channels import Extra
 from bristle.errors import RecordError
-from bristle.identify.fit import Model, Problem, Run, fit
-from bristle.identify.run_labels import tracks_of
+from bristle.identification.fit import fit
+from bristle.identification.problem import Model, Problem, Run, tracks_of
+from bristle.learning.effect_file import effect_text
+from bristle.learning.normal import Normal, hats_at, residual_of
+from bristle.learning.rule import LEARN
+from bristle.learning.screen import distinct, knots_of, promises, signals
+from bristle.learning.signals import SLIP, rebuilt, slips
 from bristle.physics.effect import EFFECTS
-from bristle.physics.user import defined
+from bristle.user_code.load import defined
 
 
 def first_of(hidden):

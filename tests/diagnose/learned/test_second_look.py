@@ -7,19 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnose.candidates import Trial, judge
-from bristle.diagnose.learned import fit as learned_fit
-from bristle.diagnose.learned.closed import closed_forms
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.fit import Fitted, with_law_of
-from bristle.diagnose.learned.residual import residual_of
-from bristle.diagnose.learned.rule import LEARN
-from bristle.diagnose.learned.screen import promises
-from bristle.diagnose.opening import Opening
-from bristle.identify.bench import Bench
-from bristle.identify.fit import Model, Problem, Run, fit
-from bristle.physics.user import defined
+from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.trials import Trial, judge
+from bristle.identification.fit import fit
+from bristle.identification.histories import Bench
+from bristle.identification.problem import Model, Problem, Run
+from bristle.learning import fit as learned_fit
+from bristle.learning.closed_forms import closed_forms
+from bristle.learning.curve import Curve
+from bristle.learning.effect_file import effect_text
+from bristle.learning.fit import Fitted, with_law_of
+from bristle.learning.normal import residual_of
+from bristle.learning.rule import LEARN
+from bristle.learning.screen import promises
+from bristle.user_code.load import defined
 
 STEP = 0.002  # s
 T = STEP * np.arange(6000)

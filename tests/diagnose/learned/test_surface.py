@@ -12,26 +12,21 @@ from bingham_runs import VALUES, T, runs
 from scipy.interpolate import RegularGridInterpolator
 from scipy.signal import savgol_filter
 
-from bristle.check.conformance import examine
 from bristle.cli import main
-from bristle.data.extra import Extra
-from bristle.diagnose.learned.along import ALONG
-from bristle.diagnose.learned.closed import closed_forms
-from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.residual import residual_of
-from bristle.diagnose.learned.rule import LEARN
-from bristle.diagnose.learned.screen import promises
-from bristle.diagnose.learned.surface import (
-    PARTS_OF_SURFACE,
-    continued,
-    continues,
-    separated,
-    surfaces,
-)
-from bristle.identify.fit import Model, Problem, fit
+from bristle.data.extra_channels import Extra
+from bristle.identification.fit import fit
+from bristle.identification.problem import Model, Problem
+from bristle.learning.closed_forms import closed_forms
+from bristle.learning.curve import Curve
+from bristle.learning.effect_file import effect_text
+from bristle.learning.normal import residual_of
+from bristle.learning.rule import LEARN
+from bristle.learning.screen import promises
+from bristle.learning.signals import ALONG
+from bristle.learning.surface import PARTS_OF_SURFACE, continued, continues, separated, surfaces
 from bristle.physics.effect import EFFECTS, Q
-from bristle.physics.user import defined
+from bristle.user_code.conformance import examine
+from bristle.user_code.load import defined
 
 KNOTS, LEVELS = (-0.01, -0.004, 0.0, 0.006, 0.01), (0.0, 1.5, 4.0, 8.0)
 

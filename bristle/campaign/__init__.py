@@ -1,0 +1,25 @@
+"""Many runs of one scenario: ensembles, and the best constant voltage.
+
+An ensemble runs one scenario many times, with what is uncertain drawn anew each time:
+
+    import bristle
+    found = bristle.ensemble("my_ensemble.toml", out="results/mine")
+    found.quantiles, found.runs, found.failures
+
+Run i depends on the seed and on i alone; a killed ensemble goes on where it was.
+"""
+
+from __future__ import annotations
+
+from .ensemble import Ensemble, EnsembleInterrupted, ensemble
+from .ensemble_file import read_ensemble, stock_ensembles
+from .plan import Plan
+
+__all__ = [
+    "Ensemble",
+    "EnsembleInterrupted",
+    "Plan",
+    "ensemble",
+    "read_ensemble",
+    "stock_ensembles",
+]

@@ -1,0 +1,246 @@
+"""Runs an ensemble: what is left of it, in processes or on a cluster, kept as it comes."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Generator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..core.progress import Progress
+from ..core.text import written
+from ..errors import EnsembleError, RunError
+from ..view import Viewable
+from .campaign import prepare
+from .ensemble_file import read_ensemble
+from .plan import Outcome, Plan
+from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class EnsembleInterrupted(KeyboardInterrupt):
+    """An ensemble that Ctrl-C has stopped; what is done is in its folder."""
+
+
+@dataclass(frozen=True, repr=False)
+class Ensemble(Viewable):
+    """What an ensemble has found.
+
+    Attributes
+    ----------
+    runs : DataFrame
+        Index run; status ("done", "failed"), reason, what varied, outputs. `attrs["units"]`.
+    quantiles : DataFrame
+        Index output; unit, "5 %" ... "95 %", how many runs are done and failed.
+    failures : list of Failure
+        By reason, most frequent first.
+    continued : int
+        How many runs were there already.
+    wall_time : float
+        [s], of this start.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> found = bristle.ensemble("el_centro_damper_and_building", runs=2, workers=1)
+    >>> len(found.runs), found.failures
+    (2, [])
+    """
+
+    plan: Plan
+    runs: pd.DataFrame
+    quantiles: pd.DataFrame
+    failures: list[Failure]
+    continued: int
+    wall_time: float
+
+    @property
+    def parts(self) -> dict[str, dict[str, float]]:
+        """By output, which share of its variance is from what; empty without limits."""
+        return parts(self.plan, self.runs)
+
+    @property
+    def notes(self) -> list[str]:
+        """What is left out of the quantiles that limits leave open, and why; empty without."""
+        return notes(self.plan, self.runs)
+
+
+def ensemble(
+    file: str | Path,
+    *,
+    out: str | Path | None = None,
+    runs: int | None = None,
+    workers: int | None = None,
+    cluster: str | None = None,
+    fresh: bool = False,
+    retry: bool = False,
+    with_limits: bool = False,
+    progress: bool = False,
+) -> Ensemble:
+    """Run an ensemble, or what is left of it, and return tables of runs and quantiles.
+
+    Run i has the same values and numbers whatever the order, the number of processes or cluster.
+
+    Parameters
+    ----------
+    file : path
+        An ensemble file, or the name of a stock ensemble.
+    out : path, optional
+        Folder in which runs.csv grows; an ensemble that was stopped there is continued. Without it
+        all is kept in memory.
+    runs : int, optional
+        In place of the file's number; more runs continue an ensemble.
+    workers : int, optional
+        Processes on this machine; else as many as it has cores.
+    cluster : str, optional
+        Address of a Dask scheduler, "tcp://host:8786": its workers run in place of processes here.
+    fresh : bool
+        Start anew in a folder that holds runs.
+    retry : bool
+        Run again what failed.
+    with_limits : bool
+        Make each run once more with an effect that the verdict of the file's `[identified]` does
+        not exclude: quantiles have it, and `parts` tells the share of each.
+    progress : bool
+        Show a progress bar, on a terminal only.
+
+    Returns
+    -------
+    Ensemble
+        `runs`, `quantiles` and `failures`.
+
+    Raises
+    ------
+    EnsembleError, ScenarioError
+        The input is wrong, or the folder holds runs of another ensemble; nothing was run.
+    RunError
+        The disk is full, or the cluster is lost; what is done is kept.
+    KeyboardInterrupt
+        Ctrl-C; what is done is kept.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> found = bristle.ensemble("el_centro_damper_and_building", runs=3, workers=1)
+    >>> peak = found.quantiles.loc["peak structure.floor2_acceleration_absolute"]
+    >>> peak["unit"], int(peak["done"])
+    ('m/s2', 3)
+    >>> figure = found.plot()  # a notebook shows `found` itself: table and picture
+    """
+    began = time.perf_counter()
+    _refuse_types(file, runs=runs, workers=workers)
+    plan = read_ensemble(file, runs, with_limits=with_limits)
+    if workers is not None and workers < 1:
+        raise EnsembleError(f"--workers {workers}: 1 or more is right.")
+    folder = None if out is None else Path(out)
+    with _Claimed(folder):
+        table = RunsTable(plan, folder / NAME if folder else None, fresh)
+        if retry:
+            table.forget_failures()
+        continued = sum(run < plan.runs for run in table.outcomes)
+        left = [run for run in range(plan.runs) if run not in table.outcomes]
+        try:
+            _go(plan, table, left, workers or cores(), cluster, progress)
+        except RunError as error:
+            raise RunError(f"{error} {_kept(table)}") from error
+        except KeyboardInterrupt:
+            raise EnsembleInterrupted(f"interrupted. {_kept(table)}") from None
+        finally:
+            table.close(complete=len(table.outcomes) >= plan.runs)
+    frame = table.frame()
+    frame = frame[frame.index < plan.runs]
+    seconds = time.perf_counter() - began
+    outcomes = [o for run, o in table.outcomes.items() if run < plan.runs]
+    return Ensemble(plan, frame, quantiles(plan, frame), failures(outcomes), continued, seconds)
+
+
+def _refuse_types(file: object, **numbers: object) -> None:
+    """Refuse arguments of ensemble of a type that it does not take."""
+    if not isinstance(file, str | Path):
+        raise EnsembleError(
+            f"ensemble takes a file or the name of a stock ensemble, not {written(file)}."
+        )
+    for name, value in numbers.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int)):
+            raise EnsembleError(f"{name} is {written(value)}; a whole number from 1 is right.")
+
+
+def _go(
+    plan: Plan, table: RunsTable, left: list[int], workers: int, cluster: str | None,
+    progress: bool,
+) -> None:  # fmt: skip
+    if not left:
+        return
+    with (
+        Progress(plan.title, plan.runs, progress) as bar,
+        closing(_outcomes(plan, left, workers, cluster)) as outcomes,
+    ):
+        for outcome in outcomes:
+            table.add(outcome)
+            bar.show(len(table.outcomes))
+
+
+def _outcomes(
+    plan: Plan, left: list[int], workers: int, cluster: str | None
+) -> Generator[Outcome, None, None]:
+    if cluster is not None:
+        from .cluster import run_cluster
+
+        return run_cluster(plan, left, cluster)
+    from .pool import run_local
+
+    prepare(plan)
+    return run_local(plan, left, min(workers, len(left)))
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _kept(table: RunsTable) -> str:
+    if table.path is None:
+        return "Nothing was kept, because no folder was given."
+    return (
+        f"{len(table.outcomes)} of {table.plan.runs} runs are kept in {table.path}; the same "
+        "command continues them."
+    )
+
+
+class _Claimed:
+    """A folder that nobody else writes an ensemble into; None is always free."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+
+    def __enter__(self) -> None:
+        from filelock import FileLock, Timeout
+
+        self._lock: FileLock | None = None
+        if self.folder is None:
+            return
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._lock = FileLock(self.folder / ".lock")
+            self._lock.acquire(timeout=0)
+        except Timeout:
+            raise EnsembleError(
+                f"{self.folder}: another process is running an ensemble there."
+            ) from None
+        except FileExistsError:
+            raise EnsembleError(f"{self.folder}: is a file; runs go into a folder.") from None
+        except OSError as error:
+            raise EnsembleError(
+                f"{self.folder}: cannot be written ({error.strerror or error})."
+            ) from None
+
+    def __exit__(self, *raised: object) -> None:
+        if self._lock is not None:
+            self._lock.release()

@@ -1,0 +1,315 @@
+"""The table of runs: whole lines, so that a kill leaves what there was; quantiles, failures.
+
+A CSV file whose head holds the ensemble's digest. While runs go on, lines stand in the order in
+which they ended; once all are there, the file is replaced by one in the order of the runs.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import EnsembleError, RunError
+from ..model.draws import POINT, reach, simulated_whole
+from .plan import Outcome, Plan
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+NAME = "runs.csv"
+_KIND = "# bristle ensemble"
+_DIGEST = "# digest: "
+DONE, FAILED = "done", "failed"
+EFFECT = ("effect left open", "its size over the limit")
+"""Columns of the effect that joins a run the second time it is made."""
+
+
+class RunsTable:
+    """The file of an ensemble's runs, open for appending; with None as path it is kept in memory.
+
+    Attributes
+    ----------
+    outcomes : dict
+        Run number to what became of it, those of an earlier start included.
+    """
+
+    def __init__(self, plan: Plan, path: Path | None, fresh: bool = False) -> None:
+        self.plan = plan
+        self.path = path
+        self.outcomes: dict[int, Outcome] = {}
+        self._file = -1
+        if path is None:
+            return
+        try:
+            if path.exists() and not fresh:
+                self.outcomes = _read(plan, path)
+                self._rewrite()  # without a line cut short
+            else:
+                self._replace(_head(plan))
+            self._file = os.open(path, os.O_WRONLY | os.O_APPEND)
+        except OSError as error:
+            raise EnsembleError(f"{path}: cannot be written ({error.strerror or error}).") from None
+
+    def forget_failures(self) -> None:
+        """Take runs that failed, alone or with an effect, as not yet run."""
+        kept = (one for one in self.outcomes.values() if not (one.reason or one.lost))
+        self.outcomes = {one.run: one for one in kept}
+        self._rewrite()
+
+    def add(self, outcome: Outcome) -> None:
+        """Keep what became of a run; it is on disk when this returns.
+
+        Raises
+        ------
+        RunError
+            If it cannot be written; what was before is kept.
+        """
+        self.outcomes[outcome.run] = outcome
+        if self._file < 0:
+            return
+        line = memoryview(_line(self.plan, outcome))
+        end = os.fstat(self._file).st_size
+        try:
+            while line:
+                line = line[os.write(self._file, line) :]
+        except OSError as error:
+            os.ftruncate(self._file, end)
+            raise RunError(
+                f"{self.path}: cannot be written on ({error.strerror or error}); "
+                f"{len(self.outcomes) - 1} runs are in it."
+            ) from error
+
+    def close(self, complete: bool) -> None:
+        """Close the file; a complete one is put in the order of the runs."""
+        if self._file < 0:
+            return
+        os.close(self._file)
+        self._file = -1
+        if complete:
+            self._rewrite()
+
+    def frame(self) -> pd.DataFrame:
+        """Return the table: index run, columns status, reason, varied values, outputs."""
+        import pandas as pd
+
+        runs = sorted(self.outcomes)
+        rows = [_row(self.plan, self.outcomes[run])[1:] for run in runs]
+        index = pd.Index(runs, name="run")
+        frame = pd.DataFrame(rows, index=index, columns=columns(self.plan)[1:])
+        for name in self.plan.columns:
+            frame[name] = frame[name].astype("float64")
+        frame.attrs["units"] = _units(self.plan)
+        return frame
+
+    def _rewrite(self) -> None:
+        if self.path is not None:
+            lines = b"".join(_line(self.plan, self.outcomes[k]) for k in sorted(self.outcomes))
+            was_open, self._file = self._file, -1
+            if was_open >= 0:
+                os.close(was_open)
+            self._replace(_head(self.plan) + lines)
+            if was_open >= 0:
+                self._file = os.open(self.path, os.O_WRONLY | os.O_APPEND)
+
+    def _replace(self, content: bytes) -> None:
+        assert self.path is not None
+        new = self.path.with_name(self.path.name + ".new")
+        try:
+            new.write_bytes(content)
+            new.replace(self.path)
+        finally:
+            new.unlink(missing_ok=True)
+
+
+def columns(plan: Plan) -> list[str]:
+    """Return the names of the table's columns."""
+    varied = [one.name for one in plan.varied]
+    return ["run", "status", "reason", *varied, *(EFFECT if plan.left else ()), *plan.columns]
+
+
+def _units(plan: Plan) -> dict[str, str]:
+    """Return the unit of each number that is kept."""
+    own = [output.unit for output in plan.outputs]
+    return dict(zip(plan.columns, 2 * own if plan.left else own, strict=True))
+
+
+def _row(plan: Plan, outcome: Outcome) -> list[Any]:
+    status = FAILED if outcome.reason else DONE
+    numbers = outcome.numbers or (None,) * len(plan.columns)
+    drawn = [*plan.values(outcome.run).values(), *(plan.effect(outcome.run) if plan.left else ())]
+    return [outcome.run, status, outcome.reason or outcome.lost, *drawn, *numbers]
+
+
+def _line(plan: Plan, outcome: Outcome) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(
+        ["" if value is None else repr(value) if isinstance(value, float) else value
+         for value in _row(plan, outcome)]
+    )  # fmt: skip
+    return text.getvalue().encode()
+
+
+def _head(plan: Plan) -> bytes:
+    names = columns(plan)
+    units = [_units(plan).get(name, "") for name in names]
+    titles = io.StringIO()
+    csv.writer(titles, lineterminator="\n").writerow(
+        [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
+    )
+    title = json.dumps(plan.title, ensure_ascii=False)
+    return f"{_KIND}\n{_DIGEST}{plan.digest()}\n# title: {title}\n{titles.getvalue()}".encode()
+
+
+def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
+    """Return the outcomes in a file; a last line that was cut short is left out.
+
+    Raises
+    ------
+    EnsembleError
+        If the file is of another ensemble, or damaged.
+    """
+    data = path.read_bytes()
+    head = data.split(b"\n", 2)
+    if head[0].decode(errors="replace") != _KIND or len(head) < 3:
+        raise EnsembleError(f"{path}: is no runs table of bristle; another folder is right.")
+    if head[1].decode(errors="replace") != _DIGEST + plan.digest():
+        raise EnsembleError(
+            f"{path}: its runs belong to another ensemble: {plan.file.name}, its scenario, "
+            "a record or bristle itself has changed since. Use --fresh to start again, or another "
+            "folder."
+        )
+    body = data[: data.rindex(b"\n") + 1].decode()
+    rows = csv.reader(line for line in io.StringIO(body, newline="") if line[0] != "#")
+    next(rows, None)
+    outcomes = {}
+    try:
+        for row in rows:
+            run, status, reason = int(row[0]), row[1], row[2]
+            numbers = row[len(row) - len(plan.columns) :]
+            if status == FAILED:
+                outcomes[run] = Outcome(run, reason=reason)
+            else:
+                outcomes[run] = Outcome(run, tuple(map(float, numbers)), lost=reason)
+    except (ValueError, IndexError, csv.Error) as error:
+        raise EnsembleError(
+            f"{path}: damaged ({error}). Use --fresh to start again, or another folder."
+        ) from None
+    return outcomes
+
+
+# What an ensemble says: quantiles of each output, and failures by their reason.
+
+Array = NDArray[np.float64]
+
+VARIES = "all that varies"
+"""What the ensemble draws, beside effects that are left open."""
+LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
+_NUMBER = re.compile(r"[-+]?\d+(\.\d+)?([eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Failed runs of one kind: how many, the first one's number, and its reason in full."""
+
+    count: int
+    run: int
+    reason: str
+
+
+def quantiles(plan: Plan, frame: pd.DataFrame) -> pd.DataFrame:
+    """Return one row per output: unit, quantiles of the runs that are done, their number.
+
+    Quantiles are linear between order statistics; without a run they are NaN. Effects that are
+    left open take those below the median down and those above it up.
+    """
+    import pandas as pd
+
+    done = frame[frame["status"] == "done"]
+    rows = []
+    for output in plan.outputs:
+        values = done[output.name].to_numpy()
+        found = np.quantile(values, LEVELS) if len(values) else np.full(len(LEVELS), np.nan)
+        if plan.left and len(values):
+            found = _widened(found, [*_reaches(plan, done, output.name).values()])
+        rows.append([output.unit, *map(float, found), len(values), len(frame) - len(values)])
+    titles = ["unit", *(f"{100 * level:g} %" for level in LEVELS), "done", "failed"]
+    index = pd.Index([output.name for output in plan.outputs], name="output")
+    return pd.DataFrame(rows, index=index, columns=titles)
+
+
+def parts(plan: Plan, frame: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """Return by output which share of the variance is from what, the largest first.
+
+    "all that varies" is what the ensemble draws; the others are effects that are left open.
+    """
+    done = frame[frame["status"] == "done"]
+    found = {}
+    for output in plan.outputs if plan.left and len(done) > 1 else ():
+        ends = _reaches(plan, done, output.name)
+        power = {name: 0.5 * (low**2 + high**2) / POINT**2 for name, (low, high) in ends.items()}
+        power[VARIES] = float(np.var(done[output.name].to_numpy(), ddof=1))
+        whole = sum(power.values())
+        order = sorted((name for name in power if power[name] > 0.0), key=lambda n: -power[n])
+        found[output.name] = {name: power[name] / whole for name in order}
+    return found
+
+
+def notes(plan: Plan, frame: pd.DataFrame) -> list[str]:
+    """Return what is said of effects that the quantiles do not have."""
+    if plan.identified is None:
+        return []
+    lost = _simulated(plan, frame[frame["status"] == "done"])[1] if plan.left else {}
+    return [
+        *(f"with {name} not every run could be made ({why}): the quantiles are without it"
+          for name, why in lost.items()),
+        *plan.identified.notes,
+    ]  # fmt: skip
+
+
+def _simulated(plan: Plan, done: pd.DataFrame) -> tuple[dict[str, list[int]], dict[str, str]]:
+    """Return the runs of each effect, and of others why they could not all be made with it."""
+    tried: dict[str, list[int | str]] = {}
+    made = done[plan.columns[-1]].notna()
+    for run, name, why in zip(done.index, done[EFFECT[0]], done["reason"], strict=True):
+        tried.setdefault(str(name), []).append(int(run) if made[run] else str(why))
+    return simulated_whole(tried)
+
+
+def _reaches(plan: Plan, done: pd.DataFrame, output: str) -> dict[str, tuple[float, float]]:
+    """Return by effect how far it takes an output down, and up, at 95 %."""
+    changes = done[f"{output} with it"] - done[output]
+    whole, _ = _simulated(plan, done)
+    return {name: reach(changes[runs].to_numpy()) for name, runs in whole.items()}
+
+
+def _widened(found: Array, reaches: list[tuple[float, float]]) -> Array:
+    """Return quantiles at `LEVELS` with the reach of effects below and above the median."""
+    below, above = (np.sqrt(sum(ends[side] ** 2 for ends in reaches)) / POINT for side in (0, 1))
+    away = np.array([NormalDist().inv_cdf(level) for level in LEVELS])
+    middle = found[LEVELS.index(0.5)]
+    more = np.abs(away) * np.where(away < 0.0, below, above)
+    return np.asarray(middle + np.sign(away) * np.hypot(found - middle, more))
+
+
+def failures(outcomes: Iterable[Outcome]) -> list[Failure]:
+    """Return the failures, most frequent first; reasons that differ in numbers alone are one."""
+    found: dict[str, list[Outcome]] = {}
+    for outcome in sorted(outcomes, key=lambda one: one.run):
+        if outcome.reason:
+            found.setdefault(_NUMBER.sub("#", outcome.reason), []).append(outcome)
+    return sorted(
+        (Failure(len(same), same[0].run, same[0].reason) for same in found.values()),
+        key=lambda failure: (-failure.count, failure.run),
+    )

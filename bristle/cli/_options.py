@@ -1,0 +1,261 @@
+"""Options that several commands share, and what they name: files, channels, consent."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from fnmatch import fnmatchcase
+from functools import partial
+from glob import glob
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import TrustError
+
+if TYPE_CHECKING:
+    from ..data.channels import ChannelSpec
+    from ..fmu.build import Plan
+
+
+def add_run_facts(parser: argparse.ArgumentParser) -> None:
+    """Add what is known of whole runs beside their files."""
+    for option, value, text in (
+        ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
+         "--level 'I{}A'"),
+        ("--label", "NAME=PATTERN", "other labels in the names of files: --label 'oil=batch{}'"),
+    ):  # fmt: skip
+        parser.add_argument(option, action="append", default=[], metavar=value, help=text)
+    parser.add_argument(
+        "--runs", type=Path, metavar="FILE",
+        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
+    )  # fmt: skip
+
+
+def test_files(patterns: list[str], files: list[str]) -> list[str]:
+    """Return the files of the test runs: names among the files of --data, or files of their own."""
+    from ..errors import StudyError
+
+    found: list[str] = []
+    for pattern in patterns:
+        named = [file for file in files if fnmatchcase(Path(file).name, pattern)]
+        matches = named or _matches(pattern)
+        if not matches:
+            raise StudyError(
+                f'--test "{pattern}": no file of --data has such a name, and no other file '
+                f"matches, seen from {Path.cwd()}."
+            )
+        found += matches
+    return list(dict.fromkeys(found))
+
+
+def channels_of(texts: list[str]) -> dict[str, ChannelSpec]:
+    """Return where channels are, as --channel says; StudyError where one is given twice."""
+    from ..errors import StudyError
+    from ..study.new import parse_channel
+
+    channels: dict[str, ChannelSpec] = {}
+    for text in texts:
+        name, spec = parse_channel(text)
+        if name in channels:
+            raise StudyError(f"--channel {name} is given twice; once is right.")
+        channels[name] = spec
+    return channels
+
+
+def _matches(pattern: str) -> list[str]:
+    """Return the files that a pattern names, in order."""
+    # pathlib takes no pattern that begins at the root.
+    matches = sorted(glob(pattern, recursive=True))  # noqa: PTH207
+    matches = [pattern] if Path(pattern).is_file() else matches
+    return [match for match in matches if Path(match).is_file()]
+
+
+def files_of(patterns: list[str], option: str = "--data ") -> list[str]:
+    """Return the files that patterns name, or that folders hold, each once, in order.
+
+    Parameters
+    ----------
+    patterns : of the files
+    option : what stands before them on the command line, for messages
+    """
+    from ..data.read import files_in
+    from ..errors import StudyError
+
+    found: list[str] = []
+    for pattern in patterns:
+        if Path(pattern).is_dir():
+            found += map(str, files_in(Path(pattern)))
+            continue
+        files = _matches(pattern)
+        if not files:
+            raise StudyError(f'{option}"{pattern}": no file matches, seen from {Path.cwd()}.')
+        found += files
+    return list(dict.fromkeys(found))
+
+
+# Modules that a command needs later, imported while compiled code is at work.
+
+
+def import_ahead(*names: str) -> None:
+    """Import modules in a thread of their own; what cannot be imported is told where it is needed.
+
+    Parameters
+    ----------
+    names : whole names, as in "bristle.view.style"
+    """
+
+    def bring() -> None:
+        for name in names:
+            with suppress(Exception):
+                importlib.import_module(name)
+
+    # No daemon: an end of the process in the middle of an import would bring it down.
+    threading.Thread(target=bring, name="bristle-imports").start()
+
+
+# Options that every command takes, or every action of a command, or several commands.
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """Add --quiet and --debug."""
+    _add(parser, False)
+
+
+def add_common_to_actions(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add them to the actions of a command: after an action they count as before it."""
+    for action in commands.choices.values():
+        _add(action, argparse.SUPPRESS)
+
+
+def add_overrides(
+    parser: argparse.ArgumentParser, of: str = "file", example: str = "damper.f_c=2"
+) -> None:
+    """Add --set to a command that loads a scenario; `of` is what the values are else taken from."""
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"use this value instead of the {of}'s, e.g. --set {example}",
+    )
+
+
+def add_details(parser: argparse.ArgumentParser) -> None:
+    """Add --details to a command whose answer has some."""
+    parser.add_argument(
+        "--details", action="store_true", help="print the evidence below the answer: all tables"
+    )
+
+
+def _add(parser: argparse.ArgumentParser, default: object) -> None:
+    text = "print no progress"
+    parser.add_argument("--quiet", action="store_true", default=default, help=text)
+    text = "show the traceback of an error"
+    parser.add_argument("--debug", action="store_true", default=default, help=text)
+
+
+def print_json(answer: dict[str, Any]) -> None:
+    """Print an answer as JSON has it: what is not finite is null."""
+    print(json.dumps(_finite(answer), indent=2, ensure_ascii=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+        return None
+    return value
+
+
+# Asks on a terminal whether code that came with a file may run; shows it first.
+
+
+def add_trust(parser: argparse.ArgumentParser) -> None:
+    """Add --trust to a command that may run effects of somebody's own."""
+    text = (
+        "consent to run effects and laws that came with a study or scenario; bristle remembers it"
+    )
+    parser.add_argument("--trust", action="store_true", help=text)
+
+
+def given(error: TrustError) -> bool:
+    """Return whether the user consents to a text that is shown, and remember that.
+
+    Nobody is asked where the input or the messages are no terminal.
+    """
+    if not error.text or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    from ..core.progress import tell
+    from ..trust import readable, remember
+
+    tell("")  # the question stands on the terminal until it is answered
+    print(f"{error.path} has not run on this machine before:\n", file=sys.stderr)
+    for line in readable(error.text).splitlines():
+        print(f"    {line}", file=sys.stderr)
+    print("\nIt runs with your rights. Run it, and remember that? [y/N] ", end="", file=sys.stderr)
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        return False
+    remember(Path(error.path), error.text)
+    return True
+
+
+# Options of the commands that write FMUs: those that need no Python, and for which platforms.
+
+
+def add_native(parser: argparse.ArgumentParser) -> None:
+    """Add --native, --platform and --fmi."""
+    text = "FMUs that need no Python: compiled, with a library for each platform"
+    parser.add_argument("--native", action="store_true", help=text)
+    parser.add_argument(
+        "--platform",
+        dest="platforms",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="with --native: linux64, win64, darwin64, aarch64-linux or aarch64-darwin, several "
+        "separated by commas; else all",
+    )
+    text = "with --native: include the C sources in the FMU, for hosts that compile them"
+    parser.add_argument("--sources", action="store_true", help=text)
+    text = "version of FMI; 3 needs --native (default: 2)"
+    parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help=text)
+
+
+def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:
+    """Return what builds a planned FMU into a folder.
+
+    Raises
+    ------
+    BuildError
+        If a platform is not known; if what belongs to --native is asked for without it.
+    """
+    from ..errors import BuildError
+
+    if arguments.native:
+        from ..native.build import build as build_native
+        from ..native.zig import chosen
+
+        return partial(
+            build_native,
+            platforms=chosen(arguments.platforms),
+            fmi=arguments.fmi,
+            sources=arguments.sources,
+        )
+    if arguments.platforms:
+        raise BuildError("--platform goes with --native: FMUs in Python hold all that they can.")
+    if arguments.sources:
+        raise BuildError("--sources goes with --native: FMUs in Python are their own sources.")
+    if arguments.fmi != 2:
+        raise BuildError("--fmi 3 goes with --native: FMUs in Python follow FMI 2.0.")
+    from ..fmu.build import build
+
+    return build

@@ -1,0 +1,167 @@
+"""What a probe is. Probes are plain functions in `probes/`, listed here in their order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from .bench import Bench, Plan
+
+
+Verdict = Literal["pass", "fail", "note"]
+Level = Literal["file", "library", "run"]
+Rule = Literal["standard", "robustness", "bristle"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one probe saw, in words, and how that is to be judged.
+
+    `data` is for the probes that follow (step count, whether inputs may be driven). `rule` is which
+    rule was broken where that is not the probe's own. `said` is what the FMU itself said of it.
+    """
+
+    verdict: Verdict
+    seen: str
+    data: Mapping[str, float | bool] = field(default_factory=dict)
+    rule: Rule | None = None
+    said: str = ""
+
+
+class UnexpectedError(Exception):
+    """A legal call was not answered as the standard demands; the text says which."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One row to be: what it tries, the rule it holds the FMU to, and the code that tries it.
+
+    `needs` is what must have worked before: "file" nothing, "library" that the library loads,
+    "run" that a legal run gave a reference. `unless` returns why a probe does not apply, or None.
+    `bare` runs it in an interpreter without site-packages. `rule` says what a failure is: a
+    violation of the "standard"; a lack of "robustness" against what the standard forbids the
+    importer or says nothing of; or a violation of a rule of "bristle" for its own FMUs. `fmi3` is
+    the rule of FMI 3.0 where that is another; `only_fmi2` why it does not apply to FMI 3.0, or "".
+    """
+
+    name: str
+    tried: str
+    standard: str
+    run: Callable[[Bench], Finding]
+    needs: Level
+    unless: Callable[[Plan], str | None]
+    bare: bool
+    rule: Rule
+    fmi3: str = ""
+    only_fmi2: str = ""
+
+
+PROBES: dict[str, Probe] = {}
+
+
+def probe(
+    name: str,
+    *,
+    tried: str,
+    standard: str,
+    needs: Level = "run",
+    unless: Callable[[Plan], str | None] = lambda plan: None,
+    bare: bool = False,
+    rule: Rule = "standard",
+    fmi3: str = "",
+    only_fmi2: str = "",
+) -> Callable[[Callable[[Bench], Finding]], Callable[[Bench], Finding]]:
+    """Return a decorator that enters a function into the list of probes.
+
+    Parameters
+    ----------
+    name : str
+        Name of the row, used once.
+    tried, standard : str
+        What is tried, and the rule that it holds the FMU to, for the row.
+    needs : "file", "library" or "run"
+        What must have worked before; see `Probe`.
+    unless : callable
+        Returns why the probe does not apply to a plan, or None.
+    bare : bool
+        Whether it runs without site-packages.
+    rule : "standard", "robustness" or "bristle"
+        What a failure is; see `Probe`.
+    fmi3 : str
+        The rule of FMI 3.0, where it is another one and not only told in other names.
+    only_fmi2 : str
+        Why it does not apply to FMI 3.0, or "".
+    """
+
+    def enter(function: Callable[[Bench], Finding]) -> Callable[[Bench], Finding]:
+        PROBES[name] = Probe(
+            name, tried, standard, function, needs, unless, bare, rule, fmi3, only_fmi2
+        )
+        return function
+
+    return enter
+
+
+def passed(seen: str, **data: float | bool) -> Finding:
+    """Return a finding that does what the standard says."""
+    return Finding("pass", seen, data)
+
+
+def failed(seen: str, rule: Rule | None = None, **data: float | bool) -> Finding:
+    """Return a finding that breaks a rule, the probe's own or another, or takes its host down."""
+    return Finding("fail", seen, data, rule)
+
+
+def noted(seen: str, **data: float | bool) -> Finding:
+    """Return a finding that a user should know and the standard leaves open."""
+    return Finding("note", seen, data)
+
+
+def unless_claimed(flag: str) -> Callable[[Plan], str | None]:
+    """Return a condition: the probe applies to FMUs that claim a capability only."""
+
+    def unless(plan: Plan) -> str | None:
+        return None if plan.claims(flag) else f"{flag} is not claimed"
+
+    return unless
+
+
+def unless_single(plan: Plan) -> str | None:
+    """Return why an FMU may be instantiated once only, None if it may be more often."""
+    flag = "canBeInstantiatedOnlyOncePerProcess"
+    return f"{flag} is claimed" if plan.claims(flag) else None
+
+
+# What a row says of an FMU of FMI 3.0. Probes are written once, in the names of FMI 2.0.
+
+_RULE = re.compile(r"FMI 2\.0(?: sections? \d[\d.]*\d(?:(?:,| and) \d[\d.]*\d)*)?")
+_FUNCTION = re.compile(r"\bfmi2([A-Z]\w*)")
+_NAMES = {
+    "Instantiate": "InstantiateCoSimulation",
+    "GetReal": "GetFloat64", "SetReal": "SetFloat64",
+    "GetInteger": "GetInt32", "SetInteger": "SetInt32",
+    "SetupExperiment": "EnterInitializationMode",
+    "Terminated": "the flag to terminate",
+    "DeSerializeFMUstate": "DeserializeFMUState",
+}  # fmt: skip
+"""Functions that FMI 3.0 calls otherwise, beside the spelling of FMUState."""
+
+
+def in_fmi3(text: str) -> str:
+    """Return a text about FMI 2.0 with the functions and names of FMI 3.0.
+
+    Sections are left out: those of FMI 3.0 are others.
+
+    >>> in_fmi3("FMI 2.0 section 2.1.8: fmi2GetFMUstate, then fmi2GetReal")
+    'FMI 3.0: fmi3GetFMUState, then fmi3GetFloat64'
+    """
+    text = _FUNCTION.sub(_function, _RULE.sub("FMI 3.0", text))
+    return text.replace("FMUstate", "FMUState").replace("nvr", "nValueReferences")
+
+
+def _function(found: re.Match[str]) -> str:
+    name = _NAMES.get(found[1], found[1])
+    return name if name.startswith("the ") else f"fmi3{name}"

@@ -1,0 +1,285 @@
+"""The runs of a comparison: a scenario for each motion and controller, written, run, measured."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..campaign.campaign import prepare, statistic
+from ..campaign.ensemble_file import read_ensemble
+from ..campaign.plan import Output, Plan
+from ..campaign.pool import run_local
+from ..campaign.table import RunsTable
+from ..core.progress import Count
+from ..engine.coupled import simulate
+from ..engine.run import run_quietly
+from ..errors import EnsembleError, RunError
+from ..system.scenario import load_scenario
+from .setting import (
+    CONTROLLER,
+    DAMPER,
+    ENSEMBLES,
+    GROUND,
+    SCENARIOS,
+    STRUCTURE,
+    Damper,
+    Entry,
+    Folder,
+    Motion,
+    Part,
+    Site,
+    constant,
+    ensemble_text,
+    plain_name,
+    scenario_text,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SENSORS = "sensors"
+SEED = 1
+"""Of every ensemble: its members are the same for all controllers."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What all runs of a comparison share.
+
+    Attributes
+    ----------
+    site, damper, folder
+        Building, damper, and the folder of the comparison.
+    step : float
+        Of the runs' rows, and of FMUs [s].
+    engine : str
+        "compiled", where all parts are built in, or "fmu" for all.
+    fmus : str
+        "python" or "native": what the engine "fmu" steps.
+    workers : int
+        Processes for many runs.
+    remarks : list of str
+        Warnings of the scenarios' checks, as they come.
+    """
+
+    site: Site
+    damper: Damper
+    folder: Folder
+    step: float
+    engine: str
+    fmus: str
+    workers: int
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """What is kept of every run."""
+        return self.site.outputs(self.command)
+
+    @property
+    def command(self) -> str:
+        """Column that has the command; controllers differ in what they call theirs."""
+        return f"{CONTROLLER}.voltage"
+
+    def engine_of(self, entry: Entry) -> str:
+        """Return the engine that runs a controller."""
+        foreign = str(self.damper.part.source.get("fmu", "")).endswith(".fmu")
+        return "fmu" if foreign or not entry.built_in else self.engine
+
+    def columns(self, entry: Entry) -> dict[str, str]:
+        """Return the column of a run for each column of the comparison."""
+        own = f"{CONTROLLER}.{entry.output}"
+        return {o.column: own if o.column == self.command else o.column for o in self.outputs}
+
+    def text(self, motion: Motion, entry: Entry, sensors: Part | None = None) -> str:
+        """Return the text of a scenario.
+
+        Parameters
+        ----------
+        motion, entry : the case
+        sensors : instruments between the structure and the controller, if any
+        """
+        ports = self.site.ports
+        parts = {GROUND: motion.part, STRUCTURE: self.site.part, DAMPER: self.damper.part}
+        command: Any = f"{CONTROLLER}.{entry.output}"
+        if self.damper.drive.name != "voltage":
+            command = {"from": command, "factor": 1.0}
+        wires: dict[str, Any] = {
+            f"{STRUCTURE}.ground_acceleration": f"{GROUND}.ground_acceleration",
+            f"{STRUCTURE}.{ports.force}": f"{DAMPER}.force",
+            f"{DAMPER}.displacement": f"{STRUCTURE}.{ports.displacement}",
+            f"{DAMPER}.velocity": f"{STRUCTURE}.{ports.velocity}",
+            f"{DAMPER}.{self.damper.drive.name}": command,
+        }
+        if sensors is not None:
+            parts[SENSORS] = sensors
+            wires |= {f"{SENSORS}.{name}": column for name, column in self.site.measured.items()}
+        for name, column in entry.wires.items():
+            sensed = sensors is not None and name in self.site.measured
+            wires[f"{CONTROLLER}.{name}"] = f"{SENSORS}.{name}_measured" if sensed else column
+        parts[CONTROLLER] = entry.part
+        title = f"{motion.name}, {self.site.building.name}, {self.damper.name}: {entry.name}"
+        return scenario_text(title, motion.stop, self.step, parts, wires)
+
+    def write(self, motion: Motion, entry: Entry) -> Path:
+        """Write the scenario of a case; return its file."""
+        file = self.folder.at(SCENARIOS, motion.name, f"{plain_name(entry.name)}.toml")
+        return self.folder.write(file, self.text(motion, entry))
+
+    def run(self, motion: Motion, entry: Entry) -> pd.DataFrame:
+        """Return a case's run: the comparison's columns, and what figures show, by time [s].
+
+        Raises
+        ------
+        ScenarioError, FmuError
+            If the scenario is wrong.
+        RunError
+            If the run fails; the text says which.
+        """
+        import pandas as pd
+
+        scenario = load_scenario(self.write(motion, entry))
+        self.remarks.extend(one.text for one in scenario.findings if one.level == "warning")
+        try:
+            found: Any
+            if self.engine_of(entry) == "compiled":
+                found = simulate(scenario)
+                time = found["time"]
+            else:
+                found = run_quietly(scenario, "fmu", self.fmus)
+                time = found.index.to_numpy()
+        except RunError as error:
+            raise RunError(f"{motion.name}, {entry.name}: {error}") from error
+        columns = self.columns(entry)
+        extra = [
+            f"{DAMPER}.velocity",
+            f"{DAMPER}.stroke_ratio",
+            f"{STRUCTURE}.{self.site.ports.velocity}",
+        ]
+        names = {**{name: name for name in extra if name in found}, **columns}
+        data = {name: np.asarray(found[own], dtype=np.float64) for name, own in names.items()}
+        return pd.DataFrame(data, index=pd.Index(time, name="time"))
+
+    def measured(self, frame: pd.DataFrame) -> dict[str, float]:
+        """Return what is kept of a run, by the names of `outputs`."""
+        return {o.name: statistic(o, frame[o.column].to_numpy()) for o in self.outputs}
+
+    def many(
+        self, file: Path, entry: Entry, scenario: Path, runs: int,
+        tables: Mapping[str, Mapping[str, Any]],
+    ) -> tuple[pd.DataFrame, int]:  # fmt: skip
+        """Write an ensemble and run it; return what is kept of its runs, and how many failed.
+
+        Parameters
+        ----------
+        file : of the ensemble
+        entry : its controller
+        scenario : its base
+        runs : how many
+        tables : `vary`, and others
+        """
+        import pandas as pd
+
+        columns = self.columns(entry)
+        kept: dict[str, list[str]] = {}
+        for one in self.outputs:
+            kept.setdefault(columns[one.column], []).append(one.statistic)
+        content: dict[str, Any] = {
+            "title": file.stem, "scenario": _relative(scenario, file.parent),
+            "engine": self.engine_of(entry), "runs": runs, "seed": SEED,
+        }  # fmt: skip
+        if content["engine"] == "fmu" and self.fmus != "python":
+            content["fmus"] = self.fmus
+        self.folder.write(file, ensemble_text(content, {**tables, "outputs": kept}))
+        plan = read_ensemble(file)
+        prepare(plan)
+        runs_file = file.with_suffix(".csv")
+        with quiet(), _continued(plan, runs_file, self.folder.goes_on) as table:
+            left = [run for run in range(plan.runs) if run not in table.outcomes]
+            count = Count(f"{file.parent.name}, {file.stem}: run", len(left))
+            for outcome in run_local(plan, left, min(self.workers, len(left))) if left else ():
+                table.add(outcome)
+                count.done()
+        outcomes = [table.outcomes[run] for run in range(plan.runs)]
+        rows = {one.run: one.numbers for one in outcomes if not one.reason}
+        failed = len(outcomes) - len(rows)
+        names = {f"{o.statistic} {columns[o.column]}": o.name for o in self.outputs}
+        titles = [names[one.name] for one in plan.outputs]
+        frame = pd.DataFrame([rows[k] for k in sorted(rows)], index=sorted(rows), columns=titles)
+        return frame, failed
+
+    def levels(self, motion: Motion, count: int) -> pd.DataFrame:
+        """Return what is kept of a motion's runs at constant voltages, by the voltage [V].
+
+        Parameters
+        ----------
+        motion : the ground motion
+        count : how many voltages, from 0 to the damper's largest
+
+        Raises
+        ------
+        RunError
+            If one fails.
+        """
+        entry = constant("constant", 0.0, "")
+        volts = np.linspace(0.0, self.damper.most, count).tolist()
+        base = self.write(motion, entry)
+        file = self.folder.at(ENSEMBLES, motion.name, "constant.toml")
+        vary = {"vary": {f"{CONTROLLER}.level": {"each": volts}}}
+        found, failed = self.many(file, entry, base, count, vary)
+        if failed:
+            raise RunError(
+                f"{motion.name}: {failed} of {count} runs at constant voltages fail; bristle "
+                f"ensemble {file} says why."
+            )
+        found.index = volts
+        return found
+
+
+@contextmanager
+def _continued(plan: Plan, path: Path, goes_on: bool) -> Iterator[RunsTable]:
+    """Yield the table of an ensemble's runs, with those of before where it `goes_on`."""
+    try:
+        table = RunsTable(plan, path, fresh=not goes_on)
+        table.forget_failures()
+    except EnsembleError:  # of other files or numbers, or damaged
+        table = RunsTable(plan, path, fresh=True)
+    try:
+        yield table
+    finally:
+        table.close(complete=len(table.outcomes) >= plan.runs)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep the runs' own warnings back: the tables tell where a run leaves the stroke."""
+    logger = logging.getLogger("bristle")
+    before = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+
+
+def _relative(file: Path, folder: Path) -> str:
+    """Return a file's path from a folder two levels below the comparison's."""
+    return "/".join(["..", "..", *file.relative_to(folder.parent.parent).parts])
+
+
+def best_level(levels: pd.DataFrame, judged: str) -> float:
+    """Return the constant voltage [V] with the least judged value among those that were run."""
+    volts = levels.index.to_numpy()
+    return float(volts[int(np.argmin(levels[judged].to_numpy()))])
+
+
+def flat(values: Iterable[float]) -> bool:
+    """Return whether values are all the same."""
+    found = np.array(list(values))
+    return bool(np.ptp(found) <= 1e-12 * np.abs(found).max())

@@ -1,0 +1,139 @@
+"""Files written whole or not at all, TOML read with its lines; folders of data and caches."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import StudyError
+from .config import read_text
+from .text import written
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file so that there is the old one or the new one at any time, never a part.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be written.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    draft: Path | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
+        draft = Path(name)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        draft.chmod(0o666 & ~_umask())
+        draft.replace(path)
+    except OSError as error:
+        raise StudyError(f"{path}: cannot be written ({error.strerror or error}).") from None
+    finally:
+        if draft is not None:
+            draft.unlink(missing_ok=True)
+
+
+def write_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a JSON file whole; numbers that are not finite become null."""
+    write_whole(path, json.dumps(_plain(data), indent=2, ensure_ascii=False) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return the content of a JSON file that holds an object; StudyError if it does not."""
+    try:
+        found = json.loads(read_text(path, StudyError))
+    except ValueError as error:
+        raise StudyError(f"{path}: no JSON ({error}). Remove or correct the file.") from None
+    if not isinstance(found, dict):
+        raise StudyError(f"{path}: holds {written(found)}: expected an object.")
+    return found
+
+
+_INF = float("inf")
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it: numbers of numpy and tuples turned, NaN and infinity null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and (value != value or abs(value) == _INF):
+        return None
+    return value
+
+
+def _umask() -> int:
+    """Return the process's umask, which can only be read by setting it."""
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
+
+
+# Where things are: the checkout that the package runs from, or the wheel and the cache.
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def root() -> Path | None:
+    """Return the checkout's folder, or None when the package is installed."""
+    folder = _PACKAGE.parent
+    return folder if (folder / "build_fmus.py").is_file() else None
+
+
+def components_folder() -> Path:
+    """Return the folder with one source file per built-in component."""
+    return (root() or _PACKAGE) / "components"
+
+
+def scenarios_folder() -> Path:
+    """Return the folder with the stock scenarios."""
+    return (root() or _PACKAGE) / "scenarios"
+
+
+def ensembles_folder() -> Path:
+    """Return the folder with the stock ensembles."""
+    return (root() or _PACKAGE) / "ensembles"
+
+
+def cache_folder() -> Path:
+    """Return the user's cache folder, `$BRISTLE_CACHE` where that is set; it may not exist yet."""
+    chosen = os.environ.get("BRISTLE_CACHE")
+    if chosen:
+        return Path(chosen).expanduser().absolute()
+    from platformdirs import user_cache_path
+
+    return user_cache_path("bristle", appauthor=False)
+
+
+def state_folder() -> Path:
+    """Return where what must outlive the cache is kept, `$BRISTLE_STATE` where that is set.
+
+    Consent to code, and tracebacks; it may not exist yet.
+    """
+    chosen = os.environ.get("BRISTLE_STATE")
+    if chosen:
+        return Path(chosen).expanduser().absolute()
+    from platformdirs import user_state_path
+
+    return user_state_path("bristle", appauthor=False)
+
+
+def fmus_folder() -> Path:
+    """Return where built FMUs are kept: fmus/ of a checkout, else the cache."""
+    checkout = root()
+    return (
+        checkout / "fmus"
+        if checkout and not os.environ.get("BRISTLE_CACHE")
+        else (cache_folder() / "fmus")
+    )

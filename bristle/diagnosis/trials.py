@@ -1,0 +1,330 @@
+"""Each effect tried inside the model: refitted on training runs, judged on held-out ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.progress import Count
+from ..identification.error import ForceError, errors_by_run, force_error, pooled
+from ..identification.problem import (
+    EXPLAINS,
+    Expected,
+    Model,
+    Problem,
+    excess_of,
+    in_noises,
+    residuals,
+)
+from ..identification.search import in_threads, loss, losses, mean_loss, z_of, z_scale
+from ..identification.start_grid import (
+    Candidate,
+    Search,
+    SearchContext,
+    is_rough,
+    ranked_guesses,
+    refine,
+)
+from ..physics.effect import EFFECTS, effects_of, exclude
+from .rule import BENCH
+
+Array = NDArray[np.float64]
+
+SCREENING = 3
+"""Jacobians of the screening that decides which effects are searched as a second one."""
+
+QUICK = 8
+"""Jacobians of the first, short search from each start."""
+
+ROUGH = 24
+"""The same where impacts make the way rough, for the `CARRIED` best after `OUTSET` Jacobians."""
+
+OUTSET = 4
+CARRIED = 2
+
+LONG = 20
+"""Jacobians of the second search, of those that promise enough."""
+
+SECONDS = 4
+"""How many effects are searched as the second one of a pair."""
+
+WORTH = 0.005
+"""Share of the loss that a candidate must gain at least to be refined."""
+
+SHOWN = ("force",)
+"""Channels whose instrument's effects are tried where nothing else is known of them."""
+
+PROMISING = 0.4
+"""Share of the best gain on the training runs below which a candidate is not refined."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A model tried: fitted on the training runs, judged on the held-out ones.
+
+    `train`, `z` the robust RMS of residual over expected noise there; `losses` (n,) the robust loss
+    per held-out sample, by the weights of the fit; `residual` (n,) the residuals over the noise;
+    `rms` [N] the error over the samples that decide: where a law of dry friction is at rest its
+    force may be any, and no effect is judged by that. `error` is that over all samples, None where
+    nobody asked. `refined` is False where the first, short search already showed that it gains too
+    little.
+    """
+
+    model: Model
+    train: float
+    z: float
+    rms: float
+    losses: Array
+    residual: Array
+    refined: bool = True
+    error: ForceError | None = None
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects of the model."""
+        return self.model.effects
+
+
+def judge(
+    model: Model, train: Problem, held_out: Problem, noise: tuple[Expected, Expected] | None = None
+) -> Trial:
+    """Return how a fitted model does on the runs that it was fitted to and on the others.
+
+    Parameters
+    ----------
+    model : the model as fitted
+    train, held_out : runs that it was fitted to, and those that decide
+    noise : what a true model would show on `train` and on `held_out`, where it is not worth drawing
+        for this model; None draws it
+    """
+    fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
+    r = residuals(held_out, model, expected)
+    z = in_noises(held_out, r, expected)
+    own = in_noises(train, residuals(train, model, fitted), fitted)
+    decides = pooled(errors_by_run(held_out, model, entire=False))
+    return Trial(
+        model, z_scale(own), z_of(mean_loss(losses(z))), decides.rms, losses(r), z, noise is None,
+        force_error([(held_out, model)]),
+    )  # fmt: skip
+
+
+def missed_by(trial: Trial, train: Problem) -> float:
+    """Return the variance [N2] beside the noise that a trial's model misses, 0 where little."""
+    return excess_of(train, trial.model) if trial.train > EXPLAINS else 0.0
+
+
+def joinable(
+    base: Model, shown: Sequence[str] = SHOWN, problem: Problem | None = None
+) -> list[str]:
+    """Return the effects that can join a damper's model, the slow ones first.
+
+    Parameters
+    ----------
+    base : the model that they join
+    shown : the channels whose instruments no redundancy of the channels has judged already
+    problem : the damper's runs, which say what is offered; None for those of a test bench
+    """
+    instruments = [effect.name for effect in effects_of("sensor") if effect.shows in shown]
+    names = [
+        name
+        for name in (*(problem or Problem([])).damper_effects(base.law), *instruments)
+        if name not in base.effects and not any(exclude(name, one) for one in base.effects)
+    ]
+    return sorted(names, key=lambda name: not EFFECTS[name].joint)
+
+
+def screened(effect: str, context: SearchContext, guesses: Sequence[Candidate]) -> list[Candidate]:
+    """Return starts with what a very short search from the best one has led to in front.
+
+    One step is not enough where the present model's parameters hold each other: a fall with speed
+    that went to its bound moves only together with what is to take its place. A joint is too dear.
+    """
+    screening = context.screening(effect)
+    search = Search(
+        screening.problem, guesses[0].model, screening.expected, guesses[0].model.free()
+    )
+    if search.rough:
+        return list(guesses)
+    model, ended = search.run(SCREENING)
+    return [Candidate(model, ended.cost), *guesses]
+
+
+def short_search(
+    effect: str, context: SearchContext, guesses: Sequence[Candidate], fewer: bool = False
+) -> Candidate:
+    """Search shortly from the best starts; return the best of the ends.
+
+    Its loss is that on the training runs.
+
+    All parameters move at once: with the law's held, an effect that the law has absorbed vanishes.
+    Where impacts make the way rough the first step says little of a start: all go a short way, and
+    those that came farthest go on.
+
+    Parameters
+    ----------
+    effect : name of the effect that joins
+    context : the model that it joins, on its training runs
+    guesses : starts of the search, the best first
+    fewer : whether to go from half as many starts
+    """
+    screening = context.screening(effect)
+
+    def searched(one: Candidate, sweeps: int) -> Candidate:
+        search = Search(screening.problem, one.model, screening.expected, one.model.free())
+        model, ended = search.run(sweeps)
+        return Candidate(model, ended.cost)
+
+    some = guesses[: max(1, screening.kept // 2) if fewer else screening.kept]
+    if is_rough(guesses[0].model):
+        first = sorted((searched(one, OUTSET) for one in some), key=lambda one: one.cost)
+        found = [searched(one, ROUGH) for one in first[: 1 if fewer else CARRIED]]
+    else:
+        found = [searched(one, QUICK) for one in some]
+    best = min(found, key=lambda one: one.cost).model
+    return Candidate(best, mean_loss(loss(residuals(context.train, best, context.expected))))
+
+
+def _starts(
+    names: Sequence[str], context: SearchContext, most: int | None
+) -> dict[str, list[Candidate]]:
+    """Return the starts of effects in their order; with `most` of those that promise most alone."""
+    looked = in_threads(lambda name: ranked_guesses(name, context), names)
+    guesses = dict(zip(names, looked, strict=True))
+    if most is None:
+        return guesses
+    looked = in_threads(lambda name: screened(name, context, guesses[name]), names)
+    guesses = dict(zip(names, looked, strict=True))
+    best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
+    return {name: guesses[name] for name in names if name in best}
+
+
+def try_all(
+    base: Model,
+    train: Problem,
+    held_out: Problem,
+    shown: Sequence[str] = SHOWN,
+    most: int | None = None,
+) -> list[Trial]:
+    """Try every effect that can join the model, on all cores; best on the held-out runs first.
+
+    Every effect is searched shortly from its best starts; those that gain a fair share of what the
+    best one gains on the training runs are refined.
+
+    Parameters
+    ----------
+    base : the fitted model that effects join
+    train, held_out : runs to fit to, and those that decide
+    shown : channels whose instruments' effects are tried as well
+    most : how many effects are searched, those that a screening promises most of, from fewer
+        starts: for a second effect; None for all
+    """
+    context = SearchContext(base, train)
+    there = held_out.expectation(base)
+    names = joinable(base, shown, train)
+    guesses = _starts(names, context, most)
+    names, fewer = [*guesses], most is not None
+    ends: dict[str, float] = {}
+    count = Count("effect", len(names))
+
+    def look(name: str) -> Candidate:
+        end = short_search(name, context, guesses[name], fewer)
+        ends[name] = end.cost
+        share = 100.0 * end.cost / context.cost if context.cost > 0.0 else 100.0
+        best = min(dict(ends), key=lambda one: ends[one])
+        count.done(name, f"{share:.3g} % of the cost remains; best so far {best}")
+        return end
+
+    found = in_threads(look, names)
+    gained = max(context.cost - one.cost for one in found)
+    least = max(PROMISING * gained, WORTH * context.cost)
+
+    refined = Count("refining effect", sum(context.cost - one.cost >= least for one in found))
+
+    def finish(one: Candidate) -> Trial:
+        if context.cost - one.cost >= least:
+            trial = judge(refine(one.model, train, LONG), train, held_out)
+            refined.done(one.model.effects[-1], f"z {trial.z:.3g} on held-out runs")
+            return trial
+        return judge(one.model, train, held_out, (context.expected, there))
+
+    trials = in_threads(finish, found)
+    return sorted(trials, key=lambda trial: trial.z)
+
+
+def try_members(pair: Trial, base: Model, train: Problem, held_out: Problem) -> list[Trial]:
+    """Try each new effect of a model alone, its search begun from the values found together.
+
+    Parameters
+    ----------
+    pair : the trial of the model with all new effects
+    base : the model without them
+    train, held_out : runs to fit to, and those that decide
+    """
+    out = []
+    for name in pair.effects:
+        if name in base.effects:
+            continue
+        others = [e for e in pair.effects if e not in base.effects and e != name]
+        kept = tuple(e for e in pair.effects if e not in others)
+        values = {
+            key: value
+            for key, value in pair.model.values.items()
+            if key.partition(".")[0] not in others
+        }
+        alone = refine(replace(pair.model, effects=kept, values=values), train, 2 * LONG)
+        out.append(judge(alone, train, held_out))
+    return out
+
+
+# Significance that accounts for correlation: blocks, not samples, are what is independent.
+
+BLOCK = 250
+"""Samples per block, longer than the residuals' correlation."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A paired difference of losses on held-out runs: its mean and the interval of that mean."""
+
+    mean: float
+    low: float
+    high: float
+
+    @property
+    def certain(self) -> bool:
+        """Whether zero lies outside the interval."""
+        return self.low > 0.0 or self.high < 0.0
+
+
+def parts_of(losses: Array, block: int = BLOCK) -> list[Array]:
+    """Return losses (n,) in blocks of about so many samples, four at least."""
+    return np.array_split(losses, max(4, len(losses) // block))
+
+
+def paired(
+    first: Array,
+    second: Array,
+    chance: float = BENCH.chance,
+    block: int = BLOCK,
+    draws: int = 400,
+    seed: int = 0,
+) -> Difference:
+    """Return the mean of first - second per sample with its interval by block bootstrap.
+
+    Parameters
+    ----------
+    first, second : (n,) losses of two models on the same samples
+    chance : probability left outside the interval, half on either side
+    block : samples per block, longer than the residuals' correlation
+    draws, seed : how many resamplings of the blocks, and their seed
+    """
+    difference = first - second
+    blocks = np.array([part.mean() for part in parts_of(difference, block)])
+    generator = np.random.default_rng(seed)
+    picks = generator.integers(0, len(blocks), (draws, len(blocks)))
+    means = blocks[picks].mean(axis=1)
+    low, high = np.quantile(means, [0.5 * chance, 1.0 - 0.5 * chance])
+    return Difference(float(blocks.mean()), float(low), float(high))

@@ -1,0 +1,251 @@
+"""Figures and tables of a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import Any
+
+from ..comparison.names import joined
+from ..core.text import percent, quantity, short_z, with_interval
+from ..data.channels import channel_unit, is_channel
+from ..identification.error import ForceError
+from ..physics.drive import text_for
+from ..physics.effect import EFFECTS
+from ..view.blocks import Block, Figure, Table, Text, View, view_of
+from ..view.plots import ROW, draw_ranking
+from ..view.style import Page, look
+from .verdict import Diagnosis
+from .words import (
+    FAULTS,
+    HEADER,
+    LIMITS,
+    LIMITS_NOTES,
+    TABLE_NOTE,
+    TONES,
+    Verdict,
+    about,
+    drive_of,
+    fault_rows,
+    fault_texts,
+    headline,
+    law_name,
+    law_table,
+    limit_rows,
+    reasons,
+    separating,
+    untestable,
+)
+
+MOST = 10
+"""Effects that are drawn."""
+_WHY = 3
+"""Sentences of the answer that say why; the others are details."""
+_ROLES = {"holdout": "held-out runs", "train": "training runs"}
+_Z = "z: error / noise; a true model has 1."
+
+
+@view_of(Diagnosis)
+def diagnosis_view(found: Diagnosis) -> View:
+    """Return the view of a verdict."""
+    return verdict_view(found.as_dict())
+
+
+def verdict_view(verdict: Verdict) -> View:
+    """Return the view of the content of verdict.json."""
+    kind, why = str(verdict["kind"]), reasons(verdict)
+    shown, apart = why[:_WHY], why[_WHY:]
+    named = [_about(str(name), verdict) for name in verdict.get("effects") or []]
+    hidden = untestable(verdict)
+    notes = [*fault_texts(verdict, " ".join(why)), *(verdict.get("notes") or [])]
+    if hidden:
+        notes.append(f"Not testable with these runs: {', '.join(hidden)}.")
+    separate = separating(verdict)
+    return View(
+        headline(verdict),
+        (
+            *(Text(text, "say") for text in named if kind == "effect"),
+            *(Text(text) for text in named if kind != "effect"),
+            Text(f"{_error(verdict)} {_gain(verdict)}".strip()),
+            *map(Text, shown),
+            Text(f"To distinguish them: {separate}" if separate else ""),
+            *(Text(f"{note.rstrip('.')}.", "note") for note in notes),
+        ),
+        (
+            *map(Text, apart), *map(Text, _errors_beside(verdict)), *_tables(verdict),
+        ),
+        TONES[kind],
+    )  # fmt: skip
+
+
+def _about(name: str, verdict: Verdict) -> str:
+    """Return what an effect is, and its parameters with their 95 % intervals."""
+    values = {
+        key.partition(".")[2]: one
+        for found in verdict.get("findings") or []
+        for key, one in (found.get("values") or {}).items()
+        if key.partition(".")[0] == name
+    }
+    told = []
+    for key, one in values.items():
+        text, half = with_interval(one["value"], one["std"])
+        unit = EFFECTS[name].parameters[key].unit if name in EFFECTS else "1"
+        told.append(f"{key} = {text} {half}" + ("" if unit == "1" else f" {unit}"))
+    sizes = f" {', '.join(told)} (95 %)." if told else ""
+    return about(name, drive_of(verdict)) + sizes
+
+
+def worst(verdict: Verdict) -> Mapping[str, Any]:
+    """Return the finding at the site whose model errs the most; first one whose noise is unknown.
+
+    Such a site has no z: what effects gain there is told first.
+    """
+    findings = [one for one in verdict.get("findings") or [] if "z_holdout_before" in one]
+    z_before = ((inf if (z := one["z_holdout_before"]) is None else z, one) for one in findings)
+    return max(z_before, key=lambda pair: pair[0], default=(0.0, verdict))[1]
+
+
+def _gain(verdict: Verdict) -> str:
+    """Return how the error falls with what is named; "" where nothing is, or that is not known."""
+    at = worst(verdict)
+    both = [at.get(f"error_holdout_{when}") for when in ("before", "after")]
+    if at.get("kind") != "effect" or not all(both):
+        return ""
+    before, after = (ForceError.of(one).text() for one in both if one)
+    where = f" at the {at['site']}" if len(verdict["findings"]) > 1 else ""
+    return f"Fitted again{where}: {before}, with {joined(at['effects'])} {after}."
+
+
+def _error(verdict: Verdict) -> str:
+    """Return the error of the model as the study has it, which every command prints alike."""
+    role = _judged(verdict)
+    if not role:
+        return ""
+    sites = (verdict.get("error_by_site") or {}).get(role, {})
+    by_site = [f"{site} {ForceError.of(one).text()}" for site, one in sites.items()]
+    more = f"; {', '.join(by_site)}" if len(by_site) > 1 else ""
+    error = ForceError.of(verdict["error"][role]).text()
+    return f"The study's model errs by {error} on the {_ROLES[role]}{more}."
+
+
+def _errors_beside(verdict: Verdict) -> list[str]:
+    role = _judged(verdict)
+    return ForceError.of(verdict["error"][role]).beside() if role else []
+
+
+def _judged(verdict: Verdict) -> str:
+    return next((role for role in _ROLES if role in (verdict.get("error") or {})), "")
+
+
+def _tables(verdict: Verdict) -> list[Block]:
+    """Return the evidence: faults, laws, trials, limits, and what could not be tested."""
+    blocks: list[Block] = []
+    if faults := fault_rows(verdict):
+        blocks.append(Table(FAULTS, faults, title="Faults of channels"))
+    if laws := verdict.get("laws"):
+        blocks.append(law_block(laws))
+    alt = f"error / noise (z) with each effect: {headline(verdict)}"
+    blocks.append(Figure(lambda: draw_verdict(verdict), alt))
+    blocks += _trials(verdict)
+    if limits := limit_rows(verdict):
+        title, note = "How large each effect may still be", " ".join(LIMITS_NOTES)
+        blocks.append(Table(LIMITS, limits, (2, 3), title, note=note))
+    if hidden := untestable(verdict):
+        drive, rows = drive_of(verdict), []
+        for told in hidden:
+            name = told.partition(" ")[0]
+            expect = text_for(EFFECTS[name].expect, drive) if name in EFFECTS else ""
+            rows.append([told, about(name, drive), expect])
+        header = ("effect", "what it does", "what it would look like")
+        note = "They may still be present: the data do not excite them, or the model absorbs them."
+        blocks.append(Table(header, rows, title="Not testable with these runs", note=note))
+    floor = [
+        f"{name} {quantity(value, channel_unit(name) if is_channel(name) else '1', fine=True)}"
+        for name, value in (verdict.get("noise_floor") or {}).items()
+        if isinstance(value, int | float)
+    ]
+    return [*blocks, Text(f"Noise floor of the verdict: {', '.join(floor)}." if floor else "")]
+
+
+def law_block(rows: Sequence[Verdict]) -> Table:
+    """Return the table of laws, from its rows as verdict.json has them."""
+    return Table(HEADER, law_table(rows), range(2, 8), "The laws", note=TABLE_NOTE)
+
+
+def _trials(verdict: Verdict) -> list[Block]:
+    """Return the table of what each effect leaves of the error, the largest gain first."""
+    ranking, known = verdict.get("ranking") or [], verdict.get("noise_known", True)
+    if not ranking:
+        return []
+    several = len({row.get("site") for row in ranking}) > 1
+    at, named = worst(verdict), set(verdict.get("effects") or [])
+    where = f" ({at['site']})" if several else ""
+    model = f"{verdict['law']} alone" if verdict.get("laws") else "present model"
+    z = [at.get("z_train_before"), at.get("z_holdout_before")]
+    rows = [[model + where, *map(_z, z), "", ""]] if known else []
+    strong = []
+    for row in ranking:
+        if row["effect"] in named:
+            strong.append(len(rows))
+        z = [row.get("z_train"), row.get("z_holdout")]
+        gain = percent(row["gain"]) if row.get("gain") is not None else "-"
+        search = "" if row.get("refined", True) else "short"
+        site = f" ({row['site']})" if several else ""
+        rows.append([f"with {row['effect']}{site}", *(map(_z, z) if known else ()), gain, search])
+    z_columns = ("z, training", "z, held out") if known else ()
+    header = ("model", *z_columns, "error lower by", "search")
+    note = (
+        "Each effect added to the model, all parameters fitted again; held-out runs decide. Short "
+        "search: it gains too little to be sought at length."
+    )
+    numbers = range(1, len(header) - 1)
+    note = f"{_Z} {note}" if known else note
+    return [Table(header, rows, numbers, "The evidence", strong, note)]
+
+
+def _z(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def draw_verdict(verdict: Verdict) -> Page:
+    """Return the figure of a verdict: what each effect that was tried leaves of the error.
+
+    Of a building it shows the site where the model errs the most, the best effect first, with the
+    pair of effects that was found. Data that carry no verdict have no trials, without a known noise
+    there is no z: then the figure is the verdict's words.
+    """
+    at, before = worst(verdict), worst(verdict).get("z_holdout_before")
+    rows = [
+        (str(row["effect"]), float(row["z_holdout"]))
+        for row in verdict.get("ranking") or []
+        if row.get("z_holdout") is not None and row.get("site") == at.get("site", row.get("site"))
+    ][:MOST]
+    with look():
+        if not rows or before is None or not verdict.get("noise_known", True):
+            return Page(7.6, 0.0, headline(verdict), " ".join(reasons(verdict)))
+        own = [str(name) for name in at.get("effects") or []]
+        if at.get("kind") == "effect" and len(own) > 1 and at.get("z_holdout_after") is not None:
+            rows.append((joined(own), float(at["z_holdout_after"])))
+        rows.sort(key=lambda row: row[1])
+        without = "the present model"
+        if verdict.get("laws"):
+            without = f"{law_name(verdict)}, the law of this verdict, without the effect"
+        where = f" at the {at['site']}" if at.get("site") else ""
+        page = Page(
+            7.6, ROW * len(rows) + 1.0, headline(verdict),
+            f"Dashed: {without}{where}. Each bar: the model with that effect, fitted again. "
+            "Green: the noise floor.",
+        )  # fmt: skip
+        grid = page.grid(1, 1, top=0.3, bottom=0.5, left=1.9, right=0.7)
+        axes = page.figure.add_subplot(grid[0, 0])
+        named = {_label(name) for name in (*(verdict.get("effects") or ()), joined(own))}
+        names, values = [_label(name) for name, _ in rows], [z for _, z in rows]
+        draw_ranking(axes, names, values, float(before), named)
+        axes.set_title(f"dashed: {without}, z = {short_z(before)}", loc="right", fontsize=8.5)
+        axes.set_xlabel("error / noise on held-out runs (z)")
+    return page
+
+
+def _label(name: str) -> str:
+    """Return an effect, or a pair of them, as it stands beside its bar: a pair in two lines."""
+    return f"with {name}".replace(" and ", "\nand ")

@@ -1,1 +1,0 @@
-"""Plots of plain arrays, and the style that all figures share; matplotlib comes on first use."""

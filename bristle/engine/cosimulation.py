@@ -1,0 +1,307 @@
+"""The master: steps the FMUs of a scenario together and keeps every output of every step.
+
+Row k holds all outputs at t_k = k step, t = 0 included. What is set and read when, is decided
+in `schedule`; how it is called, in `loop`; this module initialises, watches and explains.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, NoReturn, Self
+
+import numpy as np
+
+from ..errors import RunError
+from ..fmu.description import Description, Value
+from .instance import FATAL, STATUS, WARNING, Instance, Message, Unpacked
+from .macro_step import Memory, compile_loop
+from .results import Array, Table, count_steps, make_columns, times
+from .schedule import (
+    Node,
+    Operation,
+    Port,
+    Ramp,
+    Read,
+    Restore,
+    Save,
+    Step,
+    find_loop,
+    kind_of,
+    make_nodes,
+    make_schedule,
+)
+
+if TYPE_CHECKING:
+    from ..system.scenario import Component, Scenario
+
+SETTLE = 100
+"""Rounds in which the values at t = 0 must settle where outputs and inputs follow each other."""
+
+VERBS = {
+    Step: "doStep",
+    Read: "reading its outputs",
+    Ramp: "setting the derivatives of its inputs",
+    Save: "getting its state",
+    Restore: "setting its state",
+}
+
+FAULTS = {
+    1: "an input is not finite",
+    2: "the step is not a positive finite number",
+    3: "it was asked to step outside step mode",
+    4: "a state or output is not finite or out of bounds",
+    5: "a parameter or record is wrong",
+}
+
+
+class Master:
+    """The FMUs of a scenario, stepped together.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A checked scenario.
+    paths : mapping of str to Path
+        The FMU file of each component.
+    descriptions : mapping of str to Description
+        What each FMU says of itself.
+    parameters : mapping of str to mapping
+        Values set before initialisation, per component; also of inputs that nothing feeds.
+    listen : callable
+        Gets every message of every FMU.
+
+    Raises
+    ------
+    FmuError
+        An FMU cannot be unpacked, loaded or instantiated.
+    RunError
+        From any method: a component fails; the text names it, the time and its inputs. The rows
+        before are kept, see `table`.
+
+    Examples
+    --------
+    >>> with Master(scenario, paths, descriptions, parameters, print) as master:  # doctest: +SKIP
+    ...     master.start()
+    ...     master.advance(master.steps)
+    ...     table = master.table()
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        paths: Mapping[str, Path],
+        descriptions: Mapping[str, Description],
+        parameters: Mapping[str, Mapping[str, Value]],
+        listen: Callable[[Message], None],
+    ) -> None:
+        self.step = scenario.step
+        self.steps = count_steps(scenario.stop, scenario.step)
+        self._stop = scenario.stop
+        self._parameters = parameters
+        self.nodes = make_nodes(scenario, descriptions)
+        self.columns = make_columns(scenario, descriptions)
+        schedule = make_schedule(self.nodes, scenario.algorithm)
+        self._memory = Memory(self.nodes, schedule)
+        self._rows: list[bytes] = []
+        self._blocks: list[dict[Port, Array]] = []
+        self._collected = 0
+        self._instances: list[Instance] = []
+        self._unpacked = Unpacked()
+        try:
+            self._instantiate(scenario.components, paths, descriptions, listen)
+            self._loop = compile_loop(
+                schedule, self._memory, self._instances, self.step, self._rows, self._check
+            )
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def rows(self) -> int:
+        """The number of rows so far; row 0 is t = 0."""
+        return self._collected + len(self._rows)
+
+    @property
+    def time(self) -> float:
+        """The time of the newest row, 0 before there is one."""
+        return float(times(max(self.rows - 1, 0), max(self.rows, 1), self.step)[0])
+
+    def start(self) -> None:
+        """Initialise all FMUs and keep row 0, the outputs at t = 0.
+
+        Outputs are passed on in rounds until nothing changes, in initialisation mode and after
+        it, so that chains of outputs that follow inputs are all at t = 0.
+
+        Raises
+        ------
+        RunError
+            Also if an algebraic loop does not settle; the text names the loop.
+        """
+        for node, instance in zip(self.nodes, self._instances, strict=True):
+            instance.initialise(self._parameters.get(node.name, {}), self._stop)
+        self._settle()
+        for instance in self._instances:
+            instance.finish_initialisation()
+        self._memory.put(self._settle())
+        self._rows.append(self._memory.row.tobytes())
+        if any(self._memory.row[self._memory.faults :]):
+            self._explain_fault("at t = 0 s")
+
+    def advance(self, count: int) -> None:
+        """Make `count` macro steps, or those that are left."""
+        first = self.rows - 1
+        last = min(first + count, self.steps)
+        self._loop(times(first, last, self.step).tolist())
+
+    def table(self, first: int = 0) -> Table:
+        """Return the rows from `first` on."""
+        if self._rows:
+            self._blocks.append(self._memory.columns(self._rows))
+            self._collected += len(self._rows)
+            self._rows.clear()
+        blocks, skipped = [], 0
+        for block in self._blocks:
+            length = len(next(iter(block.values())))
+            if skipped + length > first:
+                blocks.append((block, max(first - skipped, 0)))
+            skipped += length
+        values = {}
+        for column, port in zip(self.columns, self._ports(), strict=True):
+            parts = [block[port][start:] for block, start in blocks]
+            values[column.name] = np.concatenate(parts).astype(column.dtype)
+        return Table(times(first, self._collected, self.step), self.columns, values)
+
+    def close(self) -> None:
+        """Free the FMUs and remove what was unpacked."""
+        while self._instances:
+            self._instances.pop().close()
+        self.forget()
+
+    def forget(self) -> None:
+        """Remove what was unpacked without a call of the FMUs, one of which may hang."""
+        self._unpacked.close()
+
+    def _instantiate(
+        self,
+        components: Sequence[Component],
+        paths: Mapping[str, Path],
+        descriptions: Mapping[str, Description],
+        listen: Callable[[Message], None],
+    ) -> None:
+        copies: dict[Path, int] = {}
+        for component in components:
+            path, description = paths[component.name], descriptions[component.name]
+            copy = copies.get(path, 0)
+            if description.capabilities.get("canBeInstantiatedOnlyOncePerProcess") == "true":
+                copies[path] = copy + 1  # a library of its own for each
+            folder = self._unpacked.folder(path, copy)
+            self._instances.append(Instance(component.name, description, folder, listen))
+
+    def _settle(self) -> dict[Port, Value]:
+        """Pass outputs on until no input changes any more; return all outputs."""
+        given: dict[Port, Value] = {}
+        for turn in range(SETTLE):
+            outputs = {
+                (c, name): value
+                for c, instance in enumerate(self._instances)
+                for name, value in instance.get(self.nodes[c].outputs).items()
+            }
+            wanted = {
+                (c, name): node.taken(name, outputs[source])
+                for c, node in enumerate(self.nodes)
+                for name, source in node.sources.items()
+            }
+            # Without a loop all is settled exactly after one round per component.
+            near = 1e-12 if turn > len(self.nodes) else 0.0
+            changed = [p for p in wanted if p not in given or not _equal(wanted[p], given[p], near)]
+            if not changed:
+                return outputs
+            for c, instance in enumerate(self._instances):
+                instance.set({name: wanted[d, name] for d, name in changed if d == c})
+            given = wanted
+        loop = find_loop(self.nodes)
+        if loop:
+            path = " -> ".join(f"{self.nodes[c].name}.{name}" for c, name in loop)
+            raise RunError(
+                f"t = 0 s: the values of an algebraic loop do not settle: {path}.\n"
+                "  Leave out one of its connections, or add a component with memory."
+            )
+        return outputs  # an FMU whose outputs change at every look, as a noisy sensor's may
+
+    def _check(self, operation: Operation | None, status: int) -> None:
+        if operation is None:
+            self._explain_fault(f"at t = {self.time:.9g} s")
+        if status != WARNING:
+            self._explain(operation, status)
+
+    def _explain(self, operation: Operation, status: int) -> NoReturn:
+        instance = self._instances[operation.component]
+        instance.poisoned |= status == FATAL
+        verb = VERBS.get(type(operation), "setting inputs")
+        when = f"in the step from t = {self.time:.9g} s"
+        answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
+        text = f"{instance.name} {when}: {verb} answered {answer}"
+        said = instance.said()  # before the fault is read: each call forgets what was said before
+        node = self.nodes[operation.component]
+        if not instance.poisoned and any(kind_of(v) == "fault" for v in node.outputs.values()):
+            text += self._code(instance.get(["fault"])["fault"])
+        text += self._inputs(operation.component) + said
+        if isinstance(operation, Ramp):
+            held = ", ".join(f'{name} = "held"' for name in operation.names)
+            text += (
+                "\n  Its description says canInterpolateInputs. Without derivatives it is stepped "
+                f"by over_step = {{ {held} }} in [components.{instance.name}]."
+            )
+        raise RunError(text)
+
+    def _explain_fault(self, when: str) -> NoReturn:
+        for c, node in enumerate(self.nodes):
+            for name, variable in node.outputs.items():
+                if kind_of(variable) == "fault" and (code := self._memory.value((c, name))):
+                    text = f"{node.name} {when}{self._code(code)}{self._inputs(c)}"
+                    raise RunError(text + self._instances[c].said())
+        raise AssertionError("no component reports a fault")
+
+    @staticmethod
+    def _code(code: Value) -> str:
+        return f": fault {code}, {FAULTS.get(int(code), 'unknown code')}" if code else ""
+
+    def _inputs(self, component: int) -> str:
+        """Return the inputs of a component with their values, those not finite first."""
+        node = self.nodes[component]
+        values = {
+            name: node.taken(name, self._memory.value(source))
+            for name, source in node.sources.items()
+        }
+        names = sorted(values, key=lambda name: math.isfinite(float(values[name])))
+        parts = [f"{name} = {values[name]:.9g}{_unit(node, name)}" for name in names]
+        return ".\n  Inputs: " + ", ".join(parts) if parts else "."
+
+    def _ports(self) -> list[Port]:
+        return [(c, name) for c, node in enumerate(self.nodes) for name in node.outputs]
+
+
+def _equal(one: Value, other: Value, near: float) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        both_nan = math.isnan(one) and math.isnan(other)
+        return both_nan or math.isclose(one, other, rel_tol=near, abs_tol=near * 1e-3)
+    return one == other
+
+
+def _unit(node: Node, name: str) -> str:
+    unit = node.inputs[name].unit
+    return f" {unit}" if unit and unit != "1" else ""

@@ -1,0 +1,659 @@
+"""Runs a scenario of built-in components as one coupled system; named columns come out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..component import controller, damper, sensors, source, structure
+from ..core.jit import compiled
+from ..data import ground_motion_file
+from ..errors import RunError, ScenarioError
+from ..fmu import catalogue
+from ..fmu.slave import Slave
+from ..physics import damper as damper_laws
+from ..physics import structure as structure_laws
+from ..physics.building import GROUND, Building, Device
+from ..physics.generate import Functions, Link, Owner
+from ..physics.laws import LAWS
+from ..physics.linear import Row
+from ..physics.signals import CONSTANT
+from ..system.scenario import Component, Scenario
+from . import records, time_loop
+from .records import (
+    NOWHERE,
+    lay_controller,
+    lay_damper,
+    lay_sampled,
+    lay_sensors,
+    lay_source,
+    lay_structure,
+    substeps_in,
+)
+
+# Lays controllers and sensors out in records of numbers for the time loop.
+
+Array = NDArray[Any]
+
+MATRICES = ("A", "B", "W", "C")
+"""What differs in length from controller to controller."""
+
+
+class Clocks:
+    """The sampled components of a run: their records, constants and memory.
+
+    Parameters
+    ----------
+    slaves, wirings : sequences
+        The configured components in the order of the scenario, and where their signals are.
+    h : float
+        Substep [s].
+    """
+
+    def __init__(self, slaves: Sequence[Any], wirings: Sequence[Sequence[float]], h: float) -> None:
+        self._constants: list[float] = []
+        self._memory: list[float] = []
+        self.records = np.zeros(len(slaves), records.sampled_record())
+        for record, slave, wiring in zip(self.records, slaves, wirings, strict=True):
+            lay_sampled(record, slave.constants.period, wiring, h)
+            if slave.functions is sensors:
+                lay_sensors(record, slave.constants)
+            else:
+                lay_controller(record, slave.constants)
+                for name in MATRICES:
+                    record[name] = _put(self._constants, getattr(slave.constants, name))
+                    record[f"{name}_end"] = len(self._constants)
+            record["state"] = _put(self._memory, slave.state)
+            record["work"] = _put(self._memory, slave._work)
+            record["end"] = len(self._memory)
+        self.constants, self.memory = np.array(self._constants), np.array(self._memory)
+
+
+def _put(numbers: list[float], more: list[float]) -> int:
+    """Append numbers; return where they begin."""
+    begin = len(numbers)
+    numbers.extend(more)
+    return begin
+
+
+# What each damper of a coupled system pushes: a device of a structure, whose motion it feels.
+#
+# `pushed_by` finds it out from names; `couple` and what it calls are flat functions on records, as
+# those of `layout`.
+
+Port = tuple[str, str]
+
+MOVES = 1e-9
+"""Share of the largest eigenvalue below which forces move nothing: they act against each other."""
+
+MOST_ROTATIONS = 50
+"""Rounds of rotations after which the search for eigenvalues ends; some ten are enough."""
+
+
+class Pushed(NamedTuple):
+    """What a damper feels and pushes: the device, and the number of its structure.
+
+    `holding` is the slot of the force that would hold it.
+    """
+
+    structure: int
+    device: Device
+    holding: int
+
+
+def pushed_by(
+    damper: str,
+    buildings: Mapping[str, Building],
+    source_of: Mapping[Port, Port],
+    slots: Mapping[Port, int],
+) -> Pushed | None:
+    """Return what a damper both feels and pushes; None where it is not one and the same.
+
+    Parameters
+    ----------
+    damper : name of the component
+    buildings : those of the structures by the component's name, in their order
+    source_of : each connected input to its output
+    slots : where the signals are
+    """
+    name, felt = source_of.get((damper, "velocity"), ("", ""))
+    if name not in buildings:
+        return None
+    building = buildings[name]
+    moves = {f"{level}_velocity": (GROUND, i) for i, level in enumerate(building.levels())}
+    moves |= {device.ports.velocity: device.levels for device in building.devices}
+    first = building.device("")
+    forces = dict.fromkeys((building.ports(first).force, "extra_force"), first)
+    forces |= {device.ports.force: device for device in building.devices}
+    for port, device in forces.items():
+        pushes = source_of.get((name, port)) == (damper, "force")
+        if pushes and device.levels == moves.get(felt):
+            holding = building.ports(device).holding_force
+            return Pushed(list(buildings).index(name), device, slots[name, holding])
+    return None
+
+
+def room(dampers: int) -> int:
+    """Return how many floats `couple` needs as room to work, with so many dampers."""
+    return dampers * dampers + 2 * dampers
+
+
+def couple(dampers: Any, structures: Any, h: float, work: Row) -> None:
+    """Fill in what dampers that stick hold of the structures that they push.
+
+    Parameters
+    ----------
+    dampers, structures : arrays of records, laid out
+    h : substep [s]
+    work : (`room(m)`,) for m dampers, room to work
+    """
+    for i in range(len(dampers)):
+        d = dampers[i]
+        if d["on_structure"] >= 0:
+            there = structures[d["on_structure"]]
+            lower, upper = d["lower"], d["upper"]
+            gain = velocity_per_force(there, lower, upper, lower, upper)
+            d["sharing"] = sharing(dampers, structures, d["on_structure"], work)
+            d["moving_mass"] = -h / (gain * d["sharing"])
+
+
+def velocity_per_force(b: Any, lower: int, upper: int, below: int, above: int) -> float:
+    """Return the velocity of a device's ends per force of another over a substep [m/(N.s)].
+
+    Parameters
+    ----------
+    b : record of the structure
+    lower, upper : levels that the device that moves connects
+    below, above : levels that the one that pushes connects, or the same
+    """
+    n = b["n"]
+    total = 0.0
+    for i, along in ((lower, -1.0), (upper, 1.0)):
+        for j, pushes in ((below, -1.0), (above, 1.0)):
+            if i != GROUND and j != GROUND:
+                total += along * pushes * b["held"][(n + i) * (n + 1) + j]
+    return total
+
+
+def sharing(dampers: Any, structures: Any, where: int, work: Row) -> float:
+    """Return by how much dampers that stick together must each hold less than it would alone.
+
+    What one holds moves the others' ends. All correct their forces at once, which is Richardson's
+    iteration: it settles soonest at half the sum of its least and largest eigenvalue (Saad 2003,
+    Iterative Methods for Sparse Linear Systems, example 4.1). At one place that is their number.
+
+    Parameters
+    ----------
+    dampers, structures : as in `couple`
+    where : number of the structure that they push
+    work : as in `couple`
+    """
+    m = 0
+    places = work[0 : len(dampers)]
+    apart = False
+    for i in range(len(dampers)):
+        if dampers[i]["on_structure"] == where and dampers[i]["signed"]:
+            places[m] = i
+            first = dampers[int(places[0])]
+            d = dampers[i]
+            apart = apart or first["lower"] != d["lower"] or first["upper"] != d["upper"]
+            m += 1
+    if not apart:
+        return max(1.0, float(m))
+    b = structures[where]
+    begin = 2 * len(dampers)
+    values, matrix = work[len(dampers) : len(dampers) + m], work[begin : begin + m * m]
+    for i in range(m):
+        felt = dampers[int(places[i])]
+        for j in range(m):
+            pushed = dampers[int(places[j])]
+            matrix[i * m + j] = -velocity_per_force(
+                b, felt["lower"], felt["upper"], pushed["lower"], pushed["upper"]
+            )
+    for i in range(m):
+        values[i] = matrix[i * m + i] ** 0.5
+    for i in range(m):
+        for j in range(m):
+            matrix[i * m + j] /= values[i] * values[j]
+    symmetric_eigenvalues(m, matrix, values)
+    most: float = values[0]
+    for i in range(m):
+        most = max(most, values[i])
+    least = most
+    for i in range(m):
+        if values[i] > MOVES * most:
+            least = min(least, values[i])
+    return max(1.0, 0.5 * (least + most))
+
+
+def symmetric_eigenvalues(n: int, a: Row, values: Row) -> None:
+    """Fill in the eigenvalues of a symmetric matrix, in no order.
+
+    Jacobi's rotations, in rounds over all entries beside the diagonal (Golub and Van Loan 2013,
+    Matrix Computations, section 8.5).
+
+    Parameters
+    ----------
+    n : size
+    a : (n, n) flat, destroyed
+    values : (n,) filled
+    """
+    for _ in range(MOST_ROTATIONS):
+        beside, whole = 0.0, 0.0
+        for i in range(n):
+            for j in range(n):
+                whole += a[i * n + j] ** 2
+                if i != j:
+                    beside += a[i * n + j] ** 2
+        if beside <= 1e-32 * whole:
+            break
+        for p in range(n - 1):
+            for q in range(p + 1, n):
+                rotate(n, a, p, q)
+    for i in range(n):
+        values[i] = a[i * n + i]
+
+
+def rotate(n: int, a: Row, p: int, q: int) -> None:
+    """Turn a symmetric matrix in place so that an entry becomes 0.
+
+    Parameters
+    ----------
+    n : size
+    a : (n, n) flat, changed in place
+    p, q : row and column of the entry, p < q
+    """
+    if a[p * n + q] == 0.0:
+        return
+    theta = (a[q * n + q] - a[p * n + p]) / (2.0 * a[p * n + q])
+    t = 1.0 / (abs(theta) + (theta * theta + 1.0) ** 0.5)
+    if theta < 0.0:
+        t = -t
+    c = 1.0 / (t * t + 1.0) ** 0.5
+    s = t * c
+    for k in range(n):
+        left, right = a[k * n + p], a[k * n + q]
+        a[k * n + p], a[k * n + q] = c * left - s * right, s * left + c * right
+    for k in range(n):
+        left, right = a[p * n + k], a[q * n + k]
+        a[p * n + k], a[q * n + k] = c * left - s * right, s * left + c * right
+
+
+# Lays a scenario of built-in components out in records of numbers for the time loop.
+
+KINDS: dict[Any, str] = {
+    structure: "structure",
+    damper: "damper",
+    source: "source",
+    controller: "sampled",
+    sensors: "sampled",
+}
+"""What the functions of a component make it in the time loop."""
+
+SITES = {"damper": damper_laws.SETS, "structure": structure_laws.SETS}
+"""Where effects are in the time loop, with the functions that there are."""
+
+
+class System:
+    """A scenario's components as configured objects, and the slots of their signals.
+
+    Attributes
+    ----------
+    dampers, structures : Functions
+        The library's, or where a component has a law or effect that is not in it, those of all
+        that the components have.
+    outputs, kinds : dict
+        `component.port` to the slot of the signal, and to the kind of the variable.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    offered : bool
+        Whether a component has all effects that it offers, or those that are on.
+    """
+
+    def __init__(self, scenario: Scenario, offered: bool = False) -> None:
+        self.names: dict[str, list[str]] = {
+            kind: [] for kind in ("source", "damper", "structure", "sampled")
+        }
+        for c in scenario.connections:
+            if (c.factor, c.offset) != (1.0, 0.0):
+                raise ScenarioError(
+                    f'{scenario.file}: "{c.target}.{c.input}" has a factor or an offset, which is '
+                    "not compiled. Run it with the engine fmu."
+                )
+            given, wanted = (
+                scenario.component(name).description.variables[port]
+                for name, port in ((c.source, c.output), (c.target, c.input))
+            )
+            if given.kind != wanted.kind:
+                raise ScenarioError(
+                    f'{scenario.file}: "{c.target}.{c.input}" is {wanted.kind} and is fed by '
+                    f"{given.kind}, which is not compiled. Run it with the engine fmu."
+                )
+        for component in scenario.components:
+            self.names[kind_of(component, scenario)].append(component.name)
+        self.slaves: dict[str, Any] = {
+            component.name: instantiated(component, scenario) for component in scenario.components
+        }
+        self.dampers, self.structures = self._functions(offered)
+        for component in scenario.components:
+            configure(self.slaves[component.name], component, scenario)
+        self.source_of: dict[Port, Port] = {
+            (c.target, c.input): (c.source, c.output) for c in scenario.connections
+        }
+        self.names["structure"] = self._followed_first(scenario)
+        self.slots: dict[Port, int] = {}
+        self.outputs: dict[str, int] = {}
+        self.kinds: dict[str, str] = {}
+        for component in scenario.components:
+            self._add_slots(component)
+        self.slots.update({end: self.slots[begin] for end, begin in self.source_of.items()})
+
+    def _functions(self, offered: bool) -> tuple[Functions, Functions]:
+        """Let dampers compute with the same functions, and structures."""
+        slaves = {site: [self.slaves[name] for name in self.names[site]] for site in SITES}
+        own = any(one.made is not SITES[site].library for site in SITES for one in slaves[site])
+        found = []
+        for site, sets in SITES.items():
+            owners: set[Owner] = {LAWS[one.law].base for one in slaves[site] if site == "damper"}
+            for one in slaves[site]:
+                owners |= {e for e in one._effects if offered or one[e.name + ".on"]}
+            found.append(sets.of(*owners) if own else sets.library)
+            for one in slaves[site]:
+                one.take(found[-1])
+        return found[0], found[1]
+
+    def _add_slots(self, component: Component) -> None:
+        """Give every input and output a slot; hidden outputs stand behind the others."""
+        for variable in component.description.variables.values():
+            name = f"{component.name}.{variable.name}"
+            if variable.name == "fault":
+                for k in range(self.slaves[component.name].hidden):
+                    self.slots[component.name, f"hidden {k}"] = len(self.slots)
+            if variable.causality in ("input", "output"):
+                self.slots[component.name, variable.name] = len(self.slots)
+            if variable.causality == "output":
+                self.outputs[name] = self.slots[component.name, variable.name]
+                self.kinds[name] = variable.kind
+
+    def _followed_first(self, scenario: Scenario) -> list[str]:
+        """Return the structures so that one whose ground is another's floor comes after it."""
+        ordered: list[str] = []
+        left = list(self.names["structure"])
+        while left:
+            grounds = {
+                name: self.source_of.get((name, "ground_acceleration"), ("",))[0] for name in left
+            }
+            free = [name for name in left if grounds[name] not in left]
+            if not free:
+                raise ScenarioError(
+                    f"{scenario.file}: {', '.join(left)} are each other's ground, which cannot be "
+                    "solved. One of them must stand on a ground motion."
+                )
+            ordered += free
+            left = [name for name in left if name not in free]
+        return ordered
+
+    def start_values(self) -> Array:
+        """Return the signals before the run: what the scenario holds constant, friction 0."""
+        signals = np.zeros(len(self.slots) + 1)  # the last one is no friction
+        for name, slave in self.slaves.items():
+            for index in slave._inputs:
+                key = (name, slave.vars[index].name)
+                if key not in self.source_of:
+                    signals[self.slots[key]] = slave._values[index]
+        for name in self.names["source"]:
+            constants = self.slaves[name].constants
+            if constants.kind == CONSTANT:
+                signals[self._first(name)] = constants.scale * constants.p[0]
+        return signals
+
+    def _first(self, name: str) -> int:
+        """Return the slot of a component's first output; the others follow."""
+        slave = self.slaves[name]
+        return self.slots[name, slave.vars[slave._outputs[0]].name]
+
+    def _inputs(self, name: str) -> list[int]:
+        """Return the slots of a component's inputs."""
+        slave = self.slaves[name]
+        return [self.slots[name, slave.vars[index].name] for index in slave._inputs]
+
+    def coupled(self, h: float) -> tuple[Array, Array]:
+        """Return dampers and structures for substeps of h [s]."""
+        structures, dampers = self._structures(h), self._dampers()
+        couple(dampers, structures, h, np.zeros(room(len(dampers))))
+        return dampers, structures
+
+    def periods(self) -> list[float]:
+        """Return the sample periods [s] of the components that have a clock."""
+        return [self.slaves[name]["sample_period"] for name in self.names["sampled"]]
+
+    def sampled(self, h: float) -> tuple[Array, Array, Array]:
+        """Return sampled components, their constants and memory for substeps of h [s]."""
+        names = self.names["sampled"]
+        wirings = [self.wiring(name) for name in names]
+        clocks = Clocks([self.slaves[name] for name in names], wirings, h)
+        return clocks.records, clocks.constants, clocks.memory
+
+    def sources(self) -> tuple[Array, Array, Array]:
+        """Return the sources that change, as records, and the samples of all of them."""
+        constants = {name: self.slaves[name].constants for name in self.names["source"]}
+        changing = {name: c for name, c in constants.items() if c.kind != CONSTANT}
+        found = np.zeros(len(changing), records.source_record())
+        times: list[float] = []
+        samples: list[float] = []
+        for record, (name, c) in zip(found, changing.items(), strict=True):
+            lay_source(record, c, self._first(name), len(times))
+            times.extend(c.times)
+            samples.extend(c.samples)
+        return found, np.array(times), np.array(samples)
+
+    def _dampers(self) -> Array:
+        names = self.names["damper"]
+        found = np.zeros(len(names), records.damper_record(self.dampers.slots))
+        for record, name in zip(found, names, strict=True):
+            slave = self.slaves[name]
+            lay_damper(record, slave.constants, slave.state, self.wiring(name))
+        return found
+
+    def _structures(self, h: float) -> Array:
+        names = self.names["structure"]
+        found = np.zeros(len(names), records.structure_record(self.structures.slots))
+        for record, name in zip(found, names, strict=True):
+            slave = self.slaves[name]
+            lay_structure(record, slave.constants_of(h), slave.state, self.wiring(name))
+        return found
+
+    # -- where the signals of a component are, as `layout` takes it
+
+    def wiring(self, name: str) -> list[float]:
+        """Return where the signals of a component are, and what they are to the others."""
+        if name in self.names["source"]:
+            return [self._first(name)]
+        if name in self.names["sampled"]:
+            return [self._first(name), *self._inputs(name)]
+        if name in self.names["damper"]:
+            return [self._first(name), *self._pushed(name), *self._inputs(name)]
+        inputs, devices = self._inputs(name), self.slaves[name].building.devices
+        frictions = [self._friction_at(name, device.ports.force) for device in devices]
+        first = [self._friction_at(name, port) for port in ("damper_force", "extra_force")]
+        return [self._first(name), self._followed(name), *first, *inputs, *frictions]
+
+    def _pushed(self, name: str) -> list[float]:
+        buildings = {one: self.slaves[one].building for one in self.names["structure"]}
+        at = pushed_by(name, buildings, self.source_of, self.slots)
+        measured = (name, "acceleration") in self.source_of
+        if at is None:
+            return [NOWHERE, NOWHERE, measured, GROUND, GROUND]
+        return [at.structure, at.holding, measured, at.device.lower, at.device.upper]
+
+    def _friction_at(self, structure: str, port: str) -> int:
+        """Return the slot of the friction in a force on a structure; the last one is none."""
+        begin = self.source_of.get((structure, port), ("", ""))
+        pushes = begin[0] in self.names["damper"] and begin[1] == "force"
+        return self.slots[begin[0], "hidden 0"] if pushes else len(self.slots)
+
+    def _followed(self, structure: str) -> bool:
+        """Return whether a component reads more of a structure than displacement and velocity."""
+        read = {port for name, port in self.source_of.values() if name == structure}
+        building = self.slaves[structure].building
+        motion = {
+            f"{level}_{what}"
+            for level in building.levels()
+            for what in ("displacement", "velocity")
+        }
+        for device in building.devices:
+            motion |= {device.ports.displacement, device.ports.velocity}
+        return bool(read - motion)
+
+
+def kind_of(component: Component, scenario: Scenario) -> str:
+    """Return "source", "damper", "structure" or "sampled".
+
+    Raises
+    ------
+    ScenarioError
+        Naming a component that cannot be compiled.
+    """
+    known = catalogue.component_names()
+    if component.path is None and (component.law or component.fmu in known):
+        kind: Any = catalogue.component_class(catalogue.source(component.made_of()))
+        return KINDS[kind.functions]
+    raise ScenarioError(
+        f"{scenario.file} [components.{component.name}]: {component.fmu} cannot be compiled. "
+        f"Compiled are {', '.join(known)}; run it with the engine fmu."
+    )
+
+
+def instantiated(component: Component, scenario: Scenario) -> Slave:
+    """Return the component's Python object with the scenario's values."""
+    slave = catalogue.instantiate(
+        component.made_of(),
+        component.building,
+        component.name,
+        component.controller,
+        component.effects,
+    )
+    for name, value in component.parameters.items():
+        if name == "record":
+            value = ground_motion_file(str(value), scenario.file.parent)
+        elif name == "file":
+            value = str((scenario.file.parent / Path(str(value))).absolute())
+        index = slave._index[name]
+        slave._values[index] = type(slave._values[index])(value)
+        slave._set.add(index)
+    return slave
+
+
+def configure(slave: Slave, component: Component, scenario: Scenario) -> None:
+    """Build the model of a component's Python object."""
+    try:
+        slave._check_parameters()
+        slave.configure()
+    except (ValueError, OSError, RuntimeError) as error:
+        raise ScenarioError(f"{scenario.file} [components.{component.name}]: {error}") from error
+    if following := getattr(slave, "following", {}):
+        raise ScenarioError(
+            f"{scenario.file} [components.{component.name}]: an effect follows "
+            f"{', '.join(following)}, which is not compiled. Run it with the engine fmu."
+        )
+
+
+LONGEST_SUBSTEP = 2e-4
+"""Longest substep [s]; half-sine peaks are then within 0.001 % of a tight integration."""
+REFERENCE_SUBSTEP = 5e-5
+"""The same [s] where the errors of other runs are told by this one: it must be better than they."""
+
+
+class StoppedError(RunError):
+    """A run that had to stop; `columns` holds the rows before."""
+
+    def __init__(self, text: str, columns: dict[str, Array]) -> None:
+        super().__init__(text)
+        self.columns = columns
+
+
+def simulate(scenario: Scenario, longest: float = LONGEST_SUBSTEP) -> dict[str, Array]:
+    """Return the columns of a run, time [s] first, then every output as `component.port`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of built-in components only.
+    longest : float
+        Longest substep [s].
+
+    Returns
+    -------
+    dict
+        Name to (steps + 1,) array in SI units; Integer outputs as int32.
+
+    Raises
+    ------
+    ScenarioError
+        Naming a component that cannot be compiled.
+    StoppedError
+        If a value stops being finite, or motion and forces do not agree; the text names the
+        component and the time, `columns` holds the rows before.
+    """
+    system = System(scenario)
+    rows, substeps = scenario.steps, substeps_of(scenario, system, longest)
+    h = scenario.step / substeps
+    table = np.zeros((rows + 1, len(system.outputs)))
+    slots = np.array(list(system.outputs.values()), dtype=np.int64)
+    loop = linked(system.dampers, system.structures)(time_loop.integrate)
+    filled, unsettled, _ = compiled(loop, time_loop.INLINE)(
+        (rows, substeps, h), system.sources(), system.coupled(h), system.sampled(h),
+        system.start_values(), slots, table,
+    )  # fmt: skip
+    what = ""
+    if unsettled >= 0:
+        name = system.names["damper"][unsettled]
+        what = f"{name} before t = {filled * scenario.step:.9g} s: force and motion do not agree"
+    elif not np.isfinite(table[filled - 1]).all():
+        filled -= 1
+        wrong = [n for n, v in zip(system.outputs, table[filled], strict=True) if not isfinite(v)]
+        component = wrong[0].partition(".")[0]
+        others = f" (as are {', '.join(wrong[1:4])})" if wrong[1:] else ""
+        when = f"at t = {filled * scenario.step:.9g} s"
+        what = f"{component} {when}: {wrong[0]} is not finite{others}"
+    columns = _columns(system, table[:filled], scenario.step)
+    if what:
+        raise StoppedError(
+            f"{what}.\n  A shorter step or parameters within their bounds would be right.", columns
+        )
+    return columns
+
+
+def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
+    columns: dict[str, Array] = {"time": np.arange(len(table)) * step}
+    for j, name in enumerate(system.outputs):
+        integer = system.kinds[name] == "Integer"
+        columns[name] = table[:, j].astype(np.int32) if integer else table[:, j]
+    return columns
+
+
+def substeps_of(scenario: Scenario, system: System, longest: float = LONGEST_SUBSTEP) -> int:
+    """Return into how many substeps a step is cut: at best so that instants fall on their ends.
+
+    Parameters
+    ----------
+    scenario, system : what runs, and its numbers
+    longest : longest substep [s]
+    """
+    return substeps_in(scenario.step, longest, system.periods())
+
+
+def linked(*sets: Functions, **more: Any) -> Link:
+    """Return what lets the time loop call these functions, and puts other globals in place.
+
+    A controller inverts a law of the library, whatever the dampers are.
+    """
+    made = {name: function for one in sets for name, function in one.made.items()}
+    return Link({**made, **more}, [time_loop.take_command])

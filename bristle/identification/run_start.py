@@ -1,0 +1,151 @@
+"""How a run begins: from which sample on it is judged, and which load its damper then holds.
+
+A run that begins in motion, or at rest under load, was cut out of a longer one. What its elastic
+parts hold is not known from the motion. At rest the measured force tells it: the state of the
+model that carries the force begins where it gives this force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.text import quantity
+from ..physics.effect import EFFECTS
+from ..physics.laws import LAWS
+
+Array = NDArray[np.float64]
+
+SETTLING = 25
+"""Samples at the begin of a run that are not judged."""
+
+RESTS = 2e-3
+"""Share of the stroke that a damper at rest moves by at most: noise."""
+
+STANDS = 0.2
+"""Time [s] for which it does: a motion that begins gently is faster."""
+
+LOADED = 0.2
+"""Share of its RMS that the force has at the begin of a rest under load."""
+
+MOST = 5
+"""What part of a run this may cost at most: one in so many samples."""
+
+FORGOTTEN = 0.5
+"""Path, as a share of the stroke, after which the damper forgets how such a run began."""
+
+COARSE = 0.05
+"""Step [s] in which the path is followed: noise would lengthen it sample by sample."""
+
+CARRIED = 0.01
+"""Share of the load by which the model's force may miss it once its state is found."""
+
+TURNS = 4
+"""Steps of the search for the state; the force of a bristle at rest is linear in it."""
+
+NUDGE = 1e-3
+"""The first step of that search, over the stroke for a state in m, else as it is."""
+
+
+class Begin(NamedTuple):
+    """How a run begins.
+
+    `first` is the first sample that is judged; `rest` the number of samples before it in which the
+    damper rests under load, 0 where it does not.
+    """
+
+    first: int
+    rest: int = 0
+
+
+def begin_of(x: Array, force: Array, dt: float) -> Begin:
+    """Return how a run begins.
+
+    Parameters
+    ----------
+    x, force : (n,) displacement [m], force [N]
+    dt : sampling step [s]
+    """
+    span = float(np.ptp(x))
+    rms = float(np.sqrt(np.mean(force**2)))
+    stands = max(SETTLING, round(STANDS / dt))
+    rests = float(np.ptp(x[:stands])) <= RESTS * span
+    loaded = abs(float(np.mean(force[:SETTLING]))) > LOADED * rms
+    if rests and not loaded:
+        return Begin(SETTLING)
+    every = max(1, round(COARSE / dt))
+    passed = np.cumsum(np.abs(np.diff(x[::every]))) > FORGOTTEN * span
+    first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
+    first = min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
+    return Begin(first, min(stands, first) if rests else 0)
+
+
+def carrying_state(law: str, effects: Sequence[str]) -> tuple[str, str]:
+    """Return the state that carries the force of a damper at rest, and its unit; "" where none is.
+
+    That of bristles, where the law has some; else that of an effect in the place of the sign of the
+    motion.
+    """
+    own = LAWS[law]
+    for name, unit in own.states.items():
+        if own.has("bristle") and name not in own.starts and f"{name}_0" not in own.parameters:
+            return name, unit
+    for effect in effects:
+        if "yield_force" in EFFECTS[effect].hooks():
+            for name, unit in EFFECTS[effect].states.items():
+                return f"{effect}.{name}", unit
+    return "", ""
+
+
+def start_under_load(
+    state: tuple[str, str],
+    load: float,
+    stroke: float,
+    settled: Callable[[Mapping[str, float]], float],
+) -> dict[str, float]:
+    """Return the start value of a state at which a damper at rest carries its load.
+
+    Nothing where no value of the state does: what the model holds at rest then is another part.
+
+    Parameters
+    ----------
+    state : as `carrying_state` returns it
+    load : measured [N]
+    stroke : of the run, peak to peak [m]
+    settled : the model's force [N] at rest, for start values by name
+    """  # fmt: skip
+    name, unit = state
+    if not name:
+        return {}
+    now, step = 0.0, NUDGE * (stroke if unit == "m" else 1.0)
+    force = settled({f"{name}_0": now})
+    for _ in range(TURNS):
+        following = settled({f"{name}_0": now + step})
+        slope = (following - force) / step
+        now, force = now + step, following
+        if not np.isfinite(slope) or slope == 0.0:
+            return {}
+        step = (load - force) / slope
+        if abs(load - force) <= CARRIED * abs(load):
+            return {f"{name}_0": now + step}
+    return {}
+
+
+def under_load_text(loads: Mapping[str, float]) -> str:
+    """Return the sentence that tells which runs begin at rest under load; "" where none does.
+
+    Parameters
+    ----------
+    loads : force at the begin [N], by the name of the run
+    """
+    if not loads:
+        return ""
+    told = ", ".join(f"{name} ({quantity(load, 'N')})" for name, load in loads.items())
+    one = len(loads) == 1
+    return (
+        f"{told} begin{'s' * one} at rest under load: the state of the model that carries a force "
+        "at rest begins where it gives the measured one."
+    )

@@ -1,0 +1,319 @@
+"""Where the search for an effect begins, and parameters as a search sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.effect import EFFECTS, Sizes
+from ..physics.laws import LAWS
+from .problem import Expected as Expected
+from .problem import Model, Problem, parameter
+from .problem import residuals as residuals
+from .search import HUBER, Descent, descend, jacobian, loss, mean_loss
+from .watch import watched
+
+# The search for a model's free parameters on runs.
+
+Array = NDArray[np.float64]
+
+MOST_TURNS = 5
+"""How often a rough search begins again at most."""
+
+PAYS = 0.95
+"""What the loss must fall to, as a share, for another turn."""
+
+
+def is_rough(model: Model) -> bool:
+    """Return whether events such as impacts make a model's residuals jump."""
+    return any(EFFECTS[name].joint for name in model.effects)
+
+
+class Search:
+    """The search for a model's parameters on runs: logarithms where a bound is above zero."""
+
+    def __init__(self, problem: Problem, model: Model, expected: Expected, names: Sequence[str]):
+        self.problem, self.model, self.expected = problem, model, expected
+        self.names = list(names)
+        self.rough = is_rough(model)
+        declared = [parameter(model.law, name) for name in self.names]
+        value = np.array([model.value(name) for name in self.names])
+        bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
+        self.log = (bounds[:, 0] > 0.0) & (bounds[:, 1] > 50.0 * bounds[:, 0])
+        sizes = np.array([problem.size(d.unit) for d in declared])
+        self.scale = np.where(self.log, 1.0, np.maximum(np.abs(value), 1e-2 * sizes))
+        self.low, self.high = self._to(bounds[:, 0]), self._to(bounds[:, 1])
+        self.start = self._to(np.clip(value, bounds[:, 0], bounds[:, 1]))
+
+    def _to(self, value: Array) -> Array:
+        safe = np.where(self.log, np.maximum(value, 1e-300), 1.0)
+        return np.where(self.log, np.log(safe), value / self.scale)
+
+    def at(self, theta: Array) -> Model:
+        """Return the model with these parameters."""
+        value = np.where(self.log, np.exp(np.where(self.log, theta, 0.0)), theta * self.scale)
+        return replace(
+            self.model,
+            values={**self.model.values, **dict(zip(self.names, value.tolist(), strict=True))},
+        )
+
+    def residuals(self, theta: Array) -> Array:
+        """Return the normalised residuals of all runs (n,)."""
+        return residuals(self.problem, self.at(theta), self.expected)
+
+    def sensitivities(self) -> Array:
+        """Return how the normalised residuals change with the parameters (n, p), there."""
+        here = self.residuals(self.start)
+        return jacobian(self.residuals, self.start, here, self.low, self.high, self.rough)
+
+    def run(self, sweeps: int) -> tuple[Model, Descent]:
+        """Search from the model's own values."""
+        with watched(self.problem, self.at, expected=self.expected) as accepted:
+            found = descend(
+                self.residuals, self.start, self.low, self.high, sweeps, rough=self.rough,
+                accepted=accepted,
+            )  # fmt: skip
+        return self.at(found.theta), found
+
+
+def refine(start: Model, train: Problem, sweeps: int = 12) -> Model:
+    """Fit all free parameters, the noise expected of the model renewed on the way.
+
+    Where the way is rough a search ends early: it begins again as long as that pays.
+    """
+    model, cost = start, float("inf")
+    for turn in range(MOST_TURNS):
+        search = Search(train, model, train.expectation(model), model.free())
+        model, ended = search.run(max(3, sweeps // 2) if turn == 0 else sweeps)
+        if turn and not (search.rough and ended.cost < PAYS * cost):
+            break
+        cost = ended.cost
+    return model
+
+
+RELAXED = ((0.3, 2.0), (0.05, 10.0))
+"""Size and width, as factors, of the part of a law that falls with speed, where a start makes room
+for an effect of speed: a fit without it inflates that part."""
+
+THIN = 6
+"""Of what has no memory every so many samples suffice for a search."""
+
+KEPT = {"none": 24, "memory": 2, "joint": 6}
+"""From how many starts a search is made, by what the model has that makes it dear."""
+
+STEPS = (1.0, 0.3)
+"""Shares of the linear step that are looked at: a law far from linear overshoots."""
+
+
+def initial_guesses(effect: str, base: Model, problem: Problem) -> list[Model]:
+    """Return the models from which the search for an effect's parameters begins.
+
+    An effect of speed alone competes with the law's own fall with speed, which has absorbed what it
+    could: so some of its starts have that part small and wide.
+    """
+    bases = [dict(base.values)]
+    falling, over = base.law_class.falling()
+    if EFFECTS[effect].needs == ("v",) and over and not {*falling, over} & set(base.fixed):
+        for size, width in RELAXED:
+            relaxed = {name: size * base.value(name) for name in falling}
+            bases.append({**base.values, **relaxed, over: width * base.value(over)})
+    joined = replace(base, effects=(*base.effects, effect), limits=_limits(effect, base, problem))
+    return [
+        replace(joined, values=_tied(effect, base.law, {**given, **own}, problem))
+        for given in bases
+        for own in _own_values(effect, base, problem)
+    ]
+
+
+def _own_values(effect: str, base: Model, problem: Problem) -> list[dict[str, float]]:
+    """Return the values of an effect's own parameters, by full name, at each node of its grids."""
+    declared = EFFECTS[effect].parameters
+    if EFFECTS[effect].start_shares:
+        plain = {name: parameter.value for name, parameter in declared.items()}
+        scale = _largest(problem)
+        grids = [
+            {n: [share * scale[declared[n].unit] for share in shares] for n, shares in grid.items()}
+            for grid in EFFECTS[effect].start_shares
+        ]
+    else:
+        plain = {name: problem.scaled(base.law, f"{effect}.{name}") for name in declared}
+        factors = EFFECTS[effect].start_grid
+        grids = [{n: [plain[n] * factor for factor in given] for n, given in factors.items()}]
+    nodes = [
+        dict(zip(grid, node, strict=True)) for grid in grids for node in product(*grid.values())
+    ]
+    return [{f"{effect}.{n}": v for n, v in {**plain, **node}.items()} for node in nodes]
+
+
+def _largest(problem: Problem) -> dict[str, float]:
+    """Return the sizes that `Effect.start_shares` are shares of, by unit.
+
+    Lengths and speeds are the largest that were measured: a stop beyond them has no force at all.
+    """
+    x = max(float(np.max(np.abs(run.x))) for run in problem.runs)
+    v = max(float(np.max(np.abs(run.v))) for run in problem.runs)
+    stiffness = problem.size("N/m")
+    bent = {"N/m2": stiffness / x, "N/m3": stiffness / x**2} if x > 0.0 else {}
+    units = {
+        parameter.unit for effect in EFFECTS.values() for parameter in effect.parameters.values()
+    }
+    return {**{unit: problem.size(unit) for unit in units}, **bent, "m": x, "m/s": v}
+
+
+def _limits(effect: str, base: Model, problem: Problem) -> dict[str, tuple[float, float]]:
+    """Return a model's limits with those between which the search for an effect stays."""
+    declared, own = EFFECTS[effect].parameters, EFFECTS[effect].start_limits
+    scale = _largest(problem) if own else {}
+    return base.limits | {
+        f"{effect}.{name}": (low * scale[declared[name].unit], high * scale[declared[name].unit])
+        for name, (low, high) in own.items()
+    }
+
+
+def _tied(effect: str, law: str, values: dict[str, float], problem: Problem) -> dict[str, float]:
+    """Return start values with those that follow from others, the law's yield force included."""
+    joined = EFFECTS[effect]
+    p = joined.values_of({name: values[f"{effect}.{name}"] for name in joined.parameters})
+    if joined.start_ties:
+        sizes = Sizes(*(problem.size(unit) for unit in ("m", "m/s", "V", "N")))
+        tied = joined.tie(p, sizes)  # type: ignore[attr-defined]
+        for name, value in zip(joined.start_ties, tied, strict=True):
+            values[f"{effect}.{name}"] = float(value)
+    if hasattr(joined, "yield_share"):
+        for name in LAWS[law].yield_parameters():
+            if name in values:
+                values[name] /= joined.yield_share(p)
+    return values
+
+
+@dataclass(frozen=True)
+class ScreeningData:
+    """Data for a search: runs, what to expect there, and the base model's sensitivities (n, p).
+
+    `kept` says from how many starts a search is worth its cost.
+    """
+
+    problem: Problem
+    expected: Expected
+    known: Array
+    kept: int
+
+
+class SearchContext:
+    """A model that effects are to join, on its training runs: what all their searches share."""
+
+    def __init__(self, base: Model, train: Problem) -> None:
+        self.base, self.train = base, train
+        self.expected = train.expectation(base)
+        self.cost = mean_loss(loss(residuals(train, base, self.expected)))
+        self._screening: dict[str, ScreeningData] = {}
+        self._lock = Lock()
+
+    def screening(self, effect: str) -> ScreeningData:
+        """Return what the search for an effect is made on."""
+        kind = _kind((*self.base.effects, effect), self.base.law)
+        with self._lock:
+            if kind not in self._screening:
+                problem, expected = _thinned_out(self.train, self.expected, kind)
+                search = Search(problem, self.base, expected, self.base.free())
+                self._screening[kind] = ScreeningData(
+                    problem, expected, search.sensitivities(), KEPT[kind]
+                )
+        return self._screening[kind]
+
+
+def _kind(effects: Sequence[str], law: str) -> str:
+    joined = [EFFECTS[name] for name in effects]
+    if any(effect.joint for effect in joined):
+        return "joint"
+    if LAWS[law].states or any(effect.states or effect.site == "sensor" for effect in joined):
+        return "memory"
+    return "none"
+
+
+def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Problem, Expected]:
+    """Return less data for a search: some of the samples without memory, of the runs with a joint.
+
+    Without states a law is a function of the motion at each sample. A series element costs many
+    times as much as another effect.
+    """
+    if kind == "joint":
+        few = slice(0, None, 2) if len(problem.runs) > 1 else slice(None)
+        return problem.of(problem.runs[few]), expected[few]
+    if kind == "memory":
+        return problem, expected
+    runs, thinned = [], []
+    for run, (bias, sigma, draws) in zip(problem.runs, expected, strict=True):
+        every = slice(None, None, THIN)
+        runs.append(replace(run.of(every), dt=run.dt * THIN, skip=-(-run.skip // THIN)))
+        thinned.append((bias[every], sigma[every], draws[:, every]))
+    return problem.of(runs), thinned
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate on its way, with its mean loss on the runs looked at.
+
+    `moves` whether any of its effect's parameters changes the force there: else no search leads on.
+    """
+
+    model: Model
+    cost: float
+    moves: bool = True
+
+
+def ranked_guesses(effect: str, context: SearchContext) -> list[Candidate]:
+    """Return an effect's starts after one linear step of all parameters, the best first.
+
+    Those from which nothing moves, as a softening spring where there is none to soften, are left
+    out: they would cost no more than the law alone, and so come before starts that are too large.
+    """
+    screening = context.screening(effect)
+    guesses = initial_guesses(effect, context.base, context.train)
+    found = [_stepped(guess, effect, screening) for guess in guesses]
+    moving = [one for one in found if one.moves]
+    return sorted(moving or found, key=lambda one: one.cost)
+
+
+def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
+    """Return a start, or what a linear step from it leads to where that is better.
+
+    The base model's own sensitivities are taken as they are without the effect.
+    """
+    base = [name for name in start.free() if not name.startswith(f"{effect}.")]
+    added = [name for name in start.free() if name.startswith(f"{effect}.")]
+    own = Search(screening.problem, start, screening.expected, added)
+    here = own.residuals(own.start)
+    slopes = own.sensitivities() if added else np.zeros((len(here), 0))
+    moves = not added or bool(slopes.any())
+    J = np.hstack([screening.known, slopes])
+    weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
+    normal, gradient = (J * weight[:, None]).T @ J, (J * weight[:, None]).T @ here
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
+    whole = Search(screening.problem, start, screening.expected, [*base, *added])
+    best = Candidate(start, mean_loss(loss(here)), moves)
+    for share in STEPS:
+        theta = np.clip(whole.start - share * step, whole.low, whole.high)
+        cost = mean_loss(loss(whole.residuals(theta)))
+        if cost < best.cost:
+            there = whole.at(theta)
+            if not moves or _moves(there, effect, screening):
+                best = Candidate(there, cost, moves)
+    return best
+
+
+def _moves(model: Model, effect: str, screening: ScreeningData) -> bool:
+    """Return whether an effect has a force at its values, or a parameter that gives it one."""
+    problem, expected = screening.problem, screening.expected
+    without = replace(model, effects=tuple(one for one in model.effects if one != effect))
+    with_it, bare = (residuals(problem, one, expected) for one in (model, without))
+    if not np.array_equal(with_it, bare):
+        return True
+    added = [name for name in model.free() if name.startswith(f"{effect}.")]
+    return bool(Search(problem, model, expected, added).sensitivities().any())

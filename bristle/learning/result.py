@@ -1,0 +1,190 @@
+"""What was learned from a study's runs: a curve, its closed forms, and what is said of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..comparison.names import site_name
+from ..core.text import plain, quantity, shown
+from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
+from .curve import Curve
+from .fit import LearnedCurve
+from .rule import LEARN
+from .signals import RING, SLIP
+from .surface import continues, separated
+
+DRAWN = 400
+"""Points of a closed form that a page draws."""
+
+
+@dataclass(frozen=True)
+class LearnedEffect:
+    """A learned curve as an effect of a study: `file` its effect's, None where none is kept.
+
+    `forms` the closed forms fitted to it, the best first; `closed` the one that the effect has in
+    the place of the table, None for the table; `picture` where it is drawn; `site` where on the rig
+    it was learned, "" on a bench, which has one.
+    """
+
+    found: LearnedCurve
+    forms: tuple[ClosedForm, ...] = ()
+    closed: Closed | None = None
+    file: Path | None = None
+    picture: Path | None = None
+    site: str = ""
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.found.name
+
+    def __repr__(self) -> str:
+        return shown(self, self.name, self.sentences())
+
+    def sentences(self) -> list[str]:
+        """Return what was learned, as an engineer would say it."""
+        found = self.found
+        if found.refused or found.curve is None or found.after is None:
+            return [f"Nothing was learned{self._where()}. {found.refused}"]
+        curve = found.curve
+        fall = 100.0 * (1.0 - _excess(found.after.z) / max(_excess(found.before.z), 1e-12))
+        out = [
+            f"{self.name} is {curve.words()}{self._where()}. With it the error / noise (z) on "
+            f"held-out runs falls from {found.before.z:.2f} to {found.after.z:.2f}; that is "
+            f"{fall:.0f} % of what exceeds the noise."
+        ]
+        best = self.closed.form if self.closed else name_of(self.forms)
+        if best is not None:
+            out.append(
+                f"The curve is nearly {in_words(best, curve)} "
+                f"({100.0 * best.left:.0f} % of its variation remains)."
+            )
+            if self.closed is not None:
+                out.append(
+                    f"The effect has that formula, which leaves z = {self.closed.trial.z:.2f}: "
+                    + ", ".join(self._values())
+                    + "."
+                )
+        elif curve.across:
+            out += _of_surface(curve)
+        elif curve.part == SLIP:
+            pairs = zip(curve.knots, curve.values, strict=True)
+            elements = [f"{quantity(f, 'N')} at {quantity(x, 'm')}" for x, f in pairs if f > 0.0]
+            out.append(f"They give way with {', '.join(elements)} of travel.")
+        elif curve.part == RING:
+            out.append(_of_mode(curve))
+        elif self.forms:
+            near = nearest_of(self.forms)
+            text = f": the nearest, {in_words(near, curve)}, leaves " if near else ""
+            text += f"{100.0 * near.left:.0f} % of its variation" if near else ""
+            out.append(f"No closed form follows it{text}.")
+        return [*out, *self._line()]
+
+    def _where(self) -> str:
+        """Return at which site it was learned, for a sentence; "" on a bench."""
+        return f" at {site_name(self.site)}" if self.site else ""
+
+    def _line(self) -> list[str]:
+        """Return the sentence about the line of a layer or a storey beside the curve."""
+        curve, trial = self.found.curve, self.closed.trial if self.closed else self.found.after
+        if curve is None or trial is None or not curve.place.is_line:
+            return []
+        stiffness = trial.model.value(trial.model.law_class.stiffness)
+        return [f"Beside it, the linear stiffness there is {plain(stiffness, 4)} N/m."]
+
+    def _values(self) -> list[str]:
+        assert self.closed is not None
+        return [
+            f"{name} = {plain(value, 4)} +- {plain(1.96 * self.closed.std[name], 2)}"
+            + (f" {unit}" if unit != "1" else "")
+            for name, value, unit in self.closed.formula.parameters
+        ]
+
+    def _nearest(self, curve: Curve) -> dict[str, list[float]]:
+        """Return the best closed form along its signal, to draw it; empty where there is none."""
+        if not self.forms:
+            return {}
+        along = np.linspace(curve.knots[0], curve.knots[-1], DRAWN)
+        return {"along": along.tolist(), "values": self.forms[0].at(along).tolist()}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        found = self.found
+        out: dict[str, Any] = {
+            "name": self.name, "kept": not found.refused, "why": found.refused,
+            "sentences": self.sentences(), "z_before": found.before.z,
+            "z_train_before": found.before.train,
+        }  # fmt: skip
+        if found.curve is not None and found.after is not None:
+            curve = found.curve
+            out |= {
+                "z": found.after.z, "z_train": found.after.train, "site": curve.at,
+                "part": curve.part,
+                "along": curve.along, "unit": curve.unit, "along_unit": curve.along_unit,
+                "knots": list(curve.knots), "values": list(curve.values), "std": list(found.std),
+                "memory": dict(curve.memory),
+                **_levels(curve),
+                "forms": [
+                    {"name": one.name, "formula": one.form.text, "values": list(one.values),
+                     "left": one.left}
+                    for one in self.forms[:3]
+                ],
+                "nearest": self._nearest(curve),
+                "others": [
+                    {"part": one.curve.part, "along": one.curve.along,
+                     **({"across": one.curve.across} if one.curve.across else {}),
+                     "z": one.trial.z, "z_train": one.trial.train}
+                    for one in found.others
+                ],
+            }  # fmt: skip
+        return out
+
+
+def _of_mode(curve: Curve) -> str:
+    """Return what is said of a mode through which the measured force rings."""
+    mode = dict(curve.memory)
+    return (
+        f"{100.0 * curve.values[0]:.3g} % of the force passes through a mode at "
+        f"{plain(mode['frequency'], 4)} Hz with a damping ratio of {plain(mode['damping'], 2)}: "
+        "the frame, the fixture or the load cell itself. Stiffen it, or measure the force closer "
+        "to the damper."
+    )
+
+
+def _levels(curve: Curve) -> dict[str, Any]:
+    """Return what a surface has more than a curve: `values` are then those of each level."""
+    if not curve.across:
+        return {}
+    return {
+        "across": curve.across, "across_unit": curve.across_unit, "levels": list(curve.levels),
+        "continued": [curve.entries[k] for k in continues(curve)],
+    }  # fmt: skip
+
+
+def _of_surface(curve: Curve) -> list[str]:
+    """Return what is said of a surface beside what it explains."""
+    one, other = (signal.words for signal in curve.signals)
+    kind, left = separated(curve)
+    out = (
+        f"The surface is nearly the {kind} of a curve along {one} and one along {other} "
+        f"({100.0 * left:.0f} % of its variation remains)."
+        if left <= LEARN.follows
+        else "The surface is neither the sum nor the product of two curves: the nearest "
+        f"{kind} leaves {100.0 * left:.0f} % of its variation."
+    )
+    few, count = len(continues(curve)), len(curve.values)
+    if not few:
+        return [out]
+    verb = "continues" if few == 1 else "continue"
+    return [
+        out,
+        f"{few} of its {count} values {verb} those beside them: these runs hardly reach there.",
+    ]
+
+
+def _excess(z: float) -> float:
+    return max(z * z - 1.0, 0.0)

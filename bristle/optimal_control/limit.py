@@ -1,0 +1,232 @@
+"""The least peak or RMS that any voltage of a scenario's damper reaches, and how sure that is."""
+
+from __future__ import annotations
+
+import tempfile
+import time as clock
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.progress import Count, counted, tell
+from ..core.text import unknown
+from ..engine.coupled import simulate
+from ..engine.run import run
+from ..errors import RunError, ScenarioError
+from ..system.scenario import Scenario, loaded_with
+from .bound import FASTER, bound_of, largest_force
+from .case import Case, Problem, case_of, refuse_folder, write_scenario
+from .preview import foreseen
+from .result import Limit, Start
+from .search import descended, levelled, value_of
+
+if TYPE_CHECKING:
+    from ..engine.results import Results
+
+Array = NDArray[np.float64]
+
+OUTPUT = "structure.floor2_acceleration_absolute"
+PREVIEWS = (0.0, 0.1, 0.5)
+"""Times [s] for which a receding horizon sees the ground motion ahead."""
+NODES_PER_PERIOD = 80
+"""Nodes of the voltage in a period of the first mode, about."""
+LEVELS = 9
+"""Constant voltages that are compared."""
+STATISTICS = ("peak", "rms")
+QUIET = 0.35
+"""Share of its peak under the best constant voltage that an output has fallen to for good where the
+search's window ends, two periods later; it is the whole motion where the rest then counts."""
+
+
+def limit(
+    scenario: str | Path | Scenario,
+    overrides: Mapping[str, object] | None = None,
+    *,
+    output: str = OUTPUT,
+    statistic: str = "peak",
+    previews: Iterable[float] = PREVIEWS,
+    starts: int = 3,
+    out: str | Path | None = None,
+) -> Limit:
+    """Return the least peak or RMS of an output that any voltage of the damper reaches.
+
+    The ground motion is known in advance, and the force is what the damper gives at its velocity
+    with a voltage between 0 and its largest.
+
+    Parameters
+    ----------
+    scenario : path or Scenario
+        With one structure without effects, one damper, and a ground motion. What commands the
+        damper is left out of account.
+    overrides : mapping, optional
+        Values in place of the scenario's, as for `bristle.run`.
+    output : str
+        An output of the structure, "component.port".
+    statistic : str
+        "peak" (of its size) or "rms".
+    previews : iterable of float
+        Times [s], for each of which a receding horizon that sees so far ahead is run as well.
+    starts : int
+        How many voltages the search begins with.
+    out : path, optional
+        Folder for the voltage, a scenario that plays it, and its results.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario does not suit, or an argument is out of place.
+    RunError
+        If a run fails, or the folder cannot be written.
+
+    Returns
+    -------
+    Limit
+
+    Examples
+    --------
+    >>> from bristle.limit import limit
+    >>> found = limit("half_sine_pulse", {"run.stop": 1.0})  # doctest: +SKIP
+    >>> found.bound < found.value <= min(found.constant.values())  # doctest: +SKIP
+    True
+    """
+    began = clock.monotonic()
+    seen = _checked(statistic, previews, starts)
+    if out is not None:
+        refuse_folder(Path(out))
+    loaded = loaded_with(scenario, overrides)
+    case = case_of(loaded, output)
+    tell("compiling the laws, once")
+    whole = Problem(case)
+    levels = np.linspace(0.0, case.v_max, LEVELS).tolist()
+    constant = {V: value_of(whole.respond(whole.level(V)), statistic) for V in levels}
+    if not np.isfinite([*constant.values()]).all():
+        raise RunError(f"{loaded.file}: {output} is not finite at some constant {case.command}.")
+    best = min(constant, key=lambda V: constant[V])
+    last = _window(whole, best) if statistic == "peak" else whole.last
+    problem, found = _searched_from_all(whole, last, statistic, best, starts)
+    if not _in_window(problem, whole, found[0][1]):
+        problem, found = _searched_from_all(whole, whole.last, statistic, best, starts)
+    searched, voltage = found[0][0].value, found[0][1]
+    ahead = {}
+    for s in counted(seen, "receding horizon"):
+        ahead[s] = _seen_ahead(problem, whole, s, best, searched, statistic)
+    bound, most = _bound(problem, whole, voltage, statistic)
+    results = _played(case, voltage, out)
+    return Limit(
+        loaded.title, output, statistic, case.unit, value_of(results[output].to_numpy(), statistic),
+        searched, tuple(start for start, _ in found), bound, most, ahead, constant,
+        value_of(simulate(loaded)[output], statistic), case.time, voltage, case.command,
+        case.command_unit, results, clock.monotonic() - began,
+    )  # fmt: skip
+
+
+def _checked(statistic: str, previews: Iterable[float], starts: int) -> list[float]:
+    if statistic not in STATISTICS:
+        raise ScenarioError(unknown("statistic", statistic, STATISTICS))
+    if starts < 1:
+        raise ScenarioError(f"{starts} starts: 1 or more is right; 3 is usual.")
+    seen = sorted(previews)
+    for seconds in seen:
+        if not 0.0 <= seconds <= 10.0:
+            raise ScenarioError(f"a preview of {seconds:g} s: 0 to 10 s is right.")
+    return seen
+
+
+def _window(whole: Problem, voltage: float) -> int:
+    """Return the instant behind which nothing large happens under a constant voltage [V]."""
+    case, size = whole.case, np.abs(whole.respond(whole.level(voltage)))
+    large = np.flatnonzero(size > QUIET * size.max())
+    end = int(large[-1]) if len(large) else 0
+    return min(end + round(2.0 / (case.frequency * case.plant.h)), len(case.ground) - 1)
+
+
+def _searched_from_all(
+    whole: Problem, last: int, statistic: str, rest: float, starts: int
+) -> tuple[Problem, list[tuple[Start, Array]]]:
+    """Search up to an instant from all starts; return that problem, and what came out, best first.
+
+    Parameters
+    ----------
+    whole : Problem of the whole motion
+    last : instant
+    statistic : "peak" or "rms"
+    rest : voltage behind that instant, and the first start [V]
+    starts : how many
+    """
+    case = whole.case
+    every = max(1, round(1.0 / (case.frequency * NODES_PER_PERIOD * case.plant.h)))
+    problem = Problem(case, every, last)
+    begins = _begins(problem, rest, starts)
+    count, found = Count("search", len(begins)), []
+    for name, values in begins.items():
+        count.begins(f"from {name}")
+        found.append(_searched(problem, whole, name, values, statistic, rest))
+    return problem, sorted(found, key=lambda one: one[0].value)
+
+
+def _in_window(problem: Problem, whole: Problem, voltage: Array) -> bool:
+    """Return whether the peak under a voltage (N + 1,) lies within the window."""
+    return int(np.abs(whole.respond(voltage)).argmax()) <= problem.last
+
+
+def _begins(problem: Problem, best: float, count: int) -> dict[str, Array]:
+    """Return where searches begin, by name: constant voltages, then random ones."""
+    n, v_max = len(problem.nodes), problem.case.v_max
+    known = {f"{V:g} {problem.case.command_unit}": V for V in (best, 0.125 * v_max, v_max)}
+    begins = {f"constant {name}": np.full(n, V) for name, V in known.items()}
+    for seed in range(1, count + 1):
+        random = np.random.default_rng(seed).uniform(0.0, v_max, n)
+        begins[f"random {seed}"] = random
+    return dict([*begins.items()][:count])
+
+
+def _searched(
+    problem: Problem, whole: Problem, name: str, values: Array, statistic: str, rest: float
+) -> tuple[Start, Array]:
+    """Search from voltages (n,) at the nodes; return what came out, and the voltage (N + 1,)."""
+    before = value_of(whole.respond(_continued(problem, values, rest)), statistic)
+    values = descended(problem, values, statistic)
+    if statistic == "peak":
+        values = levelled(problem, values)[0]
+    voltage = _continued(problem, values, rest)
+    return Start(name, before, value_of(whole.respond(voltage), statistic)), voltage
+
+
+def _continued(problem: Problem, values: Array, rest: float) -> Array:
+    """Return the voltage at all instants of a case: behind the window it is `rest` [V]."""
+    tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
+    return np.append(problem.between(values), tail)
+
+
+def _seen_ahead(
+    problem: Problem, whole: Problem, seconds: float, rest: float, least: float, statistic: str
+) -> float:
+    """Return what a receding horizon reaches; the cost is never told by less than 2 % of least."""
+    voltage = foreseen(problem, seconds, rest, 0.02 * least, statistic)
+    tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
+    return value_of(whole.respond(np.append(voltage, tail)), statistic)
+
+
+def _bound(
+    problem: Problem, whole: Problem, voltage: Array, statistic: str
+) -> tuple[float | None, float]:
+    """Return the lower bound, None where effects of the damper allow none; the largest force."""
+    tell("a lower bound")
+    case, course = problem.case, whole.course
+    whole.respond(voltage)
+    if not case.plain:
+        return None, float(np.abs(course.force).max())
+    speed = float(np.abs(course.x @ case.plant.velocity).max())
+    most = max(largest_force(case, FASTER * speed), float(np.abs(course.force).max()))
+    return bound_of(problem, statistic, most), most
+
+
+def _played(case: Case, voltage: Array, out: str | Path | None) -> Results:
+    """Return the results of the scenario under a voltage, run by the coupled engine."""
+    if out is not None:
+        return run(write_scenario(case, case.time, voltage, Path(out)), engine="compiled", out=out)
+    with tempfile.TemporaryDirectory() as folder:
+        return run(write_scenario(case, case.time, voltage, Path(folder)), engine="compiled")

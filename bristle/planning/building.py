@@ -1,0 +1,406 @@
+"""The next tests of a building on a shaking table: ground motions, commands, sensors to add."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..comparison.names import site_name
+from ..core.progress import tell
+from ..core.text import plain, quantity
+from ..data.measurement import Measurement
+from ..diagnosis.decision import refuse_unknown_noise
+from ..diagnosis.prepared import Opening, median_noise
+from ..diagnosis.rig_runs import BuildingRuns
+from ..errors import StudyError
+from ..identification.rig import DAMPER
+from ..identification.smoothing import smooth_steps
+from ..physics.building import Building, frequencies
+from ..physics.drive import DRIVES
+from ..physics.effect import plain_name
+from ..prediction.model_system import House
+from ..study.identify import as_model
+from ..study.rig import building_of
+from ..study.study import Study
+from .added_sensors import Added, added_sensors, place_of
+from .folder import PlannedRun
+from .information import DRAWS, Goal, Known
+from .limits import RESERVE, SLOWEST, ZERO, RigLimits, Signals, with_given
+from .outcome import Outcome, outcomes
+from .plan import Plan
+from .questions import Measured, Stated, Wish, cost_of, errs, note_of_missing, stated
+from .shaking_table import ShakingTable
+from .site_questions import SiteWish, default_wishes, largest_motion, of_one_force, purposes_at
+from .table_planner import TablePlanner
+from .waveforms import Waveform, displacement_of, records_at_hand, scalable
+
+if TYPE_CHECKING:
+    from ..view.style import Page
+
+
+# A plan of a building: ground motions with commands, and sensors that would show more.
+
+Array = NDArray[np.float64]
+
+ONE_FORCE = "distance, if they have exactly the forms of the model"
+"""The figure of rivals that add up to one force while the damper's is not measured."""
+
+
+@dataclass(frozen=True)
+class BuildingPlan(Plan):
+    """The next tests of a building.
+
+    Attributes
+    ----------
+    predicted : tuple of (n,) arrays
+        The displacement of the first level [m] in each test, simulated with the study's model.
+    sensors : tuple of Added
+        What sensors that the study lacks would show besides, the most useful one first.
+    level : str
+        The first level.
+    """
+
+    predicted: tuple[Array, ...] = field(default=(), repr=False)
+    sensors: tuple[Added, ...] = ()
+    level: str = "base"
+    rig: ClassVar[str] = "structure"
+
+    def runs(self) -> list[PlannedRun]:
+        """Return the runs as a plan's folder holds them."""
+        drive = DRIVES.get(self.drive)
+        out = []
+        for k, (test, one) in enumerate(zip(self.tests, self.signals, strict=True)):
+            channels = {"ground_acceleration": one.a}
+            about = _words(test.motion, one)
+            if drive is not None:
+                channels[drive.name] = one.V
+                about += f", {test.command.words(drive.name, drive.unit)}"
+            moved = quantity(float(np.max(np.abs(self.predicted[k]))), "m")
+            about += f"; {place_of(self.level)} moves by {moved}"
+            out.append(PlannedRun(self.name(k), self.roles[k], about, one.time, channels))
+        return out
+
+    def sentences(self) -> list[str]:
+        """Return the plan as an engineer would say it."""
+        told = [*super().sentences(), *(one.sentence() for one in self.sensors)]
+        if self.worth and not super().worth:
+            told.append("Without that sensor these tests show nothing new: add it before them.")
+        return told
+
+    @property
+    def worth(self) -> bool:
+        """Whether the tests would show what the runs at hand do not, with a sensor if need be."""
+        return super().worth or any(one.settles for one in self.sensors)
+
+    def _why(self, one: Outcome) -> str:
+        if one.what == ONE_FORCE:
+            return "they add up to one force while the damper's is not measured; no motion helps."
+        return super()._why(one)
+
+    def files(self) -> dict[str, str | bytes]:
+        """Return the further files of the plan's folder by name."""
+        from .building_picture import building_files
+
+        return building_files(self)
+
+    def _page(self, k: int) -> Page:
+        from .building_picture import draw_shaking
+
+        return draw_shaking(self.runs()[k], self.predicted[k], self.drive, self.level)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        return {**super().as_dict(), "sensors": [one.as_dict() for one in self.sensors]}
+
+
+def _words(motion: Waveform, signals: Signals) -> str:
+    """Return a ground motion in words, a recorded one with its scale."""
+    peak = quantity(float(np.max(np.abs(signals.a))), "m/s2")
+    if motion.kind != "record":
+        return motion.words(peak)
+    factor = float(np.max(np.abs(signals.x)) / np.max(np.abs(motion.record)))
+    return f"{motion.name} times {plain(factor, 2)}, {peak}"
+
+
+# What a shaking table and the building on it have done already: the limits of a plan.
+
+LONGEST = 30.0
+"""Longest test [s] where nobody says."""
+
+NEARLY = 0.02
+"""Share of a run for which a command is at its largest level, or its least, at the least."""
+
+BELOW, ABOVE = 0.3, 1.3
+"""Band of the table, over the first and the last natural frequency."""
+
+
+def limits_of_shaking(
+    runs: Sequence[Measurement], sites: Mapping[str, Opening], house: House
+) -> RigLimits:
+    """Return what table, building and amplifier have done already.
+
+    Parameters
+    ----------
+    runs : that were measured
+    sites : of the building, with their runs
+    house : the building
+    """
+    tones = frequencies(house.building)
+    low = max(SLOWEST, BELOW * tones[0])
+    grounds = [(run["ground_acceleration"], run.step) for run in runs]
+    x = [displacement_of(one, step, low) for one, step in grounds]
+    v = [np.gradient(one, step) for one, (_, step) in zip(x, grounds, strict=True)]
+    reached = {
+        site: largest_motion([*one.problem.runs, *one.held_out.runs])[0] / RESERVE
+        for site, one in sites.items()
+    }
+    drifts = [most for site, most in reached.items() if site.startswith("storey")]
+    strokes = [most for site, most in reached.items() if not site.startswith("storey")]
+    return RigLimits(
+        max(float(np.max(np.abs(one))) for one in x) / RESERVE,
+        max(float(np.max(np.abs(one))) for one in v) / RESERVE,
+        max(float(np.quantile(np.abs(one), 0.999)) for one, _ in grounds) / RESERVE,
+        band=(low, max(ABOVE * tones[-1], 2.0 * low)), command=_commands(runs),
+        duration=min(LONGEST, max(run.duration for run in runs)), rate=1.0 / runs[0].step,
+        motions=("sweep", "multisine"), commands=("held", "switched", "random"),
+        damper_stroke=max(strokes, default=np.inf), drift=max(drifts, default=np.inf),
+    )  # fmt: skip
+
+
+def _commands(runs: Sequence[Measurement]) -> tuple[float, float]:
+    """Return the least and the largest command of runs, without the noise on their record."""
+    lows, highs = [0.0], [0.0]
+    for run in runs:
+        if run.drive:
+            noise = run.noise.get(run.drive, 0.0)
+            command, _ = smooth_steps(run[run.drive], noise, run.step)
+            lows.append(float(np.quantile(command, NEARLY)) + noise)
+            highs.append(float(np.quantile(command, 1.0 - NEARLY)) - noise)
+    low, high = min(lows[1:], default=0.0), max(highs)
+    return (0.0 if abs(low) < ZERO * high else low), high
+
+
+CANDIDATES, IMPROVED = 64, 10
+"""Tests that are looked at, and evaluations in which a picked one is improved: each is a run of the
+building, simulated and smoothed."""
+
+MANY = 12_000
+"""Samples of a test from which on half as many are looked at."""
+
+SAME_RATE = 1e-3
+"""Share by which a given rate may differ from that of the runs."""
+
+TIE = 0.01
+"""Weight of how well parameters are known, where purposes leave a choice."""
+
+
+def plan_building(
+    study: Study,
+    wish: Wish | None = None,
+    *,
+    limits: Mapping[str, Any] | None = None,
+    records: Sequence[str] = (),
+    seed: int = 1,
+) -> BuildingPlan:
+    """Return the next tests of a study of a building on a shaking table.
+
+    Parameters
+    ----------
+    study : Study
+    wish : what they shall be for; None for what the verdict leaves open, or else all
+    limits : of table and building, as arguments of `RigLimits`; what is not given is what the runs
+        have done
+    records : further ground motions that may be scaled: names, or files
+    seed : of what is drawn
+
+    Raises
+    ------
+    StudyError
+        If the limits allow no test, or a purpose names what there is not.
+    RecordError
+        If a file cannot be read.
+    """
+    study.usable_effects()
+    model, runs = study.model(), study.runs()
+    building = building_of(study, model)
+    assert building is not None
+    _refuse_devices(building)
+    measured = [*runs.train, *runs.holdout]
+    motions = records_at_hand(measured, records, Path.cwd())
+    house = House(building, study.folder / model.building if model.building else None)
+    found = BuildingRuns(runs.train, runs.holdout, as_model(model), building, tell)
+    sites = _opened(study, found)
+    rig = _within(limits_of_shaking(measured, sites, house), limits or {})
+    given = wish is not None and not wish.nothing
+    wishes = [SiteWish(wish)] if given and wish else default_wishes(study.verdict() or {})
+    purposes = purposes_at(sites, wishes, rig, study.drive)
+    stand = {site: _stated(one, sites[site], seed) for site, one in purposes.items()}
+    tell("looking at ground motions")
+    with tempfile.TemporaryDirectory(prefix="bristle_plan_") as folder:
+        table = ShakingTable(
+            model, house, runs.train[0], median_noise(measured), rig.command[1], Path(folder)
+        )
+        planner = TablePlanner(
+            _joint(stand), rig, 0.0, np.zeros((0, 0, 4)), rig.rate, seed=seed, drive=study.drive,
+            candidates=CANDIDATES // (1 if rig.rate * rig.duration < MANY else 2),
+            improved=IMPROVED, table=table, show=lambda few: found.planned(few, DRAWS),
+            places=tuple(site for site, one in stand.items() for _ in one.goal.asked),
+            records=tuple(
+                scalable(one, rig.rate, rig.duration, rig.usable_band[0]) for one in motions
+            ),
+        )  # fmt: skip
+        made = _planned(study, stand, planner)
+    return replace(made, notes=_notes(study, sites))
+
+
+def _within(done: RigLimits, given: Mapping[str, Any]) -> RigLimits:
+    """Return what table and building have done, with what is given in its place.
+
+    Raises
+    ------
+    StudyError
+        If they allow no test, or ask for another rate than that of the runs.
+    """
+    rig = with_given(done, given)
+    if abs(rig.rate / done.rate - 1.0) > SAME_RATE:
+        raise StudyError(
+            f"rate = {rig.rate:g} Hz: the runs of this study have {done.rate:g} samples per "
+            "second, and so have planned ones."
+        )
+    return replace(rig, rate=done.rate)
+
+
+def _refuse_devices(building: Building) -> None:
+    """Refuse dampers that a plan does not know: several, and one that is not on the first level.
+
+    The limits of a plan are the stroke of a damper that moves with the first level, and drifts; the
+    force of other devices under another ground motion is told by no model here.
+    """
+    device = building.device(building.studied)
+    others = [one.name for one in building.devices if one.name != building.studied]
+    if others or not device.on_first:
+        where = device.place(building.levels())
+        what = f"beside {', '.join(others)}" if others else f"for {device.name} ({where})"
+        raise StudyError(
+            f"building {building.name!r}: no test can be planned {what}. A plan is for a building "
+            "with one damper, between the ground and the first level."
+        )
+
+
+def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
+    """Return the models of the sites, fitted."""
+    found.refuse_lacking(study.folder)
+    sites = {}
+    for site in found.sites():
+        tell(f"fitting {site}")
+        opened = found.open_site(site)
+        if opened is not None and opened.held_out.runs:
+            sites[site] = opened
+    for opened in sites.values():
+        refuse_unknown_noise(study.folder, opened.held_out)
+    if not sites:
+        raise StudyError(f"{study.folder}: no site of this building has runs that are held out.")
+    if DAMPER not in sites:
+        raise StudyError(
+            f"{study.folder}: neither a command nor the damper's force was measured; without its "
+            "damper no response of the building can be predicted."
+        )
+    return sites
+
+
+def _notes(study: Study, sites: Mapping[str, Opening]) -> tuple[str, ...]:
+    """Return what weakens a plan: an error that an effect would take away first."""
+    missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
+    if missing:
+        return missing
+    loud = {site: one.before.z for site, one in sites.items() if one.before.z > one.rule.clean}
+    return tuple(f"At {site_name(site)} the model {errs(z)}" for site, z in loud.items())
+
+
+def _stated(purposes: Any, opened: Opening, seed: int) -> Stated:
+    measured = Measured(opened.problem.runs, opened.held_out.runs)
+    return stated(purposes, opened.searched, measured, max(opened.before.z, 1.0), seed)
+
+
+def _joint(stand: Mapping[str, Stated]) -> Goal:
+    """Return the goal of all sites together: the mean of their costs."""
+    asked = tuple(a for one in stand.values() for a in one.goal.asked)
+    known = tuple(k for one in stand.values() for k in one.goal.known)
+
+    def cost(found: Sequence[Known]) -> float:
+        total, first = [], 0
+        for one in stand.values():
+            count = len(one.goal.asked)
+            total.append(one.goal.cost(found[first : first + count]))
+            first += count
+        spread = [np.log([*one.deviations().values()]).mean() for one in found if one.deviations()]
+        return float(np.mean(total) + TIE * np.mean(spread or [0.0]))
+
+    return Goal(asked, known, len(asked), cost, any(one.goal.judged for one in stand.values()))
+
+
+def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -> BuildingPlan:
+    """Return the plan that serves the goals of the sites, and what sensors would add to it."""
+    tests = planner.plan()
+    then = _by_site(stand, planner.goal.with_tests(tests))
+    costs = [
+        cost_of(one.purposes.figures(one.known)) - cost_of(one.purposes.figures(then[site]))
+        for site, one in stand.items()
+    ]
+    rows = [one if one.settled else _or_beyond(one, stand, planner) for one in _rows(stand, then)]
+    shown = [planner.response(one) for one in tests]
+    tell("looking at sensors")
+    assert planner.table is not None
+    assert planner.show is not None
+    sensors = added_sensors(planner.table, planner.show, stand, shown, then, rows)
+    level = planner.table.levels[0]
+    return BuildingPlan(
+        study.name, tuple(one.test for one in tests),
+        tuple(one.test.signals(planner.limits) for one in tests), tuple(rows), planner.limits,
+        study.drive, float(np.exp(np.mean(costs))), tuple(one.role for one in tests),
+        predicted=tuple(one.columns[f"structure.{level}_displacement"] for one in shown),
+        sensors=tuple(sensors), level=level,
+    )  # fmt: skip
+
+
+def _by_site(stand: Mapping[str, Stated], found: Sequence[Known]) -> dict[str, list[Known]]:
+    """Return what is known of the questions of each site, with the fitted parameters."""
+    out, first = {}, 0
+    for site, one in stand.items():
+        out[site] = list(found[first : first + one.goal.count])
+        first += len(one.goal.asked)
+    return out
+
+
+def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Known]]) -> list[Outcome]:
+    """Return what tests will show, site by site."""
+    rows = []
+    for site, one in stand.items():
+        rows += at_site(site, outcomes(one.purposes, one.asked, one.known, then[site]))
+    alike = {f"{DAMPER}: {pair}" for pair in of_one_force(stand)}
+    return [_of_one_force(one) if one.name in alike else one for one in rows]
+
+
+def _or_beyond(left: Outcome, stand: Mapping[str, Stated], planner: TablePlanner) -> Outcome:
+    """Return what a plan leaves open, with whether a test of its own would settle it."""
+    for one in planner.looked_at():
+        told = _rows(stand, _by_site(stand, planner.goal.with_pair(one)))
+        if any(other.name == left.name and other.settled for other in told):
+            return left
+    return replace(left, beyond=True)
+
+
+def at_site(site: str, rows: Sequence[Outcome]) -> list[Outcome]:
+    """Return outcomes whose names say at which site they are."""
+    return [replace(one, name=f"{site}: {one.name}") for one in rows]
+
+
+def _of_one_force(row: Outcome) -> Outcome:
+    """Return the outcome of rivals that no motion tells apart."""
+    return replace(row, what=ONE_FORCE, settled=False)

@@ -1,0 +1,214 @@
+"""A plan: the next tests of a rig, what they will show, and the files for its controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ..core.text import plain
+from ..diagnosis.rule import BENCH
+from ..errors import StudyError
+from ..physics.drive import DRIVES
+from ..physics.effect import EFFECTS, plain_name
+from ..view import Viewable
+from .folder import PlanFolder, PlannedRun, write_plan
+from .limits import RigLimits, Signals, Test
+from .outcome import NEAR, Outcome
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..view.style import Page
+
+MANY = 10
+"""How many times as many tests as are planned are still told of."""
+
+NAMED = "plan_"
+"""How the names of tests begin; a number follows."""
+
+GAINED = 0.1
+"""Share by which a plan must lower its figures on average; below that nothing is left to gain."""
+
+
+@dataclass(frozen=True, repr=False)
+class Plan(Viewable):
+    """The next tests of a rig.
+
+    Attributes
+    ----------
+    study : str
+        The study's name, "" before the first measurement.
+    tests : tuple of Test
+        The tests, in order.
+    signals : tuple of Signals
+        What each prescribes, at the controller's rate.
+    outcomes : tuple of Outcome
+        What they will show, beside what the runs at hand show.
+    limits : RigLimits
+        Within which they are.
+    drive : str
+        The channel of the command, "" where there is none.
+    gain : float
+        By what factor the figures become smaller on average.
+    roles : tuple of str
+        What each test is for: "train" or "holdout".
+    notes : tuple of str
+        What weakens the plan, in sentences.
+    first : int
+        The number in the name of the first test; the others count on.
+
+    Examples
+    --------
+    >>> import bristle, pathlib, tempfile
+    >>> sheet = pathlib.Path(tempfile.mkdtemp()) / "rig.toml"
+    >>> _ = sheet.write_text('''schema = 1
+    ... [damper]
+    ... law = "bingham"
+    ... max_force = "2 kN"
+    ... [limits]
+    ... stroke = "20 mm"
+    ... speed = "250 mm/s"
+    ... command = ["0 V", "5 V"]
+    ... rate = "100 Hz"
+    ... duration = "5 s"
+    ... ''')
+    >>> tests = bristle.plan(sheet, sharpen="f_v", runs=2)
+    >>> tests.worth, [one.name for one in tests.outcomes]
+    (True, ['f_v'])
+    >>> figure = tests.plot(2)  # the second test; tests.write("plan") writes all as files
+    """
+
+    study: str
+    tests: tuple[Test, ...]
+    signals: tuple[Signals, ...] = field(repr=False)
+    outcomes: tuple[Outcome, ...]
+    limits: RigLimits
+    drive: str
+    gain: float
+    roles: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    first: int = 1
+    rig: ClassVar[str] = "bench"
+
+    @property
+    def worth(self) -> bool:
+        """Whether the tests would show what the runs at hand do not."""
+        return self.gain > 1.0 + GAINED
+
+    def runs(self) -> list[PlannedRun]:
+        """Return the runs as a plan's folder holds them."""
+        drive = DRIVES.get(self.drive)
+        out = []
+        for k, (test, signals) in enumerate(zip(self.tests, self.signals, strict=True)):
+            channels = {"displacement": signals.x}
+            if drive is not None:
+                channels[drive.name] = signals.V
+            about = test.words(signals, drive)
+            out.append(PlannedRun(self.name(k), self.roles[k], about, signals.time, channels))
+        return out
+
+    def name(self, k: int) -> str:
+        """Return the name of test k, counted from 0: of its run, of its file, and measured too."""
+        return f"{NAMED}{self.first + k}"
+
+    def sentences(self) -> list[str]:
+        """Return the plan as an engineer would say it."""
+        if not self.worth:
+            return [
+                *self.notes,
+                *self._left_open(),
+                "Nothing is left to gain: no test within these limits would show more.",
+            ]
+        return [
+            *self.notes,
+            *(f"{run.name} ({run.role}): {run.about}." for run in self.runs()),
+            *self._left_open(),
+        ]
+
+    def _left_open(self) -> list[str]:
+        """Return what the tests do not settle, and whether another one would."""
+        return [f"{one.name}: {self._why(one)}" for one in self.outcomes if not one.settled]
+
+    def _why(self, one: Outcome) -> str:
+        """Return why the tests do not settle something."""
+        if not one.beyond:
+            return f"not settled by these tests; --{one.purpose} it alone."
+        if one.purpose != "separate":
+            return self._why_hidden(one)
+        differ = plain(one.then, 2) if one.then >= NEAR else "0"
+        return (
+            "no test within these limits tells them apart; at best they differ by "
+            f"{differ} standard deviations{self._more(one)}."
+        )
+
+    def _why_hidden(self, one: Outcome) -> str:
+        """Return why no test shows an effect: the model absorbs it, or nothing moves it."""
+        none = "no test within these limits shows it"
+        if one.excited:
+            return f"{none}; the model absorbs it."
+        held = self.limits.command[0] == self.limits.command[1] or {*self.limits.commands} == {
+            "held"
+        }
+        effect = EFFECTS[plain_name(one.name.rpartition(": ")[2])]
+        if held and "V" in effect.needs:
+            return f"{none}: the command does not move."
+        return f"{none}: none excites it."
+
+    def _more(self, one: Outcome) -> str:
+        """Return how many tests of this kind would tell rivals apart, "" where far too many."""
+        gained = one.then**2 - one.now**2
+        if one.purpose != "separate" or gained <= 0.0:
+            return ""
+        count = len(self.tests) * (BENCH.tells**2 - one.now**2) / gained
+        return f"; about {ceil(count)} such tests would" if count <= MANY * len(self.tests) else ""
+
+    def write(self, folder: Path | str) -> Path:
+        """Write the tests as files for a controller, a picture each; return the folder.
+
+        Raises
+        ------
+        StudyError
+            If the folder is there already or cannot be written.
+        """
+        path = Path(folder)
+        write_plan(
+            PlanFolder(self.rig, self.study, self.limits.rate, tuple(self.runs())), path,
+            self.files(),
+        )  # fmt: skip
+        return path
+
+    def files(self) -> dict[str, str | bytes]:
+        """Return the further files of the plan's folder by name."""
+        from .pictures import plan_files
+
+        return plan_files(self)
+
+    def plot(self, number: int = 1) -> Figure:
+        """Return the figure of a test, the first one being number 1: motion and command.
+
+        Raises
+        ------
+        StudyError
+            If there is no such test.
+        """
+        if not 1 <= number <= len(self.tests):
+            raise StudyError(f"test {number}: there are 1 to {len(self.tests)}.")
+        return self._page(number - 1).figure
+
+    def _page(self, k: int) -> Page:
+        from .pictures import draw_test
+
+        return draw_test(self.runs()[k], self.signals[k], self.drive)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        return {
+            "study": self.study, "gain": round(self.gain, 4), "worth": self.worth,
+            "notes": list(self.notes),
+            "runs": [
+                {"name": run.name, "role": run.role, "about": run.about} for run in self.runs()
+            ],
+            "outcomes": [one.as_dict() for one in self.outcomes],
+        }  # fmt: skip

@@ -1,0 +1,198 @@
+"""A study's building on its shaking table, simulated: what its channels would show of a test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.channels import channel_unit
+from ..data.measurement import Measurement
+from ..data.sampling import Sampling
+from ..errors import RunError
+from ..model.model import StudyModel
+from ..physics.drive import VOLTAGE
+from ..prediction.model_system import House, Shaking, write_signals
+from ..prediction.monte_carlo import Simulator
+from ..system.scenario import Scenario
+from .data_sheet import NOISE
+from .limits import RESERVE, RigLimits, Signals
+
+Array = NDArray[np.float64]
+Columns = Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Shaken:
+    """A test, simulated.
+
+    `signals` what it prescribes; `columns` every output; `held_out` whether it is to judge by.
+    """
+
+    signals: Signals
+    columns: Columns
+    held_out: bool
+
+
+FORCE = "force"
+DEMANDS = ("damper_stroke", "drift", "force", "heat")
+"""What a building's response asks for, by the names of `RigLimits`."""
+
+KINDS = ("displacement", "velocity", "acceleration_absolute")
+"""What can be measured of a level."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShakingTable:
+    """Runs planned tests of a study's building.
+
+    Parameters
+    ----------
+    model : StudyModel
+        The damper's law with the effects of all sites.
+    house : House
+    like : Measurement
+        A run of the study: planned ones have its channels, and its labels.
+    noise : mapping
+        Standard deviation of each channel in SI.
+    most : float
+        The largest command.
+    folder : Path
+        An empty folder for files of the simulation.
+    """
+
+    model: StudyModel
+    house: House
+    like: Measurement
+    noise: Mapping[str, float]
+    most: float
+    folder: Path
+    _made: dict[int, tuple[Simulator, Scenario]] = field(default_factory=dict, repr=False)
+    _one_at_a_time: Lock = field(default_factory=Lock, repr=False)
+
+    @property
+    def levels(self) -> list[str]:
+        """The building's levels, the first one above the ground first."""
+        return list(self.house.building.levels())
+
+    @property
+    def drive(self) -> str:
+        """The channel of the command, "" where none was measured."""
+        return self.like.drive
+
+    def response(self, signals: Signals) -> Columns | None:
+        """Return every output (n,) of the simulation in SI; None where it has no solution."""
+        with self._one_at_a_time:
+            simulator, scenario = self._ready(signals)
+            write_signals(self.folder, self._shaking(signals))
+            try:
+                return simulator.response(scenario)
+            except RunError:
+                return None
+
+    def _shaking(self, signals: Signals) -> Shaking:
+        command = signals.V if self.drive else None
+        return Shaking("plan", signals.time, signals.a, command, drive=VOLTAGE)
+
+    def _ready(self, signals: Signals) -> tuple[Simulator, Scenario]:
+        """Return what simulates a test of that length, made once."""
+        count = len(signals.time)
+        if count not in self._made:
+            largest = replace(signals, V=np.full(count, self.most))
+            simulator = Simulator(
+                self.model, self.house, False, self._shaking(largest), self.folder
+            )
+            self._made[count] = simulator, simulator.scenario()
+        return self._made[count]
+
+    def demands(self, columns: Columns) -> dict[str, float]:
+        """Return the largest values that a test asks for, by the names of `RigLimits`, in SI."""
+        first, *above = self.levels
+        drifts = {
+            one: float(np.max(np.abs(self._drift(columns, one, below))))
+            for one, below in zip(above, [first, *above], strict=False)
+        }
+        if not self.house.building.isolated:
+            drifts[first] = float(np.max(np.abs(columns[_port(f"{first}_displacement")])))
+        energy = columns.get("damper.dissipated_energy", np.zeros(1))
+        return {
+            "damper_stroke": float(np.max(np.abs(columns[_port(f"{first}_displacement")]))),
+            "drift": max(drifts.values(), default=0.0),
+            "force": float(np.max(np.abs(columns["damper.force"]))),
+            "heat": float(energy[-1]),
+        }
+
+    @staticmethod
+    def _drift(columns: Columns, level: str, below: str) -> Array:
+        return columns[_port(f"{level}_displacement")] - columns[_port(f"{below}_displacement")]
+
+    def excess(self, columns: Columns, limits: RigLimits) -> float:
+        """Return the largest value that a test asks for, over nine tenths of its limit."""
+        asked = self.demands(columns)
+        return max(
+            value / (RESERVE * float(getattr(limits, name))) for name, value in asked.items()
+        )
+
+    def measured(
+        self, signals: Signals, columns: Columns, more: Sequence[str] = (), seed: int = 0
+    ) -> Measurement:
+        """Return a test as it would be measured: the study's channels, with noise.
+
+        Parameters
+        ----------
+        signals, columns : of the test, and of its response
+        more : channels that are measured as well; the noise on the others stays the same
+        seed : of the noise
+        """
+        generator = np.random.default_rng(seed)
+        clean = {name: columns[_port(name)] for name in self._shown() if _port(name) in columns}
+        clean["ground_acceleration"] = signals.a
+        if self.drive:
+            clean[self.drive] = signals.V
+        clean |= {name: columns[_port(name)] for name in more}
+        std = {name: self._noise(name, values) for name, values in clean.items()}
+        channels = {
+            name: values + std[name] * generator.standard_normal(len(values))
+            for name, values in clean.items()
+        }
+        count = len(signals.time)
+        return replace(
+            self.like, name="plan", time=signals.time, channels=channels,
+            units={name: channel_unit(name) for name in channels},
+            measured=np.ones(count, dtype=np.bool_), noise=std,
+            noise_facts=dict.fromkeys(std), sampling=Sampling(signals.dt, count), source="plan",
+            notes=(), lost={}, saturated={}, masked=None, parts=1, since={}, spikes=(),
+        )  # fmt: skip
+
+    def _shown(self) -> list[str]:
+        """Return the channels of the building and its damper that the study has."""
+        return [name for name in (*self._of_levels(), FORCE) if self.like.has(name)]
+
+    def _of_levels(self) -> list[str]:
+        return [f"{level}_{kind}" for level in self.levels for kind in KINDS]
+
+    def lacking(self) -> list[str]:
+        """Return the channels that a study of this building may have, and this one lacks."""
+        return [name for name in (*self._of_levels(), FORCE) if not self.like.has(name)]
+
+    def _noise(self, channel: str, values: Array) -> float:
+        """Return the noise of a channel [SI]: its own, or that of the nearest one of its kind."""
+        if channel in self.noise:
+            return self.noise[channel]
+        level, _, kind = channel.partition("_")
+        alike = [f"{one}_{kind}" for one in self.levels if f"{one}_{kind}" in self.noise]
+        if level in self.levels and alike:
+            place = self.levels.index(level)
+            return self.noise[
+                min(alike, key=lambda one: abs(self.levels.index(one.partition("_")[0]) - place))
+            ]
+        return NOISE * float(np.sqrt(np.mean(values**2)))
+
+
+def _port(channel: str) -> str:
+    """Return the output of the simulation that a channel shows."""
+    return f"damper.{channel}" if channel == FORCE else f"structure.{channel}"

@@ -1,0 +1,475 @@
+"""Any FMU held against a measurement: its inputs fed from channels, its outputs judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..comparison.comparison import Comparison, compare_predictions
+from ..comparison.predictions import RunPrediction, coordinates_of, rms
+from ..data.channels import DRIVE, MOTION, PLAIN, ChannelSpec, channel_unit, is_channel
+from ..data.decimate import between
+from ..data.guess import guess_channels, specs
+from ..data.left_out import MISSING, SETTLING
+from ..data.noise import estimate_noise
+from ..data.read import read_table
+from ..data.sampling import evenly
+from ..data.table import Table
+from ..errors import FmuError, RecordError
+from ..fmu.description import Description, Value, read_description
+from ..identification.error import error_of
+from ..identification.run_start import SETTLING as SETTLED
+from ..identification.smoothing import posterior_draws, smooth, smooth_drive
+from ..units import conversion, parse
+from .fmu_ports import Port, PortMap, map_ports
+from .stepping import Job, step_through
+
+# Whether an FMU's output has the unit and the sign that it is taken to have, from the numbers.
+
+AGAINST = -0.5
+"""Correlation with the measured output below which a sign is in doubt."""
+
+ALIKE = 0.8
+"""Correlation from which the sizes of two outputs say something of their units."""
+
+NEAR = 0.35
+"""Share by which a ratio of sizes may be off that of two units: the model errs besides."""
+
+LEAST = 30.0
+"""Ratio of sizes below which a model may as well be wrong."""
+
+_SPELLED = ("N", "kN", "MN", "m", "mm", "um", "m/s", "mm/s", "V", "mV", "A", "mA", "Pa", "kPa",
+            "MPa", "m/s2", "mm/s2", "s", "ms")  # fmt: skip
+
+
+def doubts(outputs: tuple[Comparison, ...], ports: PortMap, fmu: str) -> list[str]:
+    """Return what is to know of outputs that are turned or of another size, as the user wants them.
+
+    Raises
+    ------
+    FmuError
+        If the unit or the sign of an output is in doubt and the user has said nothing of it.
+    """
+    named = {port.name: port for port in ports.outputs}
+    notes: list[str] = []
+    for one in outputs:
+        port = named[one.quantity]
+        y = np.concatenate([run.measured for run in one.predictions])
+        p = np.concatenate([run.predicted for run in one.predictions])
+        if not (np.std(y) > 0.0 and np.std(p) > 0.0):
+            continue
+        correlation = float(np.corrcoef(y, p)[0, 1])
+        text = _sign(port, correlation)
+        if text and not port.sign_given:
+            channel = f"{port.name}={{}}{port.signal}"
+            raise FmuError(
+                f"{fmu}: {text}: its sign is in doubt. --map {channel.format('-')} reverses it, "
+                f"--map {channel.format('+')} keeps it."
+            )
+        notes += [text] if text else []
+        text, unit = _unit(port, float(np.std(y) / np.std(p)), correlation)
+        if text and not port.unit_given:
+            raise FmuError(
+                f"{fmu}: {text}: {unit}? --map {port.name}={port.signal}@{unit} says so, "
+                f"@{port.unit} that it is in {port.unit} and the FMU is that wrong."
+            )
+        notes += [text] if text else []
+    return notes
+
+
+def _sign(port: Port, correlation: float) -> str:
+    if correlation >= AGAINST:
+        return ""
+    return f"{port.name} has the opposite sign of {port.signal} (correlation {correlation:.2f})"
+
+
+def _unit(port: Port, ratio: float, correlation: float) -> tuple[str, str]:
+    """Return how far an output's size is off, and the unit that would explain it, else "" twice.
+
+    Parameters
+    ----------
+    port : of the output
+    ratio : size of what was measured over that of the output
+    correlation : of the two
+    """
+    if abs(correlation) < ALIKE or 1.0 / LEAST < ratio < LEAST:
+        return "", ""
+    own = parse(port.unit)
+    for spelled in _SPELLED:
+        unit = parse(spelled)
+        if unit.dimension != own.dimension or unit.name == own.name:
+            continue
+        factor = conversion(unit.name, own.name)[0]
+        if abs(ratio / factor - 1.0) < NEAR:
+            way = "small" if factor > 1.0 else "large"
+            times = factor if factor > 1.0 else 1.0 / factor
+            return f"{port.name} is {times:.0f} times too {way}", unit.name
+    return "", ""
+
+
+# One measurement as an FMU is fed: channels and other columns, motion smoothed, errors drawn.
+
+Array = NDArray[np.float64]
+
+DRAWS = 6
+"""Draws of the inputs' error."""
+_KINEMATIC = ("displacement", "velocity", "acceleration")
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """One piece of a measurement as an FMU is fed: values (n,) in SI, smoothed where they can be.
+
+    `errors` name to (d, n): draws of what is left uncertain; `raw` the channels as measured, with
+    their noise, which is not known of those `untold`; `rates` name to that of the signal whose
+    derivative is known; `measured` (n,) where nothing was filled in.
+    """
+
+    name: str
+    dt: float
+    values: dict[str, Array]
+    units: dict[str, str]
+    errors: dict[str, Array]
+    raw: dict[str, Array]
+    noise: dict[str, float]
+    rates: dict[str, str] = field(default_factory=dict)
+    derived: tuple[str, ...] = ()
+    untold: tuple[str, ...] = ()
+    measured: NDArray[np.bool_] = field(default_factory=lambda: np.ones(0, dtype=np.bool_))
+
+
+def signals_of(
+    table: Table, channels: Mapping[str, ChannelSpec], rig: str, seed: int = 0
+) -> tuple[list[Signals], list[str]]:
+    """Return the pieces of a table as an FMU is fed, and what was guessed and done.
+
+    Columns that are no known channel are there under their own names, if they have a unit.
+
+    Parameters
+    ----------
+    table : the measurement, not converted yet
+    channels : channels that are known, by name; the others are guessed
+    rig : {"bench", "structure"}, which decides the channels that are looked for
+    seed : of the draws of the inputs' error; piece k takes seed + k
+
+    Raises
+    ------
+    RecordError
+        If there is no time, no column with a unit, or a given channel cannot be read.
+    """
+    guesses = guess_channels(table, rig)
+    notes = [f"guessed: {one}" for one in guesses if one.channel not in channels and one.doubt]
+    chosen = {**specs(table, guesses), **channels}
+    time, columns = _time(table, chosen.pop("time", None)), {}
+    for name, spec in chosen.items():
+        column = table.find(spec.column)
+        unit = spec.unit or (column.unit.name if column.unit else "")
+        if not unit or column.text in table.not_numeric:
+            if name in channels:
+                raise RecordError(f'{table.source}: "{column.text}" has no numbers or no unit.')
+            continue
+        factor, offset = conversion(unit, channel_unit(name))
+        si = spec.sign * (factor * table.values[column.text] + offset)
+        columns[name] = si, channel_unit(name)
+    taken = {table.find(spec.column).text for spec in chosen.values()}
+    for column in table.columns:
+        if column.text in taken or column.text in table.not_numeric or column.name in columns:
+            continue
+        if column.unit is not None and column.unit.name != "s":
+            columns[column.name] = table.values[column.text], column.unit.name
+        elif column.unit is None:
+            notes.append(f'not used: "{column.text}", which has no unit')
+    if not columns:
+        raise RecordError(f"{table.source}: no column besides the time has a unit that is known.")
+    values = {name: y for name, (y, _) in columns.items()}
+    even = evenly(time, values, table.lines, table.source, table.place)
+    units = {name: unit for name, (_, unit) in columns.items()}
+    stem = Path(table.source).stem
+    many = len(even.pieces) > 1
+    found = [
+        replace(
+            _signals(
+                f"{stem} ({k})" if many else stem, even.sampling.step, piece, units, channels,
+                seed + k,
+            ),
+            measured=measured,
+        )
+        for k, (_, piece, measured) in enumerate(even.pieces, 1)
+    ]  # fmt: skip
+    return found, notes + even.notes
+
+
+def _time(table: Table, spec: ChannelSpec | None) -> Array:
+    """Return the time of a table [s]."""
+    if spec is not None and spec.step is not None:
+        return np.arange(table.rows, dtype=float) * spec.step
+    if spec is None:
+        raise RecordError(
+            f"{table.source}: no column is the time. --channel time=COLUMN@s names one."
+        )
+    column = table.find(spec.column)
+    factor, _ = conversion(spec.unit or (column.unit.name if column.unit else "s"), "s")
+    return np.asarray(factor * table.values[column.text], dtype=float)
+
+
+def _signals(
+    name: str, dt: float, raw: dict[str, Array], unit: dict[str, str],
+    channels: Mapping[str, ChannelSpec], seed: int,
+) -> Signals:  # fmt: skip
+    """Return one piece: its motion smoothed, its drive without noise, draws of what is left."""
+    n, unit = len(next(iter(raw.values()))), dict(unit)
+    generator = np.random.default_rng(seed)
+    given = {k: s.noise for k, s in channels.items() if s.noise is not None}
+    facts = {k: estimate_noise(y) for k, y in raw.items() if k not in given}
+    noise = {**given, **{k: one.std for k, one in facts.items()}}
+    untold = tuple(k for k, one in facts.items() if not one.known)
+    values, errors, derived = dict(raw), {}, []
+    rates: dict[str, str] = {}
+    for prefix in ("", "base_"):
+        x, v = raw.get(f"{prefix}displacement"), raw.get(f"{prefix}velocity")
+        if x is None and v is None:
+            continue
+        sizes = (noise.get(f"{prefix}displacement", 0.0), noise.get(f"{prefix}velocity", 0.0))
+        motion = smooth(x, v, dt, sizes)
+        have = (x is not None, v is not None)
+        drawn = posterior_draws(n, dt, sizes, motion.jerk, have, DRAWS, seed, motion)
+        names = [f"{prefix}{kind}" for kind in _KINEMATIC]
+        for i, (one, y) in enumerate(zip(names, (motion.x, motion.v, motion.a), strict=True)):
+            if prefix and kind_of(one) == "acceleration":
+                continue  # of a structure it is the absolute one that is meant
+            if one not in raw:
+                derived.append(one)
+            values[one], errors[one] = y, drawn[:, :, i]
+            unit[one] = PLAIN[kind_of(one)]
+        rates |= {names[0]: names[1], names[1]: names[2]}
+    for one in DRIVE:
+        if one in raw:
+            values[one], errors[one] = smooth_drive(raw[one], noise[one], dt, DRAWS, seed + 1)
+    for one in values:
+        if one not in errors:
+            errors[one] = generator.standard_normal((DRAWS, n)) * noise.get(one, 0.0)
+    kept = {a: b for a, b in rates.items() if a in values and b in values}
+    return Signals(name, dt, values, unit, errors, raw, noise, kept, tuple(derived), untold)
+
+
+def kind_of(name: str) -> str:
+    """Return "velocity" of "base_velocity"."""
+    return name.removeprefix("base_")
+
+
+HALVINGS = 2
+"""How often the measurement's step is halved for the prediction."""
+SILENT = 1e-3
+"""Share of an output's RMS that stands in for its noise where the measurement has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class FmuComparison:
+    """An FMU held against a measurement: one `Comparison` per output that was measured."""
+
+    fmu: str
+    data: str
+    ports: PortMap
+    outputs: tuple[Comparison, ...]
+    notes: tuple[str, ...]
+
+    def mapping_lines(self) -> list[str]:
+        """Return in words what was fed from what, and what is to know."""
+        return [f"{self.fmu} against {self.data}:", *self.ports.lines(), *self.notes]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the comparison as JSON has it."""
+        from dataclasses import asdict
+
+        return {
+            "fmu": self.fmu, "data": self.data,
+            "inputs": [asdict(one) for one in self.ports.inputs],
+            "outputs": [asdict(one) for one in self.ports.outputs],
+            "left": list(self.ports.left), "notes": list(self.notes),
+            "comparisons": [one.as_dict() for one in self.outputs],
+        }  # fmt: skip
+
+
+def compare_fmu(
+    fmu: Path | str,
+    data: Path | str,
+    *,
+    values: Mapping[str, str] | None = None,
+    maps: Mapping[str, str] | None = None,
+    channels: Mapping[str, ChannelSpec] | None = None,
+    timeout: float = 300.0,
+) -> FmuComparison:
+    """Hold an FMU, anybody's, against a measurement.
+
+    It is stepped in a process of its own at a quarter of the measurement's step, inputs between
+    samples interpolated; inputs of t_k+1 are set before the step from t_k. The numerical error is
+    what the last halving of the step has changed. Displacement and velocity are joined into one
+    smoothed motion first, for the noise of inputs would be taken for errors of the FMU; what stays
+    uncertain is carried through.
+
+    Parameters
+    ----------
+    fmu, data : path
+        An FMI 2.0 co-simulation FMU; a measurement file, or results of a run.
+    values : mapping
+        Parameters and inputs by name, in the FMU's units, as text.
+    maps : mapping
+        Inputs and outputs to channels, with sign and unit where they are needed, "-force@kN"; else
+        by name, by what the name says, by unit.
+    channels : mapping
+        Where channels are in the file, in place of the guess.
+    timeout : float
+        s, for all of the run.
+
+    Raises
+    ------
+    FmuError, RecordError, RunError
+        The first also where the unit or the sign of a port is in doubt.
+    """
+    path = Path(fmu)
+    description = read_description(path, versions=("2.0",))
+    table = read_table(data)
+    structural = any(
+        v.causality in ("input", "output") and v.name.startswith(("ground_", "base_", "floor"))
+        for v in description.variables.values()
+    )
+    pieces, notes = signals_of(table, channels or {}, "structure" if structural else "bench")
+    given = _typed(description, values or {})
+    ports = map_ports(description, pieces[0].units, maps or {}, given)
+    job, passes = _job(path, pieces, ports, given)
+    found = step_through(job, passes, timeout)
+    predictions = _predictions(pieces, ports, found, notes)
+    outputs = tuple(compare_predictions(runs, seen=None) for runs in predictions.values())
+    notes += doubts(outputs, ports, description.name)
+    if pieces[0].derived:
+        notes.append(f"{', '.join(pieces[0].derived)}: from the other channels of the motion")
+    return FmuComparison(str(fmu), str(data), ports, outputs, tuple(dict.fromkeys(notes)))
+
+
+def _job(
+    path: Path, pieces: list[Signals], ports: PortMap, given: dict[str, Value]
+) -> tuple[Job, list[dict[str, Array]]]:
+    """Return the passes per piece: at the finest step, at twice that, as measured, and the draws.
+
+    Held inputs cost accuracy in proportion to the step: at that of the measurement it would be
+    taken for an error of the FMU.
+    """
+    passes: list[dict[str, Array]] = []
+    steps: list[float] = []
+
+    def add(step: float, inputs: dict[str, Array]) -> None:
+        turned = {}
+        for port in ports.inputs:
+            factor, offset = conversion(piece.units[port.signal], port.unit)
+            turned[port.name] = port.sign * (factor * inputs[port.signal] + offset)
+        passes.append(turned or {"": next(iter(inputs.values()))})
+        steps.append(step)
+
+    for piece in pieces:
+        finer = [piece.values]
+        for level in range(HALVINGS):
+            last, dt = finer[-1], piece.dt / 2**level
+            finer.append(
+                {
+                    name: between(y, last.get(piece.rates.get(name, "")), dt)
+                    for name, y in last.items()
+                }
+            )
+        for level in (HALVINGS, HALVINGS - 1, 0):
+            add(piece.dt / 2**level, finer[level])
+        for d in range(DRAWS):
+            add(piece.dt, {name: y + piece.errors[name][d] for name, y in piece.values.items()})
+    names = tuple(port.name for port in ports.inputs)
+    outputs = tuple(port.name for port in ports.outputs)
+    return Job(str(path.resolve()), dict(given), names, outputs, tuple(steps)), passes
+
+
+def _predictions(
+    pieces: list[Signals], ports: PortMap, found: list[dict[str, Array]], notes: list[str]
+) -> dict[str, list[RunPrediction]]:
+    """Return per output the pieces held against it."""
+    per = 3 + DRAWS
+    out: dict[str, list[RunPrediction]] = {port.name: [] for port in ports.outputs}
+    for k, piece in enumerate(pieces):
+        mine = found[per * k : per * (k + 1)]
+        for port in ports.outputs:
+            si = piece.units[port.signal]
+            factor, offset = conversion(port.unit, si)
+            rows = [port.sign * (factor * one[port.name] + offset) for one in mine]
+            out[port.name].append(_one(piece, port.name, port.signal, si, rows, ports, notes))
+    return out
+
+
+def _one(
+    piece: Signals, name: str, signal: str, unit: str, rows: list[Array], ports: PortMap,
+    notes: list[str],
+) -> RunPrediction:  # fmt: skip
+    predicted, coarser = rows[0][:: 2**HALVINGS], rows[1][:: 2 ** (HALVINGS - 1)]
+    middle, draws = rows[2], np.array(rows[3:])
+    measured = piece.raw[signal] if signal in piece.raw else piece.values[signal]
+    noise = piece.noise.get(signal, 0.0)
+    floor = SILENT * rms(measured - measured.mean())
+    if noise < floor:
+        noise = floor
+        notes.append(
+            f"{signal} has almost no noise: errors are in units of {SILENT:.1%} of its RMS"
+        )
+    spread = draws - middle
+    bias = spread.mean(axis=0)
+    sigma = np.sqrt(noise**2 + spread.var(axis=0, ddof=1))
+    early = np.arange(len(measured)) < SETTLED
+    return RunPrediction(
+        piece.name, piece.dt, measured, predicted + bias, sigma, noise, spread - bias,
+        _coordinates(piece, signal, ports), predicted - coarser, name, unit, skip=SETTLED,
+        known=None if piece.measured.all() else piece.measured,
+        held=error_of(measured, predicted, {MISSING: ~piece.measured, SETTLING: early}),
+        noise_known=signal not in piece.untold,
+    )  # fmt: skip
+
+
+def _coordinates(piece: Signals, signal: str, ports: PortMap) -> dict[str, Array]:
+    """Return the coordinates of a piece: of its motion, and every input besides."""
+    get = piece.values.get
+    prefix = "" if "velocity" in piece.values else "base_"
+    force = piece.raw.get("force") if signal != "force" else piece.raw[signal]
+    drive = next((one for one in DRIVE if one in piece.values), DRIVE[0])
+    found = coordinates_of(
+        piece.dt, get(f"{prefix}displacement"), get(f"{prefix}velocity"),
+        get(f"{prefix}acceleration"),
+        get(drive), force if force is not None else piece.raw.get(signal), drive,
+    )  # fmt: skip
+    for port in ports.inputs:
+        if not is_channel(port.signal) or port.signal not in (*MOTION, *DRIVE):
+            found.setdefault(port.signal, piece.values[port.signal])
+    return found
+
+
+def _typed(description: Description, values: Mapping[str, str]) -> dict[str, Value]:
+    """Return values of `--set` as the FMU has them."""
+    out: dict[str, Value] = {}
+    for name, text in values.items():
+        variable = description.variables.get(name)
+        kind = variable.kind if variable else "String"
+        try:
+            if kind == "Real":
+                out[name] = float(text)
+                if not np.isfinite(out[name]):
+                    raise ValueError
+            elif kind in ("Integer", "Enumeration"):
+                out[name] = int(text)
+            elif kind == "Boolean":
+                out[name] = {"true": True, "false": False, "1": True, "0": False}[text.lower()]
+            else:
+                # The FMU runs in a folder of its own, where a relative path would lead to nothing.
+                file = Path(text)
+                out[name] = str(file.resolve()) if file.suffix and file.is_file() else text
+        except (ValueError, KeyError):
+            raise FmuError(
+                f"--set {name}={text}: {name} is {kind} in {description.name}."
+            ) from None
+    return out

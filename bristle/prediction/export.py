@@ -1,0 +1,302 @@
+"""A study's present model as an FMU with its values baked in, and a scenario that uses it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+from shutil import copyfile
+from typing import NamedTuple
+
+import numpy as np
+
+from ..data.checks.motion import ACROSS, with_motion_across
+from ..data.measurement import Measurement
+from ..errors import RecordError, StudyError
+from ..fmu.build import Plan, build, plan
+from ..fmu.catalogue import component_of_law
+from ..identification.problem import following
+from ..identification.rig import DAMPER
+from ..model.model import StudyModel
+from ..physics.building import GROUND
+from ..physics.drive import VOLTAGE, Drive, drive_named
+from ..physics.effect import EFFECTS
+from ..study.identify import as_model
+from ..study.rig import building_of, rig_of
+from ..study.runs import Runs
+from ..study.study import Study
+from ..system.from_model import Parameters, source_of, values_of
+from ..system.toml import DamperText, part_text
+from ..user_code.load import own_effects
+from . import model_system
+from .held_out import FOLDER, HeldOut, Proof, held_out, prove, step_for, write_inputs, write_proof
+from .model_system import House, Shaking, loads, shaking_of, write_scenario
+
+Build = Callable[[Plan, Path], Path]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: the FMU, the scenario, the files it reads; what was left out, and why.
+
+    `proof` is what the FMU gives on the held-out runs, whose inputs are among the files; None where
+    the study has no damper that a force is known of.
+    """
+
+    fmu: Path
+    scenario: Path
+    files: tuple[Path, ...]
+    run: str
+    notes: tuple[str, ...] = ()
+    proof: Proof | None = None
+
+
+class Editable(NamedTuple):
+    """A scenario whose damper has its values in the file, and what was left out.
+
+    `run` is the run that it plays, `numbers` the parameters that the model gives its damper, and
+    `force` tells whether the signal `measured` holds the measured force.
+    """
+
+    scenario: Path
+    run: str
+    numbers: tuple[str, ...]
+    force: bool
+    notes: tuple[str, ...]
+
+
+def export_study(study: Study, out: Path | None = None, build: Build = build) -> Exported:
+    """Write a study's present model as an FMU and a scenario into a folder.
+
+    Parameters
+    ----------
+    study : the folder, opened, with a model
+    out : the folder, made if it is not there; None takes export/ in the study
+    build : what builds a planned FMU into a folder and returns its path
+
+    Raises
+    ------
+    StudyError
+        If the model cannot be read, or the folder cannot be written.
+    BuildError, RecordError
+        If the FMU cannot be built, or no run can be read.
+    """
+    model = study.model()
+    runs = study.runs()
+    measurement = _one_run(study, runs)
+    folder = study.folder / "export" if out is None else out
+    notes: list[str] = []
+    held = _held_out(study, model, runs, notes)
+    step = step_for(held) if held else None
+    with _writing(folder):
+        fmu = build(_damper(study, model, runs, notes, step), folder)
+
+        def damper(parameters: Parameters) -> str:
+            return part_text("damper", {"fmu": fmu.name}, parameters)
+
+        drive = drive_named(measurement.drive)
+        scenario, files = _scenario(study, model, measurement, drive, folder, damper, notes)
+        proof = None
+        if held and step:
+            files += write_inputs(held, step, folder / FOLDER)
+            proof = prove(held, fmu, step)
+            files += write_proof(proof, held, fmu, folder / FOLDER)
+    return Exported(fmu, scenario, tuple(files), measurement.name, tuple(notes), proof)
+
+
+def _held_out(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> HeldOut | None:
+    """Return what the damper is held against; None, and a note, where the runs do not tell it."""
+    try:
+        rig = rig_of(study, model, runs)
+        there = DAMPER in rig.sites(as_model(model))
+    except RecordError as error:
+        notes.append(f"the FMU was not held against the runs: {error}")
+        return None
+    if not there:
+        notes.append("the FMU was not held against the runs: they do not tell the damper's force.")
+        return None
+    bare = model.at("damper", bench=not study.settings.has_building)
+    known = [_with_stroke(study, model, one) for one in runs.holdout or runs.train]
+    return held_out(bare, model, rig, known)
+
+
+def write_editable(study: Study, folder: Path) -> Editable:
+    """Write the scenario of `export_study` with the model's values in it, in place of an FMU.
+
+    Its damper is a built-in component, so every number of the model can be changed in the scenario.
+    A current or a field drives it as a voltage of the same number: the law is the same.
+
+    Parameters
+    ----------
+    study : the folder, opened, with a model
+    folder : where to write, made if it is not there
+
+    Raises
+    ------
+    StudyError, RecordError
+        If the model or the run cannot be read, or the folder cannot be written.
+    """
+    model = study.model()
+    runs = study.runs()
+    measurement = _one_run(study, runs)
+    notes: list[str] = []
+    own = _bare(study, model, notes)
+    values = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
+    found = _range(study, model, runs, notes)
+    limit = drive_named(measurement.drive).limit
+    values |= {VOLTAGE.limit if name == limit else name: value for name, value in found.items()}
+
+    def damper(parameters: Parameters) -> str:
+        return part_text("damper", source_of(own), {**values, **parameters})
+
+    with _writing(folder):
+        scenario, _ = _scenario(study, model, measurement, VOLTAGE, folder, damper, notes)
+    numbers = tuple(name for name in values if name in own.values())
+    return Editable(scenario, measurement.name, numbers, measurement.has("force"), tuple(notes))
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Make a folder; say which file of it cannot be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise StudyError(
+            f"{error.filename or folder}: cannot be written ({error.strerror or error})."
+        ) from None
+
+
+def _scenario(
+    study: Study, model: StudyModel, measurement: Measurement, drive: Drive, folder: Path,
+    damper: DamperText, notes: list[str],
+) -> tuple[Path, list[Path]]:  # fmt: skip
+    """Write the scenario of a study's damper, on the bench or in its building, and its files."""
+    if not study.settings.has_building:
+        return model_system.write_bench_scenario(
+            folder, study.name, model, measurement, drive, damper
+        )
+    shaking = replace(shaking_of(measurement), drive=drive)
+    return _structure(study, model, shaking, folder, damper, notes)
+
+
+def _one_run(study: Study, runs: Runs) -> Measurement:
+    """Return the run that the scenario plays: the first that is held out.
+
+    On a bench it is the first whose command reaches half of the largest: without one, a scenario
+    shows nothing of what the damper is for.
+    """
+    able = runs.holdout or runs.train
+    if study.settings.has_building or not able[0].drive:
+        return able[0]
+    tops = [float(np.max(np.abs(one[one.drive]))) if one.drive else 0.0 for one in able]
+    return next(one for one, top in zip(able, tops, strict=True) if 2.0 * top >= max(tops))
+
+
+def _bare(study: Study, model: StudyModel, notes: list[str]) -> StudyModel:
+    """Return the damper's own law and effects; note what is an instrument's."""
+    bench = not study.settings.has_building
+    sensors = model.at("sensor", bench).effects
+    if sensors:
+        notes.append(
+            f"{', '.join(sensors)} left out: an instrument's effect is not in the damper. The "
+            "scenario's force is the one before the instrument."
+        )
+    return model.at("damper", bench)
+
+
+def _signals(damper: StudyModel) -> Collection[str]:
+    """Return the parameters that follow a measured channel: they are inputs of the damper."""
+    return following(damper.effects)
+
+
+def _damper(
+    study: Study, model: StudyModel, runs: Runs, notes: list[str], step: float | None
+) -> Plan:
+    """Plan the damper with the model's values as its defaults."""
+    own = _bare(study, model, notes)
+    starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
+    starts |= _range(study, model, runs, notes)
+    files = own_effects()
+    return plan(
+        component_of_law(own.base_law),
+        name=_model_name(study.name),
+        starts=starts,
+        effects=[files[name] for name in own.effects if EFFECTS[name].own],
+        drive=drive_named(runs.all[0].drive).name,
+        step=step,
+    )
+
+
+def _with_stroke(study: Study, model: StudyModel, measurement: Measurement) -> Measurement:
+    """Return a run with the displacement across the damper, where it is a building's device."""
+    building = building_of(study, model)
+    if building is None or not building.studied:
+        return measurement
+    levels = building.levels()
+    lower, upper = (
+        "" if i == GROUND else levels[i] for i in building.device(building.studied).levels
+    )
+    seen = with_motion_across(measurement, lower, upper)
+    channels = {n: v for n, v in seen.channels.items() if not n.endswith("_displacement")}
+    stroke = seen.channels.get(f"{ACROSS}_displacement")
+    return replace(
+        seen, channels=channels if stroke is None else {**channels, "displacement": stroke}
+    )
+
+
+def _range(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> dict[str, float]:
+    """Return the command's limit and stroke [m] that hold what was measured in all runs.
+
+    Where the defaults do they are left out. The run that is played alone does not tell: another
+    one, to which the model was fitted, may go further.
+    """
+    found = {}
+    drive = drive_named(runs.all[0].drive)  # that of all runs
+    if not runs.all[0].drive:
+        notes.append("neither voltage nor current was measured: the scenario holds 0 V.")
+    tops = [float(one[drive.name].max()) for one in runs.all if one.has(drive.name)]
+    if max(tops, default=0.0) > drive.largest:
+        found[drive.limit] = float(ceil(1.05 * max(tops)))
+    moved = [
+        float(np.abs(one[channel]).max())
+        for one in (_with_stroke(study, model, run) for run in runs.all)
+        for channel in ("displacement", "base_displacement") if one.has(channel)
+    ]  # fmt: skip
+    if max(moved, default=0.0) > 0.02:
+        found["stroke"] = float(f"{1.05 * max(moved):.3g}")
+    return found
+
+
+def _model_name(name: str) -> str:
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return f"{plain if plain[:1].isalpha() else 'study_' + plain}_damper"
+
+
+def _structure(
+    study: Study, model: StudyModel, shaking: Shaking, folder: Path, damper: DamperText,
+    notes: list[str],
+) -> tuple[Path, list[Path]]:  # fmt: skip
+    """Write the scenario of the study's building with the damper, under a run's ground motion."""
+    file = study.folder / model.building if model.building else None
+    building = building_of(study, model)
+    assert building is not None  # `_scenario` asked
+    house = House(building, file)
+    own = loads(model, house.building)
+    notes += own.notes
+    if channels := dict.fromkeys(following(model.effects).values()):
+        notes.append(
+            f"{', '.join(channels)}: the damper's input keeps its mean in the scenario, for a "
+            "building under a ground motion does not give it. Connect it to a signal."
+        )
+    head = (
+        f"{study.name}: the building with the model's damper, ground of {shaking.name}",
+        "# The model's damper in the study's building.",
+    )
+    copied = [Path(copyfile(one, folder / one.name)) for one in own.effects]
+    own = own._replace(effects=tuple(Path(one.name) for one in copied))
+    scenario, files = write_scenario(folder, head, house, shaking, own, damper)
+    return scenario, [*files, *copied]

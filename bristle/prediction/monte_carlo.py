@@ -1,0 +1,423 @@
+"""Bands of a prediction, by draws of model, noise and effects that are not excluded."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from ..core.progress import tell
+from ..engine.coupled import simulate
+from ..errors import PhysicsError, RunError, ScenarioError
+from ..identification.problem import values_of_labels
+from ..model.draws import OpenEffect, drawn_models, in_short, reach, simulated_whole
+from ..model.model import StudyModel
+from ..physics.drive import VOLTAGE
+from ..physics.forms import shown_law
+from ..system.from_model import Parameters, source_of, values_of
+from ..system.scenario import Scenario, load_scenario
+from ..system.toml import part_text
+from .closed_loop_result import KINDS, MISSED, PARAMETERS, Predicted
+from .excitation import Trial
+from .model_system import House, Shaking, loads, studied_ports, write_scenario, write_signals
+
+# A model's damper in a building, simulated as it is and with draws of what is uncertain.
+
+Array = NDArray[np.float64]
+Columns = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """A model's damper in a building, under one ground motion.
+
+    Parameters
+    ----------
+    model : StudyModel
+        The law with the effects of all sites.
+    house : House
+    bench : bool
+        Whether the model was identified on a bench.
+    shaking : Shaking
+        A built-in damper calls its command a voltage, whatever it is: its numbers are the same.
+    folder : Path
+        An empty folder for the scenario's files.
+    """
+
+    model: StudyModel
+    house: House
+    bench: bool
+    shaking: Shaking
+    folder: Path
+
+    def scenario(self) -> Scenario:
+        """Write the scenario of the model as it is; return it."""
+        own = loads(self.model, self.house.building, self.bench)
+        title = f"{shown_law(self.model.law)} in {self.house.building.name}"
+        quiet = replace(self.shaking, force=None, drive=VOLTAGE)
+        file, _ = write_scenario(
+            self.folder, (title, "# The model's damper in the building."), self.house, quiet,
+            own, self._damper,
+        )  # fmt: skip
+        return load_scenario(file)
+
+    def response(self, scenario: Scenario) -> dict[str, Array]:
+        """Return every output (n,) at the samples of the ground motion, in SI."""
+        columns = simulate(scenario)
+        return {name: values[:: self.shaking.fine] for name, values in columns.items()}
+
+    def with_errors(
+        self, scenario: Scenario, models: list[StudyModel], noise: tuple[float, float],
+        generator: np.random.Generator,
+    ) -> Iterator[dict[str, Array] | None]:  # fmt: skip
+        """Yield the responses of other values, with noise on ground and command.
+
+        Parameters
+        ----------
+        scenario : what `scenario` has returned
+        models : the model with other values
+        noise : standard deviations of the ground's acceleration [m/s2] and the command
+        generator : draws the noise
+
+        Yields
+        ------
+        dict or None
+            As `response`; None where the run failed.
+        """
+        shaking, count = self.shaking, len(self.shaking.time)
+        for model in models:
+            ground = shaking.ground + noise[0] * generator.standard_normal(count)
+            command = shaking.command
+            if command is not None:
+                command = command + noise[1] * generator.standard_normal()
+            write_signals(
+                self.folder, replace(shaking, ground=ground, command=command, drive=VOLTAGE)
+            )
+            try:
+                yield self.response(self._with_values(scenario, model))
+            except RunError:
+                yield None
+        write_signals(self.folder, replace(shaking, drive=VOLTAGE))
+
+    def without_noise(
+        self, scenario: Scenario, models: list[StudyModel]
+    ) -> Iterator[dict[str, Array] | RunError]:
+        """Yield the responses of other values under the ground motion as it is, or why not.
+
+        Parameters
+        ----------
+        scenario : what `scenario` has returned
+        models : the model with other values
+        """
+        for model in models:
+            try:
+                yield self.response(self._with_values(scenario, model))
+            except RunError as error:
+                yield error
+
+    def _with_values(self, scenario: Scenario, model: StudyModel) -> Scenario:
+        own = loads(model, self.house.building, self.bench)
+        # A mass that is drawn as zero is in no load, and must not stay what it is in the scenario.
+        structure = {"attached_mass": 0.0, **own.structure}
+        given = {
+            "structure": structure,
+            "damper": {**values_of(model.at("damper", self.bench)), **own.damper},
+        }
+        parts = [
+            replace(one, parameters={**one.parameters, **given.get(one.name, {})})
+            for one in scenario.components
+        ]
+        return replace(scenario, components=tuple(parts))
+
+    def _damper(self, moving: Parameters) -> str:
+        """Return the text of the damper."""
+        most = float(
+            np.max(self.shaking.level if self.shaking.command is None else self.shaking.command)
+        )
+        limit = {VOLTAGE.limit: float(ceil(1.05 * most))} if most > VOLTAGE.largest else {}
+        damper = self.model.at("damper", self.bench)
+        return part_text("damper", source_of(damper), {**values_of(damper), **limit, **moving})
+
+
+# Peak and RMS of the responses of a run that was simulated, as sensors would show them.
+
+Key = tuple[str, str]  # a response, and "peak" or "rms"
+
+
+def names_of(columns: Columns, trial: Trial) -> dict[str, str]:
+    """Return the responses and the outputs that give them: those measured, else all but speeds."""
+    given = {name.removeprefix("structure."): name for name in columns if _shown(name)}
+    given["force"] = "damper.force"
+    if not trial.measured:
+        return given
+    every = given | {
+        name.removeprefix("structure."): name
+        for name in columns
+        if name.startswith("structure.") and name.endswith("_velocity")
+    }
+    return {name: every[name] for name in trial.measured if name in every}
+
+
+def _shown(name: str) -> bool:
+    of_structure = name.startswith("structure.")
+    what = ("_displacement", "_acceleration_absolute")
+    return of_structure and (name.endswith(what) or name.startswith("structure.drift"))
+
+
+def sizes_of(
+    columns: Columns,
+    names: dict[str, str],
+    trial: Trial,
+    generator: np.random.Generator,
+    count: int,
+) -> dict[Key, list[float]]:
+    """Return peak and RMS by response as sensors would show them, for `count` draws of noise.
+
+    Noise adds to a peak: a model without it would seem to be too small.
+
+    Parameters
+    ----------
+    columns : every output (n,) of the simulation, in SI
+    names : the responses, and the outputs that give them
+    trial : the run, with the noise of its sensors and the samples that count
+    generator : draws the noise
+    count : how many draws; 0 for none, and no noise
+    """
+    found: dict[Key, list[float]] = {}
+    for name, port in names.items():
+        values = columns[port][trial.window]
+        noise = trial.measured.get(name, (None, 0.0))[1] if count else 0.0
+        for _ in range(count if noise > 0.0 else 1):
+            shown = values + noise * generator.standard_normal(len(values)) if noise else values
+            for kind in KINDS:
+                found.setdefault((name, kind), []).append(size_of(shown, kind))
+    return found
+
+
+def size_of(values: Array, kind: str) -> float:
+    """Return the peak or the RMS of a response (n,)."""
+    if kind == "peak":
+        return float(np.max(np.abs(values)))
+    return float(np.sqrt(np.mean(values**2)))
+
+
+# What effects that the runs do not exclude would change of a building's responses.
+#
+# One effect at a time joins draws of the model, so that its part of a band is known.
+
+Left = dict[str, dict[Key, Array]]
+"""By effect and figure, the changes (n,) by draws of its size."""
+
+SIZES = 6
+"""Sizes of an effect that are drawn, each in a draw of the model's parameters."""
+
+
+def changes_left_open(
+    model: StudyModel,
+    place: tuple[House, bool],
+    trial: Trial,
+    effects: Sequence[OpenEffect],
+    number: int,
+) -> tuple[Left, dict[str, str]]:
+    """Return what effects would change of peaks and RMS, by their labels.
+
+    An effect with which the building cannot be simulated at one of its sizes has no changes: why
+    comes second.
+
+    Parameters
+    ----------
+    model : the law with the effects of all sites, whose parameters are drawn
+    place : the building, and whether the model was identified on a bench
+    trial : the run
+    effects : that the model's runs do not exclude
+    number : of the run, which tells its draws from those of others
+    """
+    models = drawn_models(model, SIZES, np.random.default_rng([9, number]))
+    without = _figures(model, models, place, trial)
+    tried: dict[str, list[dict[Key, float] | str]] = {}
+    for k, effect in enumerate(effects, 1):
+        tell(
+            f"simulating {trial.shaking.name} with what its limits leave open: {effect.label} "
+            f"({k} of {len(effects)})"
+        )
+        joined = [
+            effect.joined(one, part) for one, part in zip(models, effect.parts(SIZES), strict=True)
+        ]
+        tried[effect.label] = [
+            other if isinstance(other, str) else {key: other[key] - plain[key] for key in plain}
+            for plain, other in zip(without, _tried(joined, place, trial), strict=True)
+            if not isinstance(plain, str)
+        ]
+    whole, lost = simulated_whole(tried)
+    return {
+        label: {key: np.array([one[key] for one in draws]) for key in draws[0]}
+        for label, draws in whole.items()
+    }, lost
+
+
+def _tried(
+    models: list[StudyModel], place: tuple[House, bool], trial: Trial
+) -> list[dict[Key, float] | str]:
+    """Return the figures of models, or why they cannot be simulated."""
+    try:
+        return _figures(models[-1], models, place, trial)
+    except (PhysicsError, RunError, ScenarioError) as error:
+        return [in_short(error)] * len(models)
+
+
+def _figures(
+    model: StudyModel, models: list[StudyModel], place: tuple[House, bool], trial: Trial
+) -> list[dict[Key, float] | str]:
+    """Return peaks and RMS of models without noise, or why not, under a run's ground motion.
+
+    Parameters
+    ----------
+    model : one that has the effects of the others
+    models : with other values
+    place, trial : as in `changes_left_open`
+    """
+    house, bench = place
+    quiet = np.random.default_rng(0)  # it draws nothing
+    with tempfile.TemporaryDirectory() as folder:
+        simulator = Simulator(model, house, bench, trial.shaking, Path(folder))
+        scenario = simulator.scenario()
+        found: list[dict[Key, float] | str] = []
+        for columns in simulator.without_noise(scenario, models):
+            if isinstance(columns, RunError):
+                found.append(in_short(columns))
+                continue
+            sizes = sizes_of(columns, names_of(columns, trial), trial, quiet, 0)
+            found.append({key: values[0] for key, values in sizes.items()})
+        return found
+
+
+DRAWS = 20
+"""Draws of the parameters for a band; with more of them it gets a little narrower."""
+FEWEST = 5
+"""Draws that a band needs at least."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Peak and RMS by response, of the model as it is and of draws (draws,) of its errors.
+
+    `missed` is the share of the force that the model misses beyond noise: it is taken to miss as
+    much of a response. `left` are the changes by effects that the runs do not exclude, `lost` says
+    of others of them why they cannot be simulated.
+    """
+
+    best: dict[Key, float]
+    drawn: dict[Key, Array]
+    stroke: float
+    failed: int
+    missed: float = 0.0
+    left: Left = field(default_factory=dict)
+    lost: dict[str, str] = field(default_factory=dict)
+
+    def band(self, key: Key) -> tuple[float, float] | None:
+        """Return the 95 % band of what would be measured, None with too few draws."""
+        if len(self.drawn.get(key, ())) < FEWEST:
+            return None
+        centre = float(np.mean(self.drawn[key]))
+        below, above = (
+            float(np.sqrt(sum(ends[side] ** 2 for ends in self._ends(key).values())))
+            for side in (0, 1)
+        )
+        return max(0.0, centre - below), centre + above
+
+    def parts(self, key: Key) -> dict[str, float]:
+        """Return which share of a band's variance is from what, the largest first; none without."""
+        if len(self.drawn.get(key, ())) < FEWEST:
+            return {}
+        power = {name: below**2 + above**2 for name, (below, above) in self._ends(key).items()}
+        whole = sum(power.values())
+        order = sorted((name for name in power if power[name] > 0.0), key=lambda n: -power[n])
+        return {name: power[name] / whole for name in order}
+
+    def _ends(self, key: Key) -> dict[str, tuple[float, float]]:
+        """Return by cause how far the band reaches below and above its centre."""
+        values = self.drawn[key]
+        count, centre = len(values), float(np.mean(values))
+        wide = float(student.ppf(0.975, count - 1) * np.std(values, ddof=1))
+        wide *= float(np.sqrt(1.0 + 1.0 / count))
+        misses = 1.96 * self.missed * centre
+        ends = {PARAMETERS: (wide, wide), MISSED: (misses, misses)}
+        return ends | {name: reach(changes[key]) for name, changes in self.left.items()}
+
+    def rows(self, trial: Trial, then: Figures | None) -> list[Predicted]:
+        """Return a row per response and kind of figure."""
+        out = []
+        for (name, kind), best in self.best.items():
+            measured = trial.measured.get(name)
+            value = None
+            if measured is not None:
+                value = size_of(measured[0][trial.window], kind)
+            bands = self.band((name, kind)), None if then is None else then.band((name, kind))
+            before = None if then is None else then.best[name, kind]
+            run = trial.shaking.name
+            parts = self.parts((name, kind)) if self.left else {}
+            out.append(Predicted(run, name, kind, value, best, bands[0], before, bands[1], parts))
+        return out
+
+
+def figures_of(
+    model: StudyModel,
+    place: tuple[House, bool],
+    trial: Trial,
+    draws: int,
+    number: int,
+    missed: float = 0.0,
+    effects: Sequence[OpenEffect] = (),
+) -> Figures:
+    """Simulate a run with a model, and with draws of the errors of model and channels.
+
+    Parameters
+    ----------
+    model : the law with the effects of all sites
+    place : the building, and whether the model was identified on a bench
+    trial : the run
+    draws : how many draws make a band; 0 for none
+    number : of the run, which tells its draws from those of others
+    missed : share of the force that the model misses beyond noise
+    effects : that the model's runs do not exclude, for a band that has them, too
+
+    Raises
+    ------
+    ScenarioError, RunError
+        If the model as it is cannot be simulated.
+    """
+    house, bench = place
+    model = model.with_values(values_of_labels(model.effects, trial.labels), origin="measured")
+    generator = np.random.default_rng([7, number])
+    with tempfile.TemporaryDirectory() as folder:
+        simulator = Simulator(model, house, bench, trial.shaking, Path(folder))
+        scenario = simulator.scenario()
+        columns = simulator.response(scenario)
+        names = names_of(columns, trial)
+        sensors = np.random.default_rng([8, number])  # the same for the models before and after
+        best = {
+            key: float(np.mean(values))
+            for key, values in sizes_of(columns, names, trial, sensors, DRAWS).items()
+        }
+        collected: dict[Key, list[float]] = {key: [] for key in best}
+        failed = 0
+        models = drawn_models(model, draws, generator) if draws else []
+        for one in simulator.with_errors(scenario, models, trial.noise, generator):
+            if one is None:
+                failed += 1
+                continue
+            for key, values in sizes_of(one, names, trial, generator, 1).items():
+                collected[key] += values
+    changes, lost = (
+        ({}, {}) if not effects else changes_left_open(model, place, trial, effects, number)
+    )
+    across = studied_ports(house.building).displacement
+    stroke = float(np.max(np.abs(columns[f"structure.{across}"])))
+    drawn = {key: np.array(values) for key, values in collected.items()}
+    return Figures(best, drawn, stroke, failed, missed, changes, lost)

@@ -1,1 +1,0 @@
-"""Scenarios as data: files read, and checked before a step."""

@@ -1,0 +1,522 @@
+"""Identify the model of a study: fit it to the training runs, judge it on those held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+from ..core.progress import tell
+from ..core.text import plain, unknown
+from ..data.cut_off import saturated_share
+from ..data.measurement import Measurement
+from ..errors import StudyError
+from ..identification.error import ForceError
+from ..identification.error_table import LawError, error_table
+from ..identification.fit import Fit
+from ..identification.histories import compile_ahead
+from ..identification.problem import Model, robust_z
+from ..identification.rig import DAMPER, Rig
+from ..identification.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
+from ..identification.run_start import under_load_text
+from ..model.model import StudyModel, new_model
+from ..physics.effect import AT, EFFECTS, exclude, laws_joined
+from ..physics.forms import shown_law
+from ..physics.laws import LAWS, base_and_variant, law_names
+from ..units import convert
+from ..user_code.load import waiting, why_left_out
+from .changes import behind_data
+from .forms import (
+    FormError,
+    all_laws,
+    form_of,
+    forms_asked,
+    in_form,
+    left_out_notes,
+    refuse_in_building,
+)
+from .identified import Identified, is_identified
+from .rig import rig_of
+from .runs import Runs
+from .study import Study
+from .study_file import ALL
+
+# What there is to say of a fit: doubts about its runs, and how far its numbers can be trusted.
+
+_MISFIT = 1.15  # z above which an error is more than noise
+_LESS = 0.95  # share of the model's error below which what least squares leave is told
+_SATURATED = 0.95  # share of samples at the extremes of a force above which it tells nothing else
+
+
+def doubts(runs: list[Measurement]) -> list[str]:
+    """Refuse a force that is nothing but its ends; return what weakens an identification.
+
+    Raises
+    ------
+    StudyError
+        If nearly all samples of a force are at its extremes.
+    """
+    notes = []
+    for run in runs:
+        share = saturated_share(run["force"])
+        if share > _SATURATED:
+            raise StudyError(
+                f"{run.name}: {share:.0%} of the force's samples are at its extremes: the load "
+                "cell or its amplifier is saturated, or this is a friction without noise that "
+                "nothing changes, and no law is told by it. Measure with a wider range or with "
+                "other motions, or leave the run out in study.toml."
+            )
+        if share > 0.0:
+            notes.append(f"{run.name}: {share:.1%} of the force's samples are at its extremes.")
+    doubtful: dict[str, int] = {}
+    for run in runs:
+        for channel, fact in run.noise_facts.items():
+            if fact is not None and fact.colour in ("slow", "hidden", "rough", "blue"):
+                doubtful[channel] = doubtful.get(channel, 0) + 1
+    if doubtful:
+        where = ", ".join(f"{c} ({n} of {len(runs)} runs)" for c, n in doubtful.items())
+        notes.append(
+            f"The noise is hard to separate from the signal: {where}. Give it in study.toml: z and "
+            "intervals depend on it."
+        )
+    return notes
+
+
+def under_load(at: SiteModel) -> list[str]:
+    """Return the sentence that tells which runs begin under a load that the model carries."""
+    problems = (at.site.train, at.site.holdout)
+    loads = {
+        run.name: float(np.mean(run.force[: run.rest]))
+        for problem in problems
+        if problem is not None
+        for run in problem.runs
+        if problem.carrying(at.model, run)
+    }
+    return [under_load_text(loads)] if loads else []
+
+
+def by_site(models: SiteModels) -> list[str]:
+    """Return the sentence that tells z by site.
+
+    None where the one site goes without saying, or no run is held out.
+    """
+    problems = {at.site.shown: at.site.holdout for at in models.values()}
+    if "" in problems:
+        return []
+    z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
+    if not z:
+        return []
+    text = ", ".join(f"{site} {plain(z[site])}" for site in sorted(z, key=lambda site: -z[site]))
+    return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
+
+
+def weighing(rows: list[LawError], model: StudyModel, own: ForceError, z: float) -> list[str]:
+    """Return what a model that errs by more than noise does to intervals and to the fit.
+
+    Parameters
+    ----------
+    rows : the table of laws at a site
+    model : the study's model
+    own : its error at that site on the training runs
+    z : of the whole rig there
+    """
+    if z <= _MISFIT:
+        return []
+    lead = "The error exceeds the noise"
+    if z != z:
+        lead = "The noise of the force is not known, so that there is no z"
+    notes = [
+        f"{lead}. The intervals come from the error itself: they describe "
+        "the best values of this model, not the constants of a damper."
+    ]
+    same = [row for row in rows if row.law == model.law and not model.effects]
+    if same and same[0].error_train.rms < _LESS * own.rms:
+        notes.append(
+            f"The fit weighs each sample by its noise and by what the model misses, and counts "
+            f"outliers less. Least squares of the force alone, as in the table, would leave "
+            f"{same[0].error_train.text()} on the training runs instead of {own.text()}."
+        )
+    return notes
+
+
+def why(found: Identified) -> str:
+    """Return what a step of the history says of an identification."""
+    runs, held_out = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
+    lost = ", ".join(found.unidentified)
+    return (
+        f"fit to {runs} training run{'s' * (runs != 1)}, tested on {held_out} held out; "
+        f"{found.fit.agreed} of {found.fit.starts} starts agree"
+        + (f"; the data do not identify {lost}" if lost else "")
+    )
+
+
+# Which effects may join a study's model.
+
+
+def as_named_here(name: str, bench: bool) -> str:
+    """Return the name that a study's model gives an effect: its site is told where it must be.
+
+    NAME@SITE is an effect at another site than the one that its plain name means.
+    """
+    own, at, site = name.partition(AT)
+    if not at or own not in EFFECTS or site not in EFFECTS[own].sites:
+        return name
+    if not bench:
+        return EFFECTS[own].key(site)
+    if site == "structure":
+        raise StudyError(f"{name}: a test bench has no structure; {own} is that of the damper.")
+    return own
+
+
+def refuse_left_out(file: Path) -> None:
+    """Refuse an effect or law of a user's own that was left out when its file was read.
+
+    Raises
+    ------
+    TrustError
+        If its code must not run yet.
+    StudyError
+        Saying what is wrong with the file, and where.
+    """
+    if untrusted := waiting(file):
+        raise untrusted
+    if why := why_left_out(file):
+        raise StudyError(why)
+
+
+def refuse_effect(model: StudyModel, name: str, bench: bool) -> None:
+    """Refuse an effect that is not known, is in a model already, or cannot join it.
+
+    Parameters
+    ----------
+    model : what it is to join
+    name : as the model would name it
+    bench : whether the model is of a damper on a bench
+
+    Raises
+    ------
+    StudyError
+        Saying which of these it is, and what would be right.
+    """
+    if name not in EFFECTS:
+        raise StudyError(unknown("effect", name, sorted(EFFECTS)))
+    effect = EFFECTS[name]
+    if name in model.effects:
+        raise StudyError(f"{name} is in the model already.")
+    if bench and effect.sites == ("structure",):
+        raise StudyError(f"{name} acts in a structure, and on a test bench there is none.")
+    at_damper = "damper" in effect.sites if bench else effect.site == "damper"
+    if at_damper and not effect.joins(LAWS[model.base_law]):
+        raise StudyError(
+            f"{name} cannot join the law {model.law}; it joins {', '.join(laws_joined(effect))}."
+        )
+    for other in model.effects:
+        if exclude(name, other):
+            raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
+
+
+# Longer than 300 lines: what a study's model is to a fit, and a fit to it, stand beside the fit.
+
+
+Show = Callable[[int], None]
+
+STAGES = 4
+"""How many stages `identify_study` reports to `show`."""
+
+_TABLE_STARTS = 3
+_LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
+
+
+def identify_study(
+    study: Study,
+    *,
+    law: str | None = None,
+    command: str | Sequence[str] | None = None,
+    model: StudyModel | None = None,
+    cutoff: float | None = None,
+    starts: int = 4,
+    table: bool = True,
+    write: bool = True,
+    show: Show | None = None,
+) -> Identified:
+    """Identify the present model of a study on its training runs, its effects included.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    law : another law to take than the model's; its effects stay where they can join it. With
+        "all" the model keeps its law, and `laws` of the result tells how every law does
+    command : the form in which the command enters, one of `physics.forms.FORMS`; several, or
+        "all", are compared, and the model keeps its own if it is among them, else the first
+    model : a model to take in place of the present one
+    cutoff : Hz, of the low-pass for the table of errors; None takes the study's
+    starts : how many starting points are tried
+    table : whether to compare the laws as the paper does
+    write : whether to make the result the present model, as a step of the history
+    show : is told how many of `STAGES` are done
+
+    Raises
+    ------
+    StudyError
+        If the law is not known, the data cannot carry an identification, the study cannot be
+        written, or all laws are asked for in a building.
+    RecordError
+        If a file cannot be read, or a channel that is needed is missing.
+    """
+    if starts < 1:
+        raise StudyError(f"starts = {starts}; 1 or more is right.")
+    if cutoff is not None and not 0.0 <= cutoff < inf:
+        raise StudyError(f"cut-off {cutoff:g} Hz; 0 for none, or a positive number is right.")
+    refuse_in_building(law, study.settings.has_building)
+    all_of_them, law = law == ALL, None if law == ALL else law
+    if law is not None:
+        refuse_left_out(study.laws_folder / f"{law}.py")
+    present = study.model()
+    model = _of_law(model or present, law)
+    compile_ahead(model.law, model.effects)
+    cutoff = study.settings.cut_off if cutoff is None else cutoff
+    task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
+    # Before is what the study had: at its defaults another law would be nobody's model.
+    other = present.law != model.law
+    task = replace(task, laws=all_of_them, present=present if other else None)
+    found = identify_model(study, model, task)
+    if not write:
+        return found
+    step = study.add_step(
+        f"identify {shown_law(found.model.law)}" + "".join(f" + {e}" for e in found.model.effects),
+        why(found), found.model, *found.for_history(),
+    )  # fmt: skip
+    return replace(found, step=step)
+
+
+def _show_nothing(done: int) -> None:
+    """Tell nobody how many stages are done."""
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """How a model is to be identified.
+
+    `cutoff` [Hz] of the low-pass for the table of errors; `starts` how many starting points are
+    tried; `table` whether to compare the laws; `present` the model whose errors are those before,
+    None for the one that is identified; `command` the form or forms of the command, None for the
+    model's; `laws` whether every law is tried as well; `begin` values in SI by name from which one
+    more fit begins, the better one counts; `show` is told how many of `STAGES` are done.
+    """
+
+    cutoff: float
+    starts: int = 4
+    table: bool = True
+    present: StudyModel | None = None
+    begin: Mapping[str, float] = field(default_factory=dict)
+    command: str | Sequence[str] | None = None
+    show: Show = _show_nothing
+    laws: bool = False
+
+
+def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified:
+    """Identify a model on a study's training runs; the study stays as it is.
+
+    Raises
+    ------
+    StudyError, RecordError
+        As `identify_study`.
+    """
+    left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
+    model = _with_choices(model, task.begin)
+    runs, old = study.runs(), behind_data(study)
+    # What the present model does not know of the data, this fit does.
+    runs = replace(runs, notes=tuple(note for note in runs.notes if note != old))
+    model = _with_labels(model, runs.train)
+    found = identify_on_rig(rig_of(study, model, runs), runs, model, task)
+    return replace(found, notes=(*found.notes, *left_out))
+
+
+def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    """Identify a model on a rig, in the form of the command that the task asks for.
+
+    Parameters
+    ----------
+    rig : its sites with their runs
+    runs : the measurements that the rig was made of, with what weakens their split
+    model : where the fit begins
+    task : how it is to be identified
+
+    Raises
+    ------
+    StudyError, RecordError
+        As `identify_study`.
+    """
+    if task.laws:
+        return _with_all_laws(rig, runs, model, task)
+    if task.command is None:
+        return _in_own_form(rig, runs, model, task)
+    forms = forms_asked(task.command)
+    own = form_of(model) if form_of(model) in forms else forms[0]
+    models = {form: in_form(model, form, runs.train) for form in forms}
+    present = task.present or model
+    found = _in_own_form(rig, runs, models.pop(own), replace(task, present=present))
+    if not models:
+        return found
+    rows = [_form_error(own, found)]
+    for form, other in models.items():
+        tell(f"identifying with the form {form} of the command")
+        alone = replace(task, present=present, table=False, show=_show_nothing)
+        rows.append(_form_error(form, _in_own_form(rig, runs, other, alone)))
+    return replace(found, forms=tuple(sorted(rows, key=lambda row: forms.index(row.form))))
+
+
+def _with_all_laws(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    rows = all_laws(rig, runs, as_model(model))
+    found = identify_on_rig(rig, runs, model, replace(task, laws=False))
+    notes = (*found.notes, *left_out_notes(rig, as_model(model)))
+    return replace(found, laws=rows, notes=notes)
+
+
+def _form_error(form: str, found: Identified) -> FormError:
+    return FormError(form, found.model, found.after, len(found.fit.std))
+
+
+def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    """Fit a model at all sites of a rig, then judge it there."""
+    start = as_model(model)
+    rig.prepare(start)
+    notes = [*runs.notes, *doubts([run for run in runs.all if run.has("force")])]
+    task.show(1)
+    fits = fit_rig(rig, start, task.starts, task.begin)
+    task.show(2)
+    fit = fits.whole(start)
+    fitted = _with_fit(model, fit)
+    models = site_models(rig, as_model(fitted))
+    present = task.present or model
+    old = site_models(rig, as_model(present))
+    # The start of a first fit is nobody's model: its error is no step on the way.
+    fitted_before = is_identified(present) or _lines_alone(old)
+    before = errors_of(old, task.cutoff) if fitted_before else None
+    after = errors_of(models, task.cutoff)
+    task.show(3)
+    at = models.get(DAMPER) or _worst(models)
+    rows = _table(at, task) if task.table else []
+    task.show(4)
+    own = after.at["train"][at.site.name]
+    notes += [
+        *fits.notes(),
+        *by_site(models),
+        *weighing(rows, model, own, after.numbers["z_train"]),
+    ]
+    notes += [*rig.notes, *under_load(at)]
+    return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+
+
+def _lines_alone(models: SiteModels) -> bool:
+    """Return whether a model is lines, which are fitted wherever it is judged, and nothing else."""
+    return all(site.is_line and not model.effects for site, model in models.values())
+
+
+def _worst(models: SiteModels) -> SiteModel:
+    """Return the site where the model errs the most, on held-out runs if there are any."""
+
+    def z(at: SiteModel) -> float:
+        held_out = at.site.holdout
+        return robust_z(at.site.train if held_out is None else held_out, at.model)
+
+    return max(models.values(), key=z)
+
+
+def _table(at: SiteModel, task: FitTask) -> list[LawError]:
+    """Return the errors of the laws; none where not every law can be held against the samples."""
+    site = at.site
+    samples = sum(len(run.force) for run in site.train.runs)
+    if site.is_line or not site.any_law or samples > _LONGEST_TABLE:
+        return []
+    return error_table(
+        site.train, site.holdout, task.cutoff, laws=_tabled(at.model.law),
+        starts=min(task.starts, _TABLE_STARTS),
+    )  # fmt: skip
+
+
+def _tabled(own: str) -> tuple[str, ...]:
+    """Return the laws of the table: the model's, and those that a step moves on by `advance`.
+
+    What is integrated by its rates takes minutes to fit; whoever wants it asks for it by name.
+    """
+    named = {name: base_and_variant(name)[0] for name in law_names()}
+    names = tuple(n for n, law in named.items() if law.exact() or law.name == own)
+    return names if own in names else (*names, own)
+
+
+def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
+    """Return the model with the choices of a form, such as a storey's number, that were found."""
+    chosen = {n: v for n, v in begin.items() if n.endswith(".which") and n in model.flat()}
+    return model.with_values(chosen, origin="assumed") if chosen else model
+
+
+def _with_labels(model: StudyModel, runs: Sequence[Measurement]) -> StudyModel:
+    """Return the model with what is known of runs at their mean, unless it was set by hand."""
+    found = {}
+    for name in model.effects:
+        effect = EFFECTS[name]
+        for own, label in {**effect.labels, **effect.label_means}.items():
+            numbers = [y for run in runs if not isinstance(y := run.labels.get(label, ""), str)]
+            parameter = f"{name}.{own}"
+            left = model.flat()[parameter].value == effect.parameters[own].value
+            if left and len(numbers) == len(runs):
+                found[parameter] = float(np.mean(numbers))
+    return model.with_values(found, origin="measured") if found else model
+
+
+def _of_law(model: StudyModel, law: str | None) -> StudyModel:
+    """Return the model with another law, its effects kept where they can join."""
+    if law is None or law == model.law:
+        return model
+    if law not in law_names():
+        raise StudyError(f'law "{law}"; there are: {", ".join(law_names())}.')
+    other = new_model(law, (), model.building, model.drive)
+    base, _ = base_and_variant(law)
+    unfit = [
+        name
+        for name in model.effects
+        if EFFECTS[name].site == base.site and not EFFECTS[name].joins(base)
+    ]
+    if unfit:
+        raise StudyError(f'{", ".join(unfit)} cannot join the law "{law}": undo the step first.')
+    return replace(other, effects=dict(model.effects))
+
+
+def as_model(model: StudyModel) -> Model:
+    """Return a study's model as the fit takes it: values, fixed parameters and bounds in SI."""
+    fixed, limits = [], {}
+    for name, value in model.flat().items():
+        unit = model.declared(name).unit
+        if not value.free:
+            fixed.append(name)
+        limits[name] = (convert(value.low, value.unit, unit), convert(value.high, value.unit, unit))
+    return Model(model.base_law, tuple(model.effects), model.values(), tuple(fixed), limits)
+
+
+def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
+    """Return the study's model with the values found; what is not identified has no interval."""
+    flat = model.flat()
+    identifiable = [name for name in fit.std if name not in fit.unidentified]
+    found = model.with_values(
+        {name: _inside(model, name, fit.model.values[name]) for name in identifiable},
+        {name: fit.std[name] for name in identifiable},
+    )
+    silent = [name for name in fit.unidentified if flat[name].free]
+    found = found.with_values(
+        {name: _inside(model, name, fit.model.value(name)) for name in silent}, origin="assumed"
+    )
+    if fit.covariance is None or not identifiable:
+        return found
+    index = [list(fit.std).index(name) for name in identifiable]
+    return found.with_covariance(identifiable, fit.covariance[np.ix_(index, index)])
+
+
+def _inside(model: StudyModel, name: str, value: float) -> float:
+    """Return a value that rounding has not put outside of its bounds."""
+    own, unit = model.flat()[name], model.declared(name).unit
+    low, high = (convert(bound, own.unit, unit) for bound in (own.low, own.high))
+    return float(np.clip(value, low, high))

@@ -1,0 +1,182 @@
+"""A curve learned from a study's runs: its effect's file, its picture, and what is known of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
+from itertools import count
+from keyword import iskeyword
+
+from ..core.files import write_whole
+from ..core.progress import tell
+from ..diagnosis.decision import noise_not_known
+from ..diagnosis.prepared import Insufficient, Opening
+from ..diagnosis.rig_runs import BenchRuns, BuildingRuns
+from ..errors import StudyError
+from ..learning.closed_forms import close, closed_forms
+from ..learning.curve import Place, refuse_elsewhere
+from ..learning.curve_picture import curve_png
+from ..learning.effect_file import effect_text
+from ..learning.fit import learn
+from ..learning.result import LearnedEffect
+from ..physics.effect import EFFECTS
+from ..trust import remember_made
+from ..user_code.load import flaw_of
+from .history import LEARNED
+from .identify import as_model
+from .rig import building_of
+from .study import Study
+
+Runs = BenchRuns | BuildingRuns
+
+
+def learn_effect(
+    study: Study,
+    *,
+    parts: Sequence[str] = (),
+    along: Sequence[str] = (),
+    at: str = "",
+    name: str = "",
+    table: bool = False,
+    write: bool = True,
+) -> LearnedEffect:
+    """Learn what a study's model misses at one of its sites, as an effect of the study.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    parts, along : on which parts of the model a curve may act and along which signals, by name;
+        empty for all
+    at : the site, "damper", "layer", "storey1" ...; else that where the verdict is unknown, or
+        where the model errs most
+    name : of the effect; else learned_1, learned_2 ...
+    table : whether the effect keeps the curve's table where a formula does as well
+    write : whether to write the effect's file and the picture
+
+    Raises
+    ------
+    StudyError
+        If the data carry no verdict, the runs do not show the site, no curve can have such a part
+        or signal there, or the name is taken.
+    """
+    for why in study.usable_effects():
+        tell(f"left out: {why}")
+    given, name = name, name or _free_name(study)
+    if not name.isidentifier() or iskeyword(name):
+        raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
+    _refuse_taken(study, name)
+    site, opened = _opened(study, at)
+    refuse_elsewhere(parts, along, Place(site), study.settings.beside)
+    found = learn(opened, name, parts=parts, along=along)
+    told = site if study.settings.has_building else ""
+    if found.refused or found.curve is None:
+        return LearnedEffect(found, site=told)
+    forms, closed = tuple(closed_forms(found.curve, found.std)), None
+    if not table:
+        closed = close(opened, found, forms)
+    if closed is not None:  # the name that the effect's formula has
+        forms = (closed.form, *(one for one in forms if one is not closed.form))
+    learned = LearnedEffect(found, forms, closed, site=told)
+    flaw = ""
+    for one in [learned, replace(learned, closed=None)] if closed is not None else [learned]:
+        flaw = flaw_of(name, _text(study, one, name))
+        if not flaw:
+            return _written(study, one, given) if write else one
+    why = f"{found.curve.words().capitalize()} can be no effect: {flaw}"
+    return replace(learned, closed=None, found=replace(found, refused=why))
+
+
+def _text(study: Study, learned: LearnedEffect, name: str) -> str:
+    """Return the text of a learned effect's file; its name may be another than in the fit."""
+    curve, closed = learned.found.curve, learned.closed
+    assert curve is not None
+    if closed is not None:
+        values = closed.trial.model.values  # of an effect that has no file yet
+        memory = tuple((n, values[f"{learned.name}.{n}"]) for n, _ in curve.memory)
+        curve = replace(curve, memory=memory)
+    origin = f"{LEARNED} {study.name}, {date.today().year}"
+    return effect_text(name, curve, origin, closed.formula if closed else None)
+
+
+def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
+    """Write a learned effect's file, its picture, and what the report says of it.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    learned : the effect
+    given : the name that its user gave it, "" for the next free one
+    """
+    with study.writing():
+        study.refuse_if_changed()
+        # A fit takes minutes, in which another process may have taken the name.
+        if given:
+            _refuse_taken(study, given)
+        name = given or _free_name(study)
+        file, text = study.effects_folder / f"{name}.py", _text(study, learned, name)
+        write_whole(file, text)
+        remember_made(file, text)
+    learned = replace(learned, found=replace(learned.found, name=name))
+    drawn = curve_png(learned.found, learned.forms, learned.closed)
+    picture = study.write_report(f"{name}.png", drawn)
+    told = json.dumps(learned.as_dict(), indent=2, ensure_ascii=False)
+    study.write_report(f"{name}.json", told)
+    return replace(learned, file=file, picture=picture)
+
+
+def _opened(study: Study, at: str) -> tuple[str, Opening]:
+    """Return the site to learn at, and what is known there."""
+    rig = _rig(study)
+    if isinstance(rig, BuildingRuns):
+        rig.refuse_lacking(study.folder)
+    there = rig.sites()
+    if at and at not in there:
+        raise StudyError(
+            f"--at: these runs do not show the site {at}; they show {', '.join(there)}."
+        )
+    openings = [(site, rig.open_site(site)) for site in ([at] if at else _wanted(study, there))]
+    opened = [(site, one) for site, one in openings if isinstance(one, Opening)]
+    able = [(site, one) for site, one in opened if one.held_out.noise_known]
+    if not able:
+        why = [" ".join(one.reasons) for _, one in openings if isinstance(one, Insufficient)]
+        why += list(dict.fromkeys(noise_not_known(one.held_out) for _, one in opened))
+        raise StudyError(f"{study.folder}: nothing can be learned from these runs. {' '.join(why)}")
+    return max(able, key=lambda pair: pair[1].before.z)
+
+
+def _rig(study: Study) -> Runs:
+    model, runs = study.model(), study.runs()
+    known = any(value.origin == "identified" for value in model.flat().values())
+    building, present = building_of(study, model), as_model(model)
+    if building is None:
+        return BenchRuns(runs.train, runs.holdout, present, known, tell)
+    return BuildingRuns(runs.train, runs.holdout, present, building, tell)
+
+
+def _wanted(study: Study, there: Sequence[str]) -> list[str]:
+    """Return the sites where the verdict on the present model is unknown; all where it is nowhere.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    there : the sites that its runs show
+    """
+    findings = (study.verdict() or {}).get("findings") or []
+    unknown = [one["site"] for one in findings if one["kind"] == "unknown"]
+    return [site for site in there if site in unknown] or list(there)
+
+
+def _free_name(study: Study) -> str:
+    """Return the first of learned_1, learned_2 ... that no effect has."""
+    return next(name for k in count(1) if not _is_taken(study, name := f"learned_{k}"))
+
+
+def _refuse_taken(study: Study, name: str) -> None:
+    if _is_taken(study, name):
+        raise StudyError(f'an effect is named "{name}" already. Another name is right.')
+
+
+def _is_taken(study: Study, name: str) -> bool:
+    return name in EFFECTS or (study.effects_folder / f"{name}.py").exists()

@@ -1,0 +1,278 @@
+"""The picture of the data check: channels over time, force over velocity and displacement."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.text import quantity, short_z
+from ..data.channels import DRIVE
+from ..data.checks.motion import velocity_of_run
+from ..data.measurement import Measurement
+from ..data.table import Array
+from ..view.style import BLUE, FLOOR, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .history import HistoryStep
+
+
+_SCALES = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+_SHOWN = 12000  # samples per line: more are not seen
+_ROWS = 8
+_TIME = "time, runs one after the other [s]"
+_NAMES = 12
+"""Part of the width that the name of a run takes: names of shorter runs are left out."""
+
+
+def draw_data_check(runs: list[Measurement], level: str = "") -> Page:
+    """Return the picture of a data check, drawn and not yet written.
+
+    Parameters
+    ----------
+    runs : one or more
+    level : what stands before the damper's displacement and velocity in a building, "" on a bench
+    """
+    channels = _rows(runs)
+    forced = [run for run in runs if "force" in run.channels]
+    with look():
+        height = max(1.15 * len(channels), 4.6 if forced else 2.0) + 0.3
+        page = Page(12.0, height, _heading(runs), _subtitle(runs))
+        side = 4.3 if forced else 0.25
+        grid = page.grid(
+            len(channels), 1, top=0.62, bottom=0.45, left=0.7, right=side, row_gap=0.36
+        )
+        first = None
+        for row, channel in enumerate(channels):
+            axes = page.figure.add_subplot(grid[row, 0], sharex=first)
+            first = first or axes
+            _strip(axes, runs, channel, named=row == 0)
+            last = row == len(channels) - 1
+            axes.tick_params(labelbottom=last)
+            if last:
+                axes.set_xlabel(_TIME if len(runs) > 1 else "time [s]", loc="right", labelpad=0)
+        if forced:
+            over = ("velocity", "displacement")[: max(len(channels), 1)]
+            grid = page.grid(len(over), 1, top=0.62, bottom=0.5, left=8.45, right=0.4, row_gap=0.75)
+            for row, one in enumerate(over):
+                _loops(page.figure.add_subplot(grid[row, 0]), forced, level, one)
+    return page
+
+
+def _heading(runs: list[Measurement]) -> str:
+    total = sum(run.duration for run in runs)
+    return f"{len(runs)} run{'s' * (len(runs) > 1)}, {total:.4g} s together"
+
+
+def _subtitle(runs: list[Measurement]) -> str:
+    rates = sorted({round(run.sampling.rate, 3) for run in runs})
+    told = f"{rates[0]:.4g}" if len(rates) == 1 else f"{rates[0]:.4g} to {rates[-1]:.4g}"
+    gaps = any(not run.measured.all() for run in runs)
+    marked = " Red: not measured, filled in." if gaps else ""
+    return f"All runs, one after the other; {told} Hz.{marked}"
+
+
+def _rows(runs: list[Measurement]) -> list[str]:
+    """Return the channels to show, the damper's first."""
+    there = dict.fromkeys(channel for run in runs for channel in run.channels)
+    first = ["ground_acceleration", "displacement", "velocity", "acceleration", "force", *DRIVE]
+    first += [f"base_{one}" for one in ("displacement", "velocity", "acceleration_absolute")]
+    named = [channel for channel in first if channel in there]
+    return [*named, *(channel for channel in there if channel not in named)][:_ROWS]
+
+
+def _strip(axes: Axes, runs: list[Measurement], channel: str, *, named: bool) -> None:
+    """Draw a channel of all runs, one after the other; above them their names where asked."""
+    unit_si = next(run.units[channel] for run in runs if channel in run.channels)
+    factor, unit = _SCALES.get(unit_si, (1.0, unit_si))
+    total, begin = sum(run.duration for run in runs), 0.0
+    every = max(1, sum(len(run.time) for run in runs) // _SHOWN)
+    for run in runs:
+        time = begin + run.time - run.time[0]
+        if channel in run.channels:
+            axes.plot(time[::every], factor * run[channel][::every], lw=0.7, color=BLUE)
+            missing = ~run.measured
+            axes.plot(time[missing], factor * run[channel][missing], ".", ms=3, color=VERMILION)
+        if begin > 0.0:
+            axes.axvline(begin, color=GREY, lw=0.7)
+        if named and run.duration > total / _NAMES:
+            axes.annotate(
+                run.name, (begin, 1.0), (2, 20), xycoords=axes.get_xaxis_transform(),
+                textcoords="offset points", fontsize=8, color=GREY,
+            )  # fmt: skip
+        begin += run.duration
+    axes.set_xlim(0.0, max(total, 1e-9))
+    axes.set_title(f"{channel.replace('_', ' ')} [{unit}]", fontsize=9)
+
+
+def _loops(axes: Axes, runs: list[Measurement], level: str, over: str) -> None:
+    """Draw force over velocity or displacement, coloured by the voltage where there is one."""
+    x, force, drive = _gathered(runs, level, over)
+    if not len(x):
+        axes.set_axis_off()
+        return
+    unit = "mm/s" if over == "velocity" else "mm"
+    dots: dict[str, Any] = {"s": 1.5, "alpha": 0.6, "lw": 0}
+    if len(drive) == len(x) and np.ptp(drive) > 0.0:
+        points = axes.scatter(1e3 * x, force, c=drive, cmap="viridis", **dots)
+        bar: Any = axes.figure.colorbar(points, ax=axes, pad=0.03, aspect=25)
+        bar.set_label(_drive_label(runs), fontsize=8.5)
+        bar.outline.set_visible(False)
+    else:
+        axes.scatter(1e3 * x, force, color=BLUE, **dots)
+    axes.set_xlabel(f"{over} [{unit}]")
+    axes.set_title(f"force [N] over {over}", fontsize=9)
+
+
+def _drive_label(runs: list[Measurement]) -> str:
+    """Return what colours the loops: the drive's name and unit, all of them where runs differ."""
+    found = [next((d for d in DRIVE if d in run.channels), "") for run in runs]
+    units = {d: run.units[d] for d, run in zip(found, runs, strict=True) if d}
+    return " or ".join(f"{name} [{unit}]" for name, unit in units.items())
+
+
+def _gathered(runs: list[Measurement], level: str, over: str) -> tuple[Array, Array, Array]:
+    xs, forces, drives = [], [], []
+    for run in runs:
+        if over == "velocity":
+            x = velocity_of_run(run, level)
+        else:
+            x = run.channels.get(f"{level}_displacement" if level else "displacement")
+        if x is None:
+            continue
+        every = max(1, len(x) * len(runs) // _SHOWN)
+        xs.append(x[::every])
+        forces.append(run["force"][::every])
+        drive = next((run[one] for one in DRIVE if one in run.channels), None)
+        if drive is not None:
+            drives.append(drive[::every])
+    empty = np.zeros(0)
+    join = [np.concatenate(parts) if parts else empty for parts in (xs, forces, drives)]
+    return join[0], join[1], join[2]
+
+
+# The picture of a measured run: its channels over time.
+
+_RUN_SCALES = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+_ROW = 1.15
+"""Height of a channel's row [in]."""
+_RUN_ROWS = 8
+_RUNS_SHOWN = 4000  # samples per line: more are not seen
+
+
+def draw_run(run: Measurement) -> Page:
+    """Return the channels of a run over time; samples that were not measured are marked."""
+    channels = list(run.channels)[:_RUN_ROWS]
+    every = max(1, len(run.time) // _RUNS_SHOWN)
+    missing = ~run.measured
+    with look():
+        about = f"{run.sampling.rate:.4g} Hz, {run.duration:.4g} s"
+        more = f" Not shown: {', '.join(list(run.channels)[_RUN_ROWS:])}." * (
+            len(run.channels) > _RUN_ROWS
+        )
+        gaps = " Red: not measured, filled in." if missing.any() else ""
+        page = Page(9.2, _ROW * len(channels) + 0.4, run.name, f"{about}.{gaps}{more}")
+        grid = page.grid(len(channels), 1, top=0.35, bottom=0.5, left=0.7, row_gap=0.42)
+        shared = None
+        for row, channel in enumerate(channels):
+            axes = shared = page.figure.add_subplot(grid[row, 0], sharex=shared)
+            factor, unit = _RUN_SCALES.get(run.units[channel], (1.0, run.units[channel]))
+            values = factor * run[channel]
+            axes.plot(run.time[::every], values[::every], color=BLUE, lw=0.8)
+            axes.plot(run.time[missing], values[missing], ".", ms=3.0, color=VERMILION)
+            axes.set_title(f"{channel.replace('_', ' ')} [{unit}]")
+            axes.margins(x=0.0)
+            axes.tick_params(labelbottom=row == len(channels) - 1)
+        if shared is not None:
+            shared.set_xlabel("time [s]", loc="right", labelpad=0)
+    return page
+
+
+# The picture of a study's history: the error of each model, a step per change.
+
+_WIDTH = 9.2
+SMALL = 0.1
+"""Change of z below which a riser of the staircase carries no label."""
+
+
+def staircase_page(history_steps: Sequence[HistoryStep], unit: str = "N") -> Page:
+    """Return the staircase: z of each model on training and held-out runs over the noise floor."""
+    steps = [one for one in history_steps if one.z is not None]
+    with look():
+        page = Page(_WIDTH, 3.5, "")
+        grid = page.grid(1, 1, top=0.25, bottom=0.5, left=0.6, right=1.0)
+        axes = page.figure.add_subplot(grid[0, 0])
+        top = max([one.z or 1.0 for one in steps] + [one.z_train or 1.0 for one in steps] + [2.0])
+        axes.set_yscale("log")
+        axes.axhspan(0.9, 1.1, color=FLOOR, lw=0.0)
+        _stairs(axes, [one.z_train for one in steps], PALE, 1.6)
+        _stairs(axes, [one.z for one in steps], BLUE, 2.6)
+        for i, one in enumerate(steps):
+            assert one.z is not None
+            _step_marks(axes, i, one, steps[i - 1].z if i else None, unit)
+        axes.set_xlim(-0.5, len(steps) - 0.5)
+        axes.set_ylim(0.75, 2.2 * top)
+        names = [textwrap.fill(f"{one.number}  {one.what}", 20) for one in steps]
+        axes.set_xticks(range(len(steps)), names, fontsize=9, color=INK)
+        axes.tick_params(axis="x", length=0)
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.yaxis.set_minor_formatter(lambda value, _: "")
+        axes.grid(visible=False, axis="x")
+        axes.set_title("error / noise (z)")
+        last = steps[-1]
+        ends = [
+            ("noise floor", 1.0, GREEN),
+            ("held-out", last.z, BLUE),
+            ("training", last.z_train, GREY),
+        ]
+        _name_ends(axes, [(name, y, c) for name, y, c in ends if y is not None], len(steps) - 0.5)
+    return page
+
+
+def _name_ends(axes: Axes, ends: list[tuple[str, float, str]], x: float) -> None:
+    """Write the names of lines at their right ends, pushed apart where they are close."""
+    low, high = np.log(axes.get_ylim())
+    height = axes.get_position().height * axes.figure.get_figheight() * 72.0  # type: ignore[union-attr]
+    before = -np.inf
+    for name, y, colour in sorted(ends, key=lambda end: (end[1], end[0] == "held-out")):
+        at = (np.log(y) - low) / (high - low) * height
+        up = max(at, before + 12.0)
+        before = up
+        label(axes, name, x, y, colour, xytext=(6, up - at), va="center")
+
+
+def _stairs(axes: Axes, heights: Sequence[float | None], colour: str, width: float) -> None:
+    """Draw steps with risers between them."""
+    x, y = [], []
+    for i, height in enumerate(heights):
+        if height is not None:
+            x += [i - 0.5, i + 0.5]
+            y += [height, height]
+    axes.plot(x, y, color=colour, lw=width, solid_joinstyle="miter")
+
+
+def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None, unit: str) -> None:
+    """Write z and error over a step, and at its riser by how much the error fell."""
+    assert one.z is not None
+    z = short_z(one.z)
+    rms = "" if one.rms is None else f"  {quantity(one.rms, unit, 4)}"
+    rms += f" below {one.cut_off:g} Hz" if rms and one.cut_off else ""
+    # Above the higher of both lines, so that neither strikes it through.
+    height = max(one.z, one.z_train or 0.0)
+    label(axes, f"z = {z}{rms}", i, height, BLUE, xytext=(0, 7), ha="center", va="bottom")
+    if before is None or before <= 0.0:
+        return
+    change = one.z / before - 1.0
+    if abs(change) < SMALL:
+        return  # its riser is too low for a label
+    # In units of the noise: what there was above it, and what is left of that.
+    text = f"{100.0 * change:+.0f} %".replace("-", MINUS)
+    colour = GREEN if change < 0.0 else VERMILION
+    axes.annotate(
+        text, (i - 0.5, float(np.sqrt(one.z * before))), xytext=(5, 0), textcoords="offset points",
+        color=colour, fontsize=10, fontweight="bold", ha="left", va="center",
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Scenarios and SSP packages: read, checked, completed, written."""

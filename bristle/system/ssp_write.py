@@ -1,0 +1,451 @@
+"""A scenario as the files of other tools: SystemStructure.ssd and OspSystemStructure.xml."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..fmu.build import Plan, build, plan
+from ..fmu.description import Value, Variable
+from ..units import DIMENSIONS, Unit, alike
+from .overrides import FILE_PARAMETERS
+from .scenario import Component, Scenario, fmu_parameters
+from .ssp_read import FMU_TYPE, NAMESPACES, OMS, OSP, OSP_SYSTEM, OWN, OWN_TYPE, STRUCTURE
+
+Element = ElementTree.Element
+
+
+@dataclass(frozen=True)
+class WrittenComponent:
+    """A component of a flat system that is written.
+
+    `source` is its FMU, relative to the text; `ports` are its connected inputs and outputs;
+    `values` those of parameters, and of inputs that are held, with their variables; `step` its own
+    step [s], None for the system's.
+    """
+
+    name: str
+    source: str
+    ports: tuple[Variable, ...]
+    values: tuple[tuple[Variable, Value], ...]
+    step: float | None = None
+
+
+@dataclass(frozen=True)
+class WrittenConnection:
+    """Component and port that give a value, those that take factor value + offset.
+
+    `transformed` is whether factor and offset are told: no unit is converted then.
+    """
+
+    source: str
+    output: str
+    target: str
+    input: str
+    factor: float = 1.0
+    offset: float = 0.0
+    transformed: bool = False
+
+    @property
+    def changes(self) -> bool:
+        """Whether a value changes on its way."""
+        return (self.factor, self.offset) != (1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class WrittenSystem:
+    """A flat system: title, stop and step [s], algorithm, components, connections."""
+
+    title: str
+    stop: float
+    step: float
+    algorithm: str
+    components: tuple[WrittenComponent, ...]
+    connections: tuple[WrittenConnection, ...] = field(default=())
+
+
+def ssd_text(system: WrittenSystem) -> str:
+    """Return the text of SystemStructure.ssd, SSP 1.0.
+
+    The step stands in it as libcosim and Ecos read it and as OMSimulator does.
+    """
+    root = Element("ssd:SystemStructureDescription", {f"xmlns:{k}": v for k, v in NAMESPACES})
+    root.set("name", system.title)
+    root.set("version", "1.0")
+    whole = _add(root, "ssd:System", name=_NAME_OF_SYSTEM)
+    elements = _add(whole, "ssd:Elements")
+    declared = _declared(system.components)
+    for component in system.components:
+        _component(elements, component, declared)
+    if system.connections:
+        connections = _add(whole, "ssd:Connections")
+        for connection in system.connections:
+            _connection(connections, connection)
+    information = _add(_annotation(whole, OMS), "oms:Annotations")
+    information = _add(information, "oms:SimulationInformation")
+    step = repr(system.step)
+    _add(
+        information, "oms:FixedStepMaster", description="oms-ma", stepSize=step,
+        absoluteTolerance=_OMS_TOLERANCE, relativeTolerance=_OMS_TOLERANCE,
+    )  # fmt: skip
+    _units(root, declared)
+    experiment = _add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(system.stop))
+    annotations = _add(experiment, "ssd:Annotations")
+    algorithm = _add(_add(annotations, "ssc:Annotation", type=OSP), "osp:Algorithm")
+    _add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=step)
+    own = _add(annotations, "ssc:Annotation", type=OWN_TYPE)
+    _add(own, f"{OWN}:Run", algorithm=system.algorithm)
+    return _text(root)
+
+
+_NAME_OF_SYSTEM = "system"
+_OMS_TOLERANCE = "0.0001"
+"""Beside a fixed step, as OMSimulator itself writes it."""
+
+
+def _component(
+    elements: Element, component: WrittenComponent, declared: Mapping[str, Unit]
+) -> None:
+    element = _add(
+        elements, "ssd:Component", name=component.name, type=FMU_TYPE, source=component.source,
+    )  # fmt: skip
+    if component.ports:
+        connectors = _add(element, "ssd:Connectors")
+        for port in component.ports:
+            connector = _add(connectors, "ssd:Connector", name=port.name, kind=port.causality)
+            _add(connector, f"ssc:{_kind(port)}", **_unit(port, declared))
+    if component.values:
+        binding = _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding")
+        values = _add(binding, "ssd:ParameterValues")
+        found = _add(values, "ssv:ParameterSet", version="1.0", name=component.name)
+        parameters = _add(found, "ssv:Parameters")
+        for variable, value in component.values:
+            parameter = _add(parameters, "ssv:Parameter", name=variable.name)
+            _add(parameter, f"ssv:{_kind(variable)}", value=_written(value))
+
+
+def _connection(connections: Element, connection: WrittenConnection) -> None:
+    element = _add(
+        connections,
+        "ssd:Connection",
+        startElement=connection.source,
+        startConnector=connection.output,
+        endElement=connection.target,
+        endConnector=connection.input,
+    )
+    if connection.transformed:
+        element.set("suppressUnitConversion", "true")
+    if connection.changes:
+        _add(
+            element,
+            "ssc:LinearTransformation",
+            factor=repr(connection.factor),
+            offset=repr(connection.offset),
+        )
+
+
+def _declared(components: Iterable[WrittenComponent]) -> dict[str, Unit]:
+    """Return the units of the ports by name, but for names by which FMUs mean different ones."""
+    found: dict[str, Unit | None] = {}
+    for port in (port for component in components for port in component.ports):
+        measure = port.measure if port.kind == "Real" else None
+        if measure is None or measure.unit is None:  # a foreign FMU's own
+            continue
+        first = found.setdefault(measure.name, measure.unit)
+        if first is not None and not alike(first, measure.unit):
+            found[measure.name] = None
+    return {name: unit for name, unit in found.items() if unit is not None}
+
+
+def _units(root: Element, declared: Mapping[str, Unit]) -> None:
+    if not declared:
+        return
+    units = _add(root, "ssd:Units")
+    for name, unit in sorted(declared.items()):
+        powers = {
+            base: str(power)
+            for base, power in zip(DIMENSIONS, unit.dimension, strict=True)
+            if power
+        }
+        if unit.factor != 1.0:
+            powers["factor"] = repr(unit.factor)
+        if unit.offset:
+            powers["offset"] = repr(unit.offset)
+        _add(_add(units, "ssc:Unit", name=name), "ssc:BaseUnit", **powers)
+
+
+def _unit(port: Variable, declared: Mapping[str, Unit]) -> dict[str, str]:
+    """Return the unit of a connector, none where it cannot be declared."""
+    known = port.kind == "Real" and port.unit in declared
+    return {"unit": str(port.unit)} if known else {}
+
+
+def _kind(variable: Variable) -> str:
+    return "Integer" if variable.kind == "Enumeration" else variable.kind
+
+
+def _annotation(parent: Element, kind: str) -> Element:
+    return _add(_add(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
+
+
+def osp_text(system: WrittenSystem) -> str:
+    """Return the text of OspSystemStructure.xml."""
+    root = Element("OspSystemStructure", {"xmlns": OSP_SYSTEM, "version": "0.1"})
+    for name, text in (
+        ("StartTime", "0.0"),
+        ("EndTime", repr(system.stop)),
+        ("BaseStepSize", repr(system.step)),
+        ("Algorithm", "fixedStep"),
+    ):
+        _add(root, name).text = text
+    simulators = _add(root, "Simulators")
+    for component in system.components:
+        simulator = _add(simulators, "Simulator", name=component.name, source=component.source)
+        if component.step is not None:
+            simulator.set("stepSize", repr(component.step))
+        if component.values:
+            values = _add(simulator, "InitialValues")
+            for variable, value in component.values:
+                initial = _add(values, "InitialValue", variable=variable.name)
+                _add(initial, _kind(variable), value=_written(value))
+    changed = [one for one in system.connections if one.changes]
+    if changed:
+        functions = _add(root, "Functions")
+        for one in changed:
+            _add(
+                functions, "LinearTransformation", name=_function(one), factor=repr(one.factor),
+                offset=repr(one.offset),
+            )  # fmt: skip
+    if system.connections:
+        connections = _add(root, "Connections")
+        for one in system.connections:
+            _osp_connection(connections, one)
+    return _text(root)
+
+
+def _function(connection: WrittenConnection) -> str:
+    # A dot, which no component has in its name: d_x.in and d.x_in are two.
+    return f"{connection.target}.{connection.input}"
+
+
+def _osp_connection(connections: Element, one: WrittenConnection) -> None:
+    if not one.changes:
+        joined = _add(connections, "VariableConnection")
+        _add(joined, "Variable", simulator=one.source, name=one.output)
+        _add(joined, "Variable", simulator=one.target, name=one.input)
+        return
+    into = _add(connections, "SignalConnection")
+    _add(into, "Variable", simulator=one.source, name=one.output)
+    _add(into, "Signal", function=_function(one), name="in")
+    out = _add(connections, "SignalConnection")
+    _add(out, "Signal", function=_function(one), name="out")
+    _add(out, "Variable", simulator=one.target, name=one.input)
+
+
+def _written(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _add(parent: Element, tag: str, **attributes: str) -> Element:
+    return ElementTree.SubElement(parent, tag, attributes)
+
+
+def _text(root: Element) -> str:
+    ElementTree.indent(root)
+    body = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
+
+
+# A scenario as an SSP package, or as a folder with OspSystemStructure.xml, for other tools.
+#
+# What a component is made from (building, controller, record, own effects) is inside its FMU, and
+# so are its values: tools differ in what they make of a package's own.
+
+RESOURCES = "resources"
+Build = Callable[[Plan, Path], Path]
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
+
+
+@dataclass(frozen=True)
+class ExportedPackage:
+    """The files that were written, and what is otherwise in other tools, a text each."""
+
+    files: tuple[Path, ...]
+    notes: tuple[str, ...]
+
+
+def export_ssp(
+    scenario: Scenario, file: Path, osp: Path | None = None, build: Build = build
+) -> ExportedPackage:
+    """Write a scenario as an SSP package, and its parts into a folder for OSP.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A checked scenario.
+    file : Path
+        FILE.ssp, in place of an older one.
+    osp : Path, optional
+        Folder that takes OspSystemStructure.xml with the FMUs beside it.
+    build : callable
+        Builds a planned FMU into a folder and returns its path.
+
+    Raises
+    ------
+    ScenarioError
+        If a file cannot be written.
+    BuildError, RecordError
+        If an FMU cannot be built.
+    """
+    if file.suffix.lower() != ".ssp":
+        raise ScenarioError(f"{file}: the name of an SSP package ends with .ssp.")
+    with tempfile.TemporaryDirectory(prefix="bristle_ssp_") as temporary:
+        fmus = _fmus(scenario, Path(temporary), build)
+        system = _system(scenario, fmus)
+        with _writing(file):
+            _pack(file, ssd_text(system), list(fmus.values()))
+        written = [file]
+        if osp is not None:
+            with _writing(osp):
+                written += _lay_out(osp, system, list(fmus.values()))
+    return ExportedPackage(tuple(written), tuple(_notes(scenario)))
+
+
+def _fmus(scenario: Scenario, folder: Path, build: Build) -> dict[str, Path]:
+    """Return the FMU of each component, built with its values or copied, each of a name its own."""
+    found: dict[str, Path] = {}
+    taken: set[str] = set()
+    for component in scenario.components:
+        stem = re.sub(r"[^A-Za-z0-9_]", "_", component.name)
+        stem = stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}"
+        while stem.lower() in taken:
+            stem += "_"
+        taken.add(stem.lower())
+        found[component.name] = _fmu(component, scenario.file.parent, folder, stem, build)
+    return found
+
+
+def _fmu(component: Component, home: Path, folder: Path, name: str, build: Build) -> Path:
+    if component.path is not None:
+        target = folder / f"{name}.fmu"
+        target.write_bytes(component.path.read_bytes())
+        return target
+    values = fmu_parameters(component, home)
+    files = {key: Path(str(values.pop(key))) for key in FILE_PARAMETERS if values.get(key)}
+    what = plan(
+        component.made_of(),
+        name=name,
+        building=component.building,
+        controller=component.controller,
+        effects=component.effects,
+        record=files.get("record"),
+        samples=files.get("file"),
+        starts=values,
+    )
+    return build(what, folder)
+
+
+def _system(scenario: Scenario, fmus: dict[str, Path]) -> WrittenSystem:
+    ends = {(c.target, c.input) for c in scenario.connections}
+    ends |= {(c.source, c.output) for c in scenario.connections}
+    components = tuple(
+        WrittenComponent(
+            component.name,
+            f"{RESOURCES}/{fmus[component.name].name}",
+            tuple(
+                variable
+                for variable in component.description.variables.values()
+                if (component.name, variable.name) in ends
+            ),
+            tuple(
+                (component.description.variables[key], value)
+                for key, value in _values(component, scenario.file.parent).items()
+            ),
+            component.step,
+        )
+        for component in scenario.components
+    )
+    connections = tuple(
+        WrittenConnection(
+            c.source, c.output, c.target, c.input, c.factor, c.offset, c.transformed
+        )
+        for c in scenario.connections
+    )  # fmt: skip
+    return WrittenSystem(
+        scenario.title, scenario.stop, scenario.step, scenario.algorithm, components, connections
+    )
+
+
+def _values(component: Component, home: Path) -> dict[str, Value]:
+    """Return the values that stand in the package; files are in the FMUs."""
+    values = fmu_parameters(component, home)
+    if component.path is None:
+        values = {key: value for key, value in values.items() if key not in FILE_PARAMETERS}
+    return values
+
+
+def _notes(scenario: Scenario) -> Iterator[str]:
+    for component in scenario.components:
+        if component.step is not None and component.step != scenario.step:
+            yield (
+                f"{component.name} steps every {1e3 * component.step:g} ms here; SSP has no word "
+                f"for that, and tools step it every {1e3 * scenario.step:g} ms."
+            )
+        if component.path is not None and component.parameters:
+            yield (
+                f"{component.name}: a foreign FMU is packed as it is. Its values stand in the "
+                "package alone, which some tools leave aside."
+            )
+        names = [key for key in FILE_PARAMETERS if component.parameters.get(key)]
+        if component.path is not None and names:
+            yield f"{component.name} reads a file of this computer: {', '.join(names)}."
+
+
+def _pack(file: Path, text: str, fmus: list[Path]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if file.is_dir():
+        raise ScenarioError(f"{file}: is a folder; another name is right.")
+    handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}-")
+    draft = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
+            _write(archive, STRUCTURE, text.encode())
+            for fmu in fmus:
+                _write(archive, f"{RESOURCES}/{fmu.name}", fmu.read_bytes())
+        draft.chmod(0o644)
+        draft.replace(file)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _write(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+    entry = zipfile.ZipInfo(name, _EPOCH)
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    entry.external_attr = 0o644 << 16
+    archive.writestr(entry, data)
+
+
+def _lay_out(folder: Path, system: WrittenSystem, fmus: list[Path]) -> list[Path]:
+    folder.mkdir(parents=True, exist_ok=True)
+    beside = tuple(replace(c, source=Path(c.source).name) for c in system.components)
+    structure = folder / "OspSystemStructure.xml"
+    for fmu in fmus:
+        (folder / fmu.name).write_bytes(fmu.read_bytes())
+    structure.write_text(osp_text(replace(system, components=beside)), encoding="utf-8")
+    return [structure]
+
+
+@contextmanager
+def _writing(target: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise ScenarioError(f"{target}: cannot be written ({error.strerror or error}).") from None

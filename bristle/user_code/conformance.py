@@ -1,0 +1,296 @@
+"""What is asked of every effect and law: rest, energy, bounds, and the compiled path."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from math import cos, inf, isfinite, pi, sin
+
+import numpy as np
+
+from ..component.structure import StructureModel
+from ..physics.building import Building, paper_building
+from ..physics.damper import DamperModel, room, step
+from ..physics.effect import Effect, effects_of, laws_joined
+from ..physics.law import Law
+from ..physics.tuples import Inputs
+from .compiled import refused, shown
+from .reading import FlawError
+from .trial import CYCLES, cycle, ends
+
+STEP = 1e-3  # s
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing asked of an effect, whether it holds, and what was found."""
+
+    asked: str
+    holds: bool
+    found: str = ""
+
+
+def examine(effect: type[Effect]) -> list[Check]:
+    """Return what is asked of an effect that is registered, and whether it holds."""
+    asked: list[Callable[[type[Effect]], Check]] = [_says, _compiles]
+    for site in effect.sites:
+        asked += _ASKED_AT[site]
+    return [one(effect) for one in asked]
+
+
+def _says(effect: type[Effect]) -> Check:
+    lacking = []
+    if ":" not in effect.first_line() or not effect.first_line().endswith("."):
+        lacking.append('a first docstring line "Name: what happens."')
+    if "Leaves out" not in (effect.__doc__ or ""):
+        lacking.append('a docstring sentence "Leaves out ..."')
+    if not re.search(r"\b(1[89]|20)\d\d\b", effect.source):
+        lacking.append("a source with its year")
+    if len(effect.expect.split()) < 5:
+        lacking.append("expect, what a residual looks like without it")
+    return Check(
+        "name, texts and source are complete",
+        not lacking,
+        "lacks " + ", ".join(lacking) if lacking else "",
+    )
+
+
+def _compiles(effect: type[Effect]) -> Check:
+    flaw = refused(effect)
+    return Check("compiled code gives the same numbers", flaw is None, flaw[1] if flaw else "")
+
+
+def _corners(effect: type[Effect]) -> Iterator[dict[str, float]]:
+    yield {}
+    for name, parameter in effect.parameters.items():
+        for bound in parameter.bounds:
+            yield {f"{effect.name}.{name}": bound}
+
+
+def _rests(effect: type[Effect]) -> Check:
+    asked = "no force at rest" if effect.zero_at_rest else "a force at rest, as declared"
+    most, at = 0.0, ""
+    for law in laws_joined(effect):
+        for values in _corners(effect):
+            for V in (0.0, 4.0, 8.0):
+                model = DamperModel(law, values, [effect.name])
+                force = abs(model.force(0.0, 0.0, 0.0, V, inf, 0.0, 0.0, False))
+                if force > most:
+                    most, at = force, f"{force:g} N at {V:g} V, {law}, {values or 'defaults'}"
+    return Check(asked, (most == 0.0) == effect.zero_at_rest, at or "none at any bound")
+
+
+def _cycle(
+    law: str, effects: list[str], values: dict[str, float], amplitude: float, frequency: float,
+    V: Callable[[float], float] | float,
+) -> tuple[list[float], list[float], list[float]]:  # fmt: skip
+    """Return times, velocities and forces of three cycles."""
+    model = DamperModel(law, values, effects)
+    voltage = V if callable(V) else lambda _t: V
+    w, before = 2.0 * pi * frequency, 2.0 * pi * frequency * amplitude
+    times, speeds, forces = [], [], []
+    for k in range(1, round(3.0 / frequency / STEP) + 1):
+        t = k * STEP
+        x, v = amplitude * sin(w * t), amplitude * w * cos(w * t)
+        forces.append(model.step(x, v, (v - before) / STEP, voltage(t), STEP, 0.0, 0.0, False))
+        times.append(t)
+        speeds.append(v)
+        before = v
+    return times, speeds, forces
+
+
+def _matters(effect: type[Effect]) -> Check:
+    best = 0.0
+    # A stop may not be met by the smaller motion.
+    for law, amplitude in product(laws_joined(effect), (0.01, 0.03)):
+        rows = [
+            np.array(_cycle(law, on, {}, amplitude, 2.0, lambda t: 4.0 + 3.0 * sin(9.0 * t))[2])
+            for on in ([], [effect.name])
+        ]
+        change = float(np.sqrt(np.mean((rows[1] - rows[0]) ** 2) / np.mean(rows[0] ** 2)))
+        best = max(best, change)
+    text = f"{100.0 * best:.3g} % of the force RMS on a damper of 10 N, at its defaults"
+    return Check("it changes the force by more than 1 %", best > 0.01, text)
+
+
+def _bounds(effect: type[Effect]) -> Check:
+    for law in laws_joined(effect):
+        for values in _corners(effect):
+            forces = _cycle(law, [effect.name], values, 0.01, 3.0, 8.0)[2]
+            if not all(isfinite(force) for force in forces):
+                return Check("it can be simulated at every bound", False, f"{law}, {values}")
+    return Check("it can be simulated at every bound", True)
+
+
+def _energy(effect: type[Effect]) -> Check:
+    asked = "a closed cycle gives no energy"
+    if not effect.passive:
+        return Check(asked, True, "not asked: passive = False")
+    for law in laws_joined(effect):
+        for amplitude, frequency, V in ((0.001, 5.0, 6.0), (0.015, 5.0, 0.0), (0.015, 1.0, 6.0)):
+            for values in _corners(effect):
+                cycle = _cycle(law, [effect.name], values, amplitude, frequency, V)
+                last = round(1.0 / frequency / STEP)
+                v, force = np.array(cycle[1][-last:]), np.array(cycle[2][-last:])
+                work = float(STEP * np.sum(v * force))
+                scale = amplitude * max(1e-9, float(np.abs(force).max()))
+                if work < -1e-3 * scale:
+                    where = f"{law}, {1e3 * amplitude:g} mm at {frequency:g} Hz, {V:g} V"
+                    text = f"{work:.3g} J at {where}, {values or 'defaults'}"
+                    return Check(asked, False, text)
+    return Check(asked, True)
+
+
+_FORCES = {"N": 10.0, "N/m": 1e3, "N/m2": 1e5, "N/m3": 1e7, "N.s/m": 50.0}
+"""Forces [SI, by unit] of effects that are no more than such a model of a building is made for."""
+
+
+def _building_of(effect: type[Effect]) -> Building:
+    """Return a building to simulate an effect in, as heavy as the forces of its own rig ask for."""
+    building = paper_building()
+    if not effect.of_this_rig():
+        return building
+    sizes = [
+        abs(p.value) / _FORCES[p.unit] for p in effect.parameters.values() if p.unit in _FORCES
+    ]
+    times = max([1.0, *sizes])
+    M, C, K = (tuple(tuple(times * one for one in row) for row in part) for part in building[1:4])
+    stiffnesses = tuple(times * one for one in building.stiffnesses)
+    return building._replace(M=M, C=C, K=K, stiffnesses=stiffnesses)
+
+
+def _building_rests(effect: type[Effect]) -> Check:
+    model = StructureModel(_building_of(effect), {}, [effect.name])
+    for _ in range(20):
+        model.step(0.002, 0.0, 0.0, 0.0)
+    still = not any(model.x)
+    return Check("a building at rest stays at rest", still or not effect.zero_at_rest)
+
+
+def _building_bounds(effect: type[Effect]) -> Check:
+    asked = "it can be simulated at every bound"
+    for values in _corners(effect):
+        model = StructureModel(_building_of(effect), values, [effect.name])
+        for k in range(200):
+            model.step(0.002, 4.0 * sin(0.02 * k), 4.0 * sin(0.02 * k + 0.02), 0.0)
+        if not all(isfinite(x) and abs(x) < 10.0 for x in model.x):
+            return Check(asked, False, f"the base leaves 10 m at {values}")
+    return Check(asked, True)
+
+
+def _shows(effect: type[Effect]) -> Check:
+    signal = np.sin(2.0 * pi * 2.0 * np.arange(500) * 0.002)
+    for values in _corners(effect):
+        own = {name.partition(".")[2]: value for name, value in values.items()}
+        if not np.isfinite(shown(effect, own, signal, 0.002)).all():
+            return Check("what it shows is finite at every bound", False, f"{values}")
+    return Check("what it shows is finite at every bound", True)
+
+
+_ASKED_AT: dict[str, tuple[Callable[[type[Effect]], Check], ...]] = {
+    "damper": (_rests, _matters, _bounds, _energy),
+    "structure": (_building_rests, _building_bounds),
+    "sensor": (_shows,),
+}
+"""What is asked of an effect at each site."""
+
+
+# What is asked of every law, asked of one: rest, energy, bounds, steps, and the compiled path.
+
+FINER = 4
+"""Steps into which one is divided to see what it leaves out."""
+
+COARSE = 0.02
+"""Difference of the force that a step of 2 ms may make, by its largest value."""
+
+
+def examine_law(law: type[Law]) -> list[Check]:
+    """Return what is asked of a law that is registered, and whether it holds."""
+    return [
+        one(law)
+        for one in (
+            _law_says,
+            _law_compiles,
+            _law_rests,
+            _law_bounds,
+            _law_energy,
+            _steps,
+            _has_effects,
+        )
+    ]
+
+
+def _law_says(law: type[Law]) -> Check:
+    lacking = []
+    if ":" not in law.first_line() or not law.first_line().endswith("."):
+        lacking.append('a first docstring line "Name: what it is."')
+    if not re.search(r"\b(1[89]|20)\d\d\b", law.source):
+        lacking.append("a source with its year")
+    found = "lacks " + ", ".join(lacking) if lacking else ""
+    return Check("name, texts and source are complete", not lacking, found)
+
+
+def _law_compiles(law: type[Law]) -> Check:
+    flaw = refused(law)
+    return Check("compiled code gives the same numbers", flaw is None, flaw[1] if flaw else "")
+
+
+def _law_rests(law: type[Law]) -> Check:
+    most = max(
+        abs(DamperModel(law.name).force(0.0, 0.0, 0.0, V, inf, 0.0, 0.0, False))
+        for V in (0.0, 4.0, 8.0)
+    )
+    return Check("no force at rest", most == 0.0, f"{most:g} N" if most else "")
+
+
+def _law_bounds(law: type[Law]) -> Check:
+    asked = "it can be simulated at every bound"
+    for values in ends(law):
+        try:
+            cycle(law, values, *CYCLES[0])
+        except FlawError as flaw:
+            if "energy" not in str(flaw):
+                return Check(asked, False, str(flaw))
+    return Check(asked, True)
+
+
+def _law_energy(law: type[Law]) -> Check:
+    asked = "a closed cycle gives no energy, at every bound"
+    for amplitude, frequency, V in CYCLES:
+        for values in ends(law):
+            try:
+                cycle(law, values, amplitude, frequency, V)
+            except FlawError as flaw:
+                return Check(asked, False, str(flaw))
+    return Check(asked, True)
+
+
+def _steps(law: type[Law]) -> Check:
+    """Ask whether a step of 2 ms leads where finer ones do."""
+    coarse, fine = (_forces(law, step) for step in (2e-3, 2e-3 / FINER))
+    most = max(abs(force) for force in fine)
+    apart = max(abs(a - b) for a, b in zip(coarse, fine[FINER - 1 :: FINER], strict=True))
+    share = apart / max(most, 1e-9)
+    found = f"{100.0 * share:.2g} % of the force apart from steps of {2.0 / FINER:g} ms"
+    return Check("a step of 2 ms is small enough", share < COARSE, found)
+
+
+def _forces(law: type[Law], dt: float) -> list[float]:
+    """Return the forces [N] of a motion that is linear over each step of dt [s]."""
+    model, w, forces = DamperModel(law.name), 2.0 * pi * 2.0, []
+    before, z = Inputs(0.0, 0.006 * w, 0.0, 4.0, dt, 0.0, 0.0, False), model.z
+    linked, work = model.functions.link(step), room(len(z))
+    for k in range(1, round(0.5 / dt) + 1):
+        x, v = 0.006 * sin(w * k * dt), 0.006 * w * cos(w * k * dt)
+        now = Inputs(x, v, -w * w * x, 4.0, dt, 0.0, 0.0, False)
+        z1 = [0.0] * len(z)
+        setup = model.setup._replace(active=True)
+        forces.append(linked(setup, before, now, z, z1, [0.0] * work)[0])
+        before, z = now, z1
+    return forces
+
+
+def _has_effects(law: type[Law]) -> Check:
+    return Check("effects join its parts", bool(effects_of("damper", law.name)))
