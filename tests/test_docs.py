@@ -180,7 +180,7 @@ def test_tutorials_need_nothing_of_a_checkout() -> None:
         for block in snippets.blocks(page.read_text(encoding="utf-8")):
             if block.language == "console":
                 assert "tests" not in block.body
-                assert "python " not in block.body
+                assert "$ python " not in block.body
 
 
 def test_the_first_pages_begin_with_the_picture_and_the_commands_that_make_it() -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from ._options import add_trust, print_json
 from .compare import add_role
 
-HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 % band"
+HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 %% band"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Mapping
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .effect import Effect, effects_of
 from .generate import Functions, Sets, Slots, switched, switched_laws
-from .law import LAWS, Law, laws_of
+from .law import Law, base_and_variant, laws_of
 from .tuples import FACTORS, FORM_OF_LAW, law_state, law_values
 
 _FACTORS = {"limit": " * yield_factor * slip_length", "viscous": " * viscous_factor"}
@@ -342,4 +342,4 @@ LIBRARY = SETS.library
 def functions_of(law: str, effects: Collection[str]) -> Functions:
     """Return functions of a law with effects: the library's, if it has them."""
     wanted = tuple(effect for effect in effects_of("damper") if effect.name in effects)
-    return SETS.serving(LAWS[law].base, *wanted)
+    return SETS.serving(base_and_variant(law)[0].base, *wanted)

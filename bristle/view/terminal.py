@@ -8,6 +8,8 @@ from textwrap import wrap
 from .blocks import Block, Formula, Next, Table, Text, View
 
 WIDTH = 100
+WIDEST = 120
+"""Of a table, before the cells of a row stand below each other."""
 _NEXT = "Next:  "
 
 
@@ -77,7 +79,7 @@ def aligned(
             both = [[[row[0], *row[part]] for row in (header, *rows)] for part in parts]
             tables = (aligned(one[0], one[1:], range(1, len(one[0]))) for one in both)
             return [line for lines in tables for line in (*lines, "")][:-1]
-    if sum(wide) + 2 * len(wide) > WIDTH:
+    if sum(wide) + 2 * len(wide) > WIDEST:
         return [line for row in rows for line in _stacked(header, row)]
     titles = [wrap(title, width) for title, width in zip(header, wide, strict=True)]
     high = max(map(len, titles))
