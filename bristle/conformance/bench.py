@@ -15,8 +15,18 @@ from ..core.text import listed
 from ..fmu.archive import library_member
 from ..fmu.description import Description, Value, Variable
 from ..units import Unit
-from .native import DISCARD, OK, STATUS, WARNING, BlackBox, Instance, Library, LibraryFmi3, told
-from .probe import UnexpectedError
+from .native import (
+    DISCARD,
+    OK,
+    STATUS,
+    WARNING,
+    BlackBox,
+    Instance,
+    Library,
+    LibraryFmi3,
+    UnexpectedError,
+    told,
+)
 
 # What the parent tells its child processes about the FMU: one JSON file.
 

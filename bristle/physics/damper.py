@@ -2,7 +2,7 @@
 
 One source for both paths. `evaluate` gives the force at given motion, voltage and state; `step`
 advances the state over a time step and gives the force at its end. Both take records (`inputs`)
-and flat sequences (`codegen.Slots`): lists inside FMUs, arrays under numba.
+and flat sequences (`generate.Slots`): lists inside FMUs, arrays under numba.
 """
 
 from __future__ import annotations

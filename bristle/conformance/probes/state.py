@@ -7,9 +7,9 @@ from ctypes import c_void_p
 from pathlib import Path
 
 from ..bench import Bench, good
+from ..native import UnexpectedError
 from ..probe import (
     Finding,
-    UnexpectedError,
     failed,
     noted,
     passed,

@@ -9,8 +9,8 @@ from functools import partial
 
 from ...fmu.description import Value, Variable
 from ..bench import GOOD, Bench, Values, good, not_finite, some, status_name
-from ..native import FatalAnswerError, Instance
-from ..probe import Finding, UnexpectedError, failed, noted, passed, probe, unless_single
+from ..native import FatalAnswerError, Instance, UnexpectedError
+from ..probe import Finding, failed, noted, passed, probe, unless_single
 from .order import forbidden
 
 _MOST_INPUTS = 12
