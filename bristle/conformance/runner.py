@@ -20,7 +20,6 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from ..core.progress import Count
@@ -63,12 +62,7 @@ class Subprocesses:
     def __enter__(self) -> Subprocesses:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for pid in self._living:
             _kill(pid)
         if self._mother is not None:

@@ -187,9 +187,6 @@ def either(names: list[str]) -> str:
     return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-# Longer than 300 lines: every mistake of a building file has a message of its own.
-
-
 MAX_FLOORS = 20
 
 ROUNDING = 1e-9
