@@ -228,8 +228,8 @@ class Progress:
         self._telling.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._telling.__exit__(kind, error, trace)
+    def __exit__(self, *raised: Any) -> None:
+        self._telling.__exit__(*raised)
         if self._bar:
             self._bar.stop()
 

@@ -286,8 +286,6 @@ def _of_part(part: str, reading: Reading | None) -> Reading | None:
     return Reading(f"{part}.{reading.parameter}", chooser, reading.word)
 
 
-# Writes a whole scenario as one FMU that needs no Python.
-
 _COMPONENT = Path(__file__).with_name("component.py")
 
 

@@ -6,7 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -26,9 +26,6 @@ from .archive import (
 from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
-
-
-# What is known of an FMU's variables, whatever version of FMI it follows, and how numbers read.
 
 Value = float | int | bool | str
 
@@ -232,9 +229,8 @@ def mark_optional(variables: dict[str, Variable], names: str) -> None:
 # What an FMI 3.0 FMU for co-simulation says of itself, in the words of FMI 2.0 where it has them.
 #
 # Numbers keep the type that FMI 3.0 gives them in `Variable.type`; their kind is that of FMI 2.0,
-# so
-# that scenarios and the master need not ask for the version. Arrays and binaries that are no ports
-# are left out: nothing here sets or shows them.
+# so that scenarios and the master need not ask for the version. Arrays and binaries that are no
+# ports are left out: nothing here sets or shows them.
 
 KINDS = {
     **dict.fromkeys(("Float64", "Float32"), "Real"),
@@ -304,22 +300,18 @@ def check_ports(root: ElementTree.Element) -> None:
         If a port is an array or belongs to a clock.
     """
     for element in root.iterfind("ModelVariables/*"):
-        _refuse(element)
-
-
-def _refuse(element: ElementTree.Element) -> None:
-    name = element.get("name")
-    if not name:
-        raise FmuError("a variable has no name.")
-    if element.get("causality") not in ("input", "output"):
-        return
-    if element.tag == "Clock" or element.get("clocks"):
-        raise FmuError(
-            f'"{name}" belongs to a clock. Values are passed on at communication points only; an '
-            "FMU without clocks is right."
-        )
-    if element.find("Dimension") is not None:
-        raise FmuError(f'"{name}" is an array. Ports are single numbers here.')
+        name = element.get("name")
+        if not name:
+            raise FmuError("a variable has no name.")
+        if element.get("causality") not in ("input", "output"):
+            continue
+        if element.tag == "Clock" or element.get("clocks"):
+            raise FmuError(
+                f'"{name}" belongs to a clock. Values are passed on at communication points only; '
+                "an FMU without clocks is right."
+            )
+        if element.find("Dimension") is not None:
+            raise FmuError(f'"{name}" is an array. Ports are single numbers here.')
 
 
 def _variable_fmi3(
@@ -327,14 +319,44 @@ def _variable_fmi3(
     types: Mapping[str, ElementTree.Element],
     units: Mapping[str, Measure],
 ) -> Variable:
-    name, kind = element.attrib["name"], KINDS[element.tag]
-    declared = types.get(element.get("declaredType", ""))
-    own = {**(declared.attrib if declared is not None else {}), **element.attrib}
-    low, high = _RANGES.get(element.tag, (None, None))
-    least, most = (number_of(name, key, own.get(key)) for key in ("min", "max"))
+    kind, declared = KINDS[element.tag], types.get(element.get("declaredType", ""))
     start = element.get("start")
     if kind == "String" and (given := element.find("Start")) is not None:
         start = given.get("value")
+    listed_in = declared if kind == "Enumeration" else None
+    read = _read_variable(element, kind, element, declared, start, units, _annotation_fmi3)
+    low, high = _RANGES.get(element.tag, (None, None))
+    return replace(
+        read,
+        minimum=low if read.minimum is None else read.minimum,
+        maximum=high if read.maximum is None else read.maximum,
+        type=element.tag,
+        items=items_of(read.name, listed_in),
+    )
+
+
+def _read_variable(
+    element: ElementTree.Element,
+    kind: str,
+    value: ElementTree.Element,
+    declared: ElementTree.Element | None,
+    start: str | None,
+    units: Mapping[str, Measure],
+    annotation: Callable[[ElementTree.Element, str], str | None],
+) -> Variable:
+    """Return what both versions of FMI say alike of a variable.
+
+    Parameters
+    ----------
+    element, value : of the variable, and that which has the attributes of its type
+    kind : of its values
+    declared : the type that it refers to, None without one
+    start : text of its start value
+    units : the FMU's, by name
+    annotation : reads one of bristle's annotations of the variable
+    """
+    name = element.attrib["name"]
+    own = {**(declared.attrib if declared is not None else {}), **value.attrib}
     return Variable(
         name=name,
         kind=kind,
@@ -343,15 +365,13 @@ def _variable_fmi3(
         reference=reference_of(name, element.get("valueReference")),
         unit=own.get("unit"),
         start=start_of(name, kind, start),
-        minimum=low if least is None else least,
-        maximum=high if most is None else most,
+        minimum=number_of(name, "min", own.get("min")),
+        maximum=number_of(name, "max", own.get("max")),
         nominal=number_of(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
-        over_step=over_step_of(name, _annotation_fmi3(element, OVER_STEP_TAG)),
-        jumps_without=_annotation_fmi3(element, JUMPS_TAG),
-        type=element.tag,
+        over_step=over_step_of(name, annotation(element, OVER_STEP_TAG)),
+        jumps_without=annotation(element, JUMPS_TAG),
         defined=unit_of(own, units),
-        items=items_of(name, declared if kind == "Enumeration" else None),
     )
 
 
@@ -452,7 +472,9 @@ def describe(root: ElementTree.Element) -> Description:
         twice = sorted(n for n, times in Counter(v.name for v in every).items() if times > 1)
         raise FmuError(f"variables defined twice: {listed(twice)}.")
     _add_dependencies(root, every, variables)
-    _mark_optional(root, variables)
+    for tool in root.iterfind("VendorAnnotations/Tool"):
+        if tool.get("name") == TOOL:
+            mark_optional(variables, tool.findtext("optional", ""))
     check_jumps(variables)
     return Description(
         name=root.get("modelName", ""),
@@ -499,25 +521,9 @@ def _variable(
     if value is None:
         raise FmuError(f'variable "{name}" has no type (one of {", ".join(_KINDS)}).')
     declared = types.get(value.get("declaredType", ""))
-    inherited = dict(declared.attrib) if declared is not None else {}
-    own = inherited | value.attrib
-    return Variable(
-        name=name,
-        kind=value.tag,
-        causality=element.get("causality", "local"),
-        variability=element.get("variability", "continuous" if value.tag == "Real" else None),
-        reference=reference_of(name, element.get("valueReference")),
-        unit=own.get("unit"),
-        start=start_of(name, value.tag, value.get("start")),
-        minimum=number_of(name, "min", own.get("min")),
-        maximum=number_of(name, "max", own.get("max")),
-        nominal=number_of(name, "nominal", own.get("nominal")),
-        description=element.get("description", ""),
-        over_step=over_step_of(name, _annotation(element, OVER_STEP_TAG)),
-        jumps_without=_annotation(element, JUMPS_TAG),
-        defined=unit_of(own, units),
-        items=items_of(name, declared),
-    )
+    start, kind = value.get("start"), value.tag
+    read = _read_variable(element, kind, value, declared, start, units, _annotation)
+    return replace(read, items=items_of(name, declared))
 
 
 def _annotation(element: ElementTree.Element, tag: str) -> str | None:
@@ -549,10 +555,3 @@ def _indexed(every: list[Variable], text: str | None) -> Variable:
             f"ModelStructure names variable {text!r}; the variables are 1 to {len(every)}."
         )
     return every[number - 1]
-
-
-def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:
-    for tool in root.iterfind("VendorAnnotations/Tool"):
-        if tool.get("name") != TOOL:
-            continue
-        mark_optional(variables, tool.findtext("optional", ""))

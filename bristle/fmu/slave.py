@@ -7,8 +7,6 @@ serialise; outputs that follow their inputs as soon as these are set.
 This module is bundled in every FMU: standard library and pythonfmu only.
 """
 
-# Longer than most files: FMI's calls are one class, for all of them act on the same flat values.
-
 from __future__ import annotations
 
 import json
@@ -301,10 +299,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def __getitem__(self, name: str) -> Any:
         """Return the value of a variable by its full name ("gas_spring.k")."""
         return self._values[self._index[name]]
-
-    def was_set(self, name: str) -> bool:
-        """Return whether the host has ever set this variable, or the build this input."""
-        return self._index[name] in self._set
 
     # -- the life of an instance
 
