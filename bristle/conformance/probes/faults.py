@@ -133,8 +133,7 @@ def fault_order(bench: Bench) -> Finding:
             bench.run(instance, 0, 2)
             good(instance.terminate(), "Terminate")
         if when == "in initialisation":
-            good(instance.setup(plan.start, None), "SetupExperiment")
-            good(instance.enter(), "EnterInitializationMode")
+            bench.entered(instance)
         status = instance.step(plan.start, plan.step)
         if status not in _REFUSED:
             raise UnexpectedError(f"a step {when}: answered {status_name(status)}")
