@@ -28,12 +28,10 @@ from .native import (
     told,
 )
 
-# What the parent tells its child processes about the FMU: one JSON file.
-
 
 @dataclass
 class Plan:
-    """An unpacked FMU and how to try it; times in s.
+    """An unpacked FMU and how to try it, as the parent tells its child processes; times in s.
 
     `steps` is how many communication steps the comparing probes take, `instances` how often
     the repeating ones instantiate; both shrink for an FMU that is slow. `driven` says whether

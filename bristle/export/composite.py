@@ -319,9 +319,7 @@ def export_composite(
 
 
 def plan_of(
-    scenario: str | Path,
-    overrides: Mapping[str, object] | None = None,
-    inputs: Iterable[str] = (),
+    scenario: str | Path, overrides: Mapping[str, object] | None = None, inputs: Iterable[str] = ()
 ) -> Plan:
     """Return what to build; parameters and errors are those of `export_composite`."""
     file, named = resolve_scenario(scenario), list(inputs)

@@ -171,14 +171,10 @@ def platform_folder(version: str = "2.0") -> str:
     return f"{system}{64 if sys.maxsize > 2**32 else 32}"
 
 
-def library_suffix() -> str:
-    """Return what a shared library's name ends with on this platform."""
-    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-
-
 def library_member(identifier: str, version: str = "2.0") -> str:
     """Return where an FMU of a version of FMI keeps its shared library for this platform."""
-    return f"binaries/{platform_folder(version)}/{identifier}{library_suffix()}"
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    return f"binaries/{platform_folder(version)}/{identifier}{suffix}"
 
 
 def check_library(

@@ -152,12 +152,6 @@ def items_of(name: str, declared: ElementTree.Element | None) -> dict[str, int]:
     return found
 
 
-def begins(root: ElementTree.Element) -> str:
-    """Return the start time of an FMU's default experiment as it writes it, "" without one."""
-    experiment = root.find("DefaultExperiment")
-    return "" if experiment is None else experiment.get("startTime", "")
-
-
 def reference_of(name: str, text: str | None) -> int:
     """Return a value reference of the variable of this name."""
     number = unsigned(text)
@@ -262,8 +256,6 @@ def describe_fmi3(root: ElementTree.Element) -> Description:
     FmuError
         It contradicts itself, or has ports that are arrays or belong to clocks.
     """
-    slave = root.find("CoSimulation")
-    assert slave is not None  # read_root refuses what has none
     types = {child.get("name", ""): child for child in root.iterfind("TypeDefinitions/*")}
     units = units_of(root)
     variables: dict[str, Variable] = {}
@@ -276,19 +268,22 @@ def describe_fmi3(root: ElementTree.Element) -> Description:
             variables[name] = _variable_fmi3(element, types, units)
     _add_dependencies_fmi3(root, variables)
     mark_optional(variables, _annotation_fmi3(root, "optional") or "")
+    return _described(root, root.get("instantiationToken", ""), variables, "3.0")
+
+
+def _described(
+    root: ElementTree.Element, guid: str, variables: dict[str, Variable], version: str
+) -> Description:
+    """Return what an FMU of either version says of itself besides its variables, with these."""
     check_jumps(variables)
+    slave = root.find("CoSimulation")
+    assert slave is not None  # read_root refuses what has none
+    flags = {_CAPABILITIES.get(key, key): value for key, value in slave.attrib.items()}
+    identifier, experiment = flags.pop("modelIdentifier", ""), root.find("DefaultExperiment")
     return Description(
-        name=root.get("modelName", ""),
-        guid=root.get("instantiationToken", ""),
-        identifier=slave.get("modelIdentifier", ""),
-        description=root.get("description", ""),
-        variables=variables,
-        capabilities={
-            _CAPABILITIES.get(k, k): v for k, v in slave.attrib.items() if k != "modelIdentifier"
-        },
-        version="3.0",
-        begins=begins(root),
-    )
+        root.get("modelName", ""), guid, identifier, root.get("description", ""), variables, flags,
+        version, "" if experiment is None else experiment.get("startTime", ""),
+    )  # fmt: skip
 
 
 def check_ports(root: ElementTree.Element) -> None:
@@ -457,8 +452,6 @@ def describe(root: ElementTree.Element) -> Description:
     """Return the description in an XML tree that `read_root` let through."""
     if root.get("fmiVersion") == "3.0":
         return describe_fmi3(root)
-    slave = root.find("CoSimulation")
-    assert slave is not None  # read_root refuses what has none
     types = {
         name: child
         for simple in root.iterfind("TypeDefinitions/SimpleType")
@@ -475,16 +468,7 @@ def describe(root: ElementTree.Element) -> Description:
     for tool in root.iterfind("VendorAnnotations/Tool"):
         if tool.get("name") == TOOL:
             mark_optional(variables, tool.findtext("optional", ""))
-    check_jumps(variables)
-    return Description(
-        name=root.get("modelName", ""),
-        guid=root.get("guid", ""),
-        identifier=slave.get("modelIdentifier", ""),
-        description=root.get("description", ""),
-        variables=variables,
-        capabilities={k: v for k, v in slave.attrib.items() if k != "modelIdentifier"},
-        begins=begins(root),
-    )
+    return _described(root, root.get("guid", ""), variables, "2.0")
 
 
 def _check_kind(path: Path, root: ElementTree.Element, versions: Sequence[str]) -> str:

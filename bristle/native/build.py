@@ -244,11 +244,7 @@ _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 
 
 def build(
-    what: Plan,
-    folder: Path,
-    platforms: Sequence[Platform],
-    fmi: int = 2,
-    sources: bool = False,
+    what: Plan, folder: Path, platforms: Sequence[Platform], fmi: int = 2, sources: bool = False
 ) -> Path:
     """Build a native FMU into a folder, unless the same one stands there; return its path.
 

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 from ..errors import PhysicsError
 from .linear import cholesky, inverse
 
-# Where devices sit in a building: each acts between two levels, or between the ground and one.
-
 GROUND = -1
 """The ground in place of a level."""
 

@@ -179,7 +179,7 @@ class Registry(dict[str, "type[Effect]"]):
             return default
 
 
-EFFECTS: Registry = Registry()
+EFFECTS = Registry()
 
 
 def plain_name(key: str) -> str:
@@ -201,23 +201,11 @@ SITES = ("damper", "structure", "sensor")
 CHANNELS = ("force", "velocity")
 """Channels whose instrument a sensor's effect may be."""
 
-# In the order in which an evaluation calls them.
 HOOKS = (
-    "voltage",
-    "motion",
-    "yield_factor",
-    "viscous_factor",
-    "reach",
-    "yield_force",
-    "force",
-    "spring",
-    "factor",
-    "reaction",
-    "rate",
-    "advance",
-    "channel",
-)
-
+    "voltage", "motion", "yield_factor", "viscous_factor", "reach", "yield_force", "force",
+    "spring", "factor", "reaction", "rate", "advance", "channel",
+)  # fmt: skip
+"""In the order in which an evaluation calls them."""
 
 ACTS_ON = {
     "voltage": "command",

@@ -8,15 +8,7 @@ from pathlib import Path
 
 from ..bench import Bench, good
 from ..native import UnexpectedError
-from ..probe import (
-    Finding,
-    failed,
-    noted,
-    passed,
-    probe,
-    unless_claimed,
-    unless_single,
-)
+from ..probe import Finding, failed, noted, passed, probe, unless_claimed, unless_single
 
 _COPY, _BYTES = "canGetAndSetFMUstate", "canSerializeFMUstate"
 
