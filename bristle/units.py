@@ -162,30 +162,14 @@ _LONGEST = 80  # characters
 _DIGITS = 1e-6  # how far [1] two ways to write one factor may lie apart
 _COMMON = ("m/s2", "m/s", "N/m", "N.s/m", "N.s/(m.V)", "rad/s", "degC")
 _USUAL = (
-    "m",
-    "s",
-    "m/s",
-    "m/s2",
-    "N",
-    "Pa",
-    "V",
-    "A",
-    "T",
-    "J",
-    "W",
-    "kg",
-    "Hz",
-    "N/m",
-    "N.s/m",
-    "Ohm",
-)
+    "m", "s", "m/s", "m/s2", "N", "Pa", "V", "A", "T", "J", "W", "kg", "Hz", "N/m", "N.s/m", "Ohm",
+)  # fmt: skip
 _GRAM = re.compile(r"(?i)[a-zµ]?g|(milli|kilo)?gram(me)?s?")
 
 # Superscripts, signs and letters that look alike, each with the plain one that is meant: the
 # Unicode minus, the dot of a product, both micro signs, the ohm sign, no-break spaces.
 _PLAIN_TEXT = str.maketrans(
-    "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺\u2212·⋅∙*\u00d7\u00b5\u03bc\u2126º\u00a0\u202f",
-    "0123456789-+-.....uu\u03a9°  ",
+    "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺\u2212·⋅∙*\u00d7\u00b5\u03bc\u2126º\u00a0\u202f", "0123456789-+-.....uu\u03a9°  "
 )
 _TOKEN = re.compile(
     r"(?P<symbol>°?[A-Za-zΩ]+|[°%])(?:\^?(?P<power>[+-]?[1-9])|\^\((?P<braced>[+-]?[1-9])\))?"

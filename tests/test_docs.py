@@ -21,7 +21,7 @@ from bristle.fmu import catalogue
 from bristle.model.equations import formulas
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
-from bristle.view.formula import formula_html
+from bristle.view.formula import formula as formula_html
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

@@ -20,8 +20,9 @@ PACKAGE = ROOT / "bristle"
 # imports from those before it in its list, never from beside it or from behind it.
 BASE = (
     {"errors", "version"},
-    {"units", "core"},
+    {"units"},
     {"physics"},
+    {"core"},
     {"component", "view"},
     {"data", "user_code"},
     {"model"},

@@ -18,7 +18,7 @@ from bristle.physics.laws import LAWS
 from bristle.study import Study, create_study
 from bristle.study.steps import add_effects
 from bristle.user_code import load
-from bristle.user_code.templates import effect_template, law_template
+from bristle.user_code.templates import file_text
 
 Files = dict[str, str]
 
@@ -34,7 +34,7 @@ def telltale(marker: Path, name: str = "seal") -> str:
     """Return an effect that works, and that writes a file as soon as its text runs."""
     write = f"open({str(marker)!r}, 'w').close()"
     more = f'def said(made):\n    return "{write}"\n\n\n@exec\n@said\nclass Made:\n    """."""\n'
-    return f"{effect_template(name)}\n\n{more}"
+    return f"{file_text('effect', name)}\n\n{more}"
 
 
 @pytest.fixture
@@ -111,7 +111,9 @@ def law_mailed(tmp_path: Path, marker: Path) -> Path:
     study.laws_folder.mkdir()
     write = f"open({str(marker)!r}, 'w').close()"
     more = f'def said(made):\n    return "{write}"\n\n\n@exec\n@said\nclass Made:\n    """."""\n'
-    (study.laws_folder / "oil.py").write_text(f"{law_template('oil')}\n\n{more}", encoding="utf-8")
+    (study.laws_folder / "oil.py").write_text(
+        f"{file_text('law', 'oil')}\n\n{more}", encoding="utf-8"
+    )
     (study.folder / "model.toml").write_text(
         'schema = 1\nlaw = "oil"\n[parameters.f_c]\nvalue = 1.5\nunit = "N"\n'
         'origin = "identified"\n',
@@ -312,7 +314,7 @@ def test_a_file_made_here_is_trusted_and_checking_it_is_consent(
     assert main(["check", "rub.py"]) == 0
     assert trust.load_file(file).parameters["f_s"].value == 0.4
     other = tmp_path / "sent.py"
-    other.write_text(effect_template("sent"))
+    other.write_text(file_text("effect", "sent"))
     assert main(["check", "sent.py"]) == 2
     assert "sent.py: this file's code has not run here" in capsys.readouterr().err
     assert main(["check", "sent.py", "--trust"]) == 0
@@ -342,7 +344,7 @@ def test_a_file_imports_nothing_beside_it(tmp_path: Path, marker: Path) -> None:
     (tmp_path / "helper.py").write_text(f"open({str(marker)!r}, 'w').close()\n")
     for line in ("import helper", "from . import helper", "from .helper import x"):
         file = tmp_path / "rub.py"
-        file.write_text(effect_template("rub").replace("from math import tanh", line))
+        file.write_text(file_text("effect", "rub").replace("from math import tanh", line))
         with pytest.raises(PhysicsError, match=r"is imported"):
             trust.load_file(file, trust=True)
     assert not marker.exists()
@@ -350,7 +352,7 @@ def test_a_file_imports_nothing_beside_it(tmp_path: Path, marker: Path) -> None:
 
 def test_a_text_in_another_coding_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "rub.py"
-    file.write_text("# -*- coding: utf-7 -*-\n" + effect_template("rub"))
+    file.write_text("# -*- coding: utf-7 -*-\n" + file_text("effect", "rub"))
     with pytest.raises(PhysicsError, match="utf-8 is right"):
         trust.load_file(file, trust=True)
 
@@ -363,9 +365,9 @@ def test_nothing_hides_in_what_is_shown() -> None:
 def test_without_the_gate_nothing_runs(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path; from bristle.user_code import load as user\n"
-        "print(user.load_effects(Path(sys.argv[1]))[0].error)"
+        "print(user.load(Path(sys.argv[1]))[0].error)"
     )
-    (tmp_path / "rub.py").write_text(effect_template("rub"))
+    (tmp_path / "rub.py").write_text(file_text("effect", "rub"))
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True,
         env={**os.environ, trust.VARIABLE: "1"},

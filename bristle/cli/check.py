@@ -130,7 +130,7 @@ def _own(file: Path, as_json: bool) -> int:
     word = _word(file)
     made = load_file(file, word, trust=is_made_here(file))  # refuses with file and line
     tell(f"checking {file.name}: its hooks are called some hundred thousand times, and compiled")
-    program = [sys.executable, "-m", "bristle.user_code.own", word, str(file)]
+    program = [sys.executable, "-m", "bristle.user_code.conformance", word, str(file)]
     try:
         child = subprocess.run(program, capture_output=True, text=True, check=False, timeout=WITHIN)
     except subprocess.TimeoutExpired:

@@ -65,13 +65,13 @@ def _controller(name: str) -> tuple[Path, str]:
     """Write the file; return it and the name of the component in it."""
     from ..errors import BuildError
     from ..fmu.catalogue import component_names
-    from ..user_code.templates import class_name
-    from ..user_code.templates import controller_template as template
+    from ..user_code.templates import class_name, file_text
 
     component = class_name(name)
     if component in component_names():
         raise BuildError(f'"{name}": {component} is a built-in component; take another name.')
-    return _written(Path(f"{name}.py"), name, template, BuildError), component
+    text = file_text("controller", name)
+    return _written(Path(f"{name}.py"), name, text, BuildError), component
 
 
 def _physics(word: str, name: str, study: Path | None) -> Path:
@@ -81,30 +81,26 @@ def _physics(word: str, name: str, study: Path | None) -> Path:
     from ..physics.effect import EFFECTS
     from ..physics.laws import law_names
     from ..trust import remember_made
-    from ..user_code import templates as _effect_template
-    from ..user_code import templates as _law_template
+    from ..user_code.templates import file_text
 
     if name in (*law_names(), *law_names("structure"), *EFFECTS):
         raise PhysicsError(f'"{name}" is taken in the library; take another name.')
     if study is not None and not (study / "study.toml").is_file():
         raise PhysicsError(f"--study {study}: no study; there is no study.toml.")
-    template = (_effect_template if word == "effect" else _law_template).template
     folder = Path() if study is None else study / f"{word}s"
-    file = _written(folder / f"{name}.py", name, template, PhysicsError)
-    remember_made(file, template(name))
+    file = _written(folder / f"{name}.py", name, file_text(word, name), PhysicsError)
+    remember_made(file, file_text(word, name))
     return file
 
 
-def _written(
-    file: Path, name: str, template: Callable[[str], str], error: Callable[[str], Exception]
-) -> Path:
+def _written(file: Path, name: str, text: str, error: Callable[[str], Exception]) -> Path:
     """Write the text that a template has for a name into a file that is not there yet."""
     if not name.isidentifier() or not name.isascii() or name != name.lower() or name[0] == "_":
         raise error(f'"{name}": expected a name of small letters, digits and _.')
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with file.open("x", encoding="utf-8") as stream:
-            stream.write(template(name))
+            stream.write(text)
     except FileExistsError:
         raise error(f"{file} is there already; another name, or remove it.") from None
     except OSError as flaw:

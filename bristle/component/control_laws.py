@@ -17,8 +17,6 @@ from ..physics.damper_source import advance_law, law_force
 from ..physics.linear import Row
 from ..physics.tuples import NO_EFFECT, Inputs, record
 
-# From a command to a voltage within limits: the clipped-optimal switch, the signed voltage.
-
 
 def sign(value: float) -> float:
     """Return 1 or -1; 1 at zero."""
@@ -174,8 +172,7 @@ def voltage_share(count: int, hidden: int, inputs: Row, weights: Row, units: Row
 # (2012), IEEE TCST 20(5), eq. (7).
 #
 # `law` is the code of a law of the library (`physics.law.law_code`), `p` are its parameters in
-# their
-# order, `z` its states as the controller estimates them: after each sample they move on by
+# their order, `z` its states as the controller estimates them: after each sample they move on by
 # `estimate_states`.
 
 STILL = 1e-3
@@ -261,8 +258,7 @@ def affine_voltage(
 #
 # `y` is the measured floor acceleration, `w` a second input: for anti-windup, w = rate (sat(u) - u)
 # with the rate in 1/s; for LQG, the damper's force. Matrices of a table lie one after another in
-# flat
-# sequences, `row` says which one: `A` (rows n n), `B`, `W`, `C` (rows n).
+# flat sequences, `row` says which one: `A` (rows n n), `B`, `W`, `C` (rows n).
 
 
 def table_row(v: float, v_top: float, rows: int) -> int:
@@ -313,9 +309,6 @@ def advance(
         spare[i] = total
     for i in range(n):
         x[i] = spare[i]
-
-
-# Velocities that no sensor measures, and the skyhook law that needs one.
 
 
 def low_passed(filtered: float, before: float, now: float, corner: float, h: float) -> float:

@@ -40,8 +40,6 @@ from .control_laws import (
 )
 from .controller_file import Controller
 
-# What a design and its parameters imply of a controller's constants, from flat numbers.
-
 CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE, POLICY = range(7)
 """Kinds of controllers."""
 

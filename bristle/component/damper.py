@@ -24,8 +24,6 @@ from ..physics.linear import Row, open_row, packed, place, row
 from ..physics.tuples import Inputs, Setup, record
 from .control_laws import limited
 
-# What a build and its parameters imply of a damper's constants, from flat numbers.
-
 DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
 FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
 """Outputs; friction, the part of the force that is, is hidden."""

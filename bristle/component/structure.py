@@ -193,9 +193,6 @@ def gain(lower: int, upper: int, below: int, above: int, c: Constants) -> float:
     return total
 
 
-# What a building, its parameters and the length of a step imply of a structure's constants.
-
-
 class Constants(NamedTuple):
     """What a structure computes with.
 

@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 
 from .bench import Bench, Plan
-from .native import BlackBox, FatalAnswerError, MissingFunctionError
-from .probe import Finding, UnexpectedError, failed
+from .native import BlackBox, FatalAnswerError, MissingFunctionError, UnexpectedError
+from .probe import Finding, failed
 from .probes import PROBES
 
 PLAN, FINDING, BOX = "plan.json", "finding.json", "box"
@@ -58,12 +58,10 @@ def serve(work: Path) -> None:
 def _try(bench: Bench, name: str) -> Finding:
     try:
         return PROBES[name].run(bench)
-    except UnexpectedError as error:
+    except (UnexpectedError, MissingFunctionError) as error:
         return failed(str(error))
     except FatalAnswerError as error:
         return failed(f"{error} answered Fatal: no instance may be used any more")
-    except MissingFunctionError as error:
-        return failed(str(error))
     except Exception as error:  # what an FMU answers can break any code that reads it
         where = bench.box.text() or "reading its answer"
         return failed(f"the probe broke off, {where}: {type(error).__name__}: {error}")

@@ -15,15 +15,23 @@ from ..core.text import listed
 from ..fmu.archive import library_member
 from ..fmu.description import Description, Value, Variable
 from ..units import Unit
-from .native import DISCARD, OK, STATUS, WARNING, BlackBox, Instance, Library, LibraryFmi3, told
-from .probe import UnexpectedError
-
-# What the parent tells its child processes about the FMU: one JSON file.
+from .native import (
+    DISCARD,
+    OK,
+    STATUS,
+    WARNING,
+    BlackBox,
+    Instance,
+    Library,
+    LibraryFmi3,
+    UnexpectedError,
+    told,
+)
 
 
 @dataclass
 class Plan:
-    """An unpacked FMU and how to try it; times in s.
+    """An unpacked FMU and how to try it, as the parent tells its child processes; times in s.
 
     `steps` is how many communication steps the comparing probes take, `instances` how often
     the repeating ones instantiate; both shrink for an FMU that is slow. `driven` says whether
@@ -156,13 +164,24 @@ class Bench:
         texts = () if self._library is None else self._library.said()
         return told(" / ".join(texts))
 
+    def entered(self, instance: Instance | None = None, stop: float | None = None) -> Instance:
+        """Return an instance in initialisation mode, a new one unless one is given; `stop` in s."""
+        instance = instance or self.instance()
+        good(instance.setup(self.plan.start, stop), "SetupExperiment")
+        good(instance.enter(), "EnterInitializationMode")
+        return instance
+
+    def under_way(self) -> Instance:
+        """Return a new instance that has made two steps."""
+        instance = self.ready()
+        self.run(instance, 0, 2)
+        return instance
+
     def ready(
         self, instance: Instance | None = None, *, drive: bool | None = None, stop: bool = False
     ) -> Instance:
         """Return an instance that has passed initialisation, a new one unless one is given."""
-        instance = instance or self.instance()
-        good(instance.setup(self.plan.start, self.plan.end if stop else None), "SetupExperiment")
-        good(instance.enter(), "EnterInitializationMode")
+        instance = self.entered(instance, self.plan.end if stop else None)
         if self.plan.driven if drive is None else drive:
             self.move(instance, 0)
         good(instance.leave(), "ExitInitializationMode")
@@ -231,11 +250,9 @@ class Bench:
         status = instance.step(time, step)
         if status in GOOD:
             return
-        wish = ", and it wants the run to end" if self._ends(instance, status) else ""
+        ends = status == DISCARD and instance.wants_to_end()
+        wish = ", and it wants the run to end" if ends else ""
         raise UnexpectedError(f"fmi2DoStep at t = {time:g} s answered {STATUS[status]}{wish}")
-
-    def _ends(self, instance: Instance, status: int) -> bool:
-        return status == DISCARD and instance.wants_to_end()
 
     def whole_run(self, instance: Instance | None = None) -> list[Values]:
         """Return the outputs of a legal run from initialisation on, as the reference holds them."""

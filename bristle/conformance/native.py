@@ -18,20 +18,15 @@ from ctypes import (
     c_char_p,
     c_double,
     c_int,
-    c_int32,
     c_size_t,
     c_uint,
-    c_uint32,
     c_void_p,
+    create_string_buffer,
 )
-from ctypes import create_string_buffer as buffer_of
 from pathlib import Path
 from typing import Any
 
 from ..fmu.description import Value
-from .probe import UnexpectedError
-
-# The functions of FMI 2.0 co-simulation: names, argument types, results.
 
 _refs, _state = POINTER(c_uint), c_void_p
 TYPES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
@@ -82,10 +77,6 @@ RESULTS: dict[str, Any] = {
     "fmi2FreeInstance": None,
 }
 
-
-# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
-
-
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
@@ -108,6 +99,10 @@ class _Callbacks(ctypes.Structure):
         ("finished", _FINISHED),
         ("environment", c_void_p),
     )
+
+
+class UnexpectedError(Exception):
+    """A legal call was not answered as the standard demands; the text says which."""
 
 
 class FatalAnswerError(Exception):
@@ -267,7 +262,7 @@ class Library:
 
     def instantiate(
         self, name: str, guid: str, resources: str, *, logging: bool = False
-    ) -> Instance | None:  # fmt: skip
+    ) -> Instance | None:
         """Return a new instance for co-simulation, None if the FMU refuses.
 
         Parameters
@@ -277,15 +272,9 @@ class Library:
         logging : whether the FMU logs for debugging
         """
         handle = self.call(
-            "fmi2Instantiate",
-            name.encode(),
-            1,
-            guid.encode(),
-            resources.encode(),
-            ctypes.addressof(self._callbacks),
-            0,
-            int(logging),
-        )
+            "fmi2Instantiate", name.encode(), 1, guid.encode(), resources.encode(),
+            ctypes.addressof(self._callbacks), 0, int(logging),
+        )  # fmt: skip
         self._refused = [] if handle else list(self._latest)
         return Instance(self, handle) if handle else None
 
@@ -304,32 +293,39 @@ class Library:
 class Instance:
     """One instance. Every method returns the status that the FMU answered."""
 
+    _output_slopes = "GetRealOutputDerivatives"
+
     def __init__(self, library: Library, handle: int) -> None:
         self.library = library
         self.handle = handle
 
     def _do(self, name: str, *arguments: Any) -> int:
-        return self.library.status(name, self.handle, *arguments)
+        """Call a function by its name without a version."""
+        return self.library.status(f"{self.library.prefix}{name}", self.handle, *arguments)
+
+    def _sized(self, array: Any) -> tuple[Any, ...]:
+        """Return an array as its version of FMI takes it: FMI 3.0 asks for its length as well."""
+        return (array,)
 
     def setup(self, start: float, stop: float | None) -> int:
         """Call fmi2SetupExperiment without a tolerance; times in s."""
-        return self._do("fmi2SetupExperiment", 0, 0.0, start, int(stop is not None), stop or 0.0)
+        return self._do("SetupExperiment", 0, 0.0, start, int(stop is not None), stop or 0.0)
 
     def enter(self) -> int:
         """Call fmi2EnterInitializationMode."""
-        return self._do("fmi2EnterInitializationMode")
+        return self._do("EnterInitializationMode")
 
     def leave(self) -> int:
         """Call fmi2ExitInitializationMode."""
-        return self._do(f"{self.library.prefix}ExitInitializationMode")
+        return self._do("ExitInitializationMode")
 
     def terminate(self) -> int:
         """Call fmi2Terminate."""
-        return self._do(f"{self.library.prefix}Terminate")
+        return self._do("Terminate")
 
     def reset(self) -> int:
         """Call fmi2Reset."""
-        return self._do(f"{self.library.prefix}Reset")
+        return self._do("Reset")
 
     def free(self) -> None:
         """Call fmi2FreeInstance."""
@@ -337,10 +333,10 @@ class Instance:
 
     def step(self, time_: float, step: float) -> int:
         """Call fmi2DoStep (s), and wait where the FMU computes asynchronously."""
-        status = self._do("fmi2DoStep", time_, step, 1)
+        status = self._do("DoStep", time_, step, 1)
         while status == PENDING:  # the time limit of the call ends an endless wait
             answer = c_int(PENDING)
-            asked = self._do("fmi2GetStatus", _DO_STEP_STATUS, byref(answer))
+            asked = self._do("GetStatus", _DO_STEP_STATUS, byref(answer))
             status = answer.value if asked in (OK, WARNING) else asked
             if status == FATAL:
                 raise FatalAnswerError("fmi2DoStep")
@@ -351,7 +347,7 @@ class Instance:
         """Return whether the FMU says, after Discard, that it wants the run to end."""
         answer = c_int(0)
         try:
-            status = self._do("fmi2GetBooleanStatus", _TERMINATED, byref(answer))
+            status = self._do("GetBooleanStatus", _TERMINATED, byref(answer))
         except (FatalAnswerError, MissingFunctionError):
             return False
         return status in (OK, WARNING) and bool(answer.value)
@@ -360,7 +356,7 @@ class Instance:
         """Return the status and the values of variables of one kind."""
         kind, count = _base(kind), len(references)
         values = (TYPES[kind] * count)()
-        status = self._do(f"fmi2Get{kind}", (c_uint * count)(*references), count, values)
+        status = self._do(f"Get{kind}", (c_uint * count)(*references), count, values)
         if kind == "String":
             return status, [(v or b"").decode("utf-8", "replace") for v in values]
         return status, [bool(v) for v in values] if kind == "Boolean" else list(values)
@@ -368,84 +364,80 @@ class Instance:
     def set(self, kind: str, references: Sequence[int], values: Sequence[Value]) -> int:
         """Set variables of one kind."""
         kind, count = _base(kind), len(references)
-        raw = [v.encode() if isinstance(v, str) else v for v in values]
-        array = (TYPES[kind] * count)(*raw)
-        return self._do(f"fmi2Set{kind}", (c_uint * count)(*references), count, array)
+        array = (TYPES[kind] * count)(*_raw(values))
+        return self._do(f"Set{kind}", (c_uint * count)(*references), count, array)
 
     def save(self, state: c_void_p) -> int:
         """Call fmi2GetFMUstate into `state`."""
-        return self._do("fmi2GetFMUstate", byref(state))
+        return self._do("GetFMUstate", byref(state))
 
     def restore(self, state: c_void_p) -> int:
         """Call fmi2SetFMUstate."""
-        return self._do("fmi2SetFMUstate", state)
+        return self._do("SetFMUstate", state)
 
     def forget(self, state: c_void_p) -> int:
         """Call fmi2FreeFMUstate."""
-        return self._do("fmi2FreeFMUstate", byref(state))
+        return self._do("FreeFMUstate", byref(state))
 
     def serialise(self, state: c_void_p) -> tuple[int, bytes]:
         """Return the status and the bytes of a saved state."""
         size = c_size_t(0)
-        status = self._do("fmi2SerializedFMUstateSize", state, byref(size))
+        status = self._do("SerializedFMUstateSize", state, byref(size))
         if status not in (OK, WARNING):
             return status, b""
-        buffer = ctypes.create_string_buffer(size.value)
-        return self._do("fmi2SerializeFMUstate", state, buffer, size.value), buffer.raw
+        buffer = create_string_buffer(size.value)
+        return self._do("SerializeFMUstate", state, buffer, size.value), buffer.raw
 
     def deserialise(self, data: bytes, state: c_void_p) -> int:
         """Call fmi2DeSerializeFMUstate into `state`."""
-        return self._do("fmi2DeSerializeFMUstate", data, len(data), byref(state))
+        return self._do("DeSerializeFMUstate", data, len(data), byref(state))
 
     def debug_logging(self, on: bool, categories: Sequence[str] = ()) -> int:
         """Call fmi2SetDebugLogging."""
         names = (c_char_p * len(categories))(*(c.encode() for c in categories))
-        return self._do("fmi2SetDebugLogging", int(on), len(categories), names)
+        return self._do("SetDebugLogging", int(on), len(categories), names)
 
     def derivatives(
         self, unknowns: Sequence[int], knowns: Sequence[int]
-    ) -> tuple[int, list[float]]:  # fmt: skip
+    ) -> tuple[int, list[float]]:
         """Return the status and the directional derivative along the sum of all knowns."""
-        result = (c_double * len(unknowns))()
+        n, m = len(unknowns), len(knowns)
+        seed, result = (c_double * m)(*[1.0] * m), (c_double * n)()
         status = self._do(
-            "fmi2GetDirectionalDerivative",
-            (c_uint * len(unknowns))(*unknowns),
-            len(unknowns),
-            (c_uint * len(knowns))(*knowns),
-            len(knowns),
-            (c_double * len(knowns))(*[1.0] * len(knowns)),
-            result,
-        )
+            "GetDirectionalDerivative", (c_uint * n)(*unknowns), n, (c_uint * m)(*knowns), m,
+            *self._sized(seed), *self._sized(result),
+        )  # fmt: skip
         return status, list(result)
 
     def input_derivative(self, reference: int, value: float, order: int = 1) -> int:
         """Call fmi2SetRealInputDerivatives with one derivative [per s, per s2 ...] of an order."""
         one = (c_uint * 1)(reference)
         return self._do(
-            "fmi2SetRealInputDerivatives", one, 1, (c_int * 1)(order), (c_double * 1)(value)
+            "SetRealInputDerivatives", one, 1, (c_int * 1)(order), (c_double * 1)(value)
         )
 
     def output_derivative(self, reference: int) -> tuple[int, float]:
         """Return the status and the first derivative of one output."""
-        value = (c_double * 1)()
-        one = (c_uint * 1)(reference)
-        status = self._do("fmi2GetRealOutputDerivatives", one, 1, (c_int * 1)(1), value)
+        value, one = (c_double * 1)(), (c_uint * 1)(reference)
+        status = self._do(self._output_slopes, one, 1, (c_int * 1)(1), *self._sized(value))
         return status, value[0]
+
+
+def _raw(values: Sequence[Value]) -> list[Any]:
+    return [v.encode() if isinstance(v, str) else v for v in values]
 
 
 def _base(kind: str) -> str:
     return "Integer" if kind == "Enumeration" else kind
 
 
-# The functions of FMI 3.0 co-simulation: names, argument types, results.
-
-_refs3, _state3, _sizes = POINTER(c_uint32), c_void_p, POINTER(c_size_t)
-_flag, _numbers, _qualifiers = POINTER(c_bool), POINTER(c_double), POINTER(ctypes.c_int)
+_sizes = POINTER(c_size_t)
+_flag, _numbers, _qualifiers = POINTER(c_bool), POINTER(c_double), POINTER(c_int)
 _counters = POINTER(ctypes.c_uint64)
 TYPES_FMI3: dict[str, Any] = {
     "Float64": c_double, "Float32": ctypes.c_float, "Boolean": c_bool, "String": c_char_p,
     "Int8": ctypes.c_int8, "UInt8": ctypes.c_uint8, "Int16": ctypes.c_int16,
-    "UInt16": ctypes.c_uint16, "Int32": c_int32, "UInt32": c_uint32,
+    "UInt16": ctypes.c_uint16, "Int32": c_int, "UInt32": c_uint,
     "Int64": ctypes.c_int64, "UInt64": ctypes.c_uint64,
 }  # fmt: skip
 NATURAL = {
@@ -453,10 +445,10 @@ NATURAL = {
     "String": "String",
 }  # fmt: skip
 """The type of a kind of FMI 2.0 where nothing else is said."""
-LOGGER = ctypes.CFUNCTYPE(None, c_void_p, ctypes.c_int, c_char_p, c_char_p)
+LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
 _values = {
-    f"fmi3{verb}{name}": (c_void_p, _refs3, c_size_t, POINTER(kind), c_size_t)
+    f"fmi3{verb}{name}": (c_void_p, _refs, c_size_t, POINTER(kind), c_size_t)
     for verb in ("Get", "Set")
     for name, kind in TYPES_FMI3.items()
 }
@@ -465,7 +457,7 @@ REQUIRED_FMI3 = {
     "fmi3SetDebugLogging": (c_void_p, c_bool, c_size_t, POINTER(c_char_p)),
     "fmi3InstantiateCoSimulation": (
         *(c_char_p, c_char_p, c_char_p, c_bool, c_bool, c_bool, c_bool),
-        *(_refs3, c_size_t, c_void_p, LOGGER, c_void_p),
+        *(_refs, c_size_t, c_void_p, LOGGER, c_void_p),
     ),
     "fmi3FreeInstance": (c_void_p,),
     "fmi3EnterInitializationMode": (c_void_p, c_bool, c_double, c_double, c_bool, c_double),
@@ -476,34 +468,34 @@ REQUIRED_FMI3 = {
     **_values,
 }
 OPTIONAL_FMI3 = {
-    "fmi3GetFMUState": (c_void_p, POINTER(_state3)),
-    "fmi3SetFMUState": (c_void_p, _state3),
-    "fmi3FreeFMUState": (c_void_p, POINTER(_state3)),
-    "fmi3SerializedFMUStateSize": (c_void_p, _state3, _sizes),
-    "fmi3SerializeFMUState": (c_void_p, _state3, c_char_p, c_size_t),
-    "fmi3DeserializeFMUState": (c_void_p, c_char_p, c_size_t, POINTER(_state3)),
+    "fmi3GetFMUState": (c_void_p, POINTER(_state)),
+    "fmi3SetFMUState": (c_void_p, _state),
+    "fmi3FreeFMUState": (c_void_p, POINTER(_state)),
+    "fmi3SerializedFMUStateSize": (c_void_p, _state, _sizes),
+    "fmi3SerializeFMUState": (c_void_p, _state, c_char_p, c_size_t),
+    "fmi3DeserializeFMUState": (c_void_p, c_char_p, c_size_t, POINTER(_state)),
     "fmi3GetDirectionalDerivative": (
-        (c_void_p, _refs3, c_size_t, _refs3, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
+        (c_void_p, _refs, c_size_t, _refs, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
     ),
     "fmi3GetAdjointDerivative": (
-        (c_void_p, _refs3, c_size_t, _refs3, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
+        (c_void_p, _refs, c_size_t, _refs, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
     ),
-    "fmi3GetOutputDerivatives": (c_void_p, _refs3, c_size_t, POINTER(c_int32), _numbers, c_size_t),
-    "fmi3GetBinary": (c_void_p, _refs3, c_size_t, _sizes, c_void_p, c_size_t),
-    "fmi3SetBinary": (c_void_p, _refs3, c_size_t, _sizes, c_void_p, c_size_t),
-    "fmi3GetClock": (c_void_p, _refs3, c_size_t, _flag),
-    "fmi3SetClock": (c_void_p, _refs3, c_size_t, _flag),
-    "fmi3GetIntervalDecimal": (c_void_p, _refs3, c_size_t, _numbers, _qualifiers),
-    "fmi3GetIntervalFraction": (c_void_p, _refs3, c_size_t, _counters, _counters, _qualifiers),
-    "fmi3GetShiftDecimal": (c_void_p, _refs3, c_size_t, _numbers),
-    "fmi3GetShiftFraction": (c_void_p, _refs3, c_size_t, _counters, _counters),
-    "fmi3SetIntervalDecimal": (c_void_p, _refs3, c_size_t, _numbers),
-    "fmi3SetIntervalFraction": (c_void_p, _refs3, c_size_t, _counters, _counters),
-    "fmi3SetShiftDecimal": (c_void_p, _refs3, c_size_t, _numbers),
-    "fmi3SetShiftFraction": (c_void_p, _refs3, c_size_t, _counters, _counters),
-    "fmi3GetNumberOfVariableDependencies": (c_void_p, c_uint32, _sizes),
+    "fmi3GetOutputDerivatives": (c_void_p, _refs, c_size_t, POINTER(c_int), _numbers, c_size_t),
+    "fmi3GetBinary": (c_void_p, _refs, c_size_t, _sizes, c_void_p, c_size_t),
+    "fmi3SetBinary": (c_void_p, _refs, c_size_t, _sizes, c_void_p, c_size_t),
+    "fmi3GetClock": (c_void_p, _refs, c_size_t, _flag),
+    "fmi3SetClock": (c_void_p, _refs, c_size_t, _flag),
+    "fmi3GetIntervalDecimal": (c_void_p, _refs, c_size_t, _numbers, _qualifiers),
+    "fmi3GetIntervalFraction": (c_void_p, _refs, c_size_t, _counters, _counters, _qualifiers),
+    "fmi3GetShiftDecimal": (c_void_p, _refs, c_size_t, _numbers),
+    "fmi3GetShiftFraction": (c_void_p, _refs, c_size_t, _counters, _counters),
+    "fmi3SetIntervalDecimal": (c_void_p, _refs, c_size_t, _numbers),
+    "fmi3SetIntervalFraction": (c_void_p, _refs, c_size_t, _counters, _counters),
+    "fmi3SetShiftDecimal": (c_void_p, _refs, c_size_t, _numbers),
+    "fmi3SetShiftFraction": (c_void_p, _refs, c_size_t, _counters, _counters),
+    "fmi3GetNumberOfVariableDependencies": (c_void_p, c_uint, _sizes),
     "fmi3GetVariableDependencies": (
-        (c_void_p, c_uint32, _sizes, _refs3, _sizes, _qualifiers, c_size_t)
+        (c_void_p, c_uint, _sizes, _refs, _sizes, _qualifiers, c_size_t)
     ),
     "fmi3EnterEventMode": (c_void_p,),
     "fmi3EnterStepMode": (c_void_p,),
@@ -517,12 +509,6 @@ RESULTS_FMI3: dict[str, Any] = {
     "fmi3InstantiateCoSimulation": c_void_p,
     "fmi3FreeInstance": None,
 }
-
-
-# The FMI 3.0 functions of a shared library, called bare, under the names of `native`.
-#
-# Instances are stepped without event mode, intermediate update and early return, as an importer may
-# choose for any FMU. Runs in the child process: standard library only.
 
 
 class LibraryFmi3(Library):
@@ -566,15 +552,27 @@ class LibraryFmi3(Library):
 
 
 class InstanceFmi3(Instance):
-    """One instance of FMI 3.0. Every method returns the status that the FMU answered."""
+    """One instance of FMI 3.0. Every method returns the status that the FMU answered.
+
+    It is stepped without event mode, intermediate update and early return, as an importer may
+    choose for any FMU.
+    """
 
     library: LibraryFmi3
+    _output_slopes = "GetOutputDerivatives"
 
     def __init__(self, library: LibraryFmi3, handle: int) -> None:
         super().__init__(library, handle)
         self._start = 0.0
         self._stop: float | None = None
         self._ended = False
+
+    def _do(self, name: str, *arguments: Any) -> int:
+        name = name.replace("FMUstate", "FMUState").replace("DeSerialize", "Deserialize")
+        return super()._do(name, *arguments)
+
+    def _sized(self, array: Any) -> tuple[Any, ...]:
+        return array, len(array)
 
     def setup(self, start: float, stop: float | None) -> int:
         """Keep start and stop [s] until initialisation mode is entered, which tells them."""
@@ -583,16 +581,15 @@ class InstanceFmi3(Instance):
 
     def enter(self) -> int:
         """Call fmi3EnterInitializationMode with the times of `setup`."""
-        stop = self._stop
-        told = False, 0.0, self._start, stop is not None, stop or 0.0
-        return self._do("fmi3EnterInitializationMode", *told)
+        times = self._start, self._stop is not None, self._stop or 0.0
+        return self._do("EnterInitializationMode", False, 0.0, *times)
 
     def step(self, time_: float, step: float) -> int:
         """Call fmi3DoStep (s); Discard if the FMU asks to end the run, which is its word for it."""
         event, end, early = c_bool(), c_bool(), c_bool()
         last = c_double()
         answers = (byref(one) for one in (event, end, early, last))
-        status = self._do("fmi3DoStep", time_, step, True, *answers)
+        status = self._do("DoStep", time_, step, True, *answers)
         if status in (OK, WARNING) and early.value:
             raise UnexpectedError("fmi3DoStep returned early, which it was not allowed to")
         self._ended = bool(end.value)
@@ -615,10 +612,9 @@ class InstanceFmi3(Instance):
         worst, found = OK, dict[int, Value](dict.fromkeys(range(len(references)), 0))
         for name, places in self._by_type(kind, references):
             count = len(places)
-            some = (c_uint32 * count)(*(references[i] for i in places))
+            some = (c_uint * count)(*(references[i] for i in places))
             values = (TYPES_FMI3[name] * count)()
-            status = self._do(f"fmi3Get{name}", some, count, values, count)
-            worst = max(worst, status)
+            worst = max(worst, self._do(f"Get{name}", some, count, values, count))
             for i, value in zip(places, values, strict=True):
                 text = name == "String"
                 found[i] = (value or b"").decode("utf-8", "replace") if text else value
@@ -629,58 +625,7 @@ class InstanceFmi3(Instance):
         worst = OK
         for name, places in self._by_type(kind, references):
             count = len(places)
-            some = (c_uint32 * count)(*(references[i] for i in places))
-            raw = [values[i] for i in places]
-            array = (TYPES_FMI3[name] * count)(
-                *(v.encode() if isinstance(v, str) else v for v in raw)
-            )
-            worst = max(worst, self._do(f"fmi3Set{name}", some, count, array, count))
+            some = (c_uint * count)(*(references[i] for i in places))
+            array = (TYPES_FMI3[name] * count)(*_raw([values[i] for i in places]))
+            worst = max(worst, self._do(f"Set{name}", some, count, array, count))
         return worst
-
-    def save(self, state: c_void_p) -> int:
-        """Call fmi3GetFMUState into `state`."""
-        return self._do("fmi3GetFMUState", byref(state))
-
-    def restore(self, state: c_void_p) -> int:
-        """Call fmi3SetFMUState."""
-        return self._do("fmi3SetFMUState", state)
-
-    def forget(self, state: c_void_p) -> int:
-        """Call fmi3FreeFMUState."""
-        return self._do("fmi3FreeFMUState", byref(state))
-
-    def serialise(self, state: c_void_p) -> tuple[int, bytes]:
-        """Return the status and the bytes of a saved state."""
-        size = c_size_t(0)
-        status = self._do("fmi3SerializedFMUStateSize", state, byref(size))
-        if status not in (OK, WARNING):
-            return status, b""
-        buffer = buffer_of(size.value)
-        return self._do("fmi3SerializeFMUState", state, buffer, size.value), buffer.raw
-
-    def deserialise(self, data: bytes, state: c_void_p) -> int:
-        """Call fmi3DeserializeFMUState into `state`."""
-        return self._do("fmi3DeserializeFMUState", data, len(data), byref(state))
-
-    def debug_logging(self, on: bool, categories: Sequence[str] = ()) -> int:
-        """Call fmi3SetDebugLogging."""
-        names = (c_char_p * len(categories))(*(c.encode() for c in categories))
-        return self._do("fmi3SetDebugLogging", on, len(categories), names)
-
-    def derivatives(
-        self, unknowns: Sequence[int], knowns: Sequence[int]
-    ) -> tuple[int, list[float]]:
-        """Return the status and the directional derivative along the sum of all knowns."""
-        n, m = len(unknowns), len(knowns)
-        result = (c_double * n)()
-        status = self._do(
-            "fmi3GetDirectionalDerivative", (c_uint32 * n)(*unknowns), n, (c_uint32 * m)(*knowns),
-            m, (c_double * m)(*[1.0] * m), m, result, n,
-        )  # fmt: skip
-        return status, list(result)
-
-    def output_derivative(self, reference: int) -> tuple[int, float]:
-        """Return the status and the first derivative of one output."""
-        value, one = (c_double * 1)(), (c_uint32 * 1)(reference)
-        status = self._do("fmi3GetOutputDerivatives", one, 1, (c_int32 * 1)(1), value, 1)
-        return status, value[0]

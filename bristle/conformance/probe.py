@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from .bench import Bench, Plan
-
+from .bench import Bench, Plan
 
 Verdict = Literal["pass", "fail", "note"]
 Level = Literal["file", "library", "run"]
@@ -29,10 +27,6 @@ class Finding:
     data: Mapping[str, float | bool] = field(default_factory=dict)
     rule: Rule | None = None
     said: str = ""
-
-
-class UnexpectedError(Exception):
-    """A legal call was not answered as the standard demands; the text says which."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +128,6 @@ def unless_single(plan: Plan) -> str | None:
     flag = "canBeInstantiatedOnlyOncePerProcess"
     return f"{flag} is claimed" if plan.claims(flag) else None
 
-
-# What a row says of an FMU of FMI 3.0. Probes are written once, in the names of FMI 2.0.
 
 _RULE = re.compile(r"FMI 2\.0(?: sections? \d[\d.]*\d(?:(?:,| and) \d[\d.]*\d)*)?")
 _FUNCTION = re.compile(r"\bfmi2([A-Z]\w*)")

@@ -20,7 +20,6 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from ..core.progress import Count
@@ -34,8 +33,6 @@ from .probe import Finding, Probe, failed, in_fmi3, noted
 from .probes import PROBES
 from .report import Report, Row
 
-# Processes for probes: each in one of its own, ended when a call takes too long.
-#
 # On Linux a process that has imported the probes, and never an FMU, forks one child per probe:
 # starting Python anew each time would take most of the time of a judgement. Elsewhere, and where
 # a probe asks for it, Python starts anew.
@@ -63,12 +60,7 @@ class Subprocesses:
     def __enter__(self) -> Subprocesses:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for pid in self._living:
             _kill(pid)
         if self._mother is not None:
@@ -101,21 +93,21 @@ class Subprocesses:
             return self._start(probe, folder, timeout, calls, bare)
         return self._fork(probe, folder, timeout, calls)
 
-    def _command(self, bare: bool, *arguments: str) -> list[str]:
+    def _open(
+        self, ends: int, bare: bool, *arguments: str, cwd: Path | None = None
+    ) -> subprocess.Popen[bytes]:
+        """Start Python in a session of its own; `ends` is what its input and output lead to."""
         flags = ["-I", "-S"] if bare else ["-P"]
-        return [sys.executable, *flags, "-c", _BOOT, _PACKAGES, str(self._work), *arguments]
+        command = [sys.executable, *flags, "-c", _BOOT, _PACKAGES, str(self._work), *arguments]
+        return subprocess.Popen(
+            command, bufsize=0, cwd=cwd, stdin=ends, stdout=ends, stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
 
     def _start(
         self, probe: str, folder: Path, timeout: float, calls: Callable[[], int], bare: bool
     ) -> int | None:
-        process = subprocess.Popen(
-            self._command(bare, probe),
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        process = self._open(subprocess.DEVNULL, bare, probe, cwd=folder)
         # Popen.wait(timeout) would poll every 50 ms.
         waiter = threading.Thread(target=process.wait, daemon=True)
         try:
@@ -135,14 +127,7 @@ class Subprocesses:
         self, probe: str, folder: Path, timeout: float, calls: Callable[[], int]
     ) -> int | None:
         if self._mother is None:
-            self._mother = subprocess.Popen(
-                self._command(False),
-                bufsize=0,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
-            )
+            self._mother = self._open(subprocess.PIPE, False)
         request, answer = self._mother.stdin, self._mother.stdout
         assert request is not None
         assert answer is not None

@@ -6,6 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +58,6 @@ def read_json(path: Path) -> dict[str, Any]:
     return found
 
 
-_INF = float("inf")
-
-
 def _plain(value: Any) -> Any:
     """Return a value as JSON has it: numbers of numpy and tuples turned, NaN and infinity null."""
     if isinstance(value, Mapping):
@@ -68,7 +66,7 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
-    if isinstance(value, float) and (value != value or abs(value) == _INF):
+    if isinstance(value, float) and not isfinite(value):
         return None
     return value
 
@@ -79,8 +77,6 @@ def _umask() -> int:
     os.umask(mask)
     return mask
 
-
-# Where things are: the checkout that the package runs from, or the wheel and the cache.
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -131,9 +127,5 @@ def state_folder() -> Path:
 
 def fmus_folder() -> Path:
     """Return where built FMUs are kept: fmus/ of a checkout, else the cache."""
-    checkout = root()
-    return (
-        checkout / "fmus"
-        if checkout and not os.environ.get("BRISTLE_CACHE")
-        else (cache_folder() / "fmus")
-    )
+    own = None if os.environ.get("BRISTLE_CACHE") else root()
+    return (own or cache_folder()) / "fmus"

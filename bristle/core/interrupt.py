@@ -14,7 +14,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, NoReturn, Self
 
 PATIENCE = 1.5
@@ -65,12 +65,7 @@ class Interrupt:
                 self._restore.append(_watch(self._on_hang, PATIENCE))
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         while self._restore:
             self._restore.pop()()
 
@@ -108,12 +103,7 @@ class Hurry:
         if not isinstance(lost.exc_value, KeyboardInterrupt):
             self._hook(lost)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._restore is not None:
             self._restore()
             sys.unraisablehook = self._hook

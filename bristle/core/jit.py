@@ -129,10 +129,7 @@ _compiled: dict[tuple[str, tuple[str, ...], Path | None], Any] = {}
 
 
 def compiled(
-    function: Callable[..., Any],
-    inline: tuple[str, ...] = (),
-    *,
-    keep: bool = True,
+    function: Callable[..., Any], inline: tuple[str, ...] = (), *, keep: bool = True
 ) -> Any:
     """Return the function compiled by numba, together with all that it calls, cached on disk.
 

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from math import nan
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 if TYPE_CHECKING:
@@ -160,13 +159,8 @@ class Stages:
             seconds += left * sum(spent) / len(spent) if left else 0.0
         number = self._total - sum(self._left.values()) + 1
         self._left[kind] -= 1
-        tell(
-            "; ".join(
-                filter(
-                    None, (f"{self._what} {number} of {self._total}, {name}", _in_words(seconds))
-                )
-            )
-        )
+        text = f"{self._what} {number} of {self._total}, {name}"
+        tell("; ".join(filter(None, (text, _in_words(seconds)))))
 
 
 def _in_words(seconds: float) -> str:
@@ -234,13 +228,8 @@ class Progress:
         self._telling.__enter__()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._telling.__exit__(kind, error, trace)
+    def __exit__(self, *raised: Any) -> None:
+        self._telling.__exit__(*raised)
         if self._bar:
             self._bar.stop()
 
@@ -282,9 +271,8 @@ class Progress:
 
 # What a long computation has come to so far, as data: for a program that draws it on the way.
 #
-# Texts go to `progress.tell`; a snapshot is a dict that JSON can hold. A command writes each of
-# them
-# on stderr where the program that started it asks for them (`wanted`), as one line that begins with
+# Texts go to `tell`; a snapshot is a dict that JSON can hold. A command writes each of them on
+# stderr where the program that started it asks for them (`wanted`), as one line that begins with
 # the record separator: a JSON text sequence (RFC 7464), which no line of text begins with.
 
 VARIABLE = "BRISTLE_SNAPSHOTS"

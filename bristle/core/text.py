@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -157,12 +156,10 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
     places = max(digits, 0)
     tail = times_ten(power) if power else ""
     texts = (f"{round(one, digits):.{places}f}".replace("-", "\u2212") for one in (scaled, width))
-    number_text, wide = texts
+    shown_value, shown_width = texts
     power_of_zero = "" if not round(scaled, digits) else tail  # no "0 × 10³"
-    return f"{number_text}{power_of_zero}", f"± {wide}{tail}"
+    return f"{shown_value}{power_of_zero}", f"± {shown_width}{tail}"
 
-
-# What a check finds, and how it words it: the nearest right names, values as they were written.
 
 Level = Literal["error", "warning", "note"]
 LIST_AT_MOST = 12
@@ -302,7 +299,7 @@ def number(value: object) -> float | str:
         result = float(value)
     except OverflowError:
         return f"is {written(value)}"
-    return result if math.isfinite(result) else f"is {result}, not a finite number"
+    return result if isfinite(result) else f"is {result}, not a finite number"
 
 
 def capital(note: str, files: Iterable[str]) -> str:
@@ -331,9 +328,6 @@ def command(*words: object) -> str:
     from subprocess import list2cmdline
 
     return list2cmdline(texts)
-
-
-# What a Python shell shows of a result: its words, not its arrays.
 
 
 def shown(of: object, about: str, lines: Iterable[str] = ()) -> str:

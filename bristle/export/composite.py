@@ -286,8 +286,6 @@ def _of_part(part: str, reading: Reading | None) -> Reading | None:
     return Reading(f"{part}.{reading.parameter}", chooser, reading.word)
 
 
-# Writes a whole scenario as one FMU that needs no Python.
-
 _COMPONENT = Path(__file__).with_name("component.py")
 
 
@@ -321,9 +319,7 @@ def export_composite(
 
 
 def plan_of(
-    scenario: str | Path,
-    overrides: Mapping[str, object] | None = None,
-    inputs: Iterable[str] = (),
+    scenario: str | Path, overrides: Mapping[str, object] | None = None, inputs: Iterable[str] = ()
 ) -> Plan:
     """Return what to build; parameters and errors are those of `export_composite`."""
     file, named = resolve_scenario(scenario), list(inputs)

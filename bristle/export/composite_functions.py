@@ -8,7 +8,6 @@ out in records by `engine.records` and moved by `engine.time_loop`.
 
 from __future__ import annotations
 
-from ..component import structure
 from ..engine.coupled import couple
 from ..engine.records import is_whole, lay_matrices
 from ..engine.time_loop import (
@@ -60,6 +59,7 @@ from .rows import (
     scale_samples,
     setup,
     sizes,
+    structure_constants,
     take_inputs,
     take_measured,
     take_values,
@@ -72,8 +72,6 @@ __all__ = [
 
 INLINED = (*INLINE, "rows.opened", "rows.about", "rows.values_of")
 """What becomes part of its caller: that of the time loop, and what returns rows."""
-
-structure_constants = structure.constants
 
 
 def constants(baked: Row, store: Row, times: Row, samples: Row) -> Constants:

@@ -75,6 +75,8 @@ source_sizes, source_setup = source.sizes, source.setup
 source_scale_samples = source.scale_samples
 controller_sizes, controller_setup = controller.sizes, controller.setup
 sensors_sizes, sensors_setup = sensors.sizes, sensors.setup
+damper_constants, structure_constants = damper.constants, structure.constants
+source_constants = source.constants
 controller_constants, sensors_constants = controller.constants, sensors.constants
 
 
@@ -380,13 +382,6 @@ def sizes(values: Row, baked: Row, counts: Row) -> int:
     return 0
 
 
-# Lays the parts of a whole scenario out in their records, and takes inputs over.
-
-damper_constants, structure_constants = damper.constants, structure.constants
-source_constants = source.constants
-constants_of_controller, constants_of_sensors = controller.constants, sensors.constants
-
-
 def lay_part(k: int, c: Constants, run: Opened, h: float, work: Row) -> None:
     """Lay part k out in its record.
 
@@ -408,7 +403,7 @@ def lay_part(k: int, c: Constants, run: Opened, h: float, work: Row) -> None:
     elif kind == STRUCTURE:
         lay_structure(run.structures[i], structure_constants(store), first, wiring)
     elif kind == CONTROLLER:
-        r, law = run.sampled[i], constants_of_controller(store)
+        r, law = run.sampled[i], controller_constants(store)
         at = place(c.store, FIRST_STORE + 2 * k)  # its matrices stay where its store has them
         lay_sampled(r, law.period, wiring, h)
         lay_controller(r, law)
@@ -418,8 +413,8 @@ def lay_part(k: int, c: Constants, run: Opened, h: float, work: Row) -> None:
         r["W_end"], r["C_end"] = r["W"] + len(law.W), r["C"] + len(law.C)
     else:
         r = run.sampled[i]
-        lay_sampled(r, constants_of_sensors(store).period, wiring, h)
-        lay_sensors(r, constants_of_sensors(store))
+        lay_sampled(r, sensors_constants(store).period, wiring, h)
+        lay_sensors(r, sensors_constants(store))
 
 
 def lay_memory(c: Constants, run: Opened, work: Row) -> None:

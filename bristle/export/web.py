@@ -25,8 +25,6 @@ from ..system.scenario import Component, Scenario
 from ..view.html import escape, page
 from .web_module import Numbers, Slider, module
 
-# Writes what is exported for the web: modules, texts, loaders.
-
 LOADERS = Path(__file__).parent
 """Folder with the loaders, and what pages are made of."""
 
@@ -245,8 +243,6 @@ def body(wasm: bytes, description: Mapping[str, Any]) -> str:
         script=script,
     )
 
-
-# A component as a WebAssembly module: the shim of its native FMU, called by a page.
 
 _SOURCE = LOADERS / "fmi.c"
 _NAMESPACE = UUID("b1c4f0de-7f4e-5c68-9d2f-776562666d75")

@@ -14,7 +14,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from xml.parsers import expat
@@ -30,6 +30,7 @@ MAX_DESCRIPTION = 64 * 1024**2  # bytes
 _SUSPECT_RATIO = 500  # deflate reaches 1032 on zeros; real members stay below 50
 _SUSPECT_SIZE = 64 * 1024**2  # bytes; below it, no ratio does harm
 
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 _CHUNK = 1024**2
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i386": "x86", "i686": "x86"}
 """Machines by another name than in FMI 3.0."""
@@ -106,6 +107,35 @@ def read_member(path: Path, archive: zipfile.ZipFile, name: str, limit: int) -> 
     raise FmuError(f"{path}: there is no {name} at its root, so it is not an FMU.")
 
 
+def write_archive(target: Path, members: Mapping[str, bytes], note: bytes = b"") -> None:
+    """Write an archive in order and without times, and rename it into place.
+
+    Parameters
+    ----------
+    target : Path
+    members : bytes by their name
+    note : what is noted to the whole
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; nothing is left of it then.
+    """
+    part = target.with_suffix(".part")
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.comment = note
+            for name, data in sorted(members.items()):
+                entry = zipfile.ZipInfo(name, _EPOCH)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, data)
+        part.replace(target)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
 def extract(path: Path | str, folder: Path | str) -> Path:
     """Unpack an FMU into `folder` (made if missing) and return that folder.
 
@@ -141,14 +171,10 @@ def platform_folder(version: str = "2.0") -> str:
     return f"{system}{64 if sys.maxsize > 2**32 else 32}"
 
 
-def library_suffix() -> str:
-    """Return what a shared library's name ends with on this platform."""
-    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-
-
 def library_member(identifier: str, version: str = "2.0") -> str:
     """Return where an FMU of a version of FMI keeps its shared library for this platform."""
-    return f"binaries/{platform_folder(version)}/{identifier}{library_suffix()}"
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    return f"binaries/{platform_folder(version)}/{identifier}{suffix}"
 
 
 def check_library(
@@ -266,9 +292,6 @@ def _unpack(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, target:
             if written > info.file_size:
                 raise FmuError(f"{path}: the member {info.filename!r} holds more than it declares.")
             sink.write(chunk)
-
-
-# XML of unknown origin, parsed with suspicion: no entities, so no expansion and no other file.
 
 
 def parse_xml(data: bytes, name: str) -> ElementTree.Element:

@@ -31,10 +31,9 @@ from ..physics.forms import split_form
 from ..trust import require
 from ..user_code.load import own_laws
 from . import binary, catalogue
+from .archive import write_archive
 from .description import Variable
 from .slave import BAKED
-
-# What decides an FMU's bytes: its component, what is baked in, the library that it carries.
 
 PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
@@ -82,6 +81,21 @@ class Plan:
     def guid(self) -> str:
         """Return the guid that follows from the content."""
         return str(uuid5(_NAMESPACE, self.digest()))
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as JSON has it, for another process."""
+        return {
+            "name": self.name, "component": str(self.component), "baked": dict(self.baked),
+            "files": {name: str(path) for name, path in self.files.items()},
+            "effects": [*map(str, self.effects)], "laws": [*map(str, self.laws)],
+        }  # fmt: skip
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Plan:
+        """Return the plan that `as_data` gave."""
+        files = {name: Path(path) for name, path in data["files"].items()}
+        effects, laws = (tuple(map(Path, data[key])) for key in ("effects", "laws"))
+        return cls(data["name"], Path(data["component"]), data["baked"], files, effects, laws)
 
 
 @cache
@@ -214,9 +228,6 @@ def _only(right: str, component: str, what: str) -> None:
         raise BuildError(f"{what} goes into {right}, not into {component}.")
 
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
-
-
 def build(what: Plan, folder: Path) -> Path:
     """Build an FMU into a folder, unless the same one stands there; return its path.
 
@@ -235,11 +246,8 @@ def build(what: Plan, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / ".lock"):
             if built_guid(target) != guid:
-                if _pythonfmu_is_whole():
-                    with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
-                        _pack(_build_loose(what, guid, Path(temporary)), target)
-                else:
-                    _build_elsewhere(what, guid, target)
+                make = _build_here if _pythonfmu_is_whole() else _build_elsewhere
+                make(what, guid, target)
     except OSError as error:
         raise BuildError(f"{target}: cannot be written ({error.strerror or error}).") from error
     return target
@@ -257,16 +265,7 @@ def _pythonfmu_is_whole() -> bool:
 
 def _build_elsewhere(what: Plan, guid: str, target: Path) -> None:
     """Build in a fresh interpreter, where no FMU was loaded."""
-    order = {
-        "name": what.name,
-        "component": str(what.component),
-        "baked": what.baked,
-        "files": {name: str(path) for name, path in what.files.items()},
-        "effects": [str(path) for path in what.effects],
-        "laws": [str(path) for path in what.laws],
-        "guid": guid,
-        "target": str(target),
-    }
+    order = {"plan": what.as_data(), "guid": guid, "target": str(target)}
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
     child = subprocess.run(
         [sys.executable, "-c", "from bristle.fmu.build import _serve; _serve()"],
@@ -280,11 +279,12 @@ def _build_elsewhere(what: Plan, guid: str, target: Path) -> None:
 def _serve() -> None:
     """Build what stands on the standard input; the other end of `_build_elsewhere`."""
     order = json.load(sys.stdin)
-    files = {name: Path(path) for name, path in order["files"].items()}
-    effects, laws = (tuple(Path(path) for path in order[key]) for key in ("effects", "laws"))
-    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
+    _build_here(Plan.from_data(order["plan"]), order["guid"], Path(order["target"]))
+
+
+def _build_here(what: Plan, guid: str, target: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
-        _pack(_build_loose(what, order["guid"], Path(temporary)), Path(order["target"]))
+        _pack(_build_loose(what, guid, Path(temporary)), target)
 
 
 def built_guid(path: Path) -> str | None:
@@ -322,19 +322,16 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
         _write_own(path, package / "physics" / "laws", package.name)
     script = folder / f"{what.component.stem}_{digest}.py"
     _write_renamed(what.component.read_text(encoding="utf-8"), script, package.name)
-    (folder / BAKED).write_text(
-        json.dumps({**what.baked, "guid": guid}, sort_keys=True), encoding="utf-8"
-    )
+    baked = json.dumps({**what.baked, "guid": guid}, sort_keys=True)
+    (folder / BAKED).write_text(baked, encoding="utf-8")
     extra = [folder / BAKED]
     for name, path in what.files.items():
         extra.append(Path(shutil.copyfile(path, folder / name)))
-    out = folder / "out"
+    carried, out = {package, *extra}, folder / "out"
     binary.LOCK.acquire()  # building imports the component
     before = list(sys.path)
     try:
-        return Path(
-            FmuBuilder.build_FMU(script, dest=out, project_files={package, *extra}, **CAPABILITIES)
-        )
+        return Path(FmuBuilder.build_FMU(script, dest=out, project_files=carried, **CAPABILITIES))
     except OSError:
         raise
     except Exception as error:  # whatever a component or an effect of the user's raises at import
@@ -355,21 +352,11 @@ def _write_renamed(text: str, target: Path, package: str) -> None:
 
 def _pack(loose: Path, target: Path) -> None:
     """Write the FMU again, in order and without times, and rename it into place."""
-    part = target.with_suffix(".part")
-    try:
-        with zipfile.ZipFile(loose) as old, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as new:
-            names = sorted(old.namelist())
-            if not any(name.startswith("binaries/") for name in names):
-                raise BuildError(f"{target}: the installed pythonfmu holds no binaries.")
-            for name in names:
-                entry = zipfile.ZipInfo(name, _EPOCH)
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.external_attr = 0o644 << 16
-                new.writestr(entry, old.read(name))
-        part.replace(target)
-    except (OSError, BuildError):
-        part.unlink(missing_ok=True)
-        raise
+    with zipfile.ZipFile(loose) as old:
+        members = {name: old.read(name) for name in old.namelist()}
+    if not any(name.startswith("binaries/") for name in members):
+        raise BuildError(f"{target}: the installed pythonfmu holds no binaries.")
+    write_archive(target, members)
 
 
 def ensure(
@@ -424,12 +411,8 @@ def planned(
         named.update(controller.read_bytes())
     for path in (*effects, *what.laws):
         named.update(path.name.encode() + path.read_bytes())
-    return replace(what, **_named(what, named.hexdigest()[:8]))
-
-
-def _named(what: Plan, ending: str) -> dict[str, Any]:
-    name = f"{what.name}_{ending}"
-    return {"name": name, "baked": {**what.baked, "name": name}}
+    name = f"{what.name}_{named.hexdigest()[:8]}"
+    return replace(what, name=name, baked={**what.baked, "name": name})
 
 
 def build_all(folder: Path, only: Iterable[str] = ()) -> list[Path]:

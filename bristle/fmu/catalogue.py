@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import units
 from ..core.config import toml_content
-from ..core.files import cache_folder, components_folder
+from ..core.files import cache_folder, components_folder, write_whole
 from ..errors import BuildError, StudyError
 from ..physics.forms import split_form
 from ..physics.law import LAWS
@@ -115,8 +115,6 @@ def _own_source(law: str) -> Path:
     All projects share the folder, and each text has its own: laws of one name differ in their
     first lines.
     """
-    from ..core.files import write_whole  # here: what only lists components needs no numpy
-
     about = LAWS[law].first_line().replace("\\", "/").replace('"', "'")
     text = _OWN_DAMPER.format(law=law, component=_own_component(law), about=about)
     folder = cache_folder() / "components" / hashlib.sha256(text.encode()).hexdigest()[:12]
@@ -146,20 +144,6 @@ def component_class(path: Path) -> type[Slave]:
 
 @cache
 def _class_of(path: Path, content: bytes) -> type[Slave]:
-    module = _load(path, content)
-    classes = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type)
-        and issubclass(value, Slave)
-        and value.__module__ == module.__name__
-    ]
-    if len(classes) != 1:
-        raise BuildError(f"{path}: {len(classes)} component classes; one per file is right.")
-    return classes[0]
-
-
-def _load(path: Path, content: bytes) -> ModuleType:
     module = ModuleType(f"_bristle_component_{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module
@@ -168,7 +152,11 @@ def _load(path: Path, content: bytes) -> ModuleType:
         exec(compile(content, str(path), "exec", dont_inherit=True), module.__dict__)
     except Exception as error:  # whatever a component of the user's own raises
         raise BuildError(f"{path}: {type(error).__name__}: {error}") from error
-    return module
+    classes = [one for one in vars(module).values() if isinstance(one, type)]
+    own = [one for one in classes if issubclass(one, Slave) and one.__module__ == module.__name__]
+    if len(own) != 1:
+        raise BuildError(f"{path}: {len(own)} component classes; one per file is right.")
+    return own[0]
 
 
 def instantiate(

@@ -91,6 +91,8 @@ class Played(NamedTuple):
     header: Optional[str]  # noqa: UP045
 
 
+_show = source.output
+
 STEP_LENGTH = "step_length"
 """What a text calls the length of the step [s]."""
 
@@ -237,11 +239,6 @@ def _span(indices: list[int]) -> tuple[int, int]:
     return (indices[0], indices[-1] + 1) if indices else (0, 0)
 
 
-# The bases of components that play a signal.
-
-_output = source.output
-
-
 class SourceSlave(ComponentSlave):
     """A component whose outputs depend on time alone.
 
@@ -289,7 +286,7 @@ class SourceSlave(ComponentSlave):
 
     def refresh(self) -> None:
         given, constants, values, shown = self._bound
-        _output(self.time, given, constants, given, given, given)
+        _show(self.time, given, constants, given, given, given)
         values[shown] = given
 
 

@@ -68,6 +68,10 @@ class SampledSlave(ComponentSlave):
         low, high = (1e-6, 10.0) if fixed is None else (fixed, fixed)
         self.add_parameter("sample_period", fixed or SAMPLE_PERIOD, "s", text, (low, high))
 
+    def declare_law(self) -> None:
+        """Declare the sample period and the law's own parameters."""
+        self.declare_period()
+
     def _structure(self, structure: Element) -> None:
         """Say that the first sample follows motion; the damper's force it takes as it is given."""
         super()._structure(structure)
@@ -105,10 +109,6 @@ class ControllerSlave(SampledSlave):
         text = "corner frequency of that low-pass"
         self.add_parameter("velocity_corner", 18.0, "Hz", text, (1e-3, 1e5))
         self.declare_law()
-
-    def declare_law(self) -> None:
-        """Declare the sample period and the law's own parameters."""
-        self.declare_period()
 
     def designed(self) -> Controller | None:
         """Return the design of the state-space law, None where there is none."""

@@ -6,7 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -26,9 +26,6 @@ from .archive import (
 from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
-
-
-# What is known of an FMU's variables, whatever version of FMI it follows, and how numbers read.
 
 Value = float | int | bool | str
 
@@ -155,12 +152,6 @@ def items_of(name: str, declared: ElementTree.Element | None) -> dict[str, int]:
     return found
 
 
-def begins(root: ElementTree.Element) -> str:
-    """Return the start time of an FMU's default experiment as it writes it, "" without one."""
-    experiment = root.find("DefaultExperiment")
-    return "" if experiment is None else experiment.get("startTime", "")
-
-
 def reference_of(name: str, text: str | None) -> int:
     """Return a value reference of the variable of this name."""
     number = unsigned(text)
@@ -232,9 +223,8 @@ def mark_optional(variables: dict[str, Variable], names: str) -> None:
 # What an FMI 3.0 FMU for co-simulation says of itself, in the words of FMI 2.0 where it has them.
 #
 # Numbers keep the type that FMI 3.0 gives them in `Variable.type`; their kind is that of FMI 2.0,
-# so
-# that scenarios and the master need not ask for the version. Arrays and binaries that are no ports
-# are left out: nothing here sets or shows them.
+# so that scenarios and the master need not ask for the version. Arrays and binaries that are no
+# ports are left out: nothing here sets or shows them.
 
 KINDS = {
     **dict.fromkeys(("Float64", "Float32"), "Real"),
@@ -266,8 +256,6 @@ def describe_fmi3(root: ElementTree.Element) -> Description:
     FmuError
         It contradicts itself, or has ports that are arrays or belong to clocks.
     """
-    slave = root.find("CoSimulation")
-    assert slave is not None  # read_root refuses what has none
     types = {child.get("name", ""): child for child in root.iterfind("TypeDefinitions/*")}
     units = units_of(root)
     variables: dict[str, Variable] = {}
@@ -280,19 +268,22 @@ def describe_fmi3(root: ElementTree.Element) -> Description:
             variables[name] = _variable_fmi3(element, types, units)
     _add_dependencies_fmi3(root, variables)
     mark_optional(variables, _annotation_fmi3(root, "optional") or "")
+    return _described(root, root.get("instantiationToken", ""), variables, "3.0")
+
+
+def _described(
+    root: ElementTree.Element, guid: str, variables: dict[str, Variable], version: str
+) -> Description:
+    """Return what an FMU of either version says of itself besides its variables, with these."""
     check_jumps(variables)
+    slave = root.find("CoSimulation")
+    assert slave is not None  # read_root refuses what has none
+    flags = {_CAPABILITIES.get(key, key): value for key, value in slave.attrib.items()}
+    identifier, experiment = flags.pop("modelIdentifier", ""), root.find("DefaultExperiment")
     return Description(
-        name=root.get("modelName", ""),
-        guid=root.get("instantiationToken", ""),
-        identifier=slave.get("modelIdentifier", ""),
-        description=root.get("description", ""),
-        variables=variables,
-        capabilities={
-            _CAPABILITIES.get(k, k): v for k, v in slave.attrib.items() if k != "modelIdentifier"
-        },
-        version="3.0",
-        begins=begins(root),
-    )
+        root.get("modelName", ""), guid, identifier, root.get("description", ""), variables, flags,
+        version, "" if experiment is None else experiment.get("startTime", ""),
+    )  # fmt: skip
 
 
 def check_ports(root: ElementTree.Element) -> None:
@@ -304,22 +295,18 @@ def check_ports(root: ElementTree.Element) -> None:
         If a port is an array or belongs to a clock.
     """
     for element in root.iterfind("ModelVariables/*"):
-        _refuse(element)
-
-
-def _refuse(element: ElementTree.Element) -> None:
-    name = element.get("name")
-    if not name:
-        raise FmuError("a variable has no name.")
-    if element.get("causality") not in ("input", "output"):
-        return
-    if element.tag == "Clock" or element.get("clocks"):
-        raise FmuError(
-            f'"{name}" belongs to a clock. Values are passed on at communication points only; an '
-            "FMU without clocks is right."
-        )
-    if element.find("Dimension") is not None:
-        raise FmuError(f'"{name}" is an array. Ports are single numbers here.')
+        name = element.get("name")
+        if not name:
+            raise FmuError("a variable has no name.")
+        if element.get("causality") not in ("input", "output"):
+            continue
+        if element.tag == "Clock" or element.get("clocks"):
+            raise FmuError(
+                f'"{name}" belongs to a clock. Values are passed on at communication points only; '
+                "an FMU without clocks is right."
+            )
+        if element.find("Dimension") is not None:
+            raise FmuError(f'"{name}" is an array. Ports are single numbers here.')
 
 
 def _variable_fmi3(
@@ -327,14 +314,44 @@ def _variable_fmi3(
     types: Mapping[str, ElementTree.Element],
     units: Mapping[str, Measure],
 ) -> Variable:
-    name, kind = element.attrib["name"], KINDS[element.tag]
-    declared = types.get(element.get("declaredType", ""))
-    own = {**(declared.attrib if declared is not None else {}), **element.attrib}
-    low, high = _RANGES.get(element.tag, (None, None))
-    least, most = (number_of(name, key, own.get(key)) for key in ("min", "max"))
+    kind, declared = KINDS[element.tag], types.get(element.get("declaredType", ""))
     start = element.get("start")
     if kind == "String" and (given := element.find("Start")) is not None:
         start = given.get("value")
+    listed_in = declared if kind == "Enumeration" else None
+    read = _read_variable(element, kind, element, declared, start, units, _annotation_fmi3)
+    low, high = _RANGES.get(element.tag, (None, None))
+    return replace(
+        read,
+        minimum=low if read.minimum is None else read.minimum,
+        maximum=high if read.maximum is None else read.maximum,
+        type=element.tag,
+        items=items_of(read.name, listed_in),
+    )
+
+
+def _read_variable(
+    element: ElementTree.Element,
+    kind: str,
+    value: ElementTree.Element,
+    declared: ElementTree.Element | None,
+    start: str | None,
+    units: Mapping[str, Measure],
+    annotation: Callable[[ElementTree.Element, str], str | None],
+) -> Variable:
+    """Return what both versions of FMI say alike of a variable.
+
+    Parameters
+    ----------
+    element, value : of the variable, and that which has the attributes of its type
+    kind : of its values
+    declared : the type that it refers to, None without one
+    start : text of its start value
+    units : the FMU's, by name
+    annotation : reads one of bristle's annotations of the variable
+    """
+    name = element.attrib["name"]
+    own = {**(declared.attrib if declared is not None else {}), **value.attrib}
     return Variable(
         name=name,
         kind=kind,
@@ -343,15 +360,13 @@ def _variable_fmi3(
         reference=reference_of(name, element.get("valueReference")),
         unit=own.get("unit"),
         start=start_of(name, kind, start),
-        minimum=low if least is None else least,
-        maximum=high if most is None else most,
+        minimum=number_of(name, "min", own.get("min")),
+        maximum=number_of(name, "max", own.get("max")),
         nominal=number_of(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
-        over_step=over_step_of(name, _annotation_fmi3(element, OVER_STEP_TAG)),
-        jumps_without=_annotation_fmi3(element, JUMPS_TAG),
-        type=element.tag,
+        over_step=over_step_of(name, annotation(element, OVER_STEP_TAG)),
+        jumps_without=annotation(element, JUMPS_TAG),
         defined=unit_of(own, units),
-        items=items_of(name, declared if kind == "Enumeration" else None),
     )
 
 
@@ -437,8 +452,6 @@ def describe(root: ElementTree.Element) -> Description:
     """Return the description in an XML tree that `read_root` let through."""
     if root.get("fmiVersion") == "3.0":
         return describe_fmi3(root)
-    slave = root.find("CoSimulation")
-    assert slave is not None  # read_root refuses what has none
     types = {
         name: child
         for simple in root.iterfind("TypeDefinitions/SimpleType")
@@ -452,17 +465,10 @@ def describe(root: ElementTree.Element) -> Description:
         twice = sorted(n for n, times in Counter(v.name for v in every).items() if times > 1)
         raise FmuError(f"variables defined twice: {listed(twice)}.")
     _add_dependencies(root, every, variables)
-    _mark_optional(root, variables)
-    check_jumps(variables)
-    return Description(
-        name=root.get("modelName", ""),
-        guid=root.get("guid", ""),
-        identifier=slave.get("modelIdentifier", ""),
-        description=root.get("description", ""),
-        variables=variables,
-        capabilities={k: v for k, v in slave.attrib.items() if k != "modelIdentifier"},
-        begins=begins(root),
-    )
+    for tool in root.iterfind("VendorAnnotations/Tool"):
+        if tool.get("name") == TOOL:
+            mark_optional(variables, tool.findtext("optional", ""))
+    return _described(root, root.get("guid", ""), variables, "2.0")
 
 
 def _check_kind(path: Path, root: ElementTree.Element, versions: Sequence[str]) -> str:
@@ -499,25 +505,9 @@ def _variable(
     if value is None:
         raise FmuError(f'variable "{name}" has no type (one of {", ".join(_KINDS)}).')
     declared = types.get(value.get("declaredType", ""))
-    inherited = dict(declared.attrib) if declared is not None else {}
-    own = inherited | value.attrib
-    return Variable(
-        name=name,
-        kind=value.tag,
-        causality=element.get("causality", "local"),
-        variability=element.get("variability", "continuous" if value.tag == "Real" else None),
-        reference=reference_of(name, element.get("valueReference")),
-        unit=own.get("unit"),
-        start=start_of(name, value.tag, value.get("start")),
-        minimum=number_of(name, "min", own.get("min")),
-        maximum=number_of(name, "max", own.get("max")),
-        nominal=number_of(name, "nominal", own.get("nominal")),
-        description=element.get("description", ""),
-        over_step=over_step_of(name, _annotation(element, OVER_STEP_TAG)),
-        jumps_without=_annotation(element, JUMPS_TAG),
-        defined=unit_of(own, units),
-        items=items_of(name, declared),
-    )
+    start, kind = value.get("start"), value.tag
+    read = _read_variable(element, kind, value, declared, start, units, _annotation)
+    return replace(read, items=items_of(name, declared))
 
 
 def _annotation(element: ElementTree.Element, tag: str) -> str | None:
@@ -549,10 +539,3 @@ def _indexed(every: list[Variable], text: str | None) -> Variable:
             f"ModelStructure names variable {text!r}; the variables are 1 to {len(every)}."
         )
     return every[number - 1]
-
-
-def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:
-    for tool in root.iterfind("VendorAnnotations/Tool"):
-        if tool.get("name") != TOOL:
-            continue
-        mark_optional(variables, tool.findtext("optional", ""))

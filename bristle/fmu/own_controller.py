@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Callable
-from types import FunctionType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
 
 from ..component.clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
+from ..physics.generate import with_globals
 from ..physics.linear import copy, open_row, packed, row
 from ..physics.tuples import made, record
 from .controller import SampledSlave
@@ -226,16 +227,9 @@ def compiled_form(
     sampled = {"_sample": namespace["sample"]}
     return SimpleNamespace(
         sizes=Functions.sizes, setup=Functions.setup, constants=namespace["constants"],
-        start=_with(Functions.start, sampled), step=_with(Functions.step, sampled),
+        start=with_globals(Functions.start, sampled), step=with_globals(Functions.step, sampled),
         output=Functions.output,
     )  # fmt: skip
-
-
-def _with(function: Any, others: dict[str, Any]) -> FunctionType:
-    """Return a copy of a function that finds other globals."""
-    copied = FunctionType(function.__code__, {**function.__globals__, **others}, function.__name__)
-    copied.__module__ = function.__module__
-    return copied
 
 
 class OwnController(SampledSlave):
@@ -254,10 +248,6 @@ class OwnController(SampledSlave):
         self.add_output("scheduling", "m/s", "velocity across the damper at the sample")
         self.add_parameter("v_max", 8.0, "V", "largest voltage", (1e-3, 1e4))
         self.declare_law()
-
-    def declare_law(self) -> None:
-        """Declare the sample period and the law's own parameters."""
-        self.declare_period()
 
     def command(self, measured: Measured, memory: Any) -> tuple[float, tuple[float, ...]]:
         """Return the wanted voltage [V] at one sample, and what is remembered until the next.

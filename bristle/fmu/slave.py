@@ -7,8 +7,6 @@ serialise; outputs that follow their inputs as soon as these are set.
 This module is bundled in every FMU: standard library and pythonfmu only.
 """
 
-# Longer than most files: FMI's calls are one class, for all of them act on the same flat values.
-
 from __future__ import annotations
 
 import json
@@ -129,11 +127,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         )
         self.description = (type(self).__doc__ or "").strip().split("\n")[0]
         self.declare()
-        self.add_output(
-            "fault",
-            None,
-            "0, or why the component stopped: 1 input, 2 step, 3 mode, 4 state, 5 parameter",
-        )
+        text = "0, or why the component stopped: 1 input, 2 step, 3 mode, 4 state, 5 parameter"
+        self.add_output("fault", None, text)
         # All Real outputs in one call; `fault` stands twice behind them, for it must give a tuple.
         fault = self._index["fault"]
         self._shown = itemgetter(*self._outputs, fault, fault)
@@ -195,18 +190,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._over_step[name] = over_step
         if optional:
             self._optional.append(name)
-        self._inputs.append(
-            self._add(
-                Real(
-                    name,
-                    causality=Fmi2Causality.input,
-                    variability=Fmi2Variability.continuous,
-                    description=text,
-                ),
-                float(start),
-                unit,
-            )
-        )
+        variable = Real(
+            name, causality=Fmi2Causality.input, variability=Fmi2Variability.continuous,
+            description=text,
+        )  # fmt: skip
+        self._inputs.append(self._add(variable, float(start), unit))
 
     def add_output(
         self,
@@ -302,18 +290,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Return the value of a variable by its full name ("gas_spring.k")."""
         return self._values[self._index[name]]
 
-    def was_set(self, name: str) -> bool:
-        """Return whether the host has ever set this variable, or the build this input."""
-        return self._index[name] in self._set
-
     # -- the life of an instance
 
     @outermost
     def setup_experiment(
-        self,
-        start_time: float,
-        stop_time: float | None = None,
-        tolerance: float | None = None,
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
         """Take the start time [s]; neither stop time nor tolerance matters here."""
         self.time = start_time
@@ -389,10 +370,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def _stop(self, code: int, text: str) -> bool:
         if not self.fault:
             self.fault = code
-            self.log(
-                f"{self.instance_name}: fault {code}, {FAULTS[code]}: {text}",
-                Fmi2Status.discard,
-            )
+            said = f"{self.instance_name}: fault {code}, {FAULTS[code]}: {text}"
+            self.log(said, Fmi2Status.discard)
         return False
 
     def log(self, msg: str, status: Any = Fmi2Status.ok, *more: Any) -> None:

@@ -89,7 +89,7 @@ _INLINE = (
 )  # fmt: skip
 """Callees of `force_history` that cost more to call than to hold in it."""
 
-_INLINE_LAW = ("codegen.step_law", "falling.falling")
+_INLINE_LAW = ("generate.step_law", "falling.falling")
 """Those of `law_history`."""
 
 _ONE_AT_A_TIME = Lock()

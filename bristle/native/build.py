@@ -7,7 +7,7 @@ import os
 import struct
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from uuid import UUID, uuid5
@@ -15,13 +15,12 @@ from xml.etree.ElementTree import Element, SubElement, fromstring
 
 from ..core.progress import Count, tell
 from ..errors import BuildError
+from ..fmu.archive import write_archive
 from ..fmu.build import Plan, built_guid, planned
 from . import zig
 from .description import text_of
 from .prepare import GUID, compile_functions, prepare
 from .zig import Platform, here
-
-# The compiled parts of native FMUs, kept by the digest of what they are made of.
 
 SHIM = Path(__file__).resolve().parent / "shim"
 """Folder with the C that all native FMUs share."""
@@ -100,8 +99,9 @@ def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2)
     kept = zig.folder() / f"{content.hexdigest()[:24]}{platform.suffix}"
     if kept.is_file():
         return kept.read_bytes()
+    compiled = hashlib.sha256(f"{zig.tools()} {platform.target} {text.stem}".encode())
     functions = keep(
-        zig.folder() / f"{_object_digest(text, platform)}.o",
+        zig.folder() / f"{compiled.hexdigest()[:24]}.o",
         lambda path: zig.compile_object(text, path, platform),
     )
 
@@ -114,10 +114,6 @@ def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2)
         own.replace(path)
 
     return keep(kept, link).read_bytes()
-
-
-def _object_digest(text: Path, platform: Platform) -> str:
-    return hashlib.sha256(f"{zig.tools()} {platform.target} {text.stem}".encode()).hexdigest()[:24]
 
 
 def keep(path: Path, make: Callable[[Path], None]) -> Path:
@@ -158,8 +154,6 @@ def libraries(
         runs = [pool.submit(counted, one) for one in platforms]
     return {one: run.result() for one, run in zip(platforms, runs, strict=True)}
 
-
-# The C of a native FMU in its archive, for hosts that compile it themselves.
 
 FOLDER = "sources"
 FUNCTIONS, TABLES = "functions.c", "tables.c"
@@ -218,8 +212,6 @@ def described(description: str, members: dict[str, bytes], fmi: int) -> dict[str
     }
 
 
-# One library for the two processors of a Mac, as FMI 2.0 has one folder for both.
-
 _FAT, _THIN = 0xCAFEBABE, 0xFEEDFACF
 _ALIGN = 14  # slices begin at pages of 16 KiB, the larger of both processors'
 
@@ -249,15 +241,10 @@ def universal(libraries: Sequence[bytes]) -> bytes:
 
 
 _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 
 def build(
-    what: Plan,
-    folder: Path,
-    platforms: Sequence[Platform],
-    fmi: int = 2,
-    sources: bool = False,
+    what: Plan, folder: Path, platforms: Sequence[Platform], fmi: int = 2, sources: bool = False
 ) -> Path:
     """Build a native FMU into a folder, unless the same one stands there; return its path.
 
@@ -303,7 +290,7 @@ def build(
         for place in set(places.values()):
             members[place] = universal([made[one] for one in platforms if places[one] == place])
         folder.mkdir(parents=True, exist_ok=True)
-        _pack(members, target, note)
+        write_archive(target, members, note)
     except OSError as error:
         why = error.strerror or error
         raise BuildError(f"{error.filename or target}: cannot be written ({why}).") from error
@@ -347,20 +334,3 @@ def _note_in(path: Path) -> bytes:
     """Return what an archive is noted to hold."""
     with zipfile.ZipFile(path) as archive:
         return archive.comment
-
-
-def _pack(members: Mapping[str, bytes], target: Path, note: bytes) -> None:
-    """Write the archive in order and without times, and rename it into place."""
-    part = target.with_suffix(".part")
-    try:
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.comment = note
-            for name, data in sorted(members.items()):
-                entry = zipfile.ZipInfo(name, _EPOCH)
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.external_attr = 0o644 << 16
-                archive.writestr(entry, data)
-        part.replace(target)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise

@@ -11,8 +11,6 @@ from typing import NamedTuple
 from ..errors import BuildError
 from .c_types import Names, Tokens, Type, Types, part_of
 
-# The operands of LLVM's instructions in one function, as expressions of C.
-
 _NOTHING = "(void *)0"
 """Address of what only Python needs."""
 
@@ -67,8 +65,6 @@ class Operands:
             return pointer[1:]
         return f"*({self.types.name(kind)} *){pointer}"
 
-
-# Instructions of LLVM that compute a value from others, as expressions of C.
 
 _WRAPPED = {"add": "+", "sub": "-", "mul": "*", "shl": "<<"}
 """What may run over, and so is unsigned in C."""
@@ -171,9 +167,6 @@ def _compare_reals(how: str, kind: Type, one: str, two: str) -> str:
 def _unsigned(kind: Type) -> str:
     """Return the unsigned type of C as large as a whole number."""
     return "bool" if kind == "i1" else "uintptr_t" if kind == "ptr" else f"uint{str(kind)[1:]}_t"
-
-
-# Statements of C, and which of them nothing needs.
 
 
 class Line(NamedTuple):
@@ -471,10 +464,8 @@ def _number(said: str) -> str:
 # LLVM's text of compiled functions as C: what every compiler takes, and no machine's own.
 #
 # numba writes few of LLVM's instructions and keeps in memory what changes, so each instruction is
-# one
-# statement here. Structures keep their parts, and the compiler at hand knows their sizes. What
-# numba
-# does not write today is refused with its line.
+# one statement here. Structures keep their parts, and the compiler at hand knows their sizes. What
+# numba does not write today is refused with its line.
 
 _HEAD = """/* Compiled from Python by bristle: each function has the name of the one that it was. */
 

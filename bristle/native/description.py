@@ -61,15 +61,11 @@ TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": 
 """What FMI 3.0 calls the types of FMI 2.0."""
 
 _ROOT = ("modelName", "description", "generationTool", "variableNamingConvention")
-_CAPABILITIES_FMI3 = {
-    "modelIdentifier": "modelIdentifier",
-    "needsExecutionTool": "needsExecutionTool",
-    "canBeInstantiatedOnlyOncePerProcess": "canBeInstantiatedOnlyOncePerProcess",
-    "canGetAndSetFMUstate": "canGetAndSetFMUState",
-    "canSerializeFMUstate": "canSerializeFMUState",
-    "canHandleVariableCommunicationStepSize": "canHandleVariableCommunicationStepSize",
-}
-"""Capabilities of FMI 2.0 that FMI 3.0 knows too, and by which name."""
+_CAPABILITIES_FMI3 = (
+    "modelIdentifier", "needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess",
+    "canGetAndSetFMUstate", "canSerializeFMUstate", "canHandleVariableCommunicationStepSize",
+)  # fmt: skip
+"""Attributes of FMI 2.0 that FMI 3.0 has too, the state with a capital letter."""
 
 
 def description_fmi3(slave: ComponentSlave, guid: str) -> str:
@@ -84,7 +80,8 @@ def description_fmi3(slave: ComponentSlave, guid: str) -> str:
     root = Element("fmiModelDescription", fmiVersion="3.0", instantiationToken=guid)
     root.attrib.update({key: old.attrib[key] for key in _ROOT if key in old.attrib})
     has = _part(old, "CoSimulation").attrib
-    capabilities = {new: has[key] for key, new in _CAPABILITIES_FMI3.items() if key in has}
+    kept = {key: has[key] for key in _CAPABILITIES_FMI3 if key in has}
+    capabilities = {key.replace("FMUstate", "FMUState"): value for key, value in kept.items()}
     SubElement(root, "CoSimulation", capabilities)
     root.append(unit_definitions([*slave._units.values(), "s"]))
     root.append(_log_categories(_part(old, "LogCategories")))
@@ -157,8 +154,6 @@ def _structure(old: Element) -> Element:
 
 # What a component declares, as the C data that the shim reads: see shim/component.h.
 
-_KINDS = {"Real": "REAL", "Integer": "INTEGER", "Boolean": "BOOLEAN", "String": "STRING"}
-_CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER"}
 _FORMATS = {("", None): "r", ("", "r"): "r", ("", "s"): "s", ("g", None): "g"}
 
 _TABLES = """\
@@ -260,12 +255,12 @@ def tables(slave: ComponentSlave, guid: str) -> str:
 
 def _variable_row(slave: ComponentSlave, index: int, has_words: bool) -> str:
     variable, value = slave.vars[index], slave._values[index]
-    kind = _KINDS[type(variable).__name__]
+    kind = type(variable).__name__.upper()
     low, high, _ = slave._bounds.get(variable.name, (None, None, None))
     if variable.causality.name != "parameter" or isinstance(value, bool):
         low = high = None
     fields = [
-        quoted(variable.name), kind, _CAUSALITIES[variable.causality.name],
+        quoted(variable.name), kind, variable.causality.name.upper(),
         "0.0" if kind == "STRING" else number(float(value)),
         quoted(value) if kind == "STRING" else "0",
         number(-inf if low is None else low), number(inf if high is None else high),

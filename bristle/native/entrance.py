@@ -95,11 +95,12 @@ def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
     BuildError
         If it is not of flat functions throughout.
     """
-    missing = [name for name in NEEDED if not isinstance(_part(functions, name), FunctionType)]
+    every = (*NEEDED, *OPTIONAL)
+    found: dict[str, Any] = {one: getattr(functions, one, None) for one in every}
+    missing = [name for name in NEEDED if not isinstance(found[name], FunctionType)]
     name = functions.setup.__module__ if hasattr(functions, "setup") else str(functions)
     if missing:
         raise BuildError(f"{name} has no flat {', '.join(missing)}: it runs in Python alone.")
-    found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
     names = {one: ", ".join(signature(found[one]).parameters) for one in _NAMED if found[one]}
     scale, discretise = names.get("scale_samples"), names.get("discretise")
     several = scale and "baked" in signature(found["scale_samples"]).parameters
@@ -117,10 +118,6 @@ def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
     entrance: FunctionType = namespace["entrance"]
     entrance.__module__ = name
     return entrance
-
-
-def _part(functions: Any, name: str) -> Any:
-    return getattr(functions, name, None)
 
 
 def functions_in_c(functions: Any, sampled: bool = False, files: Sequence[Path] = ()) -> str:

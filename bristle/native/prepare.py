@@ -83,12 +83,7 @@ def compile_functions(what: Plan, functions: str, target: Path) -> None:
     BuildError
         If the compiler refuses a function.
     """
-    order = {
-        "functions": functions, "target": str(target), "name": what.name,
-        "component": str(what.component), "baked": dict(what.baked),
-        "files": {name: str(path) for name, path in what.files.items()},
-        "effects": [str(path) for path in what.effects], "laws": [str(path) for path in what.laws],
-    }  # fmt: skip
+    order = {"functions": functions, "target": str(target), "plan": what.as_data()}
     answer_of("bristle.native.prepare", order, what.name)
 
 
@@ -168,14 +163,12 @@ def _text(slave: ComponentSlave, files: Sequence[Path]) -> str:
 def serve() -> None:
     """Do what stands on the standard input; the other end of `compile_functions`."""
     order: dict[str, Any] = json.load(sys.stdin)
-    files = {name: Path(path) for name, path in order["files"].items()}
-    effects, laws = (tuple(Path(path) for path in order[key]) for key in ("effects", "laws"))
-    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
+    what = Plan.from_data(order["plan"])
     try:
         slave = component_of(what)
         if _digest_of(slave) != order["functions"]:
             raise BuildError("its functions have changed meanwhile; build it again.")
-        text = _text(slave, (what.component, *effects, *laws))
+        text = _text(slave, (what.component, *what.effects, *what.laws))
     except BristleError as error:
         sys.exit(str(error))
     Path(order["target"]).write_text(text, encoding="utf-8")

@@ -16,8 +16,6 @@ from pathlib import Path
 from ..core.files import cache_folder
 from ..errors import BuildError
 
-# The platforms that native FMUs are built for.
-
 
 @dataclass(frozen=True)
 class Platform:

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 from ..errors import PhysicsError
 from .linear import cholesky, inverse
 
-# Where devices sit in a building: each acts between two levels, or between the ground and one.
-
 GROUND = -1
 """The ground in place of a level."""
 
@@ -185,9 +183,6 @@ def _place(given: dict[str, Any], levels: Sequence[str], where: str) -> tuple[in
 def either(names: list[str]) -> str:
     """Return names as a choice: "a, b or c"."""
     return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-# Longer than 300 lines: every mistake of a building file has a message of its own.
 
 
 MAX_FLOORS = 20

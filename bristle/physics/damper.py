@@ -2,7 +2,7 @@
 
 One source for both paths. `evaluate` gives the force at given motion, voltage and state; `step`
 advances the state over a time step and gives the force at its end. Both take records (`inputs`)
-and flat sequences (`codegen.Slots`): lists inside FMUs, arrays under numba.
+and flat sequences (`generate.Slots`): lists inside FMUs, arrays under numba.
 """
 
 from __future__ import annotations
@@ -35,21 +35,9 @@ from .series import INSTANT, SETTLE, Balance, advance_implicit, advance_series, 
 from .tuples import Inputs, Setup, record
 
 __all__ = [
-    "LIBRARY",
-    "SETS",
-    "DamperModel",
-    "evaluate",
-    "force_at",
-    "functions_of",
-    "hold_law",
-    "jump",
-    "law_force",
-    "room",
-    "setup_of",
-    "start_states",
-    "step",
-    "step_law",
-]
+    "LIBRARY", "SETS", "DamperModel", "evaluate", "force_at", "functions_of", "hold_law", "jump",
+    "law_force", "room", "setup_of", "start_states", "step", "step_law",
+]  # fmt: skip
 
 
 # What a damper's parameters and switches imply, from flat numbers into flat numbers.
@@ -466,10 +454,7 @@ class DamperModel:
     """
 
     def __init__(
-        self,
-        law: str,
-        values: dict[str, float] | None = None,
-        effects: list[str] | None = None,
+        self, law: str, values: dict[str, float] | None = None, effects: list[str] | None = None
     ) -> None:
         values, effects = values or {}, effects or []
         self.functions = functions_of(law, effects)

@@ -31,16 +31,16 @@ from .parameter import (
     all_parameters,
     check_fields,
     check_numbers,
+    class_text,
     fields_of,
+    first_line,
     named,
-    told,
+    refuse_twin,
 )
 from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
 from .parameter import Table as Table
 from .parameter import bilinear as bilinear
 from .parameter import interpolate as interpolate
-
-# What the class data of an effect must be for a search to begin from and a verdict to rest on.
 
 MIMICKED = ("force_bias", "late_drive", "limited_drive")
 """Faults of a sensor that an effect may look like: the force's zero, a drive on record late, or one
@@ -63,30 +63,20 @@ FIELDS = {
 """The class data of an effect, and of which kind each is."""
 
 
-def check_sites(
-    effect: type[Effect], where: str, known: tuple[str, ...],
-    shared: tuple[tuple[str, ...], tuple[str, ...]],
-) -> None:  # fmt: skip
-    """Refuse sites that there are not, and what an effect of several cannot use at all of them.
-
-    Parameters
-    ----------
-    effect, where : the class, and how a message begins
-    known : the sites that there are
-    shared : the hooks and the signals that a damper and a structure both have
-    """
+def check_sites(effect: type[Effect], where: str) -> None:
+    """Refuse sites that there are not, and what an effect of several cannot use at all of them."""
     if not (isinstance(effect.sites, tuple) and effect.sites):
-        raise PhysicsError(f"{where}: sites = {effect.sites!r}; a tuple of {known} is right.")
+        raise PhysicsError(f"{where}: sites = {effect.sites!r}; a tuple of {SITES} is right.")
     for site in effect.sites:
-        if site not in known:
-            raise PhysicsError(f"{where}: site {site!r} is none of {known}.")
+        if site not in SITES:
+            raise PhysicsError(f"{where}: site {site!r} is none of {SITES}.")
     if len(effect.sites) == 1:
         return
     if len(set(effect.sites)) < len(effect.sites) or "sensor" in effect.sites:
         raise PhysicsError(f'{where}: sites = {effect.sites}; each once, and "sensor" alone.')
     for what, used, both in (
-        ("defines", tuple(effect.hooks()), shared[0]),
-        ("needs", effect.needs, shared[1]),
+        ("defines", effect.hooks(), SHARED_HOOKS),
+        ("needs", effect.needs, SHARED_SIGNALS),
     ):
         wrong = [one for one in used if one not in both]
         if wrong:
@@ -111,13 +101,13 @@ def check_search(effect: type[Effect], where: str) -> None:
             )
         if not all(isinstance(values, tuple) and values for values in grid.values()):
             raise PhysicsError(f"{where}: {field} holds a tuple of numbers for each parameter.")
-    told = [name for name in (*effect.labels, *effect.label_means) if name not in effect.assumed]
-    if told:
-        raise PhysicsError(f"{where}: labels names {told}, which assumed must name as well.")
-    told = [n for n in effect.channels if n not in effect.assumed or n not in effect.parameters]
-    if told:
+    wrong = [name for name in (*effect.labels, *effect.label_means) if name not in effect.assumed]
+    if wrong:
+        raise PhysicsError(f"{where}: labels names {wrong}, which assumed must name as well.")
+    wrong = [n for n in effect.channels if n not in effect.assumed or n not in effect.parameters]
+    if wrong:
         raise PhysicsError(
-            f"{where}: channels names {told}; parameters that assumed names as well are right."
+            f"{where}: channels names {wrong}; parameters that assumed names as well are right."
         )
     if effect.channels and effect.sites != ("damper",):
         raise PhysicsError(f"{where}: channels are what an effect of the damper alone may follow.")
@@ -159,8 +149,6 @@ def check_verdict(effect: type[Effect], where: str) -> None:
         raise PhysicsError(f"{where}: lookalikes holds a sentence for each.")
 
 
-# The names of effects: NAME, and NAME@SITE at another site than its first.
-
 AT = "@"
 """Stands between an effect's name and a site that is not its first."""
 
@@ -191,7 +179,7 @@ class Registry(dict[str, "type[Effect]"]):
             return default
 
 
-EFFECTS: Registry = Registry()
+EFFECTS = Registry()
 
 
 def plain_name(key: str) -> str:
@@ -208,33 +196,16 @@ def exclude(one: str, other: str) -> bool:
     return second.name in first.excludes or first.name in second.excludes
 
 
-# Longer than 400 lines: the class data of an effect are described one by one.
-
-# Longer than 300 lines: a docstring says of every attribute and hook what it means.
-
-
 SITES = ("damper", "structure", "sensor")
 
 CHANNELS = ("force", "velocity")
 """Channels whose instrument a sensor's effect may be."""
 
-# In the order in which an evaluation calls them.
 HOOKS = (
-    "voltage",
-    "motion",
-    "yield_factor",
-    "viscous_factor",
-    "reach",
-    "yield_force",
-    "force",
-    "spring",
-    "factor",
-    "reaction",
-    "rate",
-    "advance",
-    "channel",
-)
-
+    "voltage", "motion", "yield_factor", "viscous_factor", "reach", "yield_force", "force",
+    "spring", "factor", "reaction", "rate", "advance", "channel",
+)  # fmt: skip
+"""In the order in which an evaluation calls them."""
 
 ACTS_ON = {
     "voltage": "command",
@@ -348,7 +319,7 @@ class Effect:
         Of a series element: the names of two states, the travel between rod and fluid [m] and the
         velocity across the fluid [m/s]; the integrator finds both, from the second one's `rate`.
     own
-        Whether it is a user's own, outside the library; `user.load_effects` sets it.
+        Whether it is a user's own, outside the library; `user_code.load` sets it.
     passive, zero_at_rest, excludes, source, expect
         See each effect; conformance tests hold the first two.
 
@@ -463,14 +434,14 @@ class Effect:
     def __init_subclass__(cls, register: bool = True, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if cls.name and register:
-            check_fields(cls, told("effect", cls), FIELDS)
+            check_fields(cls, class_text("effect", cls), FIELDS)
             _take_sites(cls)
             cls.parameters = all_parameters(cls.parameters, cls.tables)
             cls.State = named("State", tuple(cls.states))
             cls._laid_down = fields_of(cls.parameters, cls.tables)
             cls.Values = named("Values", tuple(cls.fields()))
             _check(cls)
-            _refuse_twin(cls)
+            refuse_twin("effect", cls, EFFECTS.get(cls.name))
             EFFECTS[cls.name] = cls
 
     @classmethod
@@ -542,7 +513,7 @@ class Effect:
     @classmethod
     def first_line(cls) -> str:
         """Return the first line of the docstring, which users read."""
-        return (cls.__doc__ or "").strip().splitlines()[0]
+        return first_line(cls)
 
 
 def _take_sites(effect: type[Effect]) -> None:
@@ -561,8 +532,8 @@ def _take_sites(effect: type[Effect]) -> None:
 
 def _check(effect: type[Effect]) -> None:
     """Refuse an effect whose class data could not work, when it is defined."""
-    where = told("effect", effect)
-    check_sites(effect, where, SITES, (SHARED_HOOKS, SHARED_SIGNALS))
+    where = class_text("effect", effect)
+    check_sites(effect, where)
     if not effect.name.isidentifier():
         raise PhysicsError(f"{where}: a name is one word of letters, digits and _.")
     unknown = [need for need in effect.needs if need not in Q._fields]
@@ -600,16 +571,6 @@ def _check(effect: type[Effect]) -> None:
     check_numbers(where, effect.parameters, effect.tables)
     check_search(effect, where)
     check_verdict(effect, where)
-
-
-def _refuse_twin(effect: type[Effect]) -> None:
-    """Refuse a second effect of a name, unless its own file defines it anew."""
-    known = EFFECTS.get(effect.name)
-    if known is not None and known.__module__ != effect.__module__:
-        raise PhysicsError(
-            f"effect {effect.name!r} ({effect.__module__}.{effect.__qualname__}): the name is "
-            f"taken by {known.__module__}.{known.__qualname__}. Another name is right."
-        )
 
 
 def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:

@@ -13,14 +13,14 @@ from collections.abc import Mapping
 from functools import cache
 from math import isfinite, sqrt
 from types import new_class
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import PhysicsError
 from .command import MOST_KNOTS, QUADRATIC, Form, Linear, Monotone, Rising
 from .parameter import Parameter, Table, entries
 
-if TYPE_CHECKING:
-    from .law import Law, Shape
+Law = Any
+"""A class of a law, as `law` defines it with what stands here."""
 
 LINEAR_FORM, QUADRATIC_FORM, TABLE_FORM = FORMS = ("linear", "quadratic", "table")
 """The words for the forms."""
@@ -48,7 +48,8 @@ def split_form(name: str) -> tuple[str, str, tuple[float, ...]]:
         numbers = tuple(float(knot) for knot in knots)
     except ValueError:
         raise PhysicsError(f"law {name!r}: its knots must be numbers [V].") from None
-    return (*_checked(name, plain, form, numbers),)
+    _check(name, form, numbers)
+    return plain, form, numbers
 
 
 def joined_form(plain: str, form: str, knots: tuple[float, ...] = ()) -> str:
@@ -61,7 +62,7 @@ def joined_form(plain: str, form: str, knots: tuple[float, ...] = ()) -> str:
     """
     if form in ("", LINEAR_FORM):
         return plain
-    _checked(plain, plain, form, knots)
+    _check(plain, form, knots)
     return f"{plain}[{' '.join([form, *(f'{knot:.6g}' for knot in knots)])}]"
 
 
@@ -71,9 +72,8 @@ def shown_law(name: str) -> str:
     return f"{plain}[{form}]" if form else plain
 
 
-def _checked(
-    where: str, plain: str, form: str, knots: tuple[float, ...]
-) -> tuple[str, str, tuple[float, ...]]:
+def _check(where: str, form: str, knots: tuple[float, ...]) -> None:
+    """Refuse a form that there is not, and knots that are not right."""
     if form not in (QUADRATIC_FORM, TABLE_FORM):
         raise PhysicsError(f"law {where!r}: there is no form {form!r}; there are {FORMS}.")
     least = 2 if form == TABLE_FORM else 0
@@ -82,10 +82,9 @@ def _checked(
     if not least <= len(knots) <= most or not ascend:
         right = f"{least} to {most} knots [V], ascending," if most else "no knots"
         raise PhysicsError(f"law {where!r}: a {form} has the knots {knots}; {right} is right.")
-    return plain, form, knots
 
 
-def choosable(law: type[Law]) -> dict[str, Linear]:
+def choosable(law: Law) -> dict[str, Linear]:
     """Return the quantities of a law whose form may be chosen, with the linear one that they have.
 
     Those that rise with the command, and whose numbers neither a variant nor the law itself fixes.
@@ -101,7 +100,7 @@ def choosable(law: type[Law]) -> dict[str, Linear]:
 
 
 @cache
-def with_form(law: type[Law], form: str, knots: tuple[float, ...]) -> type[Law]:
+def with_form(law: Law, form: str, knots: tuple[float, ...]) -> Law:
     """Return the class of a law with another form.
 
     Raises
@@ -126,21 +125,21 @@ def with_form(law: type[Law], form: str, knots: tuple[float, ...]) -> type[Law]:
     return new_class(law.__name__, (law,), {"register": False}, lambda names: names.update(own))
 
 
-class LawsByName(dict[str, "type[Law]"]):
+class LawsByName(dict[str, Law]):
     """Laws by name; one with a chosen form is made when it is asked for."""
 
-    def __missing__(self, name: str) -> type[Law]:
+    def __missing__(self, name: str) -> Law:
         plain, form, knots = split_form(name)
         if not form or plain not in self:
             raise KeyError(name)
-        return with_form(self[plain], form, knots)  # type: ignore[arg-type]  # a class can be hashed
+        return with_form(self[plain], form, knots)
 
 
 class _Chosen:
     """What takes the place of a law's linear dependences."""
 
     def __init__(
-        self, law: type[Law], quantities: Mapping[str, Linear], form: str, knots: tuple[float, ...]
+        self, law: Law, quantities: Mapping[str, Linear], form: str, knots: tuple[float, ...]
     ) -> None:
         self.law, self.quantities, self.knots = law, quantities, knots
         self.command: dict[str, Form] = {}
@@ -191,9 +190,9 @@ class _Chosen:
             found.update(self.instead.get(name, {name: parameter}))
         return found
 
-    def shapes(self) -> dict[str, Shape]:
+    def shapes(self) -> dict[str, Any]:
         """Return the law's shapes in the names of the chosen parameters."""
-        found: dict[str, Shape] = {}
+        found: dict[str, Any] = {}
         for name, shape in self.law.shapes.items():
             names = tuple(n for one in shape.shapes for n in self.instead.get(one, (one,)))
             new = tuple(self.instead.get(name, (name,)))
@@ -201,7 +200,7 @@ class _Chosen:
                 found[one] = self._shape(name, one, len(new), shape._replace(shapes=names))
         return found
 
-    def _shape(self, name: str, new: str, count: int, shape: Shape) -> Shape:
+    def _shape(self, name: str, new: str, count: int, shape: Any) -> Any:
         """Return where fits look for one of the parameters that stand in place of a shape."""
         if new == name or count == 1:
             return shape

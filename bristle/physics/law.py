@@ -31,15 +31,15 @@ from .parameter import (
     by_name,
     check_fields,
     check_numbers,
+    class_text,
     fields_of,
+    first_line,
     named,
-    told,
+    refuse_twin,
 )
 from .parameter import bilinear as bilinear
 from .parameter import interpolate as interpolate
 from .tuples import FACTORS, FORM_STEP, Inputs, values_of_law
-
-# What a law may declare, and what its class data must be for it to work.
 
 SITES = ("damper", "structure")
 
@@ -69,41 +69,42 @@ HOOKS = {
 ALL_HOOKS = (*HOOKS, "rate", "advance", "force")
 
 
+def _command(one: Any) -> bool:
+    return isinstance(one, Form) and all(isinstance(name, str) for name in one.names())
+
+
+def _shape(one: Any) -> bool:
+    """Return whether this is a `Shape` that a search could begin from."""
+    low, high, nodes, shapes, _ = one
+    return 0.0 < low <= high and isinstance(nodes, int) and nodes > 0 and isinstance(shapes, tuple)
+
+
+def _variant(one: Any) -> bool:
+    """Return whether this is a `Variant`."""
+    values, idle, lacks = one
+    return isinstance(values, Mapping) and isinstance(idle, tuple) and isinstance(lacks, str)
+
+
 FIELDS = {
     **dict.fromkeys(("name", "site", "place", "stiffness", "source", "felt"), TEXT),
     **dict.fromkeys(("parts", "contains", "assumed"), TEXTS),
     **dict.fromkeys(("states", "starts"), TEXT_BY_NAME),
     "parameters": PARAMETERS,
     "tables": TABLES,
-    "command": by_name(
-        'a dictionary such as {"yield_force": Linear("f_c", "f_v")}',
-        lambda one: isinstance(one, Form) and all(isinstance(n, str) for n in one.names()),
+    "command": (
+        'a dictionary such as {"yield_force": Linear("f_c", "f_v")}', by_name(_command),
     ),
-    "shapes": by_name(
-        'a dictionary such as {"v_s": Shape(0.02, 5.0, 9, ("f_c", "f_v"))}', lambda one: _shape(one)
+    "shapes": (
+        'a dictionary such as {"v_s": Shape(0.02, 5.0, 9, ("f_c", "f_v"))}', by_name(_shape),
     ),
-    "variants": by_name(
-        'a dictionary such as {"plain": Variant({"k": 0.0})}', lambda one: _variant(one)
-    ),
-}
+    "variants": ('a dictionary such as {"plain": Variant({"k": 0.0})}', by_name(_variant)),
+}  # fmt: skip
 """The class data of a law, and of which kind each is."""
-
-
-def _shape(one: Any) -> bool:
-    """Return whether this is a `law.Shape` that a search could begin from."""
-    low, high, nodes, shapes, _ = one
-    return 0.0 < low <= high and isinstance(nodes, int) and nodes > 0 and isinstance(shapes, tuple)
-
-
-def _variant(one: Any) -> bool:
-    """Return whether this is a `law.Variant`."""
-    values, idle, lacks = one
-    return isinstance(values, Mapping) and isinstance(idle, tuple) and isinstance(lacks, str)
 
 
 def check_law(law: type[Law]) -> None:
     """Refuse a law whose class data could not work, when it is defined."""
-    where = told("law", law)
+    where = class_text("law", law)
     if law.site not in SITES:
         raise PhysicsError(f"{where}: site {law.site!r} is none of {SITES}.")
     if not law.name.isidentifier():
@@ -142,18 +143,15 @@ def _check_names(law: type[Law], where: str) -> None:
         raise PhysicsError(
             f"{where}: starts of {wrong}; a state's name and one of {SIGNALS} is right."
         )
-    for field, names in (("assumed", law.assumed), ("stiffness", (law.stiffness,))):
-        lacking = [name for name in names if name and name not in law.parameters]
+    for what, names in (
+        ("assumed", law.assumed),
+        ("stiffness", filter(None, (law.stiffness,))),
+        *(("shapes", (name, *shape.shapes)) for name, shape in law.shapes.items()),
+        *((f"variant {n}", (*one.values, *one.idle)) for n, one in law.variants.items()),
+    ):
+        lacking = [name for name in names if name not in law.parameters]
         if lacking:
-            raise PhysicsError(f"{where}: {field} names {lacking}, no parameters of it.")
-    for name, shape in law.shapes.items():
-        lacking = [n for n in (name, *shape.shapes) if n not in law.parameters]
-        if lacking:
-            raise PhysicsError(f"{where}: shapes names {lacking}, no parameters of it.")
-    for suffix, variant in law.variants.items():
-        lacking = [n for n in (*variant.values, *variant.idle) if n not in law.parameters]
-        if lacking:
-            raise PhysicsError(f"{where}: variant {suffix} names {lacking}, no parameters of it.")
+            raise PhysicsError(f"{where}: {what} names {lacking}, no parameters of it.")
 
 
 def _check_hooks(law: type[Law], where: str) -> None:
@@ -173,9 +171,6 @@ def _check_hooks(law: type[Law], where: str) -> None:
         raise PhysicsError(f"{where}: has states and no `rate`.")
     if not law.states and (law.hook("rate") or law.hook("advance")):
         raise PhysicsError(f"{where}: has `rate` or `advance` and no states.")
-
-
-# Longer than 300 lines: what a law may declare, and what follows from it, stand in one class.
 
 
 FOREVER = 1e15
@@ -252,7 +247,7 @@ class Law:
     source
         Where it is from, with the year.
     own
-        Whether it is a user's own, outside the library; `user.load_laws` sets it.
+        Whether it is a user's own, outside the library; `user_code.load` sets it.
     base, form, knots, form_code
         Of a law with a chosen form (see `forms`) the law that it is made of, the form's word, its
         knots [V] and its code; of others itself, "", () and 0.
@@ -325,11 +320,11 @@ class Law:
         if not cls.name or not register:
             return
         cls.base = cls
-        check_fields(cls, told("law", cls), FIELDS)
+        check_fields(cls, class_text("law", cls), FIELDS)
         cls.parameters = all_parameters(cls.parameters, cls.tables)
         if any(not isinstance(form, Constant) for form in cls.command.values()):
             cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))
-        _refuse_twin(cls)
+        refuse_twin("law", cls, LAWS.get(cls.name))
         check_law(cls)
         cls.State = named("State", tuple(cls.states))
         cls.Values = named("Values", cls.seen())
@@ -468,22 +463,12 @@ class Law:
     @classmethod
     def first_line(cls) -> str:
         """Return the first line of the docstring, which users read."""
-        return (cls.__doc__ or "").strip().splitlines()[0]
+        return first_line(cls)
 
     @classmethod
     def at(cls, values: Mapping[str, float], V: float = 0.0) -> Any:
         """Return the `p` of the hooks at a voltage V [V]; missing values take their defaults."""
         return values_of_law(cls, values, V)
-
-
-def _refuse_twin(law: type[Law]) -> None:
-    """Refuse a second law of a name, unless its own file defines it anew."""
-    known = LAWS.get(law.name)
-    if known is not None and known.__module__ != law.__module__:
-        raise PhysicsError(
-            f"law {law.name!r} ({law.__module__}.{law.__qualname__}): the name is taken by "
-            f"{known.__module__}.{known.__qualname__}. Another name is right."
-        )
 
 
 def _motion(v: float, V: float, dt: float = 0.0) -> Inputs:

@@ -240,11 +240,11 @@ def open_row(flat: Row, k: int, count: int) -> int:
     return begin
 
 
-# Sums over rows, in plain Python so that `jit` compiles them into what asks for them.
+def dot(a: Row, b: Row) -> float:
+    """Return the product of two rows of one length, in the product of their units.
 
-
-def dot(a: Any, b: Any) -> float:
-    """Return the product of two rows of one length, in the product of their units."""
+    In plain Python, so that `jit` compiles it into what asks for it.
+    """
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]

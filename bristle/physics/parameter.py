@@ -165,15 +165,34 @@ def named(kind: str, fields: Sequence[str]) -> Any:
     return namedtuple(kind, tuple(fields))
 
 
-# Whether class data are of the kind that they must be, asked before anything uses them.
-
 LARGEST = 10**308
 """The largest whole number of a law or effect: beyond it there is no float."""
 
 _Right = Callable[[Any], bool]
 
 
-def told(word: str, cls: Any) -> str:
+def first_line(cls: type) -> str:
+    """Return the first line of a class's docstring, which users read."""
+    return (cls.__doc__ or "").strip().splitlines()[0]
+
+
+def refuse_twin(word: str, cls: Any, known: Any) -> None:
+    """Refuse a second law or effect of a name, unless its own file defines it anew.
+
+    Parameters
+    ----------
+    word : "effect" or "law"
+    cls : the class, with `name`
+    known : that which is registered under the name, None where there is none
+    """
+    if known is not None and known.__module__ != cls.__module__:
+        raise PhysicsError(
+            f"{word} {cls.name!r} ({cls.__module__}.{cls.__qualname__}): the name is taken by "
+            f"{known.__module__}.{known.__qualname__}. Another name is right."
+        )
+
+
+def class_text(word: str, cls: Any) -> str:
     """Return how a message names a class: by its name, and where that is not in a file of a user's.
 
     Parameters
@@ -204,15 +223,18 @@ def _number(value: Any) -> bool:
     return _real(value) and isfinite(value)
 
 
-def _texts(value: Any) -> bool:
-    return isinstance(value, tuple) and all(map(_text, value))
+def _any(value: Any) -> bool:
+    return True
 
 
-def _numbers(value: Any) -> bool:
-    return isinstance(value, tuple) and all(map(_number, value))
+def tuple_of(right: _Right) -> _Right:
+    """Return what says whether a value is a tuple of what is `right`."""
+    return lambda value: isinstance(value, tuple) and all(map(right, value))
 
 
-def _by_name(right: _Right) -> _Right:
+def by_name(right: _Right) -> _Right:
+    """Return what says whether a value is a dictionary, by name, of what is `right`."""
+
     def check(value: Any) -> bool:
         if not isinstance(value, Mapping):
             return False
@@ -221,56 +243,42 @@ def _by_name(right: _Right) -> _Right:
     return check
 
 
-def _bounded(value: Any) -> bool:
-    low_high = isinstance(value, tuple) and len(value) == 2
-    return low_high and all(map(_real, value))
+def _declared(value: Any) -> bool:
+    """Return whether unit, bounds and text of a parameter or table are of their kinds."""
+    bounded = tuple_of(_real)(value.bounds) and len(value.bounds) == 2
+    return bounded and _text(value.unit) and _text(value.text)
 
 
 def _parameter(value: Any) -> bool:
-    return (
-        isinstance(value, Parameter)
-        and _real(value.value)  # what is not finite lies outside its bounds, and is told so
-        and _text(value.unit)
-        and _bounded(value.bounds)
-        and _text(value.text)
-    )
+    # What is not finite lies outside its bounds, and is told so.
+    return isinstance(value, Parameter) and _real(value.value) and _declared(value)
 
 
 def _table(value: Any) -> bool:
+    numbers = tuple_of(_number)
     return (
         isinstance(value, Table)
-        and _numbers(value.knots)
-        and _numbers(value.values)
-        and _text(value.unit)
-        and _bounded(value.bounds)
-        and _text(value.text)
+        and numbers(value.knots)
+        and numbers(value.values)
+        and _declared(value)
     )
-
-
-def _grids(value: Any) -> bool:
-    grid = _by_name(lambda one: True)  # what is in it `effect_check` asks
-    return isinstance(value, tuple) and all(map(grid, value))
 
 
 TEXT: tuple[str, _Right] = ("a text in quotes", _text)
 SWITCH: tuple[str, _Right] = ("True or False", _switch)
-TEXTS: tuple[str, _Right] = ('a tuple of texts such as ("x", "v")', _texts)
-TEXT_BY_NAME: tuple[str, _Right] = ('a dictionary such as {"name": "text"}', _by_name(_text))
+TEXTS: tuple[str, _Right] = ('a tuple of texts such as ("x", "v")', tuple_of(_text))
+TEXT_BY_NAME: tuple[str, _Right] = ('a dictionary such as {"name": "text"}', by_name(_text))
 PARAMETERS: tuple[str, _Right] = (
     'a dictionary such as {"k": Parameter(80.0, "N/m", (0.0, 1e6), "stiffness")}',
-    _by_name(_parameter),
+    by_name(_parameter),
 )
 TABLES: tuple[str, _Right] = (
     'a dictionary such as {"curve": Table((0.0, 1.0), (1.0, 2.0), "N", (0.0, 9.0), "text")}',
-    _by_name(_table),
+    by_name(_table),
 )
-ANY_BY_NAME: tuple[str, _Right] = ("a dictionary by name", _by_name(lambda one: True))
-GRIDS: tuple[str, _Right] = ("a tuple of dictionaries", _grids)
-
-
-def by_name(what: str, right: _Right) -> tuple[str, _Right]:
-    """Return the kind of a dictionary of what is `right`, in words `what`."""
-    return what, _by_name(right)
+ANY_BY_NAME: tuple[str, _Right] = ("a dictionary by name", by_name(_any))
+GRIDS: tuple[str, _Right] = ("a tuple of dictionaries", tuple_of(by_name(_any)))
+"""What is in the grids `effect.check_search` asks."""
 
 
 def check_fields(cls: type, where: str, kinds: Mapping[str, tuple[str, _Right]]) -> None:

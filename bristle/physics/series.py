@@ -13,8 +13,6 @@ from .damper_source import advance_law, evaluate, felt_voltage, law_factors, net
 from .linear import Row, solve_in_place
 from .tuples import Inputs, Setup
 
-# Advances a damper's states that move by `rate`, implicitly.
-
 IMPLICIT_STEP = 5e-4
 """Longest substep [s] of states that move by `rate`."""
 

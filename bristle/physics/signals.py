@@ -162,9 +162,6 @@ def read_steps(text: str) -> tuple[list[float], list[float]]:
     return times, values
 
 
-# An instrument: what the channel of a sensor's effect shows, one sample after the other.
-
-
 def _source(effect: type[Effect], slots: Slots) -> str:
     q = q_source(value="value", dt="dt")
     places = slots.places(effect)

@@ -113,9 +113,6 @@ def _advanced(slots: Slots, **q: str) -> list[str]:
     return [*lines, *switched(slots, "advance", "{z_next}= {call}", **q)]
 
 
-# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
-
-
 EFFECT_STEP = 5e-4
 """Longest substep [s] of a structure with effects."""
 

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from .command import chosen_source, rising
-from .forms import choosable
+from .forms import Law, choosable
 from .linear import Row
 from .parameter import climb, fields_of
-
-if TYPE_CHECKING:
-    from .law import Law
-
 
 record = tuple.__new__
 """Makes a named tuple from a tuple, in half the time of calling its class; `jit` knows it too."""
@@ -46,13 +42,13 @@ def listed(fields: Mapping[str, Sequence[str]], tables: Any, at: Mapping[str, st
     ]
 
 
-def law_state(law: type[Law]) -> str:
+def law_state(law: Law) -> str:
     """Return the source that makes a law's state tuple from `z`."""
     return made(f"{law.name}_Z", [f"z[{k}]" for k in range(len(law.states))])
 
 
 def law_values(
-    law: type[Law], factors: Mapping[str, str] | None = None, felt: str = "z", place: int = -1
+    law: Law, factors: Mapping[str, str] | None = None, felt: str = "z", place: int = -1
 ) -> str:
     """Return the source that makes a law's parameter tuple from `p` at the voltage V.
 
@@ -79,20 +75,17 @@ def law_values(
     return made(f"{law.base.name}_P", [given[name] for name in law.seen()])
 
 
-def values_of_law(law: type[Law], values: Mapping[str, float], V: float) -> Any:
+def values_of_law(law: Law, values: Mapping[str, float], V: float) -> Any:
     """Return the `p` of a law's hooks at a voltage V [V]; missing values take their defaults."""
     p = [values.get(name, one.value) for name, one in law.parameters.items()]
-    return _maker(law)(p, V)  # type: ignore[arg-type]  # a class can be hashed
+    return _maker(law)(p, V)
 
 
 @cache
-def _maker(law: type[Law]) -> Any:
+def _maker(law: Law) -> Any:
     """Return what makes the `p` of a law's hooks from its flat parameters and the voltage."""
     names = {"record": record, "climb": climb, "rising": rising, f"{law.base.name}_P": law.Values}
     return eval(f"lambda p, V: {law_values(law, felt='')}", names)
-
-
-# What a damper is given: its inputs at one moment, and how it was set up.
 
 
 class Inputs(NamedTuple):

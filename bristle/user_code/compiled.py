@@ -19,6 +19,8 @@ from ..physics.signals import instrument
 from ..physics.tuples import Inputs
 from . import load
 
+Array = NDArray[np.float64]
+
 
 def usable(effects: Iterable[load.Loaded]) -> list[load.Loaded]:
     """Return the same, with those left out, and unregistered, that numba cannot compile.
@@ -83,11 +85,6 @@ def _reason(error: Exception) -> str:
         line for line in lines if not line.startswith(("Failed in", "File ", "During", "->"))
     ]
     return (telling[0] if telling else type(error).__name__)[:200]
-
-
-# What an instrument shows of a signal, compiled: the hooks of one sensor's effect, in time.
-
-Array = NDArray[np.float64]
 
 
 def channel_history(signal: Any, dt: float, z: Any, p: Any, out: Any) -> None:

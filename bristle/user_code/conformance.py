@@ -1,12 +1,19 @@
-"""What is asked of every effect and law: rest, energy, bounds, and the compiled path."""
+"""What is asked of every effect and law: rest, energy, bounds, and the compiled path.
+
+`python -m bristle.user_code.conformance effect FILE` prints it as JSON: `bristle check` runs it in
+a process of its own, under a limit.
+"""
 
 from __future__ import annotations
 
+import json
 import re
+import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import product
 from math import cos, inf, isfinite, pi, sin
+from pathlib import Path
 
 import numpy as np
 
@@ -41,24 +48,32 @@ def examine(effect: type[Effect]) -> list[Check]:
 
 
 def _says(effect: type[Effect]) -> Check:
-    lacking = []
-    if ":" not in effect.first_line() or not effect.first_line().endswith("."):
-        lacking.append('a first docstring line "Name: what happens."')
-    if "Leaves out" not in (effect.__doc__ or ""):
-        lacking.append('a docstring sentence "Leaves out ..."')
-    if not re.search(r"\b(1[89]|20)\d\d\b", effect.source):
-        lacking.append("a source with its year")
-    if len(effect.expect.split()) < 5:
-        lacking.append("expect, what a residual looks like without it")
-    return Check(
-        "name, texts and source are complete",
-        not lacking,
-        "lacks " + ", ".join(lacking) if lacking else "",
+    return _texts(
+        effect,
+        "what happens",
+        {
+            'a docstring sentence "Leaves out ..."': "Leaves out" in (effect.__doc__ or ""),
+            "a source with its year": _has_year(effect.source),
+            "expect, what a residual looks like without it": len(effect.expect.split()) >= 5,
+        },
     )
 
 
-def _compiles(effect: type[Effect]) -> Check:
-    flaw = refused(effect)
+def _has_year(source: str) -> bool:
+    return re.search(r"\b(1[89]|20)\d\d\b", source) is not None
+
+
+def _texts(made: type[Effect] | type[Law], about: str, has: dict[str, bool]) -> Check:
+    """Return whether a first line says `about`, and all else that users read is there."""
+    line = made.first_line()
+    has = {f'a first docstring line "Name: {about}."': ":" in line and line.endswith("."), **has}
+    lacking = ", ".join(what for what, there in has.items() if not there)
+    found = f"lacks {lacking}" if lacking else ""
+    return Check("name, texts and source are complete", not lacking, found)
+
+
+def _compiles(made: type[Effect] | type[Law]) -> Check:
+    flaw = refused(made)
     return Check("compiled code gives the same numbers", flaw is None, flaw[1] if flaw else "")
 
 
@@ -197,8 +212,6 @@ _ASKED_AT: dict[str, tuple[Callable[[type[Effect]], Check], ...]] = {
 """What is asked of an effect at each site."""
 
 
-# What is asked of every law, asked of one: rest, energy, bounds, steps, and the compiled path.
-
 FINER = 4
 """Steps into which one is divided to see what it leaves out."""
 
@@ -208,33 +221,13 @@ COARSE = 0.02
 
 def examine_law(law: type[Law]) -> list[Check]:
     """Return what is asked of a law that is registered, and whether it holds."""
-    return [
-        one(law)
-        for one in (
-            _law_says,
-            _law_compiles,
-            _law_rests,
-            _law_bounds,
-            _law_energy,
-            _steps,
-            _has_effects,
-        )
-    ]
+    joins = Check("effects join its parts", bool(effects_of("damper", law.name)))
+    asked = (_law_says, _compiles, _law_rests, _law_bounds, _law_energy, _steps)
+    return [*(one(law) for one in asked), joins]
 
 
 def _law_says(law: type[Law]) -> Check:
-    lacking = []
-    if ":" not in law.first_line() or not law.first_line().endswith("."):
-        lacking.append('a first docstring line "Name: what it is."')
-    if not re.search(r"\b(1[89]|20)\d\d\b", law.source):
-        lacking.append("a source with its year")
-    found = "lacks " + ", ".join(lacking) if lacking else ""
-    return Check("name, texts and source are complete", not lacking, found)
-
-
-def _law_compiles(law: type[Law]) -> Check:
-    flaw = refused(law)
-    return Check("compiled code gives the same numbers", flaw is None, flaw[1] if flaw else "")
+    return _texts(law, "what it is", {"a source with its year": _has_year(law.source)})
 
 
 def _law_rests(law: type[Law]) -> Check:
@@ -292,5 +285,16 @@ def _forces(law: type[Law], dt: float) -> list[float]:
     return forces
 
 
-def _has_effects(law: type[Law]) -> Check:
-    return Check("effects join its parts", bool(effects_of("damper", law.name)))
+def main() -> int:
+    """Print what is asked of a file's effect or law, and whether it holds."""
+    from ..trust import load_file
+
+    word, file = sys.argv[1:3]
+    made = load_file(Path(file), word)
+    checks = examine(made) if word == "effect" else examine_law(made)
+    print(json.dumps([asdict(check) for check in checks]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

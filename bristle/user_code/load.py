@@ -1,11 +1,10 @@
 """Effects and laws of a user's own: files that are read, refused with a reason, or registered.
 
-A file's text is read first (`user_text`), then it runs in a child process under a limit of time
-(`user_trial`), where its hooks are called (`probe`, `probe_law`). Only what passes runs here. That
+A file's text is read first (`reading`), then it runs in a child process under a limit of time
+(`trial`), where its hooks are called (`probe`, `probe_law`). Only what passes runs here. That
 keeps hooks pure; against harm stands consent (`bristle.trust`), which is asked for before any text
 runs, in the child too.
 """
-# Longer than 300 lines: every way to a user's code goes through one file.
 
 from __future__ import annotations
 
@@ -53,16 +52,6 @@ class Loaded:
         """The name of the effect or law, which is the file's too."""
         return self.path.stem
 
-    @property
-    def effect(self) -> type[Effect] | None:
-        """The effect that the file made; of a file with an effect."""
-        return self.made  # type: ignore[no-any-return]
-
-    @property
-    def law(self) -> type[Law] | None:
-        """The law that the file made; of a file with a law."""
-        return self.made  # type: ignore[no-any-return]
-
 
 @dataclass(frozen=True)
 class _Kind:
@@ -101,37 +90,27 @@ def ask_before_running(require: Callable[[Path, str], None]) -> None:
     _require = require
 
 
-def load_effects(folder: Path) -> list[Loaded]:
-    """Return the effects of a folder's files, registered, and those that are left out.
+def load(folder: Path, word: str = "effect") -> list[Loaded]:
+    """Return the effects or laws of a folder's files, registered, and those that are left out.
 
-    Read again, an unchanged file costs nothing; a changed one replaces its effect, and one that is
-    gone takes it away. A bad file never raises: its `error` says where and why.
+    Read again, an unchanged file costs nothing; a changed one replaces what it gave, and one that
+    is gone takes it away. A bad file never raises: its `error` says where and why.
+
+    Parameters
+    ----------
+    folder : it need not exist
+    word : "effect" or "law". Load laws first: an effect joins those that are there.
     """
-    return load(folder, "effect")
-
-
-def load_laws(folder: Path) -> list[Loaded]:
-    """Return the laws of a folder's files, registered, and those that are left out.
-
-    As `load_effects` does it. Load laws first: an effect joins those that are there.
-    """
-    return load(folder, "law")
-
-
-def load(folder: Path, word: str) -> list[Loaded]:
-    """Return what the files of a folder define, all of one kind: "effect" or "law"."""
     files = sorted(folder.glob("*.py")) if folder.is_dir() else []
     here = {path.resolve() for path in files}
-    gone = [path for path in _known if path.parent == folder.resolve() and path not in here]
-    for path in gone:
-        _forget(path)
-    for path in [path for path in _waiting if path.parent == folder.resolve() and path not in here]:
-        del _waiting[path]
+    for path in [*_known, *_waiting]:
+        if path.parent == folder.resolve() and path not in here:
+            _forget(path)
     return _load(files, word)
 
 
-def load_effect(path: Path) -> type[Effect]:
-    """Return the effect of one file, registered.
+def load_file(path: Path, word: str = "effect") -> Any:
+    """Return the effect or law of one file, registered.
 
     Raises
     ------
@@ -140,16 +119,6 @@ def load_effect(path: Path) -> type[Effect]:
     TrustError
         If its code must not run yet.
     """
-    return load_file(path, "effect")  # type: ignore[no-any-return]
-
-
-def load_law(path: Path) -> type[Law]:
-    """Return the law of one file, registered; see `load_effect` for what is raised."""
-    return load_file(path, "law")  # type: ignore[no-any-return]
-
-
-def load_file(path: Path, word: str) -> Any:
-    """Return the effect or law of one file, registered; see `load_effect` for what is raised."""
     if not path.is_file():
         raise PhysicsError(f"{path}: there is no such file with {_a(word)}.")
     (loaded,) = _load([path], word)
@@ -196,8 +165,7 @@ def leave_out(made: Any, why: str) -> None:
 
 def unload_effects() -> None:
     """Take every effect and law of a user's out of the library: it is as it came."""
-    _waiting.clear()
-    for path in list(_known):
+    for path in [*_known, *_waiting]:
         _forget(path)
 
 
@@ -240,10 +208,11 @@ def flaw_of(name: str, text: str) -> str:
 
 def _forget(path: Path) -> None:
     """Drop what a file gave."""
-    _, loaded = _known.pop(path)
-    registry = LAWS if isinstance(loaded.made, type) and issubclass(loaded.made, Law) else EFFECTS
-    if loaded.made is not None and registry.get(loaded.name) is loaded.made:
-        del registry[loaded.name]
+    _waiting.pop(path, None)
+    loaded = _known.pop(path)[1] if path in _known else None
+    for registry in (EFFECTS, LAWS):
+        if loaded and loaded.made is not None and registry.get(loaded.name) is loaded.made:
+            del registry[loaded.name]
 
 
 def _load(files: list[Path], word: str) -> list[Loaded]:
@@ -266,8 +235,7 @@ def _load(files: list[Path], word: str) -> list[Loaded]:
             if made is None or kind.known.get(known[1].name) is made:
                 found[shown] = known[1]
                 continue
-        if path in _known:
-            _forget(path)
+        _forget(path)
         try:
             _require(shown, text)
         except TrustError as error:
@@ -302,21 +270,21 @@ def _flaws(texts: dict[Path, str], word: str) -> dict[Path, FlawError | None]:
         except FlawError as flaw:
             found[shown] = flaw
         else:
-            orders[shown] = {"path": str(shown.resolve()), "shown": str(shown), "word": word}
-            orders[shown]["text"] = text
+            path = str(shown.resolve())
+            orders[shown] = {"path": path, "shown": str(shown), "word": word, "text": text}
     if orders:
         found.update(zip(orders, trial.tried(list(orders.values())), strict=False))
     return found
 
 
 def serve() -> None:
-    """Try the files that stand on the standard input; `user_trial.tried` starts a child for it."""
-    trial.serve(_serve_one)
+    """Try the files that stand on the standard input; `trial.tried` starts a child for it."""
 
+    def run(order: dict[str, Any]) -> None:
+        made = _made(order["text"], Path(order["path"]), Path(order["shown"]), order["word"])
+        _KINDS[order["word"]].probe(made)
 
-def _serve_one(order: dict[str, Any]) -> None:
-    made = _made(order["text"], Path(order["path"]), Path(order["shown"]), order["word"])
-    _KINDS[order["word"]].probe(made)
+    trial.serve(run)
 
 
 def _parsed(text: str, shown: Path, word: str) -> ast.Module:
@@ -361,19 +329,13 @@ def _made(text: str, path: Path, shown: Path, word: str) -> Any:
     except BaseException as error:
         kind.known.clear()
         kind.known.update(before)
-        if isinstance(error, FlawError):
+        if isinstance(error, FlawError) or not isinstance(error, Exception):
             raise
-        if not isinstance(error, Exception):
-            raise
-        raise FlawError(_said(error), _line(error, path)) from None
+        plain = isinstance(error, PhysicsError)
+        said = str(error) if plain else f"it raises {type(error).__name__}: {error}."
+        raise FlawError(said, _line(error, path)) from None
     made.own = True
     return made
-
-
-def _said(error: Exception) -> str:
-    if isinstance(error, PhysicsError):
-        return str(error)
-    return f"it raises {type(error).__name__}: {error}."
 
 
 def _line(error: Exception, path: Path) -> int:
@@ -421,7 +383,8 @@ def _check(made: Any, tree: ast.Module, kind: _Kind) -> None:
         else:
             _check_law(made)
         if made.name in kind.others:
-            raise FlawError(f'"{made.name}" is the name of {_a(_other_word(kind))}; take another.')
+            other = "law" if kind.base is Effect else "effect"
+            raise FlawError(f'"{made.name}" is the name of {_a(other)}; take another.')
         for name, parameter in made.parameters.items():
             if not all(math.isfinite(bound) for bound in parameter.bounds):
                 raise FlawError(f"the bounds of {name}, {parameter.bounds}, must be finite.")
@@ -431,18 +394,10 @@ def _check(made: Any, tree: ast.Module, kind: _Kind) -> None:
             if right != unit:
                 raise FlawError(f'unit "{unit}" is spelled "{right}" here.')
             si = units.si_unit(unit)
-            if (
-                "%" not in unit
-                and si != unit
-                and units.parse(si).factor != units.parse(unit).factor
-            ):
+            if "%" not in unit and units.parse(si).factor != units.parse(unit).factor:
                 raise FlawError(f'unit "{unit}": hooks compute in SI units; "{si}" is right.')
     except (FlawError, UnitError) as error:
         raise FlawError(str(error), line) from None
-
-
-def _other_word(kind: _Kind) -> str:
-    return next(one.dialect.word for one in _KINDS.values() if one is not kind)
 
 
 def _check_effect(effect: type[Effect]) -> None:

@@ -1,4 +1,4 @@
-"""The files that `bristle effects new`, `laws new` and `components new` write."""
+"""The files that `bristle new effect NAME`, `new law` and `new controller` write."""
 
 from __future__ import annotations
 
@@ -73,16 +73,6 @@ class {cls}(Law):
 '''
 
 
-def law_template(name: str) -> str:
-    """Return the text of a working file with a law of this name."""
-    parts = name.split("_")
-    title = " ".join(parts).strip().capitalize()
-    cls = "".join(word[:1].upper() + word[1:] for word in parts)
-    return LAW.format(name=name, title=title, cls=cls)
-
-
-# The file that `bristle new controller NAME` writes.
-
 CONTROLLER = '''"""FMU: {title}, a controller of my own."""
 
 from math import exp, pi
@@ -115,19 +105,6 @@ class {cls}(OwnController):
         return self.gain * speed, (speed,)
 '''
 
-
-def class_name(name: str) -> str:
-    """Return the class, and so the FMU, of a controller's name: MyController of my_controller."""
-    return "".join(word[:1].upper() + word[1:] for word in name.split("_"))
-
-
-def controller_template(name: str) -> str:
-    """Return the text of a working file with a controller of this name."""
-    title = " ".join(name.split("_")).strip().capitalize()
-    return CONTROLLER.format(title=title, cls=class_name(name))
-
-
-# The file that `bristle new effect NAME` writes.
 
 EFFECT = '''"""{title}: an effect of my own."""
 
@@ -194,9 +171,13 @@ class {cls}(Effect):
 '''
 
 
-def effect_template(name: str) -> str:
-    """Return the text of a working file with an effect of this name."""
-    parts = name.split("_")
-    title = " ".join(parts).strip().capitalize()
-    cls = "".join(word[:1].upper() + word[1:] for word in parts)
-    return EFFECT.format(name=name, title=title, cls=cls)
+def class_name(name: str) -> str:
+    """Return the class, and so the FMU, of a controller's name: MyController of my_controller."""
+    return "".join(word[:1].upper() + word[1:] for word in name.split("_"))
+
+
+def file_text(kind: str, name: str) -> str:
+    """Return the text of a working file with an "effect", a "law" or a "controller" of a name."""
+    title = name.replace("_", " ").strip().capitalize()
+    text = {"effect": EFFECT, "law": LAW, "controller": CONTROLLER}[kind]
+    return text.format(name=name, title=title, cls=class_name(name))

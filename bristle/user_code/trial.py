@@ -20,11 +20,9 @@ from typing import Any
 from ..physics import damper
 from ..physics.effect import OFFERED, Effect, Q, Sizes
 from ..physics.law import Law
-from ..physics.parameter import CHOICES, fields_of
+from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.tuples import Inputs
 from .reading import FlawError
-
-# Checks that an effect vanishes with the parameter that its `amount` names.
 
 _ONES = ("yield_factor", "viscous_factor", "reach", "factor")
 """Hooks that return a factor: 1 where there is no effect."""
@@ -83,8 +81,6 @@ def _without(hook: str, q: Q) -> tuple[float, ...]:
     passed_on = {"voltage": q.V, "channel": q.value, "yield_force": copysign(1.0, q.v)}
     return (passed_on.get(hook, 0.0),)
 
-
-# Calls a hook of a user's, and says what is wrong with what it gives.
 
 ROUNDING = 1e-12
 """Change of a hook, by its size, that is none."""
@@ -192,8 +188,6 @@ def refuse_jump(
             )
     return moved
 
-
-# Which signals a hook reads, by whatever way: a function that it calls, another name, an index.
 
 _STATES = ("rate", "advance")
 
@@ -425,10 +419,7 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
     within: dict[str, list[Within]] = {}
     field_of = {name: field for field, names in effect.fields().items() for name in names}
     for name, parameter in effect.parameters.items():
-        low, high = parameter.bounds
-        if not (low > 0.0 and high > 100.0 * low):  # near the default: bounds may be far away
-            reach = 3.0 * abs(parameter.value) or 1.0
-            low, high = max(low, parameter.value - reach), min(high, parameter.value + reach)
+        low, high = _span(parameter)
         moved = False
         for q, hook in product(_signals(effect), effect.hooks()):
             z = _state(effect, q, values)
@@ -513,21 +504,27 @@ def _at_parameters(
     """Call a hook with parameters between low and high, by decades where they span many."""
     given = dict(values)
     for name, low, high in within:
-        by_decades = low > 0.0 and high > 100.0 * low
-        given[name] = low * (high / low) ** share if by_decades else low + (high - low) * share
+        given[name] = _between(low, high, share)
     return _call(effect, hook, q, z, given)
 
 
-# Calls the hooks of a law where it counts, and moves a damper of it through closed cycles.
+def _span(parameter: Parameter) -> tuple[float, float]:
+    """Return between which values a parameter is looked at."""
+    low, high = parameter.bounds
+    if low > 0.0 and high > 100.0 * low:
+        return low, high
+    reach = 3.0 * abs(parameter.value) or 1.0  # near the default: bounds may be far away
+    return max(low, parameter.value - reach), min(high, parameter.value + reach)
 
-LAW_RANGES = {"x": 0.01, "v": 0.2, "V": 8.0}
-"""How far the signals of a small rig go, over which a hook is asked for jumps."""
+
+def _between(low: float, high: float, share: float) -> float:
+    """Return a value between two, by decades where they span many."""
+    by_decades = low > 0.0 and high > 100.0 * low
+    return low * (high / low) ** share if by_decades else low + (high - low) * share
+
 
 LAW_FURTHER = (1.0, 10.0, 0.1, 100.0, 0.01)
 """Factors on the signals at which a parameter is looked at until it moves something."""
-
-LAW_SHARES = (0.0, 0.2, 0.5, 0.8, 1.0)
-"""Shares of a parameter's range at which it is."""
 
 CYCLES = ((0.006, 2.0, 4.0), (0.001, 5.0, 8.0), (0.015, 0.5, 0.0), (0.015, 5.0, 8.0))
 """Amplitudes [m], frequencies [Hz] and voltages [V] of cycles in which no energy may come out."""
@@ -653,32 +650,19 @@ def _law_place(q: Inputs, values: dict[str, float]) -> str:
     return f"x = {q.x:g}, v = {q.v:g}, V = {q.V:g}; {numbers}"
 
 
-def _span(law: type[Law], name: str) -> tuple[float, float, bool]:
-    """Return between which values a parameter is looked at, and whether by equal ratios."""
-    parameter = law.parameters[name]
-    low, high = parameter.bounds
-    by_ratio = low > 0.0 and high > 100.0 * low
-    if not by_ratio:  # near the default: bounds may be far away
-        reach = 3.0 * abs(parameter.value) or 1.0
-        low, high = max(low, parameter.value - reach), min(high, parameter.value + reach)
-    return low, high, by_ratio
-
-
 def _with(
     law: type[Law], hook: str, q: Inputs, z: Any, values: dict[str, float], name: str, share: float
 ) -> tuple[float, ...]:
     """Call a hook with a parameter at a share of its range."""
-    low, high, by_ratio = _span(law, name)
-    value = low * (high / low) ** share if by_ratio else low + (high - low) * share
+    value = _between(*_span(law.parameters[name]), share)
     return _call_law(law, hook, q, z, {**values, name: value})
 
 
-def _at(
+def _law_at_signal(
     law: type[Law], hook: str, q: Any, z: Any, values: dict[str, float], signal: str,
     value: float,
 ) -> tuple[float, ...]:  # fmt: skip
-    moved: dict[str, Any] = {signal: value}
-    return _call_law(law, hook, q._replace(**moved), z, values)
+    return _call_law(law, hook, q._replace(**{signal: value}), z, values)
 
 
 def _forces(law: type[Law]) -> Iterator[str]:
@@ -689,12 +673,10 @@ def _smooth(law: type[Law], values: dict[str, float]) -> None:
     """Refuse hooks that jump with a signal or a parameter; the sign of the yield force may."""
     for q in _law_signals()[1:7]:
         z = _law_state(law, q, values)
-        for signal, hook in product(LAW_RANGES, _forces(law)):
-            given: Callable[[float], tuple[float, ...]] = partial(
-                _at, law, hook, q, z, values, signal
-            )
-            low = 0.0 if signal == "V" else -LAW_RANGES[signal]
-            refuse_jump(getattr(law, hook), given, (low, LAW_RANGES[signal]), f"q.{signal}")
+        for signal, hook in product(("x", "v", "V"), _forces(law)):
+            given: Any = partial(_law_at_signal, law, hook, q, z, values, signal)
+            low = 0.0 if signal == "V" else -RANGES[signal]
+            refuse_jump(getattr(law, hook), given, (low, RANGES[signal]), f"q.{signal}")
         for name, hook in product(law.parameters, _forces(law)):
             if name not in CHOICES:
                 given = partial(_with, law, hook, q, z, values, name)
@@ -728,7 +710,7 @@ def _moves(law: type[Law], name: str, values: dict[str, float]) -> bool:
         for q, hook in product(_law_signals(factor)[1:], law.hooks()):
             try:
                 z = _law_state(law, q, values, dt)
-                if len({_with(law, hook, q, z, values, name, share) for share in LAW_SHARES}) > 1:
+                if len({_with(law, hook, q, z, values, name, share) for share in SHARES}) > 1:
                     return True
             except FlawError:  # so far out it need not be right
                 continue

@@ -17,19 +17,19 @@ _RELATIONS = ("=", "<=", ">=", "<", ">", ",")
 _SUMS = ("+", "-", "−", "±", "+-")  # noqa: RUF001
 
 
-def formula_html(formula: str) -> str:
+def formula(text: str) -> str:
     """Return a formula as a block of MathML; what is no formula by this grammar, as code.
 
     Parameters
     ----------
-    formula : str
+    text : str
         As docstrings have it: `f = (f_c + f_v V) sgn(v) + k x^2/2`; juxtaposed factors are
         multiplied, `a_b` has an index, a prime is a derivative.
     """
     try:
-        inside = _Parser(formula).whole()
+        inside = _Parser(text).whole()
     except _NotAFormulaError:
-        return f'<div class="formula"><code>{escape(formula)}</code></div>'
+        return f'<div class="formula"><code>{escape(text)}</code></div>'
     return f'<div class="formula"><math display="block"><mrow>{inside}</mrow></math></div>'
 
 

@@ -4,28 +4,11 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from html import escape as escape
 from pathlib import Path
 
 from .blocks import Block, Figure, Formula, Table, Text, View
-from .formula import formula_html as formula
-
-__all__ = [
-    "CSS",
-    "answer",
-    "blocks",
-    "escape",
-    "figure",
-    "formula",
-    "fragment",
-    "items",
-    "notebook",
-    "page",
-    "paragraphs",
-    "section",
-    "table",
-    "tiles",
-]
+from .formula import formula as formula
 
 CSS = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 
@@ -41,20 +24,15 @@ _NOTEBOOK = (
 )
 
 
-def fragment(title: str, *parts: str) -> str:
-    """Return what a notebook shows of a result; parts are HTML, empty ones are left out."""
-    inner = "\n".join(part for part in parts if part)
-    return (
-        f'<div class="bristle">\n<style>{_NOTEBOOK}</style>\n'
-        f"<p><strong>{escape(title)}</strong></p>\n{inner}\n</div>"
-    )
-
-
 def notebook(view: View) -> str:
     """Return what a notebook shows of a result: the whole of its view."""
     from .style import DPI
 
-    return fragment(view.title, blocks((*view.blocks, *view.details), dpi=DPI))
+    return (
+        f'<div class="bristle">\n<style>{_NOTEBOOK}</style>\n'
+        f"<p><strong>{escape(view.title)}</strong></p>\n"
+        f"{blocks((*view.blocks, *view.details), dpi=DPI)}\n</div>"
+    )
 
 
 def answer(view: View) -> str:

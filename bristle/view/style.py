@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import GridSpec
 
 
-# The settings of matplotlib that all figures share.
-
 INK, GREY = "#222222", "#666666"
 
 _STYLE: dict[str, Any] = {
@@ -187,18 +185,23 @@ class Page:
             )
         undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
         try:
-            with look(), warnings.catch_warnings():
-                # A title may be in a script that the font lacks; its boxes are no news per glyph.
-                warnings.filterwarnings("ignore", "Glyph .* missing from font")
-                self.figure.savefig(path, dpi=dpi, metadata=undated)
+            _save(self.figure, path, dpi=dpi, metadata=undated)
         except OSError as error:
             raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error
 
 
 def png(drawn: Page | Figure, dpi: int = 160) -> bytes:
     """Return a page or figure as the bytes of a PNG; the same drawing gives the same bytes."""
+    file = io.BytesIO()
+    _save(drawn.figure, file, format="png", dpi=dpi)  # a figure's `figure` is itself
+    return file.getvalue()
 
-    return as_png(drawn.figure, dpi)  # a figure's `figure` is itself
+
+def _save(figure: Any, target: Any, **how: Any) -> None:
+    with look(), warnings.catch_warnings():
+        # A title may be in a script that the font lacks; its boxes are no news per glyph.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        figure.savefig(target, **how)
 
 
 def _broken(text: str, width: float, per_inch: float) -> str:
@@ -243,8 +246,6 @@ def label(
     )
 
 
-# A matplotlib figure that a notebook shows as it is, whatever the session's backend.
-
 DPI = 110
 """Dots per inch of what a notebook shows."""
 
@@ -253,14 +254,4 @@ class Picture(Figure):
     """A figure outside of pyplot: no window opens, and nothing keeps it but its owner."""
 
     def _repr_png_(self) -> bytes:
-        return as_png(self, DPI)
-
-
-def as_png(figure: Any, dpi: int) -> bytes:
-    """Return a figure as the bytes of a PNG; the same drawing gives the same bytes."""
-    file = io.BytesIO()
-    with look(), warnings.catch_warnings():
-        # A title may be in a script that the font lacks; its boxes are no news per glyph.
-        warnings.filterwarnings("ignore", "Glyph .* missing from font")
-        figure.savefig(file, format="png", dpi=dpi)
-    return file.getvalue()
+        return png(self, DPI)

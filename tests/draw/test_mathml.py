@@ -8,7 +8,7 @@ import pytest
 from bristle.model.equations import formulas
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
-from bristle.view.formula import formula_html
+from bristle.view.formula import formula as formula_html
 
 
 def tree(formula: str) -> ElementTree.Element:

@@ -12,7 +12,7 @@ from bristle.fmu.build import Plan, plan
 from bristle.native.build import build
 from bristle.native.prepare import component_of, prepare
 from bristle.native.zig import here
-from bristle.user_code.load import load_effect, load_law
+from bristle.user_code.load import load_file
 
 pytestmark = [needs_zig, pytest.mark.slow]
 
@@ -36,7 +36,7 @@ def test_an_effect_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert difference(what, **{"my_effect.on": True, "my_effect.f_s": 1.5}) <= 1e-12
     # A plan that does not name it is prepared without it, though this process has loaded it.
     bare = prepare(plan("LuGreDamper"))
-    load_effect(file)
+    load_file(file)
     assert prepare(plan("LuGreDamper")) == bare
     assert prepare(what).functions != bare.functions
 
@@ -44,7 +44,7 @@ def test_an_effect_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_a_law_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["new", "law", "my_law"]) == 0
-    load_law(tmp_path / "my_law.py")
+    load_file(tmp_path / "my_law.py", "law")
     what = plan("OwnMyLawDamper")
     assert what.laws
     assert difference(what, f_c=2.0) <= 1e-12

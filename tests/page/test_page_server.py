@@ -29,7 +29,7 @@ from bristle.page.app import App
 from bristle.page.orders import order_of
 from bristle.page.requests import RequestError, consent, waiting_texts
 from bristle.study import Study, create_study
-from bristle.user_code.templates import effect_template
+from bristle.user_code.templates import file_text
 from bristle.view.page_data import pack, unpack
 
 
@@ -431,7 +431,7 @@ def test_consent_is_to_the_text_that_was_shown(
     files = sorted((home / "lab").glob("run_*.csv"))
     create_study(home / "foreign", files, law="bingham")
     file = home / "foreign" / "effects" / "rub.py"
-    file.write_text(effect_template("rub"))
+    file.write_text(file_text("effect", "rub"))
     with page_on(home, start=False) as own:
         (shown,) = own.get("/api/studies/foreign/consent").json["texts"]
         assert shown["file"] == "effects/rub.py"
@@ -456,10 +456,10 @@ def test_consent_counts_for_a_file_with_a_byte_order_mark(
     monkeypatch.setenv("BRISTLE_STATE", str(tmp_path / "state"))
     files = sorted((home / "lab").glob("run_*.csv"))
     folder = create_study(home / "marked", files, law="bingham").study.folder
-    (folder / "effects" / "rub.py").write_text(effect_template("rub"), encoding="utf-8-sig")
+    (folder / "effects" / "rub.py").write_text(file_text("effect", "rub"), encoding="utf-8-sig")
     assert "not run" in Study(folder).own_effects[0].error
     (shown,) = waiting_texts(folder)
-    assert shown["text"] == effect_template("rub")
+    assert shown["text"] == file_text("effect", "rub")
     consent(folder, shown["file"], shown["digest"])
     assert Study(folder).own_effects[0].error == ""
     assert waiting_texts(folder) == []

@@ -256,7 +256,7 @@ def test_a_file_of_a_users_own_may_have_a_table(tmp_path: Path) -> None:
     path = tmp_path / "curved.py"
     path.write_text(FILE)
     try:
-        found = load.load_effect(path)
+        found = load.load_file(path)
         assert found.own
         known = damper.functions_of("bingham", ["curved"]).slots.parameters
         assert "curved.curve[3]" in known

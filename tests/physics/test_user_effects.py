@@ -20,7 +20,7 @@ from bristle.physics.damper import DamperModel
 from bristle.physics.effect import EFFECTS
 from bristle.user_code import load
 from bristle.user_code.compiled import refused, usable
-from bristle.user_code.templates import effect_template
+from bristle.user_code.templates import file_text
 
 
 @pytest.fixture(autouse=True)
@@ -31,13 +31,13 @@ def library(tmp_path: Path) -> Iterator[None]:
     for file in tmp_path.rglob("*.py"):
         file.unlink()
     for folder in [tmp_path, *tmp_path.rglob("*/")]:
-        load.load_effects(folder)
+        load.load(folder)
     assert set(EFFECTS) == before
 
 
 def written(folder: Path, name: str = "seal", **changes: str) -> Path:
     """Write the template's effect, some of its text replaced (old to new)."""
-    text = effect_template(name)
+    text = file_text("effect", name)
     for old, new in changes.items():
         assert old in text, old
         text = text.replace(old, new)
@@ -48,9 +48,9 @@ def written(folder: Path, name: str = "seal", **changes: str) -> Path:
 
 def test_an_effect_joins_the_library_and_the_law(tmp_path: Path) -> None:
     written(tmp_path)
-    (loaded,) = load.load_effects(tmp_path)
+    (loaded,) = load.load(tmp_path)
     assert loaded.error == ""
-    assert EFFECTS["seal"] is loaded.effect
+    assert EFFECTS["seal"] is loaded.made
     assert load.own_effects() == {"seal": (tmp_path / "seal.py").resolve()}
     plain = DamperModel("lugre").force(0.0, 0.1, 0.0, 4.0, 0.002, 0.0, 0.0, False)
     model = DamperModel("lugre", {"seal.f_s": 1.5}, ["seal"])
@@ -60,15 +60,15 @@ def test_an_effect_joins_the_library_and_the_law(tmp_path: Path) -> None:
 
 def test_an_edited_file_replaces_its_effect_and_a_gone_one_takes_it_away(tmp_path: Path) -> None:
     file = written(tmp_path)
-    first = load.load_effects(tmp_path)[0].effect
-    assert load.load_effects(tmp_path)[0].effect is first
+    first = load.load(tmp_path)[0].made
+    assert load.load(tmp_path)[0].made is first
     written(tmp_path, **{"Parameter(0.2,": "Parameter(0.7,"})
-    second = load.load_effects(tmp_path)[0].effect
+    second = load.load(tmp_path)[0].made
     assert second is not first
     assert second is not None
     assert second.parameters["f_s"].value == 0.7
     file.unlink()
-    assert load.load_effects(tmp_path) == []
+    assert load.load(tmp_path) == []
     assert "seal" not in EFFECTS
     assert "seal.f_s" not in damper.LIBRARY.slots.parameters
 
@@ -77,13 +77,13 @@ def test_of_two_folders_the_one_read_last_stays(tmp_path: Path) -> None:
     for name, value in (("one", "0.3"), ("two", "0.4")):
         (tmp_path / name).mkdir()
         written(tmp_path / name, **{"Parameter(0.2,": f"Parameter({value},"})
-        load.load_effects(tmp_path / name)
+        load.load(tmp_path / name)
         assert EFFECTS["seal"].parameters["f_s"].value == float(value)
 
 
 def test_stock_components_do_not_know_it_unless_they_are_told(tmp_path: Path) -> None:
     file = written(tmp_path)
-    load.load_effects(tmp_path)
+    load.load(tmp_path)
     assert "seal.on" not in catalogue.describe("LuGreDamper").variables
     told = catalogue.describe("LuGreDamper", effects=[file]).variables
     assert told["seal.f_s"].unit == "N"
@@ -132,12 +132,17 @@ def test_a_bad_effect_is_left_out_with_file_line_and_reason(
 ) -> None:
     file = written(tmp_path, **changes)
     before = set(EFFECTS)
-    (loaded,) = load.load_effects(tmp_path)
-    assert loaded.effect is None
+    (loaded,) = load.load(tmp_path)
+    assert loaded.made is None
     assert says in loaded.error
     assert loaded.error.count("\n") == 0
     line = next(
-        (k for k, row in enumerate(effect_template("seal").splitlines(), 1) if at and at in row), 0
+        (
+            k
+            for k, row in enumerate(file_text("effect", "seal").splitlines(), 1)
+            if at and at in row
+        ),
+        0,
     )
     assert loaded.error.startswith(f"{file}, line {line}:" if line else f"{file}")
     assert set(EFFECTS) == before
@@ -150,7 +155,7 @@ def test_a_bad_effect_leaves_the_good_ones_in(tmp_path: Path) -> None:
     written(tmp_path)
     written(tmp_path, "leaking", **{FORCE: "return p.f_s / q.v"})
     (tmp_path / "no_text.py").write_bytes(b"\xff\xfe\x00")
-    loaded = {one.name: one for one in load.load_effects(tmp_path)}
+    loaded = {one.name: one for one in load.load(tmp_path)}
     assert loaded["seal"].effect is EFFECTS["seal"]
     assert "cannot be read" in loaded["no_text"].error
     assert "leaking" not in EFFECTS
@@ -158,8 +163,8 @@ def test_a_bad_effect_leaves_the_good_ones_in(tmp_path: Path) -> None:
 
 def test_what_numba_refuses_is_left_out_too(tmp_path: Path) -> None:
     written(tmp_path, **{FORCE: "return float(str(p.f_s)) * tanh(q.v / p.v_s)"})
-    loaded = load.load_effects(tmp_path)
-    assert loaded[0].effect is not None  # Python runs it
+    loaded = load.load(tmp_path)
+    assert loaded[0].made is not None  # Python runs it
     (checked,) = usable(loaded)
     assert checked.effect is None
     assert "force cannot be compiled" in checked.error
@@ -200,9 +205,9 @@ def test_a_promise_that_does_not_hold_is_found(
 
 
 def test_one_file_is_loaded_by_name_or_refused(tmp_path: Path) -> None:
-    assert load.load_effect(written(tmp_path)).name == "seal"
+    assert load.load_file(written(tmp_path)).name == "seal"
     with pytest.raises(PhysicsError, match="there is no such file"):
-        load.load_effect(tmp_path / "gone.py")
+        load.load_file(tmp_path / "gone.py")
 
 
 SEARCHED = """    start_grid = {"v_s": (0.3, 1.0, 3.0)}
@@ -225,7 +230,7 @@ SEARCHED = """    start_grid = {"v_s": (0.3, 1.0, 3.0)}
 
 def test_the_search_and_the_verdict_take_what_an_effect_says_of_itself(tmp_path: Path) -> None:
     written(tmp_path, **{"    @staticmethod\n    def force(": SEARCHED})
-    (loaded,) = load.load_effects(tmp_path)
+    (loaded,) = load.load(tmp_path)
     assert loaded.error == ""
     t = 0.002 * np.arange(2000)
     x, v = 0.01 * np.sin(6.0 * t), 0.06 * np.cos(6.0 * t)
@@ -262,8 +267,8 @@ def test_what_an_effect_says_wrongly_of_itself_is_refused(
     tmp_path: Path, line: str, word: str
 ) -> None:
     written(tmp_path, **{"    passive = True\n": f"    passive = True\n    {line}\n"})
-    (loaded,) = load.load_effects(tmp_path)
-    assert loaded.effect is None
+    (loaded,) = load.load(tmp_path)
+    assert loaded.made is None
     assert word in loaded.error
 
 
@@ -276,5 +281,5 @@ def test_a_tie_that_gives_no_start_is_refused(tmp_path: Path, body: str, word: s
     tie += f"        {body}\n\n"
     begin = "    @staticmethod\n    def force("
     written(tmp_path, **{begin: tie + begin})
-    (loaded,) = load.load_effects(tmp_path)
+    (loaded,) = load.load(tmp_path)
     assert word in loaded.error

@@ -22,7 +22,7 @@ from bristle.physics.laws import law_names
 from bristle.physics.parameter import Parameter, Table
 from bristle.user_code import load, trial
 from bristle.user_code.compiled import usable
-from bristle.user_code.templates import effect_template, law_template
+from bristle.user_code.templates import file_text
 
 YIELDING = "return p.yield_force * tanh(q.v / p.v_s)"
 VISCOUS = "return p.c * q.v"
@@ -30,7 +30,7 @@ VISCOUS = "return p.c * q.v"
 
 def written(folder: Path, name: str = "rubbing", **changes: str) -> Path:
     """Write the template's law, some of its text replaced (old to new)."""
-    text = law_template(name)
+    text = file_text("law", name)
     for old, new in changes.items():
         assert old in text, old
         text = text.replace(old, new)
@@ -42,9 +42,9 @@ def written(folder: Path, name: str = "rubbing", **changes: str) -> Path:
 
 def test_a_law_joins_the_library_with_its_effects(tmp_path: Path) -> None:
     written(tmp_path)
-    (loaded,) = usable(load.load_laws(tmp_path))
+    (loaded,) = usable(load.load(tmp_path, "law"))
     assert loaded.error == ""
-    assert LAWS["rubbing"] is loaded.law
+    assert LAWS["rubbing"] is loaded.made
     assert "rubbing" in law_names()
     assert load.own_laws() == {"rubbing": (tmp_path / "rubbing.py").resolve()}
     force = damper.DamperModel("rubbing").force(0.004, 0.03, 0.0, 4.0, 0.002, 0.0, 0.0, False)
@@ -54,7 +54,7 @@ def test_a_law_joins_the_library_with_its_effects(tmp_path: Path) -> None:
     assert "gas_spring" not in joined, "the law says that it contains a spring"
     assert "rubbing" not in [law.name for law in invertible()], "stock controllers do not know it"
     (tmp_path / "rubbing.py").unlink()
-    assert load.load_laws(tmp_path) == []
+    assert load.load(tmp_path, "law") == []
     assert "rubbing" not in LAWS
 
 
@@ -103,13 +103,13 @@ def test_a_bad_law_is_left_out_with_file_line_and_reason(
 ) -> None:
     file = written(tmp_path, **changes)
     before = dict(LAWS)
-    (loaded,) = load.load_laws(tmp_path)
-    assert loaded.law is None
+    (loaded,) = load.load(tmp_path, "law")
+    assert loaded.made is None
     assert says in loaded.error
     assert loaded.error.count("\n") == 0
     assert loaded.error.startswith(str(file))
     if at:
-        rows = law_template("rubbing").splitlines()
+        rows = file_text("law", "rubbing").splitlines()
         line = next(k for k, row in enumerate(rows, 1) if at in row)
         assert loaded.error.startswith(f"{file}, line {line}:")
     assert before == LAWS
@@ -123,7 +123,7 @@ def test_a_hook_that_does_not_end_is_refused_within_the_limit(
     endless = "return p.c * q.v + 0.0 * float(10 ** (10 ** int(10.0 + q.v)) % 7)"
     file = written(tmp_path, **{VISCOUS: endless})
     written(tmp_path, "sound")
-    loaded = {one.name: one for one in load.load_laws(tmp_path)}
+    loaded = {one.name: one for one in load.load(tmp_path, "law")}
     assert "does not end within" in loaded["rubbing"].error
     line = next(k for k, row in enumerate(file.read_text().splitlines(), 1) if endless in row)
     assert f", line {line}:" in loaded["rubbing"].error
@@ -138,14 +138,14 @@ def test_a_hook_that_does_not_end_is_refused_within_the_limit(
 def test_every_field_of_an_effect_is_asked_for_its_kind(
     field: str, value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    head, hook, rest = effect_template("seal").partition("    @staticmethod\n")
+    head, hook, rest = file_text("effect", "seal").partition("    @staticmethod\n")
     text = f"{head}    {field} = {value}\n\n{hook}{rest}"
     file = tmp_path / "seal.py"
     file.write_text(text, encoding="utf-8")
-    (loaded,) = load.load_effects(tmp_path)
+    (loaded,) = load.load(tmp_path)
     if field in ("needs", "mimics") and value.startswith("("):
-        assert loaded.effect is None, "it names what does not exist"
-    elif loaded.effect is not None:
+        assert loaded.made is None, "it names what does not exist"
+    elif loaded.made is not None:
         raise AssertionError(f"{field} = {value} is taken")
     else:
         assert re.search(rf"\b{field}\b", loaded.error)
@@ -155,18 +155,18 @@ def test_every_field_of_an_effect_is_asked_for_its_kind(
 
 def test_an_effect_whose_parts_no_law_has_is_refused(tmp_path: Path) -> None:
     parts = '    acts_on = ("sign", "bristle")\n    passive'
-    text = effect_template("seal").replace("    passive", parts, 1)
+    text = file_text("effect", "seal").replace("    passive", parts, 1)
     (tmp_path / "seal.py").write_text(text, encoding="utf-8")
-    (loaded,) = load.load_effects(tmp_path)
+    (loaded,) = load.load(tmp_path)
     assert "no law has the parts that it acts on (sign, bristle)" in loaded.error
     (tmp_path / "seal.py").write_text(text.replace('"bristle"', '"charm"'), encoding="utf-8")
-    (loaded,) = load.load_effects(tmp_path)
+    (loaded,) = load.load(tmp_path)
     assert "acts_on ['charm']" in loaded.error
 
 
 @pytest.mark.parametrize("gap", ["0.012", "0.5", "1e-5"])
 def test_what_begins_behind_a_knot_moves_something(gap: str, tmp_path: Path) -> None:
-    text = effect_template("stop").replace("from math import tanh\n\n", "")
+    text = file_text("effect", "stop").replace("from math import tanh\n\n", "")
     text = text.replace(
         '"v_s": Parameter(2e-3, "m/s", (1e-5, 1.0), "speed over which it builds up")',
         f'"gap": Parameter({gap}, "m", (1e-6, 1.0), "free travel")',
@@ -176,9 +176,9 @@ def test_what_begins_behind_a_knot_moves_something(gap: str, tmp_path: Path) -> 
     push = "p.k * (max(q.x - p.gap, 0.0) + min(q.x + p.gap, 0.0))"
     text = text.replace("p.f_s * tanh(q.v / p.v_s)", push)
     (tmp_path / "stop.py").write_text(text, encoding="utf-8")
-    (loaded,) = load.load_effects(tmp_path)
+    (loaded,) = load.load(tmp_path)
     assert loaded.error == ""
-    assert loaded.effect is EFFECTS["stop"]
+    assert loaded.made is EFFECTS["stop"]
 
 
 @pytest.mark.parametrize("bounds", [(-1.0, 5.0), (0.0, 5.0)])
@@ -251,7 +251,7 @@ def test_a_promise_that_does_not_hold_is_found(
 def test_its_damper_is_an_fmu_that_carries_the_law(tmp_path: Path) -> None:
     with pytest.raises(BuildError, match="is a damper of the law rubbing"):
         catalogue.component_of_law("rubbing")
-    load.load_law(written(tmp_path))
+    load.load_file(written(tmp_path), "law")
     name = catalogue.component_of_law("rubbing")
     assert name == "OwnRubbingDamper"
     assert catalogue.describe(name).variables["f_c"].unit == "N"
@@ -267,18 +267,18 @@ def test_its_damper_is_an_fmu_that_carries_the_law(tmp_path: Path) -> None:
 
 
 def test_the_component_of_a_law_is_no_file_that_others_rewrite(tmp_path: Path) -> None:
-    load.load_law(written(tmp_path / "mine"))
+    load.load_file(written(tmp_path / "mine"), "law")
     mine = catalogue.source("OwnRubbingDamper")
     text = mine.read_text(encoding="utf-8")
     first_line = text.split('    """')[1].splitlines()[0].rstrip('"')
-    load.load_law(written(tmp_path / "theirs", **{first_line: "Another law of that name."}))
+    load.load_file(written(tmp_path / "theirs", **{first_line: "Another law of that name."}), "law")
     theirs = catalogue.source("OwnRubbingDamper")
     assert "Another law of that name." in theirs.read_text(encoding="utf-8")
     assert mine.read_text(encoding="utf-8") == text, "the other project reads its own file"
 
 
 def test_the_component_of_a_law_is_written_beside_and_put_in_place(tmp_path: Path) -> None:
-    load.load_law(written(tmp_path))
+    load.load_file(written(tmp_path), "law")
     file = catalogue.source("OwnRubbingDamper")
     text = file.read_text(encoding="utf-8")
     file.write_text("half of it", encoding="utf-8")
@@ -290,7 +290,7 @@ def test_the_component_of_a_law_is_written_beside_and_put_in_place(tmp_path: Pat
 def test_compiled_it_is_what_python_gives(tmp_path: Path) -> None:
     import numpy as np
 
-    load.load_law(written(tmp_path))
+    load.load_file(written(tmp_path), "law")
     t = 0.002 * np.arange(100)
     x, v = 0.006 * np.sin(9.0 * t), 0.054 * np.cos(9.0 * t)
     force = Bench("rubbing", []).force(x, v, 0.0 * v, 4.0 + 0.0 * v, 0.002, {})

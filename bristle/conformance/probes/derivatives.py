@@ -102,7 +102,6 @@ def _replayed(bench: Bench, instance: Instance) -> str:
 )
 def order_zero(bench: Bench) -> Finding:
     """Set the derivative of order 0 of an input."""
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+    instance = bench.under_way()
     reference = bench.inputs[0].reference
     return forbidden(bench, lambda: instance.input_derivative(reference, 1.0, 0), instance)

@@ -40,12 +40,8 @@ def free_without_terminate(bench: Bench) -> Finding:
     plan = bench.plan
     if unless_single(plan) is None:
         bench.instance().free()
-        instance = bench.instance()
-        good(instance.setup(plan.start, None), "SetupExperiment")
-        good(instance.enter(), "EnterInitializationMode")
-        instance.free()
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+        bench.entered().free()
+    instance = bench.under_way()
     instance.free()
     return passed("freed")
 

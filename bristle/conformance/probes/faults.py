@@ -13,8 +13,8 @@ from ctypes import c_void_p
 
 from ...fmu.description import Variable
 from ..bench import GOOD, Bench, good, not_finite, status_name
-from ..native import DISCARD, ERROR, Instance
-from ..probe import Finding, UnexpectedError, failed, passed, probe
+from ..native import DISCARD, ERROR, Instance, UnexpectedError
+from ..probe import Finding, failed, passed, probe
 
 INPUT, STEP, ORDER, PARAMETER = 1, 2, 3, 5
 _REFUSED = (DISCARD, ERROR)
@@ -133,8 +133,7 @@ def fault_order(bench: Bench) -> Finding:
             bench.run(instance, 0, 2)
             good(instance.terminate(), "Terminate")
         if when == "in initialisation":
-            good(instance.setup(plan.start, None), "SetupExperiment")
-            good(instance.enter(), "EnterInitializationMode")
+            bench.entered(instance)
         status = instance.step(plan.start, plan.step)
         if status not in _REFUSED:
             raise UnexpectedError(f"a step {when}: answered {status_name(status)}")

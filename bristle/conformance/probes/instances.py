@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ...fmu.archive import extract
 from ..bench import GOOD, Bench, Values, good
-from ..native import FatalAnswerError, Instance
-from ..probe import Finding, UnexpectedError, failed, noted, passed, probe, unless_single
+from ..native import FatalAnswerError, Instance, UnexpectedError
+from ..probe import Finding, failed, noted, passed, probe, unless_single
 
 
 @probe(

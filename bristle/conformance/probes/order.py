@@ -74,9 +74,7 @@ def step_first(bench: Bench) -> Finding:
 )
 def step_in_initialisation(bench: Bench) -> Finding:
     """Step an instance in initialisation mode."""
-    instance = bench.instance()
-    good(instance.setup(bench.plan.start, None), "SetupExperiment")
-    good(instance.enter(), "EnterInitializationMode")
+    instance = bench.entered()
     return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
 
 
@@ -88,8 +86,7 @@ def step_in_initialisation(bench: Bench) -> Finding:
 )
 def step_last(bench: Bench) -> Finding:
     """Step an instance that was terminated."""
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+    instance = bench.under_way()
     good(instance.terminate(), "Terminate")
     return forbidden(bench, lambda: instance.step(bench.time(2), bench.plan.step), instance)
 
@@ -102,8 +99,7 @@ def step_last(bench: Bench) -> Finding:
 )
 def initialise_twice(bench: Bench) -> Finding:
     """Enter initialisation mode again without a reset."""
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+    instance = bench.under_way()
     return forbidden(bench, instance.enter, instance)
 
 
@@ -136,8 +132,7 @@ def fixed_parameter(bench: Bench) -> Finding:
     v = _fixed(bench)
     if v is None:
         return passed("not tried: there is no fixed parameter")
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+    instance = bench.under_way()
     value = v.start if v.start is not None else 0
     if isinstance(value, float) and not isinstance(value, bool):
         value = 1.01 * value
@@ -155,8 +150,7 @@ def set_output(bench: Bench) -> Finding:
     outputs = bench.plan.variables("output", "Real")
     if not outputs:
         return passed("not tried: there is no real output")
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+    instance = bench.under_way()
     reference = [outputs[0].reference]
     return forbidden(bench, lambda: instance.set("Real", reference, [12.5]), instance)
 
@@ -171,9 +165,7 @@ def set_output(bench: Bench) -> Finding:
 def step_past_stop(bench: Bench) -> Finding:
     """Define a stop time after two steps, and take a third."""
     plan = bench.plan
-    instance = bench.instance()
-    good(instance.setup(plan.start, bench.time(2)), "SetupExperiment")
-    good(instance.enter(), "EnterInitializationMode")
+    instance = bench.entered(stop=bench.time(2))
     good(instance.leave(), "ExitInitializationMode")
     bench.run(instance, 0, 2)
     return forbidden(bench, lambda: instance.step(bench.time(2), plan.step), instance)
@@ -186,8 +178,7 @@ _STEP = (
 
 
 def _odd_step(bench: Bench, step: float) -> Finding:
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+    instance = bench.under_way()
     bad: list[str] = []
 
     def act() -> int:
@@ -202,33 +193,17 @@ def _odd_step(bench: Bench, step: float) -> Finding:
     return finding
 
 
-@probe("zero step", rule="robustness", tried="fmi2DoStep with a step of 0", standard=_STEP)
-def zero_step(bench: Bench) -> Finding:
-    """Take a step of length zero."""
-    return _odd_step(bench, 0.0)
+for _name, _words, _share in (
+    ("zero", "a step of 0", 0.0),
+    ("negative", "a negative step", -1.0),
+    ("NaN", "a step that is not a number", math.nan),
+    ("infinite", "an infinite step", math.inf),
+):
 
-
-@probe("negative step", rule="robustness", tried="fmi2DoStep with a negative step", standard=_STEP)
-def negative_step(bench: Bench) -> Finding:
-    """Take a step back."""
-    return _odd_step(bench, -bench.plan.step)
-
-
-@probe(
-    "NaN step",
-    rule="robustness",
-    tried="fmi2DoStep with a step that is not a number",
-    standard=_STEP,
-)
-def nan_step(bench: Bench) -> Finding:
-    """Take a step of no length at all."""
-    return _odd_step(bench, math.nan)
-
-
-@probe("infinite step", rule="robustness", tried="fmi2DoStep with an infinite step", standard=_STEP)
-def infinite_step(bench: Bench) -> Finding:
-    """Take an endless step; it must end all the same."""
-    return _odd_step(bench, math.inf)
+    @probe(f"{_name} step", rule="robustness", tried=f"fmi2DoStep with {_words}", standard=_STEP)
+    def odd_step(bench: Bench, share: float = _share) -> Finding:
+        """Take a step of a length that is none; an endless one must end all the same."""
+        return _odd_step(bench, share * bench.plan.step)
 
 
 _VARIABLE = "canHandleVariableCommunicationStepSize"

@@ -84,9 +84,7 @@ def outputs_at_start(bench: Bench) -> Finding:
     """Read everything at t = 0."""
     plan = bench.plan
     everything = list(plan.about.variables.values())
-    instance = bench.instance()
-    good(instance.setup(plan.start, None), "SetupExperiment")
-    good(instance.enter(), "EnterInitializationMode")
+    instance = bench.entered()
     bench.read(instance, everything)
     good(instance.leave(), "ExitInitializationMode")
     values = bench.read(instance, everything)
@@ -111,9 +109,7 @@ def starts_in_code(bench: Bench) -> Finding:
     """Compare the XML's start values with the binary's."""
     plan = bench.plan
     given = [v for c in ("parameter", "input") for v in plan.about.of(c) if v.start is not None]
-    instance = bench.instance()
-    good(instance.setup(plan.start, None), "SetupExperiment")
-    good(instance.enter(), "EnterInitializationMode")
+    instance = bench.entered()
     values = bench.read(instance, given)
     wrong = [
         f"{v.name} is {x!r}, not {v.start!r}"

@@ -7,16 +7,8 @@ from ctypes import c_void_p
 from pathlib import Path
 
 from ..bench import Bench, good
-from ..probe import (
-    Finding,
-    UnexpectedError,
-    failed,
-    noted,
-    passed,
-    probe,
-    unless_claimed,
-    unless_single,
-)
+from ..native import UnexpectedError
+from ..probe import Finding, failed, noted, passed, probe, unless_claimed, unless_single
 
 _COPY, _BYTES = "canGetAndSetFMUstate", "canSerializeFMUstate"
 

@@ -9,8 +9,8 @@ from functools import partial
 
 from ...fmu.description import Value, Variable
 from ..bench import GOOD, Bench, Values, good, not_finite, some, status_name
-from ..native import FatalAnswerError, Instance
-from ..probe import Finding, UnexpectedError, failed, noted, passed, probe, unless_single
+from ..native import FatalAnswerError, Instance, UnexpectedError
+from ..probe import Finding, failed, noted, passed, probe, unless_single
 from .order import forbidden
 
 _MOST_INPUTS = 12
@@ -60,35 +60,21 @@ _STRANGE = (
 )
 
 
-@probe(
-    "NaN input",
-    rule="robustness",
-    tried="each real input set to NaN, a step, a reset",
-    standard=_STRANGE,
-)
-def nan_input(bench: Bench) -> Finding:
-    """Feed NaN."""
-    return _strange_input(bench, math.nan)
+for _name, _words, _value in (
+    ("NaN", "NaN, a step, a reset", math.nan),
+    ("infinite", "infinity, a step", math.inf),
+    ("huge", "1e300, a step, a reset", 1e300),
+):
 
-
-@probe(
-    "infinite input",
-    rule="robustness",
-    tried="each real input set to infinity, a step",
-    standard=_STRANGE,
-)
-def infinite_input(bench: Bench) -> Finding:
-    """Feed infinity."""
-    return _strange_input(bench, math.inf)
-
-
-@probe(
-    "huge input",
-    rule="robustness", tried="each real input set to 1e300, a step, a reset", standard=_STRANGE
-)  # fmt: skip
-def huge_input(bench: Bench) -> Finding:
-    """Feed a number whose square overflows."""
-    return _strange_input(bench, 1e300)
+    @probe(
+        f"{_name} input",
+        rule="robustness",
+        tried=f"each real input set to {_words}",
+        standard=_STRANGE,
+    )
+    def strange_input(bench: Bench, value: float = _value) -> Finding:
+        """Feed what is no number, or a number whose square overflows."""
+        return _strange_input(bench, value)
 
 
 def _unused(bench: Bench) -> list[int]:
@@ -101,8 +87,7 @@ def _unused(bench: Bench) -> list[int]:
 
 def _bad_reference(bench: Bench, act: Callable[[Instance, int], int]) -> Finding:
     for reference in _unused(bench):
-        instance = bench.ready()
-        bench.run(instance, 0, 2)
+        instance = bench.under_way()
         finding = forbidden(bench, partial(act, instance, reference), instance)
         if finding.verdict != "pass":
             break
@@ -169,8 +154,7 @@ def set_values_stay(bench: Bench) -> Finding:
     """Read back what was set."""
     if finding := _no_inputs(bench):
         return finding
-    instance = bench.ready()
-    bench.run(instance, 0, 2)
+    instance = bench.under_way()
     if bench.plan.driven:
         bench.move(instance, 7)
     wanted = bench.read(instance, bench.inputs)
@@ -271,8 +255,7 @@ def _run_with(bench: Bench, changes: list[tuple[int, Value]], late: bool) -> lis
     instance = bench.instance()
     if not late:
         good(instance.set("Real", references, values), "SetReal of parameters")
-    good(instance.setup(bench.plan.start, None), "SetupExperiment")
-    good(instance.enter(), "EnterInitializationMode")
+    bench.entered(instance)
     if late:
         good(instance.set("Real", references, values), "SetReal of parameters")
     if bench.plan.driven:
