@@ -28,9 +28,9 @@ from ..physics.building import PAPER, Building, Device, Ports, frequencies, pape
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from ..physics.laws import LAWS, laws_of
 from ..synthesis import Damper as DesignDamper
-from ..system.from_model import source_of, values_of
 from ..system.library import damper_of
 from ..system.overrides import parse_override
+from ..system.toml import source_of, values_of
 
 # What a user chooses, as text: `WHAT,NAME=VALUE,...`, such as `Skyhook,gain=100`.
 
