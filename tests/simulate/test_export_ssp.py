@@ -21,7 +21,7 @@ from bristle.engine.coupling_error import expect
 from bristle.engine.run import run_quietly
 from bristle.errors import ScenarioError
 from bristle.fmu.description import read_description
-from bristle.system.model import Connection, Scenario
+from bristle.system.model import Connection
 from bristle.system.scenario import Scenario, load_scenario
 from bristle.system.ssp_write import export_ssp, osp_text
 
