@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +14,8 @@ from ..core.progress import Progress
 from ..core.text import written
 from ..errors import EnsembleError, RunError
 from ..view import Viewable
-from .campaign import prepare
+from .campaign import Outcome, Plan, prepare
 from .ensemble_file import read_ensemble
-from .plan import Outcome, Plan
 from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
 
 if TYPE_CHECKING:
@@ -143,9 +142,11 @@ def ensemble(
         if retry:
             table.forget_failures()
         continued = sum(run < plan.runs for run in table.outcomes)
-        left = [run for run in range(plan.runs) if run not in table.outcomes]
         try:
-            _go(plan, table, left, workers or cores(), cluster, progress)
+            with Progress(plan.title, plan.runs, progress and bool(table.left)) as bar:
+                run_left(
+                    plan, table, workers or cores(), lambda: bar.show(len(table.outcomes)), cluster
+                )
         except RunError as error:
             raise RunError(f"{error} {_kept(table)}") from error
         except KeyboardInterrupt:
@@ -170,19 +171,25 @@ def _refuse_types(file: object, **numbers: object) -> None:
             raise EnsembleError(f"{name} is {written(value)}; a whole number from 1 is right.")
 
 
-def _go(
-    plan: Plan, table: RunsTable, left: list[int], workers: int, cluster: str | None,
-    progress: bool,
-) -> None:  # fmt: skip
+def run_left(
+    plan: Plan, table: RunsTable, workers: int, done: Callable[[], None], cluster: str | None = None
+) -> None:
+    """Make the runs that a table lacks, here or on a cluster, and keep each in it as it ends.
+
+    Parameters
+    ----------
+    plan, table : what is run, and what there is
+    workers : processes on this machine
+    done : called after each run
+    cluster : address of a scheduler whose workers run in place of processes here
+    """
+    left = table.left
     if not left:
         return
-    with (
-        Progress(plan.title, plan.runs, progress) as bar,
-        closing(_outcomes(plan, left, workers, cluster)) as outcomes,
-    ):
+    with closing(_outcomes(plan, left, workers, cluster)) as outcomes:
         for outcome in outcomes:
             table.add(outcome)
-            bar.show(len(table.outcomes))
+            done()
 
 
 def _outcomes(

@@ -18,8 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from .campaign import prepare, run_one
-from .plan import Outcome, Plan
+from .campaign import Outcome, Plan, prepare, run_one
 
 AHEAD = 2
 """Runs that a process has been given and not yet answered: it never waits for the next."""

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import EnsembleError, RunError
 from ..model.draws import POINT, reach, simulated_whole
-from .plan import Outcome, Plan
+from .campaign import Outcome, Plan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,6 +61,11 @@ class RunsTable:
             self._file = os.open(path, os.O_WRONLY | os.O_APPEND)
         except OSError as error:
             raise EnsembleError(f"{path}: cannot be written ({error.strerror or error}).") from None
+
+    @property
+    def left(self) -> list[int]:
+        """The runs of the plan that are still to be made."""
+        return [run for run in range(self.plan.runs) if run not in self.outcomes]
 
     def forget_failures(self) -> None:
         """Take runs that failed, alone or with an effect, as not yet run."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from .plan import Output
+    from .campaign import Output
 
 MOST_OUTPUTS = 6
 MOST_NAMES = 8

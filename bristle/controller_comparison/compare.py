@@ -10,8 +10,8 @@ from math import ceil, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..campaign.campaign import Output
 from ..campaign.ensemble import cores
-from ..campaign.plan import Output
 from ..core.progress import Stages, tell
 from ..core.text import unknown
 from ..errors import ScenarioError

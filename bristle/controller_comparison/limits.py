@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..campaign.plan import Output
+from ..campaign.campaign import Output
 from ..core.files import cache_folder
 from ..errors import ScenarioError
 from ..optimal_control import limit

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..campaign.plan import Output
+from ..campaign.campaign import Output
 from ..errors import not_usable
 from ..view import Viewable
 from .limits import Reached

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campaign.campaign import prepare, statistic
+from ..campaign.campaign import Output, Plan, statistic
+from ..campaign.ensemble import run_left
 from ..campaign.ensemble_file import read_ensemble
-from ..campaign.plan import Output, Plan
-from ..campaign.pool import run_local
 from ..campaign.table import RunsTable
 from ..core.progress import Count
 from ..engine.coupled import simulate
@@ -198,14 +197,10 @@ class Bench:
             content["fmus"] = self.fmus
         self.folder.write(file, ensemble_text(content, {**tables, "outputs": kept}))
         plan = read_ensemble(file)
-        prepare(plan)
         runs_file = file.with_suffix(".csv")
         with quiet(), _continued(plan, runs_file, self.folder.goes_on) as table:
-            left = [run for run in range(plan.runs) if run not in table.outcomes]
-            count = Count(f"{file.parent.name}, {file.stem}: run", len(left))
-            for outcome in run_local(plan, left, min(self.workers, len(left))) if left else ():
-                table.add(outcome)
-                count.done()
+            count = Count(f"{file.parent.name}, {file.stem}: run", len(table.left))
+            run_left(plan, table, self.workers, count.done)
         outcomes = [table.outcomes[run] for run in range(plan.runs)]
         rows = {one.run: one.numbers for one in outcomes if not one.reason}
         failed = len(outcomes) - len(rows)

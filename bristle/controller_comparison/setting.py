@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..campaign.best_constant import G
-from ..campaign.plan import Output
+from ..campaign.campaign import Output
 from ..component.controller_file import Controller
 from ..core.config import toml_content
 from ..core.text import nearest, unknown, written

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campaign import ensemble_file
+from ..campaign.campaign import changed_building, write_building
 from ..campaign.distributions import Distribution, share
 from ..errors import ScenarioError
 from ..fmu.controller import SAMPLE_PERIOD
@@ -209,6 +209,6 @@ def _written(
         }
         path = bench.folder.path / FILES / f"building_{run:03d}.toml"
         bench.folder.write(path, "")
-        ensemble_file.write(ensemble_file.changed(structure, drawn), path)
+        write_building(changed_building(structure, drawn), path)
         names.append(f"../../{FILES}/{path.name}")
     return names
