@@ -16,7 +16,7 @@ from ..optimal_control.case import case_of
 from ..system.scenario import load_scenario
 from ..version import __version__
 from .runs import Bench, quiet
-from .setting import ABOVE, FILES, LIMIT, LIMITS, ON, Entry, Motion, Part, constant, plain_name
+from .setting import ABOVE, FILES, LIMIT, LIMITS, ON, Candidate, Motion, Part, constant, plain_name
 
 
 class Reached(NamedTuple):
@@ -43,18 +43,18 @@ def refuse_limit(bench: Bench, motion: Motion, judged: Output) -> None:
     ScenarioError
         Saying why.
     """
-    entry = constant(ON, bench.damper.most, "")
-    if bench.engine_of(entry) != "compiled":
+    candidate = constant(ON, bench.damper.most, "")
+    if bench.engine_of(candidate) != "compiled":
         raise ScenarioError(
             "--limit needs a damper of the library and the engine compiled: the law in an FMU is "
             "not known."
         )
-    case_of(load_scenario(bench.write(motion, entry)), judged.column)
+    case_of(load_scenario(bench.write(motion, candidate)), judged.column)
 
 
 def limit_of(
     bench: Bench, motion: Motion, judged: Output, starts: int = 3
-) -> tuple[Entry, Reached]:
+) -> tuple[Candidate, Reached]:
     """Return the voltage that reaches a motion's limit as a controller, and what is known of it.
 
     Parameters
@@ -96,7 +96,7 @@ def limit_of(
     reached = Reached(
         found["value"], found["bound"], found["agreeing"], found["starts"], found["sure"], kept
     )
-    return Entry(LIMIT, part, {}, "value", True, None, about), reached
+    return Candidate(LIMIT, part, {}, "value", True, None, about), reached
 
 
 def _digest(bench: Bench, text: str, judged: Output, starts: int) -> str:

@@ -27,8 +27,8 @@ from .setting import (
     GROUND,
     SCENARIOS,
     STRUCTURE,
+    Candidate,
     Damper,
-    Entry,
     Folder,
     Motion,
     Part,
@@ -86,27 +86,27 @@ class Bench:
         """Column that has the command; controllers differ in what they call theirs."""
         return f"{CONTROLLER}.voltage"
 
-    def engine_of(self, entry: Entry) -> str:
+    def engine_of(self, candidate: Candidate) -> str:
         """Return the engine that runs a controller."""
         foreign = str(self.damper.part.source.get("fmu", "")).endswith(".fmu")
-        return "fmu" if foreign or not entry.built_in else self.engine
+        return "fmu" if foreign or not candidate.built_in else self.engine
 
-    def columns(self, entry: Entry) -> dict[str, str]:
+    def columns(self, candidate: Candidate) -> dict[str, str]:
         """Return the column of a run for each column of the comparison."""
-        own = f"{CONTROLLER}.{entry.output}"
+        own = f"{CONTROLLER}.{candidate.output}"
         return {o.column: own if o.column == self.command else o.column for o in self.outputs}
 
-    def text(self, motion: Motion, entry: Entry, sensors: Part | None = None) -> str:
+    def text(self, motion: Motion, candidate: Candidate, sensors: Part | None = None) -> str:
         """Return the text of a scenario.
 
         Parameters
         ----------
-        motion, entry : the case
+        motion, candidate : the case
         sensors : instruments between the structure and the controller, if any
         """
         ports = self.site.ports
         parts = {GROUND: motion.part, STRUCTURE: self.site.part, DAMPER: self.damper.part}
-        command: Any = f"{CONTROLLER}.{entry.output}"
+        command: Any = f"{CONTROLLER}.{candidate.output}"
         if self.damper.drive.name != "voltage":
             command = {"from": command, "factor": 1.0}
         wires: dict[str, Any] = {
@@ -119,19 +119,19 @@ class Bench:
         if sensors is not None:
             parts[SENSORS] = sensors
             wires |= {f"{SENSORS}.{name}": column for name, column in self.site.measured.items()}
-        for name, column in entry.wires.items():
+        for name, column in candidate.wires.items():
             sensed = sensors is not None and name in self.site.measured
             wires[f"{CONTROLLER}.{name}"] = f"{SENSORS}.{name}_measured" if sensed else column
-        parts[CONTROLLER] = entry.part
-        title = f"{motion.name}, {self.site.building.name}, {self.damper.name}: {entry.name}"
+        parts[CONTROLLER] = candidate.part
+        title = f"{motion.name}, {self.site.building.name}, {self.damper.name}: {candidate.name}"
         return scenario_text(title, motion.stop, self.step, parts, wires)
 
-    def write(self, motion: Motion, entry: Entry) -> Path:
+    def write(self, motion: Motion, candidate: Candidate) -> Path:
         """Write the scenario of a case; return its file."""
-        file = self.folder.at(SCENARIOS, motion.name, f"{plain_name(entry.name)}.toml")
-        return self.folder.write(file, self.text(motion, entry))
+        file = self.folder.at(SCENARIOS, motion.name, f"{plain_name(candidate.name)}.toml")
+        return self.folder.write(file, self.text(motion, candidate))
 
-    def run(self, motion: Motion, entry: Entry) -> pd.DataFrame:
+    def run(self, motion: Motion, candidate: Candidate) -> pd.DataFrame:
         """Return a case's run: the comparison's columns, and what figures show, by time [s].
 
         Raises
@@ -143,19 +143,19 @@ class Bench:
         """
         import pandas as pd
 
-        scenario = load_scenario(self.write(motion, entry))
+        scenario = load_scenario(self.write(motion, candidate))
         self.remarks.extend(one.text for one in scenario.findings if one.level == "warning")
         try:
             found: Any
-            if self.engine_of(entry) == "compiled":
+            if self.engine_of(candidate) == "compiled":
                 found = simulate(scenario)
                 time = found["time"]
             else:
                 found = run_quietly(scenario, "fmu", self.fmus)
                 time = found.index.to_numpy()
         except RunError as error:
-            raise RunError(f"{motion.name}, {entry.name}: {error}") from error
-        columns = self.columns(entry)
+            raise RunError(f"{motion.name}, {candidate.name}: {error}") from error
+        columns = self.columns(candidate)
         extra = [
             f"{DAMPER}.velocity",
             f"{DAMPER}.stroke_ratio",
@@ -170,7 +170,7 @@ class Bench:
         return {o.name: statistic(o, frame[o.column].to_numpy()) for o in self.outputs}
 
     def many(
-        self, file: Path, entry: Entry, scenario: Path, runs: int,
+        self, file: Path, candidate: Candidate, scenario: Path, runs: int,
         tables: Mapping[str, Mapping[str, Any]],
     ) -> tuple[pd.DataFrame, int]:  # fmt: skip
         """Write an ensemble and run it; return what is kept of its runs, and how many failed.
@@ -178,20 +178,20 @@ class Bench:
         Parameters
         ----------
         file : of the ensemble
-        entry : its controller
+        candidate : its controller
         scenario : its base
         runs : how many
         tables : `vary`, and others
         """
         import pandas as pd
 
-        columns = self.columns(entry)
+        columns = self.columns(candidate)
         kept: dict[str, list[str]] = {}
         for one in self.outputs:
             kept.setdefault(columns[one.column], []).append(one.statistic)
         content: dict[str, Any] = {
             "title": file.stem, "scenario": _relative(scenario, file.parent),
-            "engine": self.engine_of(entry), "runs": runs, "seed": SEED,
+            "engine": self.engine_of(candidate), "runs": runs, "seed": SEED,
         }  # fmt: skip
         if content["engine"] == "fmu" and self.fmus != "python":
             content["fmus"] = self.fmus
@@ -222,12 +222,12 @@ class Bench:
         RunError
             If one fails.
         """
-        entry = constant("constant", 0.0, "")
+        candidate = constant("constant", 0.0, "")
         volts = np.linspace(0.0, self.damper.most, count).tolist()
-        base = self.write(motion, entry)
+        base = self.write(motion, candidate)
         file = self.folder.at(ENSEMBLES, motion.name, "constant.toml")
         vary = {"vary": {f"{CONTROLLER}.level": {"each": volts}}}
-        found, failed = self.many(file, entry, base, count, vary)
+        found, failed = self.many(file, candidate, base, count, vary)
         if failed:
             raise RunError(
                 f"{motion.name}: {failed} of {count} runs at constant voltages fail; bristle "
