@@ -199,9 +199,7 @@ class _Case:
             own[f"{ground.name}.peak"] = 0.0
         self.scenario = load_scenario(file, {**overrides, **own})
         self.cut_off = _cut_off(self.scenario, ground.name)
-        columns = {
-            c.name: c for c in make_columns(base, {p.name: p.description for p in base.components})
-        }
+        columns = {column.name: column for column in make_columns(base)}
         if output not in columns:
             raise ScenarioError(f"{base.file}: {unknown('output', output, columns)}")
         self.output = Output(output, how, columns[output].unit or "")

@@ -40,7 +40,7 @@ from ..core.toml_lines import KeyPath
 from ..engine.results import make_columns
 from ..engine.run import FORMS
 from ..errors import BristleError, EnsembleError, PhysicsError, TrustError
-from ..system.overrides import FILE_PARAMETERS, MADE_FROM
+from ..system.overrides import FILE_PARAMETERS, FILES
 from ..system.parameters import Wrong, typed
 from ..system.scenario import Scenario, load_scenario, resolve_scenario
 from ..system.toml import scenario_text
@@ -49,7 +49,6 @@ from .distributions import KINDS, Distribution, Value, Varied
 from .identified import IDENTIFIED, Identified, read_identified
 
 MOST_RUNS = 10_000_000
-_FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
 
 
 LEAST_RUNS = 4
@@ -217,7 +216,7 @@ class _Ensemble:
 
     def _found(self, name: str, value: Any) -> Any:
         """Return a value, a file's name made absolute where it lies beside the ensemble file."""
-        if name.rpartition(".")[2] in _FILES and isinstance(value, str) and Path(value).suffix:
+        if name.rpartition(".")[2] in FILES and isinstance(value, str) and Path(value).suffix:
             beside = (self.path.parent / value).absolute()
             return str(beside) if beside.is_file() else value
         return value
@@ -276,9 +275,7 @@ class _Ensemble:
         return distribution
 
     def _outputs(self, base: Scenario) -> tuple[Output, ...]:
-        columns = {
-            c.name: c for c in make_columns(base, {p.name: p.description for p in base.components})
-        }
+        columns = {column.name: column for column in make_columns(base)}
         outputs = []
         for name, statistics in self.given["outputs"].items():
             keys: KeyPath = ("outputs", name)
@@ -327,7 +324,7 @@ def place_of(name: str, base: Scenario, engine: str) -> str:
         if component.path is not None or component.fmu != "Structure":
             raise EnsembleError(f'"{name}": {component.name} is no Structure.')
         return "building"
-    if component is not None and rest not in _FILES and rest in component.description.variables:
+    if component is not None and rest not in FILES and rest in component.description.variables:
         return "parameter"
     return "scenario"
 
@@ -390,7 +387,7 @@ def _files_read(base: Scenario, varied: tuple[Varied, ...]) -> list[Path]:
         named += [component.law.file] if component.law else []
         named += [component.parameters.get(key) for key in FILE_PARAMETERS]
     for one in varied:
-        if one.name.rpartition(".")[2] in _FILES:
+        if one.name.rpartition(".")[2] in FILES:
             named += one.distribution.values
     folder = base.file.parent
     return sorted({folder / str(name) for name in named if name and (folder / str(name)).is_file()})

@@ -41,7 +41,7 @@ def run_local(plan: Plan, runs: Iterable[int], workers: int) -> Generator[Outcom
     Parameters
     ----------
     plan : Plan
-        `worker.prepare` has been called with it: forked processes have what it loaded.
+        `campaign.prepare` has been called with it: forked processes have what it loaded.
     runs : iterable of int
     workers : int
         Number of processes.

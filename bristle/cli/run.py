@@ -164,7 +164,7 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
     import json
     from dataclasses import asdict
 
-    from ..engine.summary import summarise
+    from ..engine.results import summarise
 
     answer = {
         "complete": frame.attrs["complete"],

@@ -36,8 +36,6 @@ from .records import (
     substeps_in,
 )
 
-# Lays controllers and sensors out in records of numbers for the time loop.
-
 Array = NDArray[Any]
 
 MATRICES = ("A", "B", "W", "C")
@@ -84,7 +82,7 @@ def _put(numbers: list[float], more: list[float]) -> int:
 # What each damper of a coupled system pushes: a device of a structure, whose motion it feels.
 #
 # `pushed_by` finds it out from names; `couple` and what it calls are flat functions on records, as
-# those of `layout`.
+# those of `records`.
 
 Port = tuple[str, str]
 
@@ -470,7 +468,7 @@ class System:
             lay_structure(record, slave.constants_of(h), slave.state, self.wiring(name))
         return found
 
-    # -- where the signals of a component are, as `layout` takes it
+    # -- where the signals of a component are, as `records` takes it
 
     def wiring(self, name: str) -> list[float]:
         """Return where the signals of a component are, and what they are to the others."""

@@ -15,8 +15,17 @@ from ..core.text import plain
 from ..data.cycles import largest
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
-from .results import NOTHING, Feed, Results, feeds_of
-from .summary import by_component, foreign, judged_by, reals, summarise
+from .results import (
+    NOTHING,
+    Feed,
+    Results,
+    by_component,
+    feeds_of,
+    foreign,
+    judged_by,
+    reals,
+    summarise,
+)
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,6 +1,6 @@
 """How far any control of a scenario's damper could lower a peak or RMS: the limit.
 
-    from bristle.limit import limit
+    from bristle.optimal_control import limit
     found = limit("el_centro_0p6g_constant_voltage")
     found.value, found.bound, found.previews, found.sure
 

@@ -19,9 +19,8 @@ from ..errors import RunError, ScenarioError
 from ..system.scenario import Scenario, loaded_with
 from .bound import FASTER, bound_of, largest_force
 from .case import Case, Problem, case_of, refuse_folder, write_scenario
-from .preview import foreseen
 from .result import Limit, Start
-from .search import descended, levelled, value_of
+from .search import descended, foreseen, levelled, value_of
 
 if TYPE_CHECKING:
     from ..engine.results import Results
@@ -87,7 +86,7 @@ def limit(
 
     Examples
     --------
-    >>> from bristle.limit import limit
+    >>> from bristle.optimal_control import limit
     >>> found = limit("half_sine_pulse", {"run.stop": 1.0})  # doctest: +SKIP
     >>> found.bound < found.value <= min(found.constant.values())  # doctest: +SKIP
     True
