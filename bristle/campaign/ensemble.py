@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -137,7 +137,7 @@ def ensemble(
     if workers is not None and workers < 1:
         raise EnsembleError(f"--workers {workers}: 1 or more is right.")
     folder = None if out is None else Path(out)
-    with _Claimed(folder):
+    with _claimed(folder):
         table = RunsTable(plan, folder / NAME if folder else None, fresh)
         if retry:
             table.forget_failures()
@@ -221,33 +221,25 @@ def _kept(table: RunsTable) -> str:
     )
 
 
-class _Claimed:
-    """A folder that nobody else writes an ensemble into; None is always free."""
+@contextmanager
+def _claimed(folder: Path | None) -> Iterator[None]:
+    """Hold a folder that nobody else writes an ensemble into; None is always free."""
+    from filelock import FileLock, Timeout
 
-    def __init__(self, folder: Path | None) -> None:
-        self.folder = folder
-
-    def __enter__(self) -> None:
-        from filelock import FileLock, Timeout
-
-        self._lock: FileLock | None = None
-        if self.folder is None:
-            return
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            self._lock = FileLock(self.folder / ".lock")
-            self._lock.acquire(timeout=0)
-        except Timeout:
-            raise EnsembleError(
-                f"{self.folder}: another process is running an ensemble there."
-            ) from None
-        except FileExistsError:
-            raise EnsembleError(f"{self.folder}: is a file; runs go into a folder.") from None
-        except OSError as error:
-            raise EnsembleError(
-                f"{self.folder}: cannot be written ({error.strerror or error})."
-            ) from None
-
-    def __exit__(self, *raised: object) -> None:
-        if self._lock is not None:
-            self._lock.release()
+    if folder is None:
+        yield
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(folder / ".lock")
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise EnsembleError(f"{folder}: another process is running an ensemble there.") from None
+    except FileExistsError:
+        raise EnsembleError(f"{folder}: is a file; runs go into a folder.") from None
+    except OSError as error:
+        raise EnsembleError(f"{folder}: cannot be written ({error.strerror or error}).") from None
+    try:
+        yield
+    finally:
+        lock.release()

@@ -12,7 +12,7 @@ from ..campaign.campaign import Output
 from ..core.files import cache_folder
 from ..errors import ScenarioError
 from ..optimal_control import limit
-from ..optimal_control.case import case_of
+from ..optimal_control.case import case_of, history_text
 from ..system.scenario import load_scenario
 from ..version import __version__
 from .runs import Bench, quiet
@@ -88,8 +88,7 @@ def limit_of(
         }  # fmt: skip
         bench.folder.write(file, json.dumps(found))
     path = bench.folder.at(LIMITS, motion.name, "voltage.csv")
-    rows = [f"{t:.9g},{V:.9g}" for t, V in zip(found["time"], found["voltage"], strict=True)]
-    bench.folder.write(path, "\n".join(["time [s],voltage [V]", *rows]) + "\n")
+    bench.folder.write(path, history_text(found["time"], found["voltage"]))
     said = f"{ABOVE}/{LIMITS}/{plain_name(motion.name)}/{path.name}"
     part = Part({"fmu": "SignalSource"}, {"kind": "csv", "file": said})
     about = "the voltage that reaches the limit, the ground motion known in advance"

@@ -10,7 +10,6 @@ voltage's history makes the search short; `Limit` says how sure the outcome is.
 
 from __future__ import annotations
 
-from .limit import limit
-from .result import Limit, Start
+from .limit import Limit, Start, limit
 
 __all__ = ["Limit", "Start", "limit"]

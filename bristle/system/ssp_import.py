@@ -70,10 +70,8 @@ class _Network:
     given: dict[Port, Given] = field(default_factory=dict)
 
 
-def flatten_system(
-    structure: Structure, package: Package, describe: Callable[[str, str], Description]
-) -> FlatSystem:
-    """Return a structure as components side by side.
+class _Flattener:
+    """Puts the components of a structure side by side.
 
     Parameters
     ----------
@@ -88,15 +86,9 @@ def flatten_system(
     ScenarioError
         If nothing can be run, or a connection or value is wrong: with file and element.
     """
-    return _Flattener(structure, package, describe).flat()
 
-
-class _Flattener:
     def __init__(
-        self,
-        structure: Structure,
-        package: Package,
-        describe: Callable[[str, str], Description],
+        self, structure: Structure, package: Package, describe: Callable[[str, str], Description]
     ) -> None:
         self.package = package
         self.net = _Network()
@@ -438,7 +430,7 @@ def _unpack(path: Path, folder: Path) -> ImportedPackage:
     with open_package(path) as package:
         structure = read_structure(package)
         fmus = _Fmus(package, folder)
-        flat = flatten_system(structure, package, fmus.describe)
+        flat = _Flattener(structure, package, fmus.describe).flat()
         notes = [Note(text) for text in package.notes]
     stop, step = _times(structure, fmus.files.values(), notes)
     algorithm = structure.algorithm or ALGORITHMS[0]
