@@ -249,13 +249,13 @@ def scenario_of(plan: Plan, values: Mapping[str, Value], scratch: Path) -> Scena
             raise ScenarioError(f"{name} {fits.words}")
         parameters.setdefault(component.name, {})[rest] = fits
     components = tuple(
-        _with(c, parameters.get(c.name, {}), numbers.get(c.name, {}), scratch)
+        _changed(c, parameters.get(c.name, {}), numbers.get(c.name, {}), scratch)
         for c in scenario.components
     )
     return replace(scenario, components=components)
 
 
-def _with(
+def _changed(
     component: Component, parameters: Mapping[str, Any], numbers: Mapping[str, Any], scratch: Path
 ) -> Component:
     if parameters:

@@ -148,9 +148,9 @@ def ensemble(
                     plan, table, workers or cores(), lambda: bar.show(len(table.outcomes)), cluster
                 )
         except RunError as error:
-            raise RunError(f"{error} {_kept(table)}") from error
+            raise RunError(f"{error} {_what_is_kept(table)}") from error
         except KeyboardInterrupt:
-            raise EnsembleInterrupted(f"interrupted. {_kept(table)}") from None
+            raise EnsembleInterrupted(f"interrupted. {_what_is_kept(table)}") from None
         finally:
             table.close(complete=len(table.outcomes) >= plan.runs)
     frame = table.frame()
@@ -212,7 +212,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def _kept(table: RunsTable) -> str:
+def _what_is_kept(table: RunsTable) -> str:
     if table.path is None:
         return "Nothing was kept, because no folder was given."
     return (

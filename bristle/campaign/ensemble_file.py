@@ -35,7 +35,7 @@ from typing import Any
 
 from ..core import files
 from ..core.config import ANY, Document, Key, Spec
-from ..core.text import nearest, unknown, written
+from ..core.text import did_you_mean, unknown, written
 from ..core.toml_lines import KeyPath
 from ..engine.results import make_columns
 from ..engine.run import FORMS
@@ -103,8 +103,7 @@ def resolve_ensemble(name: str | Path) -> Path:
         return stock[path.name.removesuffix(".toml")].absolute()
     if path.is_dir():
         raise EnsembleError(f"{path}: is a folder; an ensemble is a TOML file.")
-    close = nearest(path.stem, stock)
-    hint = f' Did you mean "{close[0]}"?' if close else ""
+    hint = did_you_mean(path.stem, stock)
     raise EnsembleError(
         f'there is no ensemble file "{name}".{hint} Stock ensembles: {", ".join(stock)}.'
     )

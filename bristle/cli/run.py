@@ -115,9 +115,9 @@ def _further(
 
         found.append(("figure.png", run_figure))
     if arguments.spectrum:
-        from ..engine.results import FILE, write_spectra
+        from ..engine.results import SPECTRUM_FILE, write_spectra
 
-        found.append((FILE, write_spectra))
+        found.append((SPECTRUM_FILE, write_spectra))
     return found
 
 

@@ -16,7 +16,7 @@ from ..component.controller_file import (
     read_controller,
 )
 from ..core.config import SCHEMA, Document
-from ..core.text import nearest
+from ..core.text import did_you_mean
 from ..errors import BuildError, DesignError, FmuError, ScenarioError
 from ..fmu import catalogue
 from ..fmu.build import build, plan
@@ -217,8 +217,7 @@ class Maker:
     def _of_stock(self, choice: Choice, name: str) -> Candidate:
         known = controllers()
         if choice.what not in known:
-            close = nearest(choice.what, known)
-            hint = f' Did you mean "{close[0]}"?' if close else ""
+            hint = did_you_mean(choice.what, known)
             raise ScenarioError(
                 f'no controller is named "{choice.what}". There are: {", ".join(known)}; a file of '
                 f"`bristle design`, of a component of your own (.py) or an FMU is right too.{hint}"

@@ -16,9 +16,8 @@ from ..core.progress import Stages, tell
 from ..core.text import unknown
 from ..errors import ScenarioError
 from .candidates import Maker
-from .limits import Reached, limit_of, refuse_limit
 from .result import ControllerComparison, Setting, of_designs, of_engines
-from .runs import Bench, best_level, flat
+from .runs import Bench, Reached, best_level, flat, limit_of, refuse_limit
 from .setting import (
     BEST,
     DAMPER,

@@ -14,8 +14,7 @@ from ..campaign.campaign import Output
 from ..core.text import quantity
 from ..errors import not_usable
 from ..view import Viewable
-from .limits import Reached
-from .runs import Bench
+from .runs import Bench, Reached
 from .setting import BEST, LIMIT, OFF, ON, Candidate, Damper, Motion, Site
 from .worst_case import Spread
 

@@ -14,7 +14,7 @@ from ..campaign.best_constant import G
 from ..campaign.campaign import Output
 from ..component.controller_file import Controller
 from ..core.config import toml_content
-from ..core.text import nearest, unknown, written
+from ..core.text import did_you_mean, unknown, written
 from ..core.toml_write import toml_table
 from ..data import list_ground_motions, read_ground_motion
 from ..data.building_file import read_building
@@ -39,7 +39,7 @@ Given = str | Path | Sequence[str | Path] | Mapping[str, str | Path]
 """What a caller may give as a list: one text or file, several, or several by their labels."""
 
 _SETTING = re.compile(r",(?=\s*[A-Za-z_][\w.]*\s*=)")
-_FILES = (".json", ".toml", ".py", ".fmu", ".csv", ".at2", ".txt")
+_ENDINGS = (".json", ".toml", ".py", ".fmu", ".csv", ".at2", ".txt")
 
 
 class Choice(NamedTuple):
@@ -56,7 +56,7 @@ class Choice(NamedTuple):
     def is_file(self) -> bool:
         """Whether the text names a file rather than something of the library."""
         path = Path(self.what)
-        return path.suffix.lower() in _FILES or len(path.parts) > 1
+        return path.suffix.lower() in _ENDINGS or len(path.parts) > 1
 
     @property
     def as_text(self) -> str:
@@ -256,7 +256,7 @@ def ensemble_text(content: Mapping[str, Any], tables: Mapping[str, Mapping[str, 
 # The damper whose command controllers set.
 
 DEFAULT = "LuGreDamper"
-_MOTION = ("displacement", "velocity")
+_MOTION_INPUTS = ("displacement", "velocity")
 
 
 @dataclass(frozen=True)
@@ -342,8 +342,7 @@ def damper_from(given: str | Path, folder: Folder) -> Damper:
         return _built_in(choice, {"fmu": choice.what}, law, catalogue.describe(choice.what))
     if choice.what in laws:
         return _from_law(choice, choice.what, folder)
-    close = nearest(choice.what, [*dampers, *laws])
-    hint = f' Did you mean "{close[0]}"?' if close else ""
+    hint = did_you_mean(choice.what, [*dampers, *laws])
     raise ScenarioError(
         f'--damper: no damper is named "{choice.what}". There are: {", ".join(dampers)}; the name '
         f"of a law, the folder of a study, an FMU are right too.{hint}"
@@ -391,11 +390,11 @@ def _from_model(choice: Choice, path: Path, folder: Folder) -> Damper:
     name = choice.label or (path.resolve().name if path.is_dir() else file.stem)
     return Damper(
         name, Part(source, values), VOLTAGE, _most(choice.what, values, description, VOLTAGE), law,
-        own, tuple(inside.effects), tuple(_notes(model, name)),
+        own, tuple(inside.effects), tuple(_model_notes(model, name)),
     )  # fmt: skip
 
 
-def _notes(model: StudyModel, name: str) -> Iterable[str]:
+def _model_notes(model: StudyModel, name: str) -> Iterable[str]:
     if model.drive != VOLTAGE.name:
         unit = DRIVES[model.drive].unit
         yield (
@@ -410,7 +409,7 @@ def _from_fmu(choice: Choice, path: Path, folder: Folder) -> Damper:
     description = read_description(path, any_platform=True)
     there = description.variables
     inputs = {name for name, v in there.items() if v.causality == "input"}
-    missing = [name for name in _MOTION if name not in inputs]
+    missing = [name for name in _MOTION_INPUTS if name not in inputs]
     if "force" not in there or there["force"].causality != "output":
         missing.append("force")
     if missing:
@@ -499,7 +498,7 @@ def constant(name: str, level: float, about: str) -> Candidate:
 # The ground motions of a comparison: stock names, or files with their scale.
 
 _IN_G = re.compile(r"([-+.\deE]+)\s*g")
-_KEYS = ("peak", "factor", "start", "stop")
+_MOTION_KEYS = ("peak", "factor", "start", "stop")
 
 
 @dataclass(frozen=True)
@@ -554,15 +553,15 @@ def motions_of(given: Sequence[str | Path], folder: Folder, step: float) -> list
 
 def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
     for key in choice.settings:
-        if key not in _KEYS:
-            raise ScenarioError(f"--motions {choice.what}: {unknown('setting', key, _KEYS)}")
+        if key not in _MOTION_KEYS:
+            raise ScenarioError(f"--motions {choice.what}: {unknown('setting', key, _MOTION_KEYS)}")
     names = [row.name for row in list_ground_motions()]
     record = choice.what
     begins = [name for name in names if name.startswith(record)]
     if record not in names and not Path(record).is_file() and len(begins) == 1:
         record = begins[0]
     motion = read_ground_motion(record, Path())
-    values = {key: _number(choice, key) for key in choice.settings}
+    values = {key: _motion_value(choice, key) for key in choice.settings}
     stop = values.pop("stop", float(motion.time[-1]) + values.get("start", 0.0))
     if not 0.0 < stop < 1e6:
         raise ScenarioError(f"--motions {choice.what}: stop = {stop:g} s; above 0 is right.")
@@ -576,14 +575,14 @@ def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
         raise ScenarioError(f"--motions {choice.what}: the ground does not move; check its factor.")
     own = record if record in names else folder.keep(Path(record))
     return Motion(
-        choice.label or _said(Path(record).stem if record not in names else record, values),
+        choice.label or _motion_name(Path(record).stem if record not in names else record, values),
         Part({"fmu": "GroundMotion"}, {"record": own, **values}),
         round(ceil(stop / step - 1e-9) * step, 9), scaled,
         motion.source if record in names else Path(record).name,
     )  # fmt: skip
 
 
-def _number(choice: Choice, key: str) -> float:
+def _motion_value(choice: Choice, key: str) -> float:
     value: Value = choice.settings[key]
     if isinstance(value, str) and key == "peak" and (found := _IN_G.fullmatch(value.strip())):
         try:
@@ -594,7 +593,7 @@ def _number(choice: Choice, key: str) -> float:
     return number(value, key, f"--motions {choice.what}", right)
 
 
-def _said(record: str, values: dict[str, float]) -> str:
+def _motion_name(record: str, values: dict[str, float]) -> str:
     texts = [record]
     if "peak" in values:
         texts.append(f"{values['peak'] / G:.3g} g")

@@ -22,6 +22,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..core.files import replaced_by
 from ..core.text import written
 from ..data.response_spectrum import response_spectrum, usual_periods
 from ..errors import RunError, not_usable
@@ -116,13 +117,9 @@ class CsvWriter:
         self.path = path
         head = _head(table.columns, made)
         self._place = len(f"{_KIND}\n".encode())
-        new = path.with_name(path.name + ".new")
+        whole = head.encode() + _lines(table)
         try:
-            try:
-                new.write_bytes(head.encode() + _lines(table))
-                new.replace(path)
-            finally:
-                new.unlink(missing_ok=True)
+            replaced_by(path, lambda new: new.write_bytes(whole))
             self._file = path.open("r+b", buffering=0)
         except OSError as error:
             raise cannot_write(path, error, 0) from error
@@ -189,13 +186,9 @@ def write_parquet(frame: pd.DataFrame, path: Path) -> None:
     about = {"made": frame.attrs["made"], "complete": frame.attrs["complete"]}
     schema = pa.schema([time, *fields], metadata={"bristle": json.dumps(about)})
     arrays = [table.time, *table.values.values()]
-    new = path.with_name(path.name + ".new")
+    whole = pa.table([pa.array(a) for a in arrays], schema=schema)
     try:
-        try:
-            pq.write_table(pa.table([pa.array(a) for a in arrays], schema=schema), new)
-            new.replace(path)
-        finally:
-            new.unlink(missing_ok=True)
+        replaced_by(path, lambda new: pq.write_table(whole, new))
     except OSError as error:
         raise cannot_write(path, error, 0) from error
 
@@ -480,14 +473,14 @@ def times(first: int, last: int, step: float) -> Array:
 
 # Response spectra of a run: of the ground, and of the floors as equipment on them feels it.
 
-FILE = "spectrum.csv"
-ENDS = ("ground_acceleration", "_acceleration_absolute")
+SPECTRUM_FILE = "spectrum.csv"
+_ACCELERATION_ENDS = ("ground_acceleration", "_acceleration_absolute")
 """How outputs end that have a spectrum: absolute accelerations."""
 
 
 def accelerations(names: Mapping[str, object]) -> list[str]:
     """Return those names of outputs that are absolute accelerations, in their order."""
-    return [name for name in names if name.endswith(ENDS)]
+    return [name for name in names if name.endswith(_ACCELERATION_ENDS)]
 
 
 def spectra(columns: Mapping[str, Array], step: float) -> dict[str, Array]:

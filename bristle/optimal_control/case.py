@@ -35,7 +35,7 @@ FINER = 4
 """By how much they are finer where friction sticks: its force is then held over a step."""
 
 
-FEWEST = 50
+MIN_INSTANTS = 50
 """Instants that a ground motion must have."""
 
 
@@ -217,10 +217,10 @@ def _ground(system: System, building: str, h: float, scenario: Scenario) -> Arra
     for k in range(len(found)):
         source.output(k * h, shown, constants, shown, shown, shown)
         found[k] = shown[0]
-    if len(found) < FEWEST:
+    if len(found) < MIN_INSTANTS:
         raise ScenarioError(
             f"{scenario.file}: stop = {scenario.stop:g} s is too short for a limit; "
-            f"{FEWEST * h:g} s or more is right."
+            f"{MIN_INSTANTS * h:g} s or more is right."
         )
     if not found.any():
         raise ScenarioError(f"{scenario.file}: the ground does not move: nothing is to be lowered.")
