@@ -490,7 +490,7 @@ class Candidate:
 
 
 def constant(name: str, level: float, about: str) -> Candidate:
-    """Return a constant voltage [V] as an candidate."""
+    """Return a constant voltage [V] as a candidate."""
     part = Part({"fmu": CONSTANT}, {"level": level})
     return Candidate(name, part, {}, "voltage", True, None, about)
 
