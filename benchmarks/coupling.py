@@ -18,8 +18,8 @@ import pandas as pd
 import bristle
 from bristle.engine.cosimulation import Master
 from bristle.engine.coupling_error import CouplingError, against, estimate, finer
+from bristle.engine.results import judged_by
 from bristle.engine.run import run_quietly
-from bristle.engine.summary import judged_by
 from bristle.errors import BuildError, ScenarioError
 from bristle.fmu.build import ensure
 from bristle.native.build import ensure as ensure_native

@@ -12,9 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bristle.campaign.campaign import prepare, statistic
+from bristle.campaign.campaign import Plan, prepare, statistic
 from bristle.campaign.ensemble_file import read_ensemble
-from bristle.campaign.plan import Plan
 from bristle.campaign.pool import run_local
 from bristle.engine.coupled import simulate
 from bristle.system.scenario import load_scenario

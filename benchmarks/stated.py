@@ -15,8 +15,8 @@ from pathlib import Path
 import pandas as pd
 
 from bristle.engine.coupling_error import ROUNDING, CouplingError, estimate, finer, largest
+from bristle.engine.results import judged_by
 from bristle.engine.run import run_quietly
-from bristle.engine.summary import judged_by
 from bristle.errors import BristleError, ScenarioError
 from bristle.system.scenario import Scenario, load_scenario
 

@@ -19,8 +19,7 @@ from bristle.fmu import catalogue
 from bristle.fmu.build import build, plan
 from bristle.fmu.controller import MEASURED
 from bristle.fmu.own_controller import Measured
-from bristle.system.scenario import load_scenario, stock_scenarios
-from bristle.system.stock import copy_scenario
+from bristle.system.scenario import copy_scenario, load_scenario, stock_scenarios
 from bristle.system.toml import scenario_text
 
 ROOT = Path(__file__).resolve().parents[1]

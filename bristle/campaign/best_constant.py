@@ -9,10 +9,9 @@ worse one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from ..engine.results import make_columns
 from ..errors import ScenarioError
 from ..system.scenario import Component, Scenario, load_scenario
 from ..view import Viewable
-from .ensemble_file import plain_target
+from .campaign import Output, plain_target, statistic
 
 Array = NDArray[np.float64]
 
@@ -178,7 +177,7 @@ def optimise_passive(
         goals = _goals(cases, voltages, values, best, done)
     runs = sum(len(case.known) for case in cases)
     return Passive(
-        chosen, output, statistic, cases[0].unit, voltages, values, best, goals, runs,
+        chosen, output, statistic, cases[0].output.unit, voltages, values, best, goals, runs,
         tuple(dict.fromkeys(case.cut_off for case in cases if case.cut_off)),
     )  # fmt: skip
 
@@ -187,13 +186,9 @@ class _Case:
     """One motion: the judged value as a function of the voltage, each voltage run once."""
 
     def __init__(
-        self,
-        file: str | Path,
-        overrides: Mapping[str, object],
-        motion: Motion,
-        output: str,
-        statistic: str,
-    ) -> None:
+        self, file: str | Path, overrides: Mapping[str, object], motion: Motion, output: str,
+        how: str,
+    ) -> None:  # fmt: skip
         base = load_scenario(file, overrides)
         ground, source = _only(base, "GroundMotion"), _only(base, "ConstantVoltage")
         own: dict[str, object] = {f"{ground.name}.record": motion.record}
@@ -204,13 +199,11 @@ class _Case:
             own[f"{ground.name}.peak"] = 0.0
         self.scenario = load_scenario(file, {**overrides, **own})
         self.cut_off = _cut_off(self.scenario, ground.name)
-        columns = {
-            c.name: c for c in make_columns(base, {p.name: p.description for p in base.components})
-        }
+        columns = {column.name: column for column in make_columns(base)}
         if output not in columns:
             raise ScenarioError(f"{base.file}: {unknown('output', output, columns)}")
-        self.unit = columns[output].unit or ""
-        self.output, self.statistic, self.source = output, statistic, source.name
+        self.output = Output(output, how, columns[output].unit or "")
+        self.source = source.name
         self.v_max = _largest_voltage(base)
         self.known: dict[float, float] = {}
 
@@ -222,8 +215,6 @@ class _Case:
         return self.known[voltage]
 
     def _run(self, voltage: float) -> float:
-        from dataclasses import replace
-
         from ..engine.coupled import simulate
 
         components = tuple(
@@ -232,10 +223,8 @@ class _Case:
             else c
             for c in self.scenario.components
         )
-        values: Any = simulate(replace(self.scenario, components=components))[self.output]
-        if self.statistic == "rms":
-            return float(np.sqrt(np.mean(np.square(values))))
-        return float(np.abs(values).max())
+        columns = simulate(replace(self.scenario, components=components))
+        return statistic(self.output, columns[self.output.column])
 
 
 def _only(scenario: Scenario, kind: str) -> Component:

@@ -17,8 +17,7 @@ from typing import Any
 
 from ..errors import EnsembleError, RunError
 from ..version import __version__
-from .campaign import run_one
-from .plan import Outcome, Plan
+from .campaign import Outcome, Plan, run_one
 
 INSTALL = 'pip install "bristle[cluster]"'
 CONNECT = 10.0

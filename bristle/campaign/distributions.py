@@ -122,5 +122,18 @@ class Distribution:
         return tuple(map(float, bounds))  # as they are drawn, also between whole numbers
 
 
+@dataclass(frozen=True)
+class Varied:
+    """One name that varies, e.g. "damper.sigma_a", and what it is drawn from.
+
+    `place` says where the value goes: "parameter" of a component, "building" for a number of a
+    building's data, "scenario" for what the scenario must be read anew for (records, steps, FMUs).
+    """
+
+    name: str
+    distribution: Distribution
+    place: str = "parameter"
+
+
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Generator
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,9 +14,8 @@ from ..core.progress import Progress
 from ..core.text import written
 from ..errors import EnsembleError, RunError
 from ..view import Viewable
-from .campaign import prepare
+from .campaign import Outcome, Plan, prepare
 from .ensemble_file import read_ensemble
-from .plan import Outcome, Plan
 from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
 
 if TYPE_CHECKING:
@@ -138,18 +137,20 @@ def ensemble(
     if workers is not None and workers < 1:
         raise EnsembleError(f"--workers {workers}: 1 or more is right.")
     folder = None if out is None else Path(out)
-    with _Claimed(folder):
+    with _claimed(folder):
         table = RunsTable(plan, folder / NAME if folder else None, fresh)
         if retry:
             table.forget_failures()
         continued = sum(run < plan.runs for run in table.outcomes)
-        left = [run for run in range(plan.runs) if run not in table.outcomes]
         try:
-            _go(plan, table, left, workers or cores(), cluster, progress)
+            with Progress(plan.title, plan.runs, progress and bool(table.left)) as bar:
+                run_left(
+                    plan, table, workers or cores(), lambda: bar.show(len(table.outcomes)), cluster
+                )
         except RunError as error:
-            raise RunError(f"{error} {_kept(table)}") from error
+            raise RunError(f"{error} {_what_is_kept(table)}") from error
         except KeyboardInterrupt:
-            raise EnsembleInterrupted(f"interrupted. {_kept(table)}") from None
+            raise EnsembleInterrupted(f"interrupted. {_what_is_kept(table)}") from None
         finally:
             table.close(complete=len(table.outcomes) >= plan.runs)
     frame = table.frame()
@@ -170,19 +171,25 @@ def _refuse_types(file: object, **numbers: object) -> None:
             raise EnsembleError(f"{name} is {written(value)}; a whole number from 1 is right.")
 
 
-def _go(
-    plan: Plan, table: RunsTable, left: list[int], workers: int, cluster: str | None,
-    progress: bool,
-) -> None:  # fmt: skip
+def run_left(
+    plan: Plan, table: RunsTable, workers: int, done: Callable[[], None], cluster: str | None = None
+) -> None:
+    """Make the runs that a table lacks, here or on a cluster, and keep each in it as it ends.
+
+    Parameters
+    ----------
+    plan, table : what is run, and what there is
+    workers : processes on this machine
+    done : called after each run
+    cluster : address of a scheduler whose workers run in place of processes here
+    """
+    left = table.left
     if not left:
         return
-    with (
-        Progress(plan.title, plan.runs, progress) as bar,
-        closing(_outcomes(plan, left, workers, cluster)) as outcomes,
-    ):
+    with closing(_outcomes(plan, left, workers, cluster)) as outcomes:
         for outcome in outcomes:
             table.add(outcome)
-            bar.show(len(table.outcomes))
+            done()
 
 
 def _outcomes(
@@ -205,7 +212,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def _kept(table: RunsTable) -> str:
+def _what_is_kept(table: RunsTable) -> str:
     if table.path is None:
         return "Nothing was kept, because no folder was given."
     return (
@@ -214,33 +221,25 @@ def _kept(table: RunsTable) -> str:
     )
 
 
-class _Claimed:
-    """A folder that nobody else writes an ensemble into; None is always free."""
+@contextmanager
+def _claimed(folder: Path | None) -> Iterator[None]:
+    """Hold a folder that nobody else writes an ensemble into; None is always free."""
+    from filelock import FileLock, Timeout
 
-    def __init__(self, folder: Path | None) -> None:
-        self.folder = folder
-
-    def __enter__(self) -> None:
-        from filelock import FileLock, Timeout
-
-        self._lock: FileLock | None = None
-        if self.folder is None:
-            return
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            self._lock = FileLock(self.folder / ".lock")
-            self._lock.acquire(timeout=0)
-        except Timeout:
-            raise EnsembleError(
-                f"{self.folder}: another process is running an ensemble there."
-            ) from None
-        except FileExistsError:
-            raise EnsembleError(f"{self.folder}: is a file; runs go into a folder.") from None
-        except OSError as error:
-            raise EnsembleError(
-                f"{self.folder}: cannot be written ({error.strerror or error})."
-            ) from None
-
-    def __exit__(self, *raised: object) -> None:
-        if self._lock is not None:
-            self._lock.release()
+    if folder is None:
+        yield
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(folder / ".lock")
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise EnsembleError(f"{folder}: another process is running an ensemble there.") from None
+    except FileExistsError:
+        raise EnsembleError(f"{folder}: is a file; runs go into a folder.") from None
+    except OSError as error:
+        raise EnsembleError(f"{folder}: cannot be written ({error.strerror or error}).") from None
+    try:
+        yield
+    finally:
+        lock.release()

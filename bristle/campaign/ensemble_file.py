@@ -28,79 +28,31 @@ model = "my_rig"
 
 from __future__ import annotations
 
-import copy
 import hashlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 from ..core import files
-from ..core.config import ANY, Document, Key, Spec, toml_content
-from ..core.text import nearest, unknown, written
+from ..core.config import ANY, Document, Key, Spec
+from ..core.text import did_you_mean, unknown, written
 from ..core.toml_lines import KeyPath
-from ..core.toml_write import toml_key, toml_value
 from ..engine.results import make_columns
 from ..engine.run import FORMS
 from ..errors import BristleError, EnsembleError, PhysicsError, TrustError
-from ..physics.building import PAPER, from_data
-from ..system.overrides import FILE_PARAMETERS, MADE_FROM
+from ..system.overrides import FILE_PARAMETERS, FILES
 from ..system.parameters import Wrong, typed
-from ..system.scenario import Component, Scenario, load_scenario, resolve_scenario
+from ..system.scenario import Scenario, load_scenario, resolve_scenario
 from ..system.toml import scenario_text
-from .distributions import KINDS, Distribution, Value
-from .identified import IDENTIFIED, Identified, read_identified, refuse_few
-from .plan import STATISTICS, Output, Plan, Varied
-
-# A building with some of its numbers changed: as data, and as a file for a Structure.
-
-
-def changed(component: Component, values: Mapping[str, object]) -> dict[str, Any]:
-    """Return a Structure's building data with numbers changed, checked.
-
-    Parameters
-    ----------
-    component : Component
-        A Structure.
-    values : mapping
-        "masses.2" (counted from 0, lowest level first), "rayleigh.alpha" ... to the number.
-
-    Raises
-    ------
-    PhysicsError
-        If there is no such number, or the building is none with it.
-    """
-    data = copy.deepcopy(toml_content(component.building) if component.building else PAPER)
-    for path, value in values.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise PhysicsError(f"building {path} = {value!r} must be a number.")
-        *way, last = path.split(".")
-        place: Any = data
-        for key in way:
-            place = _within(place, key, path)
-        if isinstance(_within(place, last, path), dict | list | str | bool):
-            raise PhysicsError(f"building {path} is not a single number.")
-        place[int(last) if isinstance(place, list) else last] = float(value)
-    from_data(data, "building")
-    return data
-
-
-def _within(place: Any, key: str, path: str) -> Any:
-    if isinstance(place, list) and key.isdigit() and int(key) < len(place):
-        return place[int(key)]
-    if isinstance(place, dict) and key in place:
-        return place[key]
-    there = f"0 to {len(place) - 1}" if isinstance(place, list) else ", ".join(place or ())
-    raise PhysicsError(f"building {path}: {key!r} is not there; there is {there}.")
-
-
-def write(data: Mapping[str, Any], path: Path) -> None:
-    """Write building data as TOML: its values are numbers, texts, lists and one level of tables."""
-    text = "".join(f"{toml_key(key)} = {toml_value(value)}\n" for key, value in data.items())
-    path.write_text(text, encoding="utf-8")
-
+from .campaign import STATISTICS, Output, Plan, changed_building, plain_target, split
+from .distributions import KINDS, Distribution, Value, Varied
+from .identified import IDENTIFIED, Identified, read_identified
 
 MOST_RUNS = 10_000_000
-_FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
+
+
+LEAST_RUNS = 4
+"""Runs per effect that --with-limits needs at least."""
 
 
 def _values(value: object) -> tuple[Any, ...]:
@@ -151,8 +103,7 @@ def resolve_ensemble(name: str | Path) -> Path:
         return stock[path.name.removesuffix(".toml")].absolute()
     if path.is_dir():
         raise EnsembleError(f"{path}: is a folder; an ensemble is a TOML file.")
-    close = nearest(path.stem, stock)
-    hint = f' Did you mean "{close[0]}"?' if close else ""
+    hint = did_you_mean(path.stem, stock)
     raise EnsembleError(
         f'there is no ensemble file "{name}".{hint} Stock ensembles: {", ".join(stock)}.'
     )
@@ -219,7 +170,7 @@ class _Ensemble:
             given["seed"], varied, outputs, fixed, content.hexdigest()[:16], identified,
             given["fmus"],
         )  # fmt: skip
-        refuse_few(plan)
+        _refuse_few(plan)
         return plan
 
     def _identified(self, base: Scenario, with_limits: bool) -> Identified | None:
@@ -264,7 +215,7 @@ class _Ensemble:
 
     def _found(self, name: str, value: Any) -> Any:
         """Return a value, a file's name made absolute where it lies beside the ensemble file."""
-        if name.rpartition(".")[2] in _FILES and isinstance(value, str) and Path(value).suffix:
+        if name.rpartition(".")[2] in FILES and isinstance(value, str) and Path(value).suffix:
             beside = (self.path.parent / value).absolute()
             return str(beside) if beside.is_file() else value
         return value
@@ -323,9 +274,7 @@ class _Ensemble:
         return distribution
 
     def _outputs(self, base: Scenario) -> tuple[Output, ...]:
-        columns = {
-            c.name: c for c in make_columns(base, {p.name: p.description for p in base.components})
-        }
+        columns = {column.name: column for column in make_columns(base)}
         outputs = []
         for name, statistics in self.given["outputs"].items():
             keys: KeyPath = ("outputs", name)
@@ -346,16 +295,14 @@ class _Ensemble:
         return tuple(dict.fromkeys(outputs))
 
 
-def split(name: str, base: Scenario) -> tuple[Component | None, str]:
-    """Return the component that a name begins with, and the rest of the name."""
-    first, _, rest = plain_target(name).partition(".")
-    return next((c for c in base.components if c.name == first), None), rest
-
-
-def plain_target(name: str) -> str:
-    """Return a name in its short form: "damper.f_c" of "components.damper.parameters.f_c"."""
-    first, _, rest = name.removeprefix("components.").partition(".")
-    return f"{first}.{rest.removeprefix('parameters.')}" if rest else first
+def _refuse_few(plan: Plan) -> None:
+    """Refuse an ensemble with fewer runs than its effects need."""
+    effects = len(plan.identified.left) if plan.identified is not None else 0
+    if plan.runs < LEAST_RUNS * effects:
+        raise EnsembleError(
+            f"--with-limits draws {effects} effects in turn: {LEAST_RUNS * effects} runs or more "
+            f"are right, and {plan.runs} are asked for."
+        )
 
 
 def place_of(name: str, base: Scenario, engine: str) -> str:
@@ -376,7 +323,7 @@ def place_of(name: str, base: Scenario, engine: str) -> str:
         if component.path is not None or component.fmu != "Structure":
             raise EnsembleError(f'"{name}": {component.name} is no Structure.')
         return "building"
-    if component is not None and rest not in _FILES and rest in component.description.variables:
+    if component is not None and rest not in FILES and rest in component.description.variables:
         return "parameter"
     return "scenario"
 
@@ -396,7 +343,7 @@ def _try(varied: Varied, base: Scenario) -> str:
         assert component is not None
         if varied.place == "building":
             try:
-                changed(component, {rest.removeprefix("building."): value})
+                changed_building(component, {rest.removeprefix("building."): value})
             except PhysicsError as error:
                 return f'"{varied.name}" = {written(value)}: {error}'
             continue
@@ -439,7 +386,7 @@ def _files_read(base: Scenario, varied: tuple[Varied, ...]) -> list[Path]:
         named += [component.law.file] if component.law else []
         named += [component.parameters.get(key) for key in FILE_PARAMETERS]
     for one in varied:
-        if one.name.rpartition(".")[2] in _FILES:
+        if one.name.rpartition(".")[2] in FILES:
             named += one.distribution.values
     folder = base.file.parent
     return sorted({folder / str(name) for name in named if name and (folder / str(name)).is_file()})

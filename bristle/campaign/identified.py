@@ -25,16 +25,13 @@ from ..model.model import StudyModel
 from ..model.model_file import read_model
 from ..physics.effect import EFFECTS, plain_name
 from ..system.scenario import Scenario
-from .distributions import Distribution, Value, share
-from .plan import Plan, Varied
+from .distributions import Distribution, Value, Varied, share
 
 IDENTIFIED = Spec({
     "model": Key(str, "", about="the folder of a study"), "component": Key(str, "damper"),
     "structure": Key(str, "structure"),
 })  # fmt: skip
 """`[identified]` of an ensemble file."""
-LEAST = 4
-"""Runs per effect that --with-limits needs at least."""
 _DRAW, _JOINT = "left open", "identified"
 
 
@@ -243,13 +240,3 @@ def _left(folder: Path, model: StudyModel) -> tuple[list[OpenEffect], list[str]]
     """Return what the verdict beside a model does not exclude."""
     path = folder / "verdict.json"
     return left_open(read_json(path) if path.is_file() else None, model, folder)
-
-
-def refuse_few(plan: Plan) -> None:
-    """Refuse an ensemble with fewer runs than its effects need."""
-    effects = len(plan.identified.left) if plan.identified is not None else 0
-    if plan.runs < LEAST * effects:
-        raise EnsembleError(
-            f"--with-limits draws {effects} effects in turn: {LEAST * effects} runs or more are "
-            f"right, and {plan.runs} are asked for."
-        )

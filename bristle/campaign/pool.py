@@ -18,8 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from .campaign import prepare, run_one
-from .plan import Outcome, Plan
+from .campaign import Outcome, Plan, prepare, run_one
 
 AHEAD = 2
 """Runs that a process has been given and not yet answered: it never waits for the next."""
@@ -42,7 +41,7 @@ def run_local(plan: Plan, runs: Iterable[int], workers: int) -> Generator[Outcom
     Parameters
     ----------
     plan : Plan
-        `worker.prepare` has been called with it: forked processes have what it loaded.
+        `campaign.prepare` has been called with it: forked processes have what it loaded.
     runs : iterable of int
     workers : int
         Number of processes.

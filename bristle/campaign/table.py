@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.files import replaced_by
 from ..errors import EnsembleError, RunError
 from ..model.draws import POINT, reach, simulated_whole
-from .plan import Outcome, Plan
+from .campaign import Outcome, Plan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,10 +58,15 @@ class RunsTable:
                 self.outcomes = _read(plan, path)
                 self._rewrite()  # without a line cut short
             else:
-                self._replace(_head(plan))
+                replaced_by(path, lambda new: new.write_bytes(_head(plan)))
             self._file = os.open(path, os.O_WRONLY | os.O_APPEND)
         except OSError as error:
             raise EnsembleError(f"{path}: cannot be written ({error.strerror or error}).") from None
+
+    @property
+    def left(self) -> list[int]:
+        """The runs of the plan that are still to be made."""
+        return [run for run in range(self.plan.runs) if run not in self.outcomes]
 
     def forget_failures(self) -> None:
         """Take runs that failed, alone or with an effect, as not yet run."""
@@ -119,18 +125,9 @@ class RunsTable:
             was_open, self._file = self._file, -1
             if was_open >= 0:
                 os.close(was_open)
-            self._replace(_head(self.plan) + lines)
+            replaced_by(self.path, lambda new: new.write_bytes(_head(self.plan) + lines))
             if was_open >= 0:
                 self._file = os.open(self.path, os.O_WRONLY | os.O_APPEND)
-
-    def _replace(self, content: bytes) -> None:
-        assert self.path is not None
-        new = self.path.with_name(self.path.name + ".new")
-        try:
-            new.write_bytes(content)
-            new.replace(self.path)
-        finally:
-            new.unlink(missing_ok=True)
 
 
 def columns(plan: Plan) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,14 +18,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from .plan import Output
+    from .campaign import Output
 
 MOST_OUTPUTS = 6
 MOST_NAMES = 8
 _HEIGHT = 1.75
 """Of one output's row [in]."""
 _SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
-_DPI = 160
 
 
 @view_of(Ensemble)
@@ -100,28 +98,14 @@ def passive_view(found: Passive) -> View:
     )  # fmt: skip
 
 
-def ensemble_figure(found: Ensemble, path: str | Path) -> None:
-    """Draw an ensemble of at least two runs that are done into an image file.
+@look()
+def draw_ensemble(found: Ensemble) -> Page:
+    """Return the figure of an ensemble of at least two runs that are done.
 
     One row per output, at most six. Left: a histogram with the median and the bands between the
     quantiles of 5 and 95, 25 and 75 %. Right: rank correlations (Spearman) of the output with the
     numbers that vary, largest first, and what chance alone would give.
-
-    Raises
-    ------
-    RunError
-        If the file cannot be written or its ending is no format.
     """
-    draw_ensemble(found).save(Path(path), dpi=_DPI)
-
-
-def draw_ensemble(found: Ensemble) -> Page:
-    """Return the figure, drawn and not yet written."""
-    with look():
-        return _page(found)
-
-
-def _page(found: Ensemble) -> Page:
     done = found.runs[found.runs["status"] == "done"]
     outputs = found.plan.outputs[:MOST_OUTPUTS]
     numbers = varying_numbers(found.plan, done)
@@ -217,24 +201,9 @@ def _title(output: Output) -> str:
     return f"{statistic} of {port.replace('_', ' ')} ({component})"
 
 
-def passive_figure(found: Passive, path: str | Path) -> None:
-    """Draw the judged output over the voltage, the least of each motion marked, into a file.
-
-    Raises
-    ------
-    RunError
-        If the file cannot be written or its ending is no format.
-    """
-    draw_passive(found).save(Path(path), dpi=_DPI)
-
-
+@look()
 def draw_passive(found: Passive) -> Page:
-    """Return the figure, drawn and not yet written."""
-    with look():
-        return _passive_page(found)
-
-
-def _passive_page(found: Passive) -> Page:
+    """Return the figure of the judged output over the voltage, the least of each motion marked."""
     fair = found.goals["regret"]
     what = found.what
     title = f"Best constant voltage for {len(found.motions)} ground motions: {fair.voltage:.2g} V"

@@ -98,10 +98,10 @@ def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
             f"{files['quantiles']}: cannot be written: {error.strerror or error}."
         ) from error
     if figure and (found.runs["status"] == "done").sum() > 1:
-        from ..campaign.view import ensemble_figure
+        from ..campaign.view import draw_ensemble
 
         files["figure"] = folder / "figure.png"
-        ensemble_figure(found, files["figure"])
+        draw_ensemble(found).save(files["figure"], dpi=160)
     return files
 
 

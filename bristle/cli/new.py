@@ -43,7 +43,7 @@ def main(arguments: argparse.Namespace) -> int:
         )
     about = {"file": "", kind: name}
     if kind == "scenario":
-        from ..system.stock import copy_scenario
+        from ..system.scenario import copy_scenario
 
         file = copy_scenario(arguments.like, Path(f"{name.removesuffix('.toml')}.toml"))
         then = f"{command('check', file)}  and  {command('run', file)}"

@@ -116,10 +116,10 @@ def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     except OSError as error:
         raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
     if figure:
-        from ..campaign.view import passive_figure
+        from ..campaign.view import draw_passive
 
         files["figure"] = folder / "passive.png"
-        passive_figure(found, files["figure"])
+        draw_passive(found).save(files["figure"], dpi=160)
     return files
 
 

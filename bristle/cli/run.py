@@ -115,9 +115,9 @@ def _further(
 
         found.append(("figure.png", run_figure))
     if arguments.spectrum:
-        from ..engine.results import FILE, write_spectra
+        from ..engine.results import SPECTRUM_FILE, write_spectra
 
-        found.append((FILE, write_spectra))
+        found.append((SPECTRUM_FILE, write_spectra))
     return found
 
 
@@ -164,7 +164,7 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
     import json
     from dataclasses import asdict
 
-    from ..engine.summary import summarise
+    from ..engine.results import summarise
 
     answer = {
         "complete": frame.attrs["complete"],

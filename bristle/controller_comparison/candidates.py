@@ -16,7 +16,7 @@ from ..component.controller_file import (
     read_controller,
 )
 from ..core.config import SCHEMA, Document
-from ..core.text import nearest
+from ..core.text import did_you_mean
 from ..errors import BuildError, DesignError, FmuError, ScenarioError
 from ..fmu import catalogue
 from ..fmu.build import build, plan
@@ -24,11 +24,12 @@ from ..fmu.controller import MEASURED, invertible
 from ..fmu.description import Description, read_description
 from ..physics.building import frequencies, paper_building
 from ..physics.drive import VOLTAGE
-from ..synthesis import Damper, LqgWeights, Task, Weight, Weights, design
+from ..synthesis import Damper as DesignDamper
+from ..synthesis import LqgWeights, Task, Weight, Weights, design
 from ..synthesis.design_file import task_of
 from ..synthesis.plausible import Reach, reach_of
 from ..synthesis.task import check_sample_period
-from ..system.library import controller_in
+from ..system.library import controller_in, law_of
 from .setting import (
     ABOVE,
     BEST,
@@ -39,20 +40,18 @@ from .setting import (
     OFF,
     ON,
     STRUCTURE,
+    Candidate,
     Choice,
-    Entry,
+    Damper,
     Folder,
     Given,
     Part,
     Site,
-    catalogue_law,
     choices_of,
     number,
     plain_name,
     refuse_twice,
-    said,
 )
-from .setting import Damper as SettingDamper
 
 # Designs for a comparison's building: made anew where none was made for it.
 #
@@ -62,7 +61,7 @@ from .setting import Damper as SettingDamper
 # differs in its unit of mass alone gets the same design.
 
 
-def designed_for(kind: str, site: Site, damper: SettingDamper) -> Controller:
+def designed_for(kind: str, site: Site, damper: Damper) -> Controller:
     """Return a controller of some kind, designed for a building and its damper.
 
     Parameters
@@ -78,7 +77,7 @@ def designed_for(kind: str, site: Site, damper: SettingDamper) -> Controller:
     return design(task_for(kind, site, damper)).controller
 
 
-def task_for(kind: str, site: Site, damper: SettingDamper) -> Task:
+def task_for(kind: str, site: Site, damper: Damper) -> Task:
     """Return the stock task of a kind, brought to a building and its damper.
 
     Parameters
@@ -92,7 +91,7 @@ def task_for(kind: str, site: Site, damper: SettingDamper) -> Task:
             f"yours in a checkout: `python -m benchmarks train my_{kind}.toml`, then --controller "
             f"my_{kind}.json."
         )
-    known = Damper() if damper.usual else damper.for_design()
+    known = DesignDamper() if damper.usual else damper.for_design()
     if known is None and COMMAND_UNITS[kind] == VOLTAGE.unit:
         raise DesignError(
             f"a design of the kind {kind} follows the damper's law, and {damper.name} has none "
@@ -101,7 +100,7 @@ def task_for(kind: str, site: Site, damper: SettingDamper) -> Task:
     stock = Task(kind)
     here = replace(
         stock, title=f"{kind} for {site.building.name}", building=site.building,
-        device=site.device.name, damper=known or Damper(),
+        device=site.device.name, damper=known or DesignDamper(),
     )  # fmt: skip
     return replace(here, **_weights(stock, here))
 
@@ -133,7 +132,7 @@ def _moved(weight: Weight, faster: float, share: float) -> Weight:
     return Weight(scaled(weight.numerator, share), scaled(weight.denominator))
 
 
-def force_share(damper: SettingDamper) -> float:
+def force_share(damper: Damper) -> float:
     """Return how strong a damper is beside the library's: force at its typical speed and most V.
 
     1 where its law is not known in closed form.
@@ -141,37 +140,37 @@ def force_share(damper: SettingDamper) -> float:
     return _beside(damper, lambda one: sum(one.sliding_force(one.speed, one.v_max)))
 
 
-def slope_share(damper: SettingDamper) -> float:
+def slope_share(damper: Damper) -> float:
     """Return how much force a volt makes beside the library's damper, at its typical speed.
 
     1 where its law is not known in closed form.
     """
 
-    def per_volt(one: Damper) -> float:
+    def per_volt(one: DesignDamper) -> float:
         still, driven = (sum(one.sliding_force(one.speed, V)) for V in (0.0, one.v_max))
         return (driven - still) / one.v_max
 
     return _beside(damper, per_volt)
 
 
-def _beside(damper: SettingDamper, measure: Callable[[Damper], float]) -> float:
+def _beside(damper: Damper, measure: Callable[[DesignDamper], float]) -> float:
     """Return what a measure tells of a damper over what it tells of the library's."""
     known = damper.for_design()
     if known is None or damper.usual:
         return 1.0
-    return measure(known) / measure(Damper(catalogue_law(DEFAULT)))
+    return measure(known) / measure(DesignDamper(law_of(DEFAULT)))
 
 
 @dataclass
 class Maker:
-    """Makes the entries of one comparison: `site` and `damper` are what they are for."""
+    """Makes the candidates of one comparison: `site` and `damper` are what they are for."""
 
     site: Site
-    damper: SettingDamper
+    damper: Damper
     folder: Folder
     _designs: dict[str, str] = field(default_factory=dict)
 
-    def entries(self, given: Given) -> list[Entry]:
+    def candidates(self, given: Given) -> list[Candidate]:
         """Return the controllers of a list of texts.
 
         Parameters
@@ -189,15 +188,15 @@ class Maker:
             raise ScenarioError(
                 "no controllers: name some, as --controller LqgClipped my_design.json my.fmu."
             )
-        found = [self.entry(choice) for choice in chosen]
+        found = [self.candidate(choice) for choice in chosen]
         refuse_twice([one.name for one in found], "--controller", (OFF, ON, BEST, LIMIT))
         plain = [plain_name(one.name) for one in found]
         refuse_twice(plain, "--controller", [plain_name(name) for name in (OFF, ON, BEST, LIMIT)])
         return found
 
-    def entry(self, choice: Choice) -> Entry:
+    def candidate(self, choice: Choice) -> Candidate:
         """Return the controller of one choice."""
-        name = choice.label or said(choice)
+        name = choice.as_text
         ending = Path(choice.what).suffix.lower()
         makers = {
             ".fmu": self._of_fmu, ".py": self._of_source, ".json": self._of_controller,
@@ -215,11 +214,10 @@ class Maker:
 
     # -- kinds of choices
 
-    def _of_stock(self, choice: Choice, name: str) -> Entry:
+    def _of_stock(self, choice: Choice, name: str) -> Candidate:
         known = controllers()
         if choice.what not in known:
-            close = nearest(choice.what, known)
-            hint = f' Did you mean "{close[0]}"?' if close else ""
+            hint = did_you_mean(choice.what, known)
             raise ScenarioError(
                 f'no controller is named "{choice.what}". There are: {", ".join(known)}; a file of '
                 f"`bristle design`, of a component of your own (.py) or an FMU is right too.{hint}"
@@ -236,15 +234,15 @@ class Maker:
             about = f"the library's {kind} design, made for this building"
             source = {"fmu": choice.what}
             return self._built_in(choice.what, name, source, settings, about, carries=True)
-        return self._designed(choice.what, name, settings, self._anew(kind), anew=True)
+        return self._designed(choice.what, name, settings, self._anew(kind), redesigned=True)
 
-    def _of_controller(self, choice: Choice, name: str) -> Entry:
+    def _of_controller(self, choice: Choice, name: str) -> Candidate:
         file = Path(choice.what)
         kind = read_controller(file).kind
         kept = self._checked(file, kind)
         return self._designed(self._component(kind), name, dict(choice.settings), kept)
 
-    def _of_design(self, choice: Choice, name: str) -> Entry:
+    def _of_design(self, choice: Choice, name: str) -> Candidate:
         """Design what a design file asks for; building and damper are these unless it names one."""
         file = Path(choice.what)
         document = Document(file, DesignError)
@@ -259,14 +257,14 @@ class Maker:
         self.site.check_design(found, str(file))
         return self._designed(self._component(found.kind), name, dict(choice.settings), kept)
 
-    def _of_source(self, choice: Choice, name: str) -> Entry:
+    def _of_source(self, choice: Choice, name: str) -> Candidate:
         with tempfile.TemporaryDirectory() as scratch:
             made = build(plan(choice.what), Path(scratch))
             kept = self.folder.keep(made)
         about = f"a component of your own, {Path(choice.what).name}"
         return self._of_file(self.folder.path / FILES / Path(kept).name, kept, choice, name, about)
 
-    def _of_fmu(self, choice: Choice, name: str) -> Entry:
+    def _of_fmu(self, choice: Choice, name: str) -> Candidate:
         file = Path(choice.what)
         read_description(file, any_platform=True)
         return self._of_file(file, self.folder.keep(file), choice, name, f"the FMU {file.name}")
@@ -274,25 +272,30 @@ class Maker:
     # -- what they share
 
     def _designed(
-        self, component: str, name: str, settings: dict[str, Any], kept: str, anew: bool = False
-    ) -> Entry:
+        self,
+        component: str,
+        name: str,
+        settings: dict[str, Any],
+        kept: str,
+        redesigned: bool = False,
+    ) -> Candidate:
         """Return a controller with a design of its own; `kept` is its file in the folder."""
         file = self.folder.path / FILES / Path(kept).name
         kind = read_controller(file).kind
         about = f"a design of the kind {kind}, {Path(kept).name}"
-        about += ", made for this building by the comparison" if anew else ""
+        about += ", made for this building by the comparison" if redesigned else ""
         source = {"fmu": component, "controller": kept}
         found = self._built_in(component, name, source, settings, about, carries=True, file=file)
-        return replace(found, anew=anew)
+        return replace(found, redesigned=redesigned)
 
     def _built_in(
         self, component: str, name: str, source: dict[str, Any], settings: dict[str, Any],
         about: str = "", *, carries: bool = False, file: Path | None = None,
-    ) -> Entry:  # fmt: skip
+    ) -> Candidate:  # fmt: skip
         description = catalogue.describe(component, controller=file)
         parameters = {**self._suited(component, description, settings), **settings}
         period = parameters.get("sample_period", _start(description, "sample_period"))
-        return Entry(
+        return Candidate(
             name, Part(source, parameters), self._wires(description), "voltage", True,
             None if period is None else number(period, "sample_period", component),
             about or "without a design: it suits any building", carries,
@@ -325,7 +328,7 @@ class Maker:
             found |= {key: value for key, value in values.items() if value != there[key].start}
         return found
 
-    def _of_file(self, file: Path, kept: str, choice: Choice, name: str, about: str) -> Entry:
+    def _of_file(self, file: Path, kept: str, choice: Choice, name: str, about: str) -> Candidate:
         """Return a controller that is an FMU."""
         description = read_description(file, any_platform=True)
         there = description.variables
@@ -352,7 +355,7 @@ class Maker:
         if "v_max" in there and "v_max" not in parameters:
             parameters |= self._suited("", _only(description, "v_max"), parameters)
         period = parameters.get("sample_period", _start(description, "sample_period"))
-        return Entry(
+        return Candidate(
             name, Part({"fmu": kept}, parameters), wires, output, False,
             float(period) if isinstance(period, int | float) else None, about,
             controller_in(file) is not None,

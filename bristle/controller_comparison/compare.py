@@ -10,22 +10,21 @@ from math import ceil, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..campaign.campaign import Output
 from ..campaign.ensemble import cores
-from ..campaign.plan import Output
 from ..core.progress import Stages, tell
 from ..core.text import unknown
 from ..errors import ScenarioError
 from .candidates import Maker
-from .limits import Reached, limit_of, refuse_limit
 from .result import ControllerComparison, Setting, of_designs, of_engines
-from .runs import Bench, best_level, flat
+from .runs import Bench, Reached, best_level, flat, limit_of, refuse_limit
 from .setting import (
     BEST,
     DAMPER,
     DEFAULT,
     OFF,
     ON,
-    Entry,
+    Candidate,
     Folder,
     Given,
     Motion,
@@ -138,23 +137,23 @@ def compare_controllers(
         site = site_from(building, device, folder)
         one = damper_from(damper, folder)
         tell("designing")
-        entries = Maker(site, one, folder).entries(controllers)
-        rows = _step(entries) if step is None else step
+        candidates = Maker(site, one, folder).candidates(controllers)
+        rows = _step(candidates) if step is None else step
         bench = Bench(site, one, folder, rows, engine, fmus, workers or cores())
         judged = _judged(bench, output, statistic)
         chosen = motions_of(motions, folder, rows)
         if limit:
             refuse_limit(bench, chosen[0], judged)
-        run = _Run(bench, judged, entries, grid, limit, spread)
+        run = _Run(bench, judged, candidates, grid, limit, spread)
         run.motions(chosen)
         folder.finish()
         setting = Setting(
-            site, one, entries, chosen, judged, spread, None if out is None else Path(path),
-            "" if spread is None else varied(bench, entries, spread),
+            site, one, candidates, chosen, judged, spread, None if out is None else Path(path),
+            "" if spread is None else varied(bench, candidates, spread),
         )  # fmt: skip
-        notes = [*site.notes, *one.notes, *of_designs(entries), *of_engines(bench, entries)]
+        notes = [*site.notes, *one.notes, *of_designs(candidates), *of_engines(bench, candidates)]
         if spread is not None:
-            notes += unvaried(bench, entries, spread)
+            notes += unvaried(bench, candidates, spread)
         notes += [*run.notes, *bench.remarks]
     return ControllerComparison(
         setting, bench.outputs, run.table(), run.worst(), run.levels, run.limits, run.frames,
@@ -170,10 +169,10 @@ class _Run:
     """The runs of a comparison, motion by motion."""
 
     def __init__(
-        self, bench: Bench, judged: Output, entries: list[Entry], grid: int, limit: bool,
+        self, bench: Bench, judged: Output, candidates: list[Candidate], grid: int, limit: bool,
         spread: Spread | None,
     ) -> None:  # fmt: skip
-        self.bench, self.judged, self.entries = bench, judged, entries
+        self.bench, self.judged, self.candidates = bench, judged, candidates
         self.grid, self.limit, self.spread = grid, limit, spread
         self.rows: list[dict[str, Any]] = []
         self.worsts: list[dict[str, Any]] = []
@@ -184,7 +183,7 @@ class _Run:
 
     def motions(self, chosen: list[Motion]) -> None:
         """Run everything under all ground motions."""
-        n, worst = len(chosen), len(self.entries) + CONSTANTS
+        n, worst = len(chosen), len(self.candidates) + CONSTANTS
         kinds = {"run": worst + self.limit, "levels": 1, "limit": int(self.limit)}
         kinds["worst"] = worst * (self.spread is not None)
         self.stages = Stages("case", {kind: n * each for kind, each in kinds.items()})
@@ -194,21 +193,21 @@ class _Run:
     def _motion(self, motion: Motion) -> None:
         """Run everything under one ground motion."""
         # What has a clock goes first: the loop that it is compiled to serves all the others.
-        clocked = sorted(self.entries, key=lambda one: one.period is None)
-        for entry in clocked:
-            self._frame(motion, entry)
+        clocked = sorted(self.candidates, key=lambda one: one.period is None)
+        for candidate in clocked:
+            self._frame(motion, candidate)
         constants = self._constants(motion)
-        for entry in [*constants, *self.entries]:
-            self._row(motion, entry)
+        for candidate in [*constants, *self.candidates]:
+            self._row(motion, candidate)
         if self.limit:
             self.stages.begins("limit", f"{motion.name}: the limit")
-            entry, self.limits[motion.name] = limit_of(self.bench, motion, self.judged)
-            self._row(motion, entry)
+            candidate, self.limits[motion.name] = limit_of(self.bench, motion, self.judged)
+            self._row(motion, candidate)
         if self.spread is not None:
-            for entry in [*constants, *self.entries]:
-                self._worst(motion, entry, self.spread)
+            for candidate in [*constants, *self.candidates]:
+                self._worst(motion, candidate, self.spread)
 
-    def _constants(self, motion: Motion) -> list[Entry]:
+    def _constants(self, motion: Motion) -> list[Candidate]:
         """Return the constant voltages of a motion: none, the largest, the best."""
         self.stages.begins("levels", f"{motion.name}: {self.grid} constant voltages")
         levels = self.bench.levels(motion, self.grid)
@@ -226,44 +225,39 @@ class _Run:
             constant(BEST, best, "the constant voltage that is best for the motion"),
         ]
 
-    def _frame(self, motion: Motion, entry: Entry) -> pd.DataFrame:
-        key = motion.name, entry.name
+    def _frame(self, motion: Motion, candidate: Candidate) -> pd.DataFrame:
+        key = motion.name, candidate.name
         if key not in self.frames:
-            self.stages.begins("run", f"{motion.name}: {entry.name}")
-            self.frames[key] = self.bench.run(motion, entry)
+            self.stages.begins("run", f"{motion.name}: {candidate.name}")
+            self.frames[key] = self.bench.run(motion, candidate)
         return self.frames[key]
 
-    def _row(self, motion: Motion, entry: Entry) -> None:
-        frame = self._frame(motion, entry)
-        level = entry.part.parameters.get("level") if not entry.wires else None
+    def _row(self, motion: Motion, candidate: Candidate) -> None:
+        frame = self._frame(motion, candidate)
+        level = candidate.part.parameters.get("level") if not candidate.wires else None
         ratio = f"{DAMPER}.stroke_ratio"
         self.rows.append(
             {
-                "motion": motion.name, "controller": entry.name,
-                "engine": self.bench.engine_of(entry),
+                "motion": motion.name, "controller": candidate.name,
+                "engine": self.bench.engine_of(candidate),
                 "level": float("nan") if level is None else float(level),
                 "stroke": float(frame[ratio].max()) if ratio in frame else float("nan"),
                 **self.bench.measured(frame),
             }
         )  # fmt: skip
 
-    def _worst(self, motion: Motion, entry: Entry, spread: Spread) -> None:
-        self.stages.begins("worst", f"{motion.name}: {entry.name}, {spread.members} members")
-        most, failed = worst_of(
-            self.bench,
-            motion,
-            entry,
-            self.frames[motion.name, entry.name],
-            spread,
-            not tied(self.bench, self.entries),
-        )
+    def _worst(self, motion: Motion, candidate: Candidate, spread: Spread) -> None:
+        self.stages.begins("worst", f"{motion.name}: {candidate.name}, {spread.members} members")
+        nominal = self.frames[motion.name, candidate.name]
+        whole = not tied(self.bench, self.candidates)
+        most, failed = worst_of(self.bench, motion, candidate, nominal, spread, whole)
         self.worsts.append(
-            {"motion": motion.name, "controller": entry.name, "failed": failed, **most}
+            {"motion": motion.name, "controller": candidate.name, "failed": failed, **most}
         )
         if failed:
             self.notes.append(
-                f"{motion.name}, {entry.name}: {failed} of {spread.members} members failed; the "
-                "worst case is that of the others."
+                f"{motion.name}, {candidate.name}: {failed} of {spread.members} members failed; "
+                "the worst case is that of the others."
             )
 
     def table(self) -> pd.DataFrame:
@@ -294,9 +288,9 @@ def _refuse(
         raise ScenarioError(f"--step {step:g}: a time above 0 s is right.")
 
 
-def _step(entries: list[Entry]) -> float:
+def _step(candidates: list[Candidate]) -> float:
     """Return rows that fall on the controllers' instants, where they can."""
-    periods = [one.period for one in entries if one.period is not None]
+    periods = [one.period for one in candidates if one.period is not None]
     return min([STEP, *(period / ceil(period / STEP - 1e-9) for period in periods)])
 
 

@@ -1,35 +1,46 @@
-"""The runs of a comparison: a scenario for each motion and controller, written, run, measured."""
+"""The runs of a comparison: scenarios for each motion and controller, and for its limit."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import logging
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..campaign.campaign import prepare, statistic
+from ..campaign.campaign import Output, Plan, statistic
+from ..campaign.ensemble import run_left
 from ..campaign.ensemble_file import read_ensemble
-from ..campaign.plan import Output, Plan
-from ..campaign.pool import run_local
 from ..campaign.table import RunsTable
+from ..core.files import cache_folder
 from ..core.progress import Count
 from ..engine.coupled import simulate
 from ..engine.run import run_quietly
-from ..errors import EnsembleError, RunError
+from ..errors import EnsembleError, RunError, ScenarioError
+from ..optimal_control import limit
+from ..optimal_control.case import case_of, history_text
 from ..system.scenario import load_scenario
+from ..version import __version__
 from .setting import (
+    ABOVE,
     CONTROLLER,
     DAMPER,
     ENSEMBLES,
+    FILES,
     GROUND,
+    LIMIT,
+    LIMITS,
+    ON,
     SCENARIOS,
     STRUCTURE,
+    Candidate,
     Damper,
-    Entry,
     Folder,
     Motion,
     Part,
@@ -87,27 +98,27 @@ class Bench:
         """Column that has the command; controllers differ in what they call theirs."""
         return f"{CONTROLLER}.voltage"
 
-    def engine_of(self, entry: Entry) -> str:
+    def engine_of(self, candidate: Candidate) -> str:
         """Return the engine that runs a controller."""
         foreign = str(self.damper.part.source.get("fmu", "")).endswith(".fmu")
-        return "fmu" if foreign or not entry.built_in else self.engine
+        return "fmu" if foreign or not candidate.built_in else self.engine
 
-    def columns(self, entry: Entry) -> dict[str, str]:
+    def columns(self, candidate: Candidate) -> dict[str, str]:
         """Return the column of a run for each column of the comparison."""
-        own = f"{CONTROLLER}.{entry.output}"
+        own = f"{CONTROLLER}.{candidate.output}"
         return {o.column: own if o.column == self.command else o.column for o in self.outputs}
 
-    def text(self, motion: Motion, entry: Entry, sensors: Part | None = None) -> str:
+    def text(self, motion: Motion, candidate: Candidate, sensors: Part | None = None) -> str:
         """Return the text of a scenario.
 
         Parameters
         ----------
-        motion, entry : the case
+        motion, candidate : the case
         sensors : instruments between the structure and the controller, if any
         """
         ports = self.site.ports
         parts = {GROUND: motion.part, STRUCTURE: self.site.part, DAMPER: self.damper.part}
-        command: Any = f"{CONTROLLER}.{entry.output}"
+        command: Any = f"{CONTROLLER}.{candidate.output}"
         if self.damper.drive.name != "voltage":
             command = {"from": command, "factor": 1.0}
         wires: dict[str, Any] = {
@@ -120,19 +131,19 @@ class Bench:
         if sensors is not None:
             parts[SENSORS] = sensors
             wires |= {f"{SENSORS}.{name}": column for name, column in self.site.measured.items()}
-        for name, column in entry.wires.items():
+        for name, column in candidate.wires.items():
             sensed = sensors is not None and name in self.site.measured
             wires[f"{CONTROLLER}.{name}"] = f"{SENSORS}.{name}_measured" if sensed else column
-        parts[CONTROLLER] = entry.part
-        title = f"{motion.name}, {self.site.building.name}, {self.damper.name}: {entry.name}"
+        parts[CONTROLLER] = candidate.part
+        title = f"{motion.name}, {self.site.building.name}, {self.damper.name}: {candidate.name}"
         return scenario_text(title, motion.stop, self.step, parts, wires)
 
-    def write(self, motion: Motion, entry: Entry) -> Path:
+    def write(self, motion: Motion, candidate: Candidate) -> Path:
         """Write the scenario of a case; return its file."""
-        file = self.folder.at(SCENARIOS, motion.name, f"{plain_name(entry.name)}.toml")
-        return self.folder.write(file, self.text(motion, entry))
+        file = self.folder.at(SCENARIOS, motion.name, f"{plain_name(candidate.name)}.toml")
+        return self.folder.write(file, self.text(motion, candidate))
 
-    def run(self, motion: Motion, entry: Entry) -> pd.DataFrame:
+    def run(self, motion: Motion, candidate: Candidate) -> pd.DataFrame:
         """Return a case's run: the comparison's columns, and what figures show, by time [s].
 
         Raises
@@ -144,19 +155,19 @@ class Bench:
         """
         import pandas as pd
 
-        scenario = load_scenario(self.write(motion, entry))
+        scenario = load_scenario(self.write(motion, candidate))
         self.remarks.extend(one.text for one in scenario.findings if one.level == "warning")
         try:
             found: Any
-            if self.engine_of(entry) == "compiled":
+            if self.engine_of(candidate) == "compiled":
                 found = simulate(scenario)
                 time = found["time"]
             else:
                 found = run_quietly(scenario, "fmu", self.fmus)
                 time = found.index.to_numpy()
         except RunError as error:
-            raise RunError(f"{motion.name}, {entry.name}: {error}") from error
-        columns = self.columns(entry)
+            raise RunError(f"{motion.name}, {candidate.name}: {error}") from error
+        columns = self.columns(candidate)
         extra = [
             f"{DAMPER}.velocity",
             f"{DAMPER}.stroke_ratio",
@@ -171,7 +182,7 @@ class Bench:
         return {o.name: statistic(o, frame[o.column].to_numpy()) for o in self.outputs}
 
     def many(
-        self, file: Path, entry: Entry, scenario: Path, runs: int,
+        self, file: Path, candidate: Candidate, scenario: Path, runs: int,
         tables: Mapping[str, Mapping[str, Any]],
     ) -> tuple[pd.DataFrame, int]:  # fmt: skip
         """Write an ensemble and run it; return what is kept of its runs, and how many failed.
@@ -179,33 +190,29 @@ class Bench:
         Parameters
         ----------
         file : of the ensemble
-        entry : its controller
+        candidate : its controller
         scenario : its base
         runs : how many
         tables : `vary`, and others
         """
         import pandas as pd
 
-        columns = self.columns(entry)
+        columns = self.columns(candidate)
         kept: dict[str, list[str]] = {}
         for one in self.outputs:
             kept.setdefault(columns[one.column], []).append(one.statistic)
         content: dict[str, Any] = {
             "title": file.stem, "scenario": _relative(scenario, file.parent),
-            "engine": self.engine_of(entry), "runs": runs, "seed": SEED,
+            "engine": self.engine_of(candidate), "runs": runs, "seed": SEED,
         }  # fmt: skip
         if content["engine"] == "fmu" and self.fmus != "python":
             content["fmus"] = self.fmus
         self.folder.write(file, ensemble_text(content, {**tables, "outputs": kept}))
         plan = read_ensemble(file)
-        prepare(plan)
         runs_file = file.with_suffix(".csv")
         with quiet(), _continued(plan, runs_file, self.folder.goes_on) as table:
-            left = [run for run in range(plan.runs) if run not in table.outcomes]
-            count = Count(f"{file.parent.name}, {file.stem}: run", len(left))
-            for outcome in run_local(plan, left, min(self.workers, len(left))) if left else ():
-                table.add(outcome)
-                count.done()
+            count = Count(f"{file.parent.name}, {file.stem}: run", len(table.left))
+            run_left(plan, table, self.workers, count.done)
         outcomes = [table.outcomes[run] for run in range(plan.runs)]
         rows = {one.run: one.numbers for one in outcomes if not one.reason}
         failed = len(outcomes) - len(rows)
@@ -227,12 +234,12 @@ class Bench:
         RunError
             If one fails.
         """
-        entry = constant("constant", 0.0, "")
+        candidate = constant("constant", 0.0, "")
         volts = np.linspace(0.0, self.damper.most, count).tolist()
-        base = self.write(motion, entry)
+        base = self.write(motion, candidate)
         file = self.folder.at(ENSEMBLES, motion.name, "constant.toml")
         vary = {"vary": {f"{CONTROLLER}.level": {"each": volts}}}
-        found, failed = self.many(file, entry, base, count, vary)
+        found, failed = self.many(file, candidate, base, count, vary)
         if failed:
             raise RunError(
                 f"{motion.name}: {failed} of {count} runs at constant voltages fail; bristle "
@@ -283,3 +290,102 @@ def flat(values: Iterable[float]) -> bool:
     """Return whether values are all the same."""
     found = np.array(list(values))
     return bool(np.ptp(found) <= 1e-12 * np.abs(found).max())
+
+
+# The limit of each motion: computed once, kept in the cache, played as one more controller.
+
+
+class Reached(NamedTuple):
+    """What a search for the limit of a motion found.
+
+    `value` of the judged output; `bound` below which no force can bring it, None where none is
+    known; `agreeing` of `starts` searches found it within 2 %, `sure` whether two did and the
+    coupled engine confirms it. `kept` tells whether the cache had it.
+    """
+
+    value: float
+    bound: float | None
+    agreeing: int
+    starts: int
+    sure: bool
+    kept: bool
+
+
+def refuse_limit(bench: Bench, motion: Motion, judged: Output) -> None:
+    """Refuse a case that has no limit, before the work for it is done.
+
+    Raises
+    ------
+    ScenarioError
+        Saying why.
+    """
+    candidate = constant(ON, bench.damper.most, "")
+    if bench.engine_of(candidate) != "compiled":
+        raise ScenarioError(
+            "--limit needs a damper of the library and the engine compiled: the law in an FMU is "
+            "not known."
+        )
+    case_of(load_scenario(bench.write(motion, candidate)), judged.column)
+
+
+def limit_of(
+    bench: Bench, motion: Motion, judged: Output, starts: int = 3
+) -> tuple[Candidate, Reached]:
+    """Return the voltage that reaches a motion's limit as a controller, and what is known of it.
+
+    Parameters
+    ----------
+    bench, motion : the case
+    judged : the output that is to be lowest, and its statistic
+    starts : of the search
+
+    Raises
+    ------
+    ScenarioError
+        If the case does not suit.
+    RunError
+        If a run fails.
+    """
+    text = bench.text(motion, constant(ON, bench.damper.most, ""))
+    file = cache_folder() / LIMITS / f"{_limit_digest(bench, text, judged, starts)}.json"
+    found, kept = _read_limit(file), True
+    if found is None:
+        kept = False
+        scenario = load_scenario(bench.write(motion, constant(ON, bench.damper.most, "")))
+        with quiet():
+            one = limit(
+                scenario, output=judged.column, statistic=judged.statistic, previews=(),
+                starts=starts,
+            )  # fmt: skip
+        found = {
+            "value": one.value, "bound": one.bound, "agreeing": one.agreeing,
+            "starts": len(one.starts), "sure": bool(one.sure), "time": one.time.tolist(),
+            "voltage": one.voltage.tolist(),
+        }  # fmt: skip
+        bench.folder.write(file, json.dumps(found))
+    path = bench.folder.at(LIMITS, motion.name, "voltage.csv")
+    bench.folder.write(path, history_text(found["time"], found["voltage"]))
+    said = f"{ABOVE}/{LIMITS}/{plain_name(motion.name)}/{path.name}"
+    part = Part({"fmu": "SignalSource"}, {"kind": "csv", "file": said})
+    about = "the voltage that reaches the limit, the ground motion known in advance"
+    reached = Reached(
+        found["value"], found["bound"], found["agreeing"], found["starts"], found["sure"], kept
+    )
+    return Candidate(LIMIT, part, {}, "value", True, None, about), reached
+
+
+def _limit_digest(bench: Bench, text: str, judged: Output, starts: int) -> str:
+    """Return what stands for all that decides a limit: scenario, files that it reads, goal."""
+    content = hashlib.sha256(f"{__version__}/{judged.name}/{starts}/".encode())
+    content.update(re.sub(r"^title = .*$", "", text, flags=re.MULTILINE).encode())
+    for name in re.findall(rf'{re.escape(ABOVE)}/{FILES}/([^"]+)', text):
+        content.update((bench.folder.path / FILES / name).read_bytes())
+    return content.hexdigest()[:24]
+
+
+def _read_limit(file: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None  # not there, or cut short: it is computed anew
+    return found if isinstance(found, dict) else None

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..campaign.best_constant import G
-from ..campaign.plan import Output
+from ..campaign.campaign import Output
 from ..component.controller_file import Controller
 from ..core.config import toml_content
-from ..core.text import nearest, unknown, written
-from ..core.toml_write import toml_key, toml_value
+from ..core.text import did_you_mean, unknown, written
+from ..core.toml_write import toml_table
 from ..data import list_ground_motions, read_ground_motion
 from ..data.building_file import read_building
 from ..errors import DesignError, ScenarioError, not_usable
@@ -28,9 +28,9 @@ from ..physics.building import PAPER, Building, Device, Ports, frequencies, pape
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from ..physics.laws import LAWS, laws_of
 from ..synthesis import Damper as DesignDamper
-from ..system.from_model import source_of, values_of
-from ..system.library import damper_of
+from ..system.library import damper_of, law_of
 from ..system.overrides import parse_override
+from ..system.toml import component_text, joined_text, source_of, values_of
 
 # What a user chooses, as text: `WHAT,NAME=VALUE,...`, such as `Skyhook,gain=100`.
 
@@ -39,7 +39,7 @@ Given = str | Path | Sequence[str | Path] | Mapping[str, str | Path]
 """What a caller may give as a list: one text or file, several, or several by their labels."""
 
 _SETTING = re.compile(r",(?=\s*[A-Za-z_][\w.]*\s*=)")
-_FILES = (".json", ".toml", ".py", ".fmu", ".csv", ".at2", ".txt")
+_ENDINGS = (".json", ".toml", ".py", ".fmu", ".csv", ".at2", ".txt")
 
 
 class Choice(NamedTuple):
@@ -56,7 +56,14 @@ class Choice(NamedTuple):
     def is_file(self) -> bool:
         """Whether the text names a file rather than something of the library."""
         path = Path(self.what)
-        return path.suffix.lower() in _FILES or len(path.parts) > 1
+        return path.suffix.lower() in _ENDINGS or len(path.parts) > 1
+
+    @property
+    def as_text(self) -> str:
+        """What tables call it: its label, else its name with its settings."""
+        name = Path(self.what).stem if self.is_file else self.what
+        values = (f"{key}={value}" for key, value in self.settings.items())
+        return self.label or " ".join([name, *values])
 
 
 def choice_of(text: object, where: str, label: str = "") -> Choice:
@@ -101,14 +108,8 @@ def choices_of(given: Given, where: str) -> list[Choice]:
     return [choice_of(text, where) for text in texts]
 
 
-def said(choice: Choice) -> str:
-    """Return what tables call a choice without a label: its name with its settings."""
-    name = Path(choice.what).stem if choice.is_file else choice.what
-    return " ".join([name, *(f"{key}={value}" for key, value in choice.settings.items())])
-
-
-def number(value: object, name: str, where: str) -> float:
-    """Return a setting as a number.
+def number(value: object, name: str, where: str, right: str = "a number") -> float:
+    """Return a setting as a number; `right` says which.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def number(value: object, name: str, where: str) -> float:
         If it is none; `where` says what was chosen, `name` the setting.
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise ScenarioError(f"{where}: {name} = {written(value)}; a number is right.")
+        raise ScenarioError(f"{where}: {name} = {written(value)}; {right} is right.")
     return float(value)
 
 
@@ -233,44 +234,29 @@ def plain_name(text: str) -> str:
 def scenario_text(
     title: str, stop: float, step: float, parts: Mapping[str, Part], wires: Mapping[str, Any]
 ) -> str:
-    """Return the text of a scenario.
-
-    Parameters
-    ----------
-    title : of the scenario
-    stop, step : [s]
-    parts : components by name, in the order in which they step
-    wires : input "component.port" to output, or to a table `{ from, factor }`
-    """
+    """Return the text of a scenario, stop and step in s; the rest as `joined_text` takes it."""
     run = {"stop": stop, "step": step, "algorithm": "midpoint"}
-    lines = ["schema = 1", f"title = {toml_value(title)}", "", "[run]", *_lines(run)]
-    for name, part in parts.items():
-        lines += ["", f"[components.{toml_key(name)}]", *_lines(part.source)]
-        if part.parameters:
-            lines.append(f"parameters = {toml_value(part.parameters)}")
-    return "\n".join([*lines, "", "[connections]", *_lines(wires)]) + "\n"
+    tables = (
+        component_text(
+            name, one.source | ({"parameters": one.parameters} if one.parameters else {})
+        )
+        for name, one in parts.items()
+    )
+    return joined_text(title, run, tables, wires)
 
 
 def ensemble_text(content: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the text of an ensemble file.
-
-    Parameters
-    ----------
-    content : its keys with their values
-    tables : the tables after them, by name
-    """
-    lines = _lines({"schema": 1, **content})
+    """Return the text of an ensemble file: its keys, and the tables after them by name."""
+    lines = toml_table({"schema": 1, **content})
     for name, table in tables.items():
-        lines += ["", f"[{name}]", *_lines(table)]
+        lines += ["", f"[{name}]", *toml_table(table)]
     return "\n".join(lines) + "\n"
 
 
-def _lines(table: Mapping[str, Any]) -> list[str]:
-    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]
-
+# The damper whose command controllers set.
 
 DEFAULT = "LuGreDamper"
-_MOTION = ("displacement", "velocity")
+_MOTION_INPUTS = ("displacement", "velocity")
 
 
 @dataclass(frozen=True)
@@ -309,7 +295,7 @@ class Damper:
     @property
     def usual(self) -> bool:
         """Whether it is the library's damper as it comes, for which stock designs were made."""
-        if self.law != catalogue_law(DEFAULT) or self.effects or self.most != VOLTAGE.largest:
+        if self.law != law_of(DEFAULT) or self.effects or self.most != VOLTAGE.largest:
             return False
         declared = LAWS[self.law].parameters
         return all(value == declared[name].value for name, value in self.values.items())
@@ -325,11 +311,6 @@ class Damper:
             if name.partition(".")[0] in self.effects and not name.endswith(".on")
         }
         return DesignDamper(self.law, {**self.values, **own}, self.effects, self.most)
-
-
-def catalogue_law(component: str) -> str:
-    """Return the law of a built-in component, "" where it is no damper."""
-    return str(getattr(catalogue.component_class(catalogue.source(component)), "law", ""))
 
 
 def damper_from(given: str | Path, folder: Folder) -> Damper:
@@ -354,15 +335,14 @@ def damper_from(given: str | Path, folder: Folder) -> Damper:
         return _from_model(choice, path, folder)
     if path.suffix.lower() == ".py":
         return _from_law(choice, path, folder)
-    dampers = [name for name in catalogue.component_names() if catalogue_law(name)]
+    dampers = [name for name in catalogue.component_names() if law_of(name)]
     laws = [law.name for law in laws_of("damper")]
     if choice.what in dampers:
-        law = catalogue_law(choice.what)
+        law = law_of(choice.what)
         return _built_in(choice, {"fmu": choice.what}, law, catalogue.describe(choice.what))
     if choice.what in laws:
         return _from_law(choice, choice.what, folder)
-    close = nearest(choice.what, [*dampers, *laws])
-    hint = f' Did you mean "{close[0]}"?' if close else ""
+    hint = did_you_mean(choice.what, [*dampers, *laws])
     raise ScenarioError(
         f'--damper: no damper is named "{choice.what}". There are: {", ".join(dampers)}; the name '
         f"of a law, the folder of a study, an FMU are right too.{hint}"
@@ -384,7 +364,7 @@ def _built_in(choice: Choice, source: dict[str, Any], law: str, description: Des
     on = [name[:-3] for name, value in choice.settings.items() if name.endswith(".on") and value]
     most = _most(choice.what, choice.settings, description, VOLTAGE)
     return Damper(
-        choice.label or said(choice), Part(source, dict(choice.settings)), VOLTAGE, most, law,
+        choice.as_text, Part(source, dict(choice.settings)), VOLTAGE, most, law,
         values, tuple(on),
     )  # fmt: skip
 
@@ -410,11 +390,11 @@ def _from_model(choice: Choice, path: Path, folder: Folder) -> Damper:
     name = choice.label or (path.resolve().name if path.is_dir() else file.stem)
     return Damper(
         name, Part(source, values), VOLTAGE, _most(choice.what, values, description, VOLTAGE), law,
-        own, tuple(inside.effects), tuple(_notes(model, name)),
+        own, tuple(inside.effects), tuple(_model_notes(model, name)),
     )  # fmt: skip
 
 
-def _notes(model: StudyModel, name: str) -> Iterable[str]:
+def _model_notes(model: StudyModel, name: str) -> Iterable[str]:
     if model.drive != VOLTAGE.name:
         unit = DRIVES[model.drive].unit
         yield (
@@ -429,7 +409,7 @@ def _from_fmu(choice: Choice, path: Path, folder: Folder) -> Damper:
     description = read_description(path, any_platform=True)
     there = description.variables
     inputs = {name for name, v in there.items() if v.causality == "input"}
-    missing = [name for name in _MOTION if name not in inputs]
+    missing = [name for name in _MOTION_INPUTS if name not in inputs]
     if "force" not in there or there["force"].causality != "output":
         missing.append("force")
     if missing:
@@ -447,7 +427,7 @@ def _from_fmu(choice: Choice, path: Path, folder: Folder) -> Damper:
     if drive is not VOLTAGE:
         notes.append(f"1 V of a controller counts as 1 {drive.unit} of the damper's {drive.name}.")
     return Damper(
-        choice.label or said(choice), Part({"fmu": folder.keep(path)}, dict(choice.settings)),
+        choice.as_text, Part({"fmu": folder.keep(path)}, dict(choice.settings)),
         drive, _most(choice.what, choice.settings, description, drive), "", {}, (), tuple(notes),
     )  # fmt: skip
 
@@ -473,7 +453,7 @@ CONSTANT = "ConstantVoltage"
 
 
 @dataclass(frozen=True)
-class Entry:
+class Candidate:
     """A controller as it stands in the scenarios.
 
     Attributes
@@ -494,7 +474,7 @@ class Entry:
         What it is, a sentence.
     carries : bool
         Whether it has a design, which belongs to one building.
-    anew : bool
+    redesigned : bool
         Whether that design was made by the comparison.
     """
 
@@ -506,19 +486,19 @@ class Entry:
     period: float | None
     about: str
     carries: bool = False
-    anew: bool = False
+    redesigned: bool = False
 
 
-def constant(name: str, level: float, about: str) -> Entry:
-    """Return a constant voltage [V] as an entry."""
+def constant(name: str, level: float, about: str) -> Candidate:
+    """Return a constant voltage [V] as a candidate."""
     part = Part({"fmu": CONSTANT}, {"level": level})
-    return Entry(name, part, {}, "voltage", True, None, about)
+    return Candidate(name, part, {}, "voltage", True, None, about)
 
 
 # The ground motions of a comparison: stock names, or files with their scale.
 
 _IN_G = re.compile(r"([-+.\deE]+)\s*g")
-_KEYS = ("peak", "factor", "start", "stop")
+_MOTION_KEYS = ("peak", "factor", "start", "stop")
 
 
 @dataclass(frozen=True)
@@ -573,15 +553,15 @@ def motions_of(given: Sequence[str | Path], folder: Folder, step: float) -> list
 
 def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
     for key in choice.settings:
-        if key not in _KEYS:
-            raise ScenarioError(f"--motions {choice.what}: {unknown('setting', key, _KEYS)}")
+        if key not in _MOTION_KEYS:
+            raise ScenarioError(f"--motions {choice.what}: {unknown('setting', key, _MOTION_KEYS)}")
     names = [row.name for row in list_ground_motions()]
     record = choice.what
     begins = [name for name in names if name.startswith(record)]
     if record not in names and not Path(record).is_file() and len(begins) == 1:
         record = begins[0]
     motion = read_ground_motion(record, Path())
-    values = {key: _number(choice, key) for key in choice.settings}
+    values = {key: _motion_value(choice, key) for key in choice.settings}
     stop = values.pop("stop", float(motion.time[-1]) + values.get("start", 0.0))
     if not 0.0 < stop < 1e6:
         raise ScenarioError(f"--motions {choice.what}: stop = {stop:g} s; above 0 is right.")
@@ -595,27 +575,25 @@ def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
         raise ScenarioError(f"--motions {choice.what}: the ground does not move; check its factor.")
     own = record if record in names else folder.keep(Path(record))
     return Motion(
-        choice.label or _said(Path(record).stem if record not in names else record, values),
+        choice.label or _motion_name(Path(record).stem if record not in names else record, values),
         Part({"fmu": "GroundMotion"}, {"record": own, **values}),
         round(ceil(stop / step - 1e-9) * step, 9), scaled,
         motion.source if record in names else Path(record).name,
     )  # fmt: skip
 
 
-def _number(choice: Choice, key: str) -> float:
+def _motion_value(choice: Choice, key: str) -> float:
     value: Value = choice.settings[key]
     if isinstance(value, str) and key == "peak" and (found := _IN_G.fullmatch(value.strip())):
         try:
             return float(found[1]) * G
         except ValueError:
             pass
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        right = "5.9 (m/s2) or 0.6g" if key == "peak" else "a number"
-        raise ScenarioError(f"--motions {choice.what}: {key} = {written(value)}; {right} is right.")
-    return float(value)
+    right = "5.9 (m/s2) or 0.6g" if key == "peak" else "a number"
+    return number(value, key, f"--motions {choice.what}", right)
 
 
-def _said(record: str, values: dict[str, float]) -> str:
+def _motion_name(record: str, values: dict[str, float]) -> str:
     texts = [record]
     if "peak" in values:
         texts.append(f"{values['peak'] / G:.3g} g")

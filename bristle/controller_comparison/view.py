@@ -10,10 +10,9 @@ import numpy as np
 from ..core.text import plain, scale
 from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import COLOURS, GREY, INK, PALE, Page, label, look
-from .result import REFERENCES, ControllerComparison
+from .result import REFERENCES, ControllerComparison, beside, what, winner
 from .runs import best_level
 from .setting import BEST, DAMPER, LIMIT, OFF, ON
-from .words import beside, what, winner
 
 if TYPE_CHECKING:
     import pandas as pd

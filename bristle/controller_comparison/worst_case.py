@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campaign import ensemble_file
+from ..campaign.campaign import changed_building, write_building
 from ..campaign.distributions import Distribution, share
 from ..errors import ScenarioError
 from ..fmu.controller import SAMPLE_PERIOD
 from ..physics.laws import LAWS
 from ..system.scenario import load_scenario
 from .runs import SEED, SENSORS, Bench
-from .setting import DAMPER, ENSEMBLES, FILES, STRUCTURE, Entry, Motion, Part, plain_name
+from .setting import DAMPER, ENSEMBLES, FILES, STRUCTURE, Candidate, Motion, Part, plain_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,7 +78,7 @@ class Spread:
 def worst_of(
     bench: Bench,
     motion: Motion,
-    entry: Entry,
+    candidate: Candidate,
     nominal: pd.DataFrame,
     spread: Spread,
     building: bool = True,
@@ -87,47 +87,47 @@ def worst_of(
 
     Parameters
     ----------
-    bench, motion, entry : the case
+    bench, motion, candidate : the case
     nominal : its run
     spread : what varies
     building : whether the building does
     """
     most = bench.measured(nominal)
-    sensors = _sensors(bench, entry, nominal, spread)
-    vary = _varied(bench, entry, motion, spread, building)
+    sensors = _sensors(bench, candidate, nominal, spread)
+    vary = _varied(bench, candidate, motion, spread, building)
     if sensors is not None:
         vary[f"{SENSORS}.seed"] = {"integers": [1, 10**6]}
         if spread.delay:
-            for name in entry.wires:
+            for name in candidate.wires:
                 if name in bench.site.measured:
                     vary[f"{SENSORS}.{name}.delay"] = {"uniform": [0.0, spread.delay]}
     if not vary:
         return most, 0
     folder = bench.folder
-    base = folder.at(ENSEMBLES, motion.name, f"{plain_name(entry.name)}_scenario.toml")
-    folder.write(base, bench.text(motion, entry, sensors))
-    file = folder.at(ENSEMBLES, motion.name, f"{plain_name(entry.name)}.toml")
-    found, failed = bench.many(file, entry, base, spread.members, {"vary": vary})
+    base = folder.at(ENSEMBLES, motion.name, f"{plain_name(candidate.name)}_scenario.toml")
+    folder.write(base, bench.text(motion, candidate, sensors))
+    file = folder.at(ENSEMBLES, motion.name, f"{plain_name(candidate.name)}.toml")
+    found, failed = bench.many(file, candidate, base, spread.members, {"vary": vary})
     for name in most:
         if len(found):
             most[name] = max(most[name], float(found[name].max()))
     return most, failed
 
 
-def tied(bench: Bench, entries: list[Entry]) -> list[str]:
+def tied(bench: Bench, candidates: list[Candidate]) -> list[str]:
     """Return the controllers with which no other building can be run: FMUs refuse it."""
-    return [one.name for one in entries if one.carries and bench.engine_of(one) == "fmu"]
+    return [one.name for one in candidates if one.carries and bench.engine_of(one) == "fmu"]
 
 
-def varied(bench: Bench, entries: list[Entry], spread: Spread) -> str:
+def varied(bench: Bench, candidates: list[Candidate], spread: Spread) -> str:
     """Return in words what varies in a comparison."""
-    building = "masses" in bench.site.data and not tied(bench, entries)
+    building = "masses" in bench.site.data and not tied(bench, candidates)
     return spread.text(building, bool(bench.damper.law))
 
 
-def unvaried(bench: Bench, entries: list[Entry], spread: Spread) -> list[str]:
+def unvaried(bench: Bench, candidates: list[Candidate], spread: Spread) -> list[str]:
     """Return what is not varied, a sentence each."""
-    names = tied(bench, entries)
+    names = tied(bench, candidates)
     if not spread.share:
         return []
     if "masses" not in bench.site.data:
@@ -141,12 +141,14 @@ def unvaried(bench: Bench, entries: list[Entry], spread: Spread) -> list[str]:
     ]
 
 
-def _sensors(bench: Bench, entry: Entry, nominal: pd.DataFrame, spread: Spread) -> Part | None:
+def _sensors(
+    bench: Bench, candidate: Candidate, nominal: pd.DataFrame, spread: Spread
+) -> Part | None:
     """Return the instruments of a controller, None where it measures nothing."""
-    sensed = [name for name in entry.wires if name in bench.site.measured]
+    sensed = [name for name in candidate.wires if name in bench.site.measured]
     if not sensed or not (spread.noise or spread.delay):
         return None
-    period = entry.period or SAMPLE_PERIOD
+    period = candidate.period or SAMPLE_PERIOD
     parameters: dict[str, Any] = {"sample_period": period, "seed": 1}
     for name in sensed:
         column = bench.site.measured[name]
@@ -157,17 +159,17 @@ def _sensors(bench: Bench, entry: Entry, nominal: pd.DataFrame, spread: Spread) 
 
 
 def _varied(
-    bench: Bench, entry: Entry, motion: Motion, spread: Spread, building: bool
+    bench: Bench, candidate: Candidate, motion: Motion, spread: Spread, building: bool
 ) -> dict[str, Any]:
     """Return what varies of building and damper, as an ensemble file has it."""
     found: dict[str, Any] = {}
     if not spread.share:
         return found
     values = _numbers(bench.site.data) if building else {}
-    if bench.engine_of(entry) == "compiled":
+    if bench.engine_of(candidate) == "compiled":
         found = {f"{_BUILDING}.{name}": _around(value, spread) for name, value in values.items()}
     elif values:
-        found[_BUILDING] = {"each": _written(bench, motion, values, entry, spread)}
+        found[_BUILDING] = {"each": _written(bench, motion, values, candidate, spread)}
     if not bench.damper.law:
         return found
     declared = LAWS[bench.damper.law].parameters
@@ -195,10 +197,10 @@ def _around(value: float, spread: Spread) -> dict[str, list[float]]:
 
 
 def _written(
-    bench: Bench, motion: Motion, values: dict[str, float], entry: Entry, spread: Spread
+    bench: Bench, motion: Motion, values: dict[str, float], candidate: Candidate, spread: Spread
 ) -> list[str]:
     """Write the members' buildings as files: an FMU contains its building; return their names."""
-    structure = load_scenario(bench.write(motion, entry)).component(STRUCTURE)
+    structure = load_scenario(bench.write(motion, candidate)).component(STRUCTURE)
     names = []
     for run in range(spread.members):
         drawn = {
@@ -209,6 +211,6 @@ def _written(
         }
         path = bench.folder.path / FILES / f"building_{run:03d}.toml"
         bench.folder.write(path, "")
-        ensemble_file.write(ensemble_file.changed(structure, drawn), path)
+        write_building(changed_building(structure, drawn), path)
         names.append(f"../../{FILES}/{path.name}")
     return names

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,22 @@ def write_whole(path: Path, content: str | bytes) -> None:
     finally:
         if draft is not None:
             draft.unlink(missing_ok=True)
+
+
+def replaced_by(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` make a file beside another, and put it in that one's place once it is whole.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written: the old file is left as it is.
+    """
+    new = path.with_name(path.name + ".new")
+    try:
+        write(new)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:

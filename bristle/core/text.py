@@ -193,6 +193,12 @@ def nearest(name: str, names: Iterable[str], count: int = 1) -> list[str]:
     return [folded[match] for match in matches]
 
 
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return a sentence with the name most like one that is not there, "" where none is."""
+    close = nearest(name, names)
+    return f' Did you mean "{close[0]}"?' if close else ""
+
+
 def listed(names: Iterable[str], most: int = LIST_AT_MOST) -> str:
     """Return names parted by commas, the first ones and a count of the rest where they are many.
 
@@ -253,17 +259,14 @@ def unknown(what: str, name: str, names: Iterable[str], more: str = "") -> str:
         Where to read them all, for lists too long to print.
     """
     names = list(names)
-    close = nearest(name, names)
-    words = f'there is no {what} "{name}".'
-    if close:
-        words += f' Did you mean "{close[0]}"?'
+    words = f'there is no {what} "{name}".' + did_you_mean(name, names)
     if not names:
         words += " There are none."
     elif len(names) <= LIST_AT_MOST:
         words += f" There are: {', '.join(names)}."
     else:
         others = dict.fromkeys((*nearest(name, names, 3), *names))
-        some = [one for one in others if one not in close[:1]][:3]
+        some = [one for one in others if one not in nearest(name, names)][:3]
         words += f" There are {len(names)}, among them {', '.join(some)}."
         if more:
             words += f" All: {more}"

@@ -29,3 +29,8 @@ def toml_value(value: object) -> str:
     if isinstance(value, str):  # JSON's escapes are TOML's; only DEL is missing
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)
+
+
+def toml_table(table: Mapping[str, object]) -> list[str]:
+    """Return the lines of a table, one for each of its keys."""
+    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]

@@ -1,7 +1,7 @@
 """The master: steps the FMUs of a scenario together and keeps every output of every step.
 
 Row k holds all outputs at t_k = k step, t = 0 included. What is set and read when, is decided
-in `schedule`; how it is called, in `loop`; this module initialises, watches and explains.
+in `schedule`; how it is called, in `macro_step`; this module initialises, watches and explains.
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, NoReturn, Self
 
 import numpy as np
 
 from ..errors import RunError
 from ..fmu.description import Description, Value
-from .instance import FATAL, STATUS, WARNING, Instance, Message, Unpacked
+from .instance import FATAL, WARNING, Instance, Message, Unpacked, answer_of
 from .macro_step import Memory, compile_loop
 from .results import Array, Table, count_steps, make_columns, times
 from .schedule import (
@@ -122,12 +121,7 @@ class Master:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     @property
@@ -253,8 +247,7 @@ class Master:
         instance.poisoned |= status == FATAL
         verb = VERBS.get(type(operation), "setting inputs")
         when = f"in the step from t = {self.time:.9g} s"
-        answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
-        text = f"{instance.name} {when}: {verb} answered {answer}"
+        text = f"{instance.name} {when}: {verb} answered {answer_of(status)}"
         said = instance.said()  # before the fault is read: each call forgets what was said before
         node = self.nodes[operation.component]
         if not instance.poisoned and any(kind_of(v) == "fault" for v in node.outputs.values()):

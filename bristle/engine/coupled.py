@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,55 +36,15 @@ from .records import (
     substeps_in,
 )
 
-# Lays controllers and sensors out in records of numbers for the time loop.
-
 Array = NDArray[Any]
 
 MATRICES = ("A", "B", "W", "C")
 """What differs in length from controller to controller."""
 
-
-class Clocks:
-    """The sampled components of a run: their records, constants and memory.
-
-    Parameters
-    ----------
-    slaves, wirings : sequences
-        The configured components in the order of the scenario, and where their signals are.
-    h : float
-        Substep [s].
-    """
-
-    def __init__(self, slaves: Sequence[Any], wirings: Sequence[Sequence[float]], h: float) -> None:
-        self._constants: list[float] = []
-        self._memory: list[float] = []
-        self.records = np.zeros(len(slaves), records.sampled_record())
-        for record, slave, wiring in zip(self.records, slaves, wirings, strict=True):
-            lay_sampled(record, slave.constants.period, wiring, h)
-            if slave.functions is sensors:
-                lay_sensors(record, slave.constants)
-            else:
-                lay_controller(record, slave.constants)
-                for name in MATRICES:
-                    record[name] = _put(self._constants, getattr(slave.constants, name))
-                    record[f"{name}_end"] = len(self._constants)
-            record["state"] = _put(self._memory, slave.state)
-            record["work"] = _put(self._memory, slave._work)
-            record["end"] = len(self._memory)
-        self.constants, self.memory = np.array(self._constants), np.array(self._memory)
-
-
-def _put(numbers: list[float], more: list[float]) -> int:
-    """Append numbers; return where they begin."""
-    begin = len(numbers)
-    numbers.extend(more)
-    return begin
-
-
 # What each damper of a coupled system pushes: a device of a structure, whose motion it feels.
 #
 # `pushed_by` finds it out from names; `couple` and what it calls are flat functions on records, as
-# those of `layout`.
+# those of `records`.
 
 Port = tuple[str, str]
 
@@ -436,10 +396,23 @@ class System:
 
     def sampled(self, h: float) -> tuple[Array, Array, Array]:
         """Return sampled components, their constants and memory for substeps of h [s]."""
-        names = self.names["sampled"]
-        wirings = [self.wiring(name) for name in names]
-        clocks = Clocks([self.slaves[name] for name in names], wirings, h)
-        return clocks.records, clocks.constants, clocks.memory
+        constants: list[float] = []
+        memory: list[float] = []
+        found = np.zeros(len(self.names["sampled"]), records.sampled_record())
+        for record, name in zip(found, self.names["sampled"], strict=True):
+            slave = self.slaves[name]
+            lay_sampled(record, slave.constants.period, self.wiring(name), h)
+            if slave.functions is sensors:
+                lay_sensors(record, slave.constants)
+            else:
+                lay_controller(record, slave.constants)
+                for matrix in MATRICES:
+                    record[matrix] = _put(constants, getattr(slave.constants, matrix))
+                    record[f"{matrix}_end"] = len(constants)
+            record["state"] = _put(memory, slave.state)
+            record["work"] = _put(memory, slave._work)
+            record["end"] = len(memory)
+        return found, np.array(constants), np.array(memory)
 
     def sources(self) -> tuple[Array, Array, Array]:
         """Return the sources that change, as records, and the samples of all of them."""
@@ -470,7 +443,7 @@ class System:
             lay_structure(record, slave.constants_of(h), slave.state, self.wiring(name))
         return found
 
-    # -- where the signals of a component are, as `layout` takes it
+    # -- where the signals of a component are, as `records` takes it
 
     def wiring(self, name: str) -> list[float]:
         """Return where the signals of a component are, and what they are to the others."""
@@ -511,6 +484,13 @@ class System:
         for device in building.devices:
             motion |= {device.ports.displacement, device.ports.velocity}
         return bool(read - motion)
+
+
+def _put(numbers: list[float], more: list[float]) -> int:
+    """Append numbers; return where they begin."""
+    begin = len(numbers)
+    numbers.extend(more)
+    return begin
 
 
 def kind_of(component: Component, scenario: Scenario) -> str:

@@ -20,9 +20,8 @@ from ..fmu.description import Variable
 from ..system.parameters import told_over_step
 from ..system.toml import STEP_TOLERANCE
 from ..units import alike, parse
-from .results import Table
+from .results import Table, judged_by, reals
 from .schedule import Node, Port, held_inputs
-from .summary import judged_by, reals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +39,8 @@ ROUNDING = 1e-9
 """Error along a run, as a share of the peak, below which an output has none worth telling."""
 
 Array = np.ndarray[Any, np.dtype[Any]]
+Again = Callable[["Scenario", str], "pd.DataFrame"]
+"""(scenario, engine) -> the results of another run."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class CouplingError:
 
 
 def estimate(
-    scenario: Scenario, frame: pd.DataFrame, again: Callable[[Scenario, str], pd.DataFrame]
+    scenario: Scenario, frame: pd.DataFrame, again: Again
 ) -> tuple[str, dict[str, CouplingError]]:
     """Return how the errors of a run were found, and that of every Real output.
 
@@ -236,9 +237,7 @@ def as_data(errors: dict[str, CouplingError]) -> dict[str, dict[str, Any]]:
     return {name: asdict(error) for name, error in errors.items()}
 
 
-def coupled_run(
-    scenario: Scenario, again: Callable[[Scenario, str], pd.DataFrame]
-) -> pd.DataFrame | None:
+def coupled_run(scenario: Scenario, again: Again) -> pd.DataFrame | None:
     """Return the run without coupling error, None where there is no such engine for it."""
     try:
         return again(scenario, "compiled")
@@ -267,9 +266,7 @@ MOST_UNKNOWN = 3
 """Steps in a row with an unknown error after which it goes no further down."""
 
 
-def find_step(
-    scenario: Scenario, tolerance: float, again: Callable[[Scenario, str], pd.DataFrame]
-) -> Scenario:
+def find_step(scenario: Scenario, tolerance: float, again: Again) -> Scenario:
     """Return the scenario with the largest step, 2^k times its own, whose error is small enough.
 
     Parameters
@@ -283,13 +280,7 @@ def find_step(
     RunError
         If no step does, or one of these outputs has no estimate that is worth something.
     """
-    runs: dict[tuple[float, str], pd.DataFrame] = {}
-
-    def kept(one: Scenario, engine: str) -> pd.DataFrame:
-        if (one.step, engine) not in runs:
-            runs[one.step, engine] = again(one, engine)
-        return runs[one.step, engine]
-
+    kept = _remembered(again)
     good: Scenario | None = None
     tried, unknown = scenario, 0
     for _ in range(MOST_TRIALS):
@@ -315,6 +306,19 @@ def find_step(
         f"no step down to {1e3 * tried.step:.3g} ms keeps the coupling error below "
         f"{100 * tolerance:.3g} %."
     )
+
+
+def _remembered(again: Again) -> Again:
+    """Return `again` with every run made once."""
+    runs: dict[tuple[str, float, str], pd.DataFrame] = {}
+
+    def kept(one: Scenario, engine: str) -> pd.DataFrame:
+        key = one.algorithm if engine == "fmu" else "", one.step, engine
+        if key not in runs:
+            runs[key] = again(one, engine)
+        return runs[key]
+
+    return kept
 
 
 def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> tuple[str, str]:
@@ -366,8 +370,6 @@ MOST_STEPS = 500_000
 Without the coupled engine each has one of twice as many beside it.
 """
 
-Again = Callable[["Scenario", str], "pd.DataFrame"]
-
 
 @dataclass(frozen=True)
 class Expected:
@@ -411,15 +413,7 @@ def expect(scenario: Scenario, again: Again) -> tuple[Expected, ...]:
     again : callable
         (scenario, engine) -> its results.
     """
-    runs: dict[tuple[str, float, str], pd.DataFrame] = {}
-
-    def kept(one: Scenario, engine: str) -> pd.DataFrame:
-        key = one.algorithm if engine == "fmu" else "", one.step, engine
-        if key not in runs:
-            runs[key] = again(one, engine)
-        return runs[key]
-
-    found = []
+    kept, found = _remembered(again), []
     for name in ALGORITHMS:
         try:
             found.append(_expected(replace(scenario, algorithm=name), kept, again))

@@ -17,7 +17,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NoReturn, Self
 
 from fmpy import fmi2, fmi3
@@ -30,7 +29,8 @@ from ..fmu.archive import extract, library_member, platform_folder
 from ..fmu.binary import reset_at_exit
 from ..fmu.description import Description, Value, Variable
 
-DISCARD, ERROR = 2, 3
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 
 _CHANGES_FOLDER = threading.Lock()
 """Held while fmpy loads a library: the whole process works in the FMU's folder meanwhile."""
@@ -256,9 +256,7 @@ class Fmi3(Fmi2):
         return step
 
     def _log(self, _environment: Any, status: int, category: bytes, message: bytes) -> None:
-        names = ("OK", "Warning", "Discard", "Error", "Fatal")
-        name = names[status] if 0 <= status < len(names) else f"status {status}"
-        self._say(name, (message or b"").decode("utf-8", "replace"))
+        self._say(answer_of(status), (message or b"").decode("utf-8", "replace"))
 
 
 Binding = Fmi2
@@ -275,14 +273,16 @@ def _by_type(variables: Sequence[Variable]) -> dict[str, list[int]]:
 
 # FMUs as loaded instances: unpacked, instantiated, initialised, with their messages collected.
 
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
-WARNING, DISCARD_SESSION, FATAL = 1, 2, 4
-
 _SHARED_PYTHON = (
     "It runs Python code and needs the symbols of libpython. Use a Python that offers them to "
     "shared libraries (built with --enable-shared, as those of Linux distributions and conda "
     "are), or start it with LD_PRELOAD=.../libpython{0}.{1}.so.1.0."
 )
+
+
+def answer_of(status: int) -> str:
+    """Return what a call has answered, in FMI's words."""
+    return STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
 
 
 @dataclass(frozen=True)
@@ -309,12 +309,7 @@ class Unpacked:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def folder(self, path: Path, copy: int = 0) -> Path:
@@ -436,7 +431,7 @@ class Instance:
     def say(self, status: str, text: str, category: str = "") -> None:
         """Pass on a message, as if the FMU had sent it."""
         self._last.append(text)
-        if status in STATUS[DISCARD_SESSION:] and not self._initialised:
+        if status in STATUS[DISCARD:] and not self._initialised:
             self._refused.append(text)
         self._listen(Message(self.name, status, category, text))
 
@@ -447,8 +442,7 @@ class Instance:
     def fail(self, function: str, status: int) -> NoReturn:
         """Raise RunError for a call that did not answer OK or Warning."""
         self.poisoned |= status == FATAL
-        answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
-        raise RunError(f"{self._where()}: {function} answered {answer}.{self.said()}")
+        raise RunError(f"{self._where()}: {function} answered {answer_of(status)}.{self.said()}")
 
     def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:
         self._last.clear()
@@ -530,9 +524,8 @@ def _on_message(
     if instance is None:  # an FMU that another part of this process has loaded through fmpy
         fmi2.printLogMessage(environment, name or b"", status, category or b"", text or b"")
         return
-    answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
     decoded = ((part or b"").decode("utf-8", "replace") for part in (text, category))
-    instance.say(answer, *decoded)
+    instance.say(answer_of(status), *decoded)
 
 
 _LOGGER = fmi2.fmi2CallbackLoggerTYPE(_on_message)

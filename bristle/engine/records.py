@@ -22,7 +22,7 @@ from ..component.damper import Constants
 from ..component.source import Constants as SourceConstants
 from ..component.structure import DEVICE_FORCES
 from ..component.structure import Constants as StructureConstants
-from ..fmu.controller import MEASURED as MEASURED_CONTROLLER
+from ..fmu import controller
 from ..physics import damper, structure
 from ..physics.building import MAX_FLOORS, MOST_DEVICES
 from ..physics.generate import Slots
@@ -127,7 +127,7 @@ def sampled_record() -> np.dtype[np.void]:
     room to work and `end` follow each other. A clock whose instants are all ends of substeps is
     `aligned`; sample `coming` is the next. It `senses`, or commands.
     """
-    m = len(MEASURED_CONTROLLER)
+    m = len(controller.MEASURED)
     matrices = [name + end for name in ("A", "B", "W", "C") for end in ("", "_end")]
     places = (*matrices, "state", "work", "end")
     numbers = ("v_max", "velocity_corner", "v_top", "f_min", "anti_windup", "still", "least_slope")
@@ -153,9 +153,8 @@ def sampled_record() -> np.dtype[np.void]:
 # Lays what components compute with out in the records of the time loop, in plain flat functions.
 #
 # They run in Python, for a run of the coupled engine, and compiled, in a scenario that is one FMU.
-# A
-# component's constants come first, then its wiring: numbers that say where its signals are. What
-# dampers need to know of the structures that they push comes last, see `pushed.couple`.
+# A component's constants come first, then its wiring: numbers that say where its signals are. What
+# dampers need to know of the structures that they push comes last, see `coupled.couple`.
 
 NOWHERE = -1
 """Stands for a structure, a slot or an input where there is none."""
@@ -181,7 +180,7 @@ def lay_source(g: Any, c: SourceConstants, first: int, begin: int) -> None:
 
     Parameters
     ----------
-    g : record, see `records.source_record`
+    g : record, see `source_record`
     c : Constants
     first : slot of its first output
     begin : place of its first sample among those of all sources
@@ -193,11 +192,11 @@ def lay_source(g: Any, c: SourceConstants, first: int, begin: int) -> None:
 
 
 def lay_damper(d: Any, c: Constants, state: Row, wiring: Row) -> None:
-    """Fill in the record of a damper; `pushed.couple` comes when all records are there.
+    """Fill in the record of a damper; `coupled.couple` comes when all records are there.
 
     Parameters
     ----------
-    d : record, see `records.damper_record`
+    d : record, see `damper_record`
     c : Constants
     state : states of law and effects at the begin, and what `component.damper` keeps behind them
     wiring : numbers, see `DAMPER_INPUTS`
@@ -228,7 +227,7 @@ def lay_structure(b: Any, c: StructureConstants, state: Row, wiring: Row) -> Non
 
     Parameters
     ----------
-    b : record, see `records.structure_record`
+    b : record, see `structure_record`
     c : Constants, with the matrices of a substep
     state : as `component.structure` lays it down, at the begin
     wiring : numbers, see `STRUCTURE_INPUTS`
@@ -278,7 +277,7 @@ def lay_sampled(r: Any, period: float, wiring: Row, h: float) -> None:
 
     Parameters
     ----------
-    r : record, see `records.sampled_record`
+    r : record, see `sampled_record`
     period : time between two samples [s]
     wiring : numbers, see `SAMPLED_INPUTS`
     h : substep [s]
@@ -294,7 +293,7 @@ def lay_controller(r: Any, c: Any) -> None:
 
     Parameters
     ----------
-    r : record, see `records.sampled_record`
+    r : record, see `sampled_record`
     c : `component.controller.Constants`
     """
     r["senses"] = False
@@ -311,7 +310,7 @@ def lay_sensors(r: Any, c: Any) -> None:
 
     Parameters
     ----------
-    r : record, see `records.sampled_record`
+    r : record, see `sampled_record`
     c : `component.sensors.Constants`
     """
     r["senses"], r["seed"], r["size"] = True, c.seed, c.size

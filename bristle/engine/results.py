@@ -13,7 +13,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,6 +22,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..core.files import replaced_by
 from ..core.text import written
 from ..data.response_spectrum import response_spectrum, usual_periods
 from ..errors import RunError, not_usable
@@ -29,11 +30,9 @@ from ..fmu.description import Description
 from ..view import Viewable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from matplotlib.figure import Figure
 
-    from ..system.scenario import Scenario
+    from ..system.model import Scenario
 
 
 _KIND = "# bristle results"
@@ -77,8 +76,6 @@ def to_frame(table: Table, made: Mapping[str, Any], complete: bool = True) -> Re
     Its index is the time [s]; `attrs["units"]` maps columns (and "time") to units,
     `attrs["made"]` says how the results were made, `attrs["complete"]` whether the run ended.
     """
-    import pandas as pd
-
     frame = Results(table.values, index=pd.Index(table.time, name="time"))
     units = {"time": "s"} | {c.name: c.unit for c in table.columns if c.unit}
     frame.attrs.update(units=units, made=dict(made), complete=complete)
@@ -120,13 +117,9 @@ class CsvWriter:
         self.path = path
         head = _head(table.columns, made)
         self._place = len(f"{_KIND}\n".encode())
-        new = path.with_name(path.name + ".new")
+        whole = head.encode() + _lines(table)
         try:
-            try:
-                new.write_bytes(head.encode() + _lines(table))
-                new.replace(path)
-            finally:
-                new.unlink(missing_ok=True)
+            replaced_by(path, lambda new: new.write_bytes(whole))
             self._file = path.open("r+b", buffering=0)
         except OSError as error:
             raise cannot_write(path, error, 0) from error
@@ -193,13 +186,9 @@ def write_parquet(frame: pd.DataFrame, path: Path) -> None:
     about = {"made": frame.attrs["made"], "complete": frame.attrs["complete"]}
     schema = pa.schema([time, *fields], metadata={"bristle": json.dumps(about)})
     arrays = [table.time, *table.values.values()]
-    new = path.with_name(path.name + ".new")
+    whole = pa.table([pa.array(a) for a in arrays], schema=schema)
     try:
-        try:
-            pq.write_table(pa.table([pa.array(a) for a in arrays], schema=schema), new)
-            new.replace(path)
-        finally:
-            new.unlink(missing_ok=True)
+        replaced_by(path, lambda new: pq.write_table(whole, new))
     except OSError as error:
         raise cannot_write(path, error, 0) from error
 
@@ -448,12 +437,18 @@ class Results(pd.DataFrame, Viewable):
 # What the rows and columns of a run are, whichever engine fills them.
 
 
-def make_columns(scenario: Scenario, descriptions: Mapping[str, Description]) -> tuple[Column, ...]:
-    """Return the columns of the results: every output but texts, in the order of the file."""
+def make_columns(
+    scenario: Scenario, descriptions: Mapping[str, Description] | None = None
+) -> tuple[Column, ...]:
+    """Return the columns of the results: every output but texts, in the order of the file.
+
+    `descriptions` are those of the FMUs that are stepped; else the scenario's own.
+    """
+    known = descriptions or {c.name: c.description for c in scenario.components}
     return tuple(
         Column(f"{component.name}.{variable.name}", variable.kind, variable.unit)
         for component in scenario.components
-        for variable in descriptions[component.name].of("output")
+        for variable in known[component.name].of("output")
         if variable.kind != "String"
     )
 
@@ -478,19 +473,17 @@ def times(first: int, last: int, step: float) -> Array:
 
 # Response spectra of a run: of the ground, and of the floors as equipment on them feels it.
 
-SpectraArray = NDArray[np.float64]
-
-FILE = "spectrum.csv"
-ENDS = ("ground_acceleration", "_acceleration_absolute")
+SPECTRUM_FILE = "spectrum.csv"
+_ACCELERATION_ENDS = ("ground_acceleration", "_acceleration_absolute")
 """How outputs end that have a spectrum: absolute accelerations."""
 
 
 def accelerations(names: Mapping[str, object]) -> list[str]:
     """Return those names of outputs that are absolute accelerations, in their order."""
-    return [name for name in names if name.endswith(ENDS)]
+    return [name for name in names if name.endswith(_ACCELERATION_ENDS)]
 
 
-def spectra(columns: Mapping[str, SpectraArray], step: float) -> dict[str, SpectraArray]:
+def spectra(columns: Mapping[str, Array], step: float) -> dict[str, Array]:
     """Return the 5 % damped spectra of absolute acceleration of a run's ground and floors.
 
     Parameters
@@ -543,3 +536,75 @@ def write_spectra(frame: pd.DataFrame, path: Path) -> None:
         path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     except OSError as error:
         raise cannot_write(path, error, 0) from error
+
+
+# Peaks and RMS values of a run's outputs.
+
+_INTERESTING = re.compile(
+    r"\.(.*acceleration(_absolute)?|base_displacement|drift\d*|displacement|force|voltage"
+    r"|command_raw|stroke_ratio|value)$"
+)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One output over a whole run: the largest absolute value, when it came, and the RMS."""
+
+    name: str
+    unit: str | None
+    peak: float
+    time_of_peak: float
+    rms: float
+
+
+def reals(frame: pd.DataFrame) -> list[str]:
+    """Return the names of the Real outputs of a run."""
+    return [str(name) for name in frame if frame[name].dtype.kind == "f"]
+
+
+def foreign(frame: pd.DataFrame) -> set[str]:
+    """Return the names of a run's components that are FMU files, as the results tell."""
+    scenario = tomllib.loads(frame.attrs.get("made", {}).get("scenario", ""))
+    components = scenario.get("components", {})
+    return {name for name, part in components.items() if str(part.get("fmu")).endswith(".fmu")}
+
+
+def judged_by(frame: pd.DataFrame) -> list[str]:
+    """Return the outputs that a run is judged by; each component has at least one of them."""
+    others, found = foreign(frame), set()
+    for component, names in by_component(reals(frame)).items():
+        chosen = [name for name in names if _INTERESTING.search(name)]
+        found.update(names if component in others else chosen or names)
+    return [name for name in reals(frame) if name in found]
+
+
+def by_component(names: Iterable[str]) -> dict[str, list[str]]:
+    """Return names of outputs such as "damper.force" by their component."""
+    parts: dict[str, list[str]] = {}
+    for name in names:
+        parts.setdefault(name.partition(".")[0], []).append(name)
+    return parts
+
+
+def summarise(frame: pd.DataFrame, everything: bool = False) -> list[Summary]:
+    """Return peak and RMS of the Real outputs of a run, over all of its rows.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Results as `bristle.run` returns them.
+    everything : bool
+        Every Real output; otherwise of each built-in component those that a run is usually judged
+        by (accelerations, drifts, forces, voltages), or all if it has none of these, and of each
+        foreign FMU all.
+    """
+    names = reals(frame) if everything else judged_by(frame)
+    units, time = frame.attrs["units"], frame.index.to_numpy()
+    found = []
+    for name in names:
+        values = frame[name].to_numpy()
+        at = int(np.argmax(np.abs(values)))
+        rms = float(np.sqrt(np.mean(np.square(values))))
+        peak = float(abs(values[at]))
+        found.append(Summary(name, units.get(name), peak, float(time[at]), rms))
+    return found

@@ -77,7 +77,7 @@ class Output:
     """Where a run's files go; None as the folder means that nothing is written.
 
     `show` gets the warnings and notes of the scenario's check before the run; by default they are
-    in the log alone.
+    in the log alone. `quiet` keeps the warnings of the run itself off stderr.
 
     Raises
     ------
@@ -90,12 +90,14 @@ class Output:
         folder: Path | None,
         format: str = "csv",
         show: Callable[[str], None] = lambda line: None,
+        quiet: bool = False,
     ) -> None:
         if format not in FORMATS:
             raise not_usable(f'format "{format}" is not known; there are: {", ".join(FORMATS)}.')
         self.folder = folder
         self.format = format
         self.show = show
+        self.quiet = quiet
         self._made: list[Path] = []
         self._writer: CsvWriter | None = None
         self._log: TextIO | None = None
@@ -151,7 +153,7 @@ class Output:
     def warn(self, line: str) -> None:
         """Write a line to the log and show it, once, on stderr."""
         self.log(f"warning: {line}")
-        if line not in self._told:
+        if line not in self._told and not self.quiet:
             self._told.add(line)
             logging.getLogger("bristle").warning(line)
 
@@ -197,8 +199,7 @@ class Output:
             ) from error
 
 
-# Longer than 300 lines: whatever ends a run, and how, the rows before are kept in one class.
-
+# A run: whatever ends it, and how, the rows before are kept.
 
 ENGINES = ("fmu", "compiled")
 FLUSH = 1.0
@@ -287,7 +288,7 @@ def run(
     (5.9, 'N')
     """
     _refuse_types(scenario, overrides, out)
-    output = Output(_folder(out), format)
+    output = Output(None if out is None else Path(out), format)
     return execute(
         scenario, overrides, engine, output, progress, coupling_error=coupling_error, fmus=fmus
     )
@@ -400,25 +401,16 @@ def run_quietly(scenario: Scenario, engine: str, fmus: str = "python") -> Result
         shown = listening()
     else:
         tell(f"{scenario.title}: the coupled engine")
-    return execute(scenario, None, engine, _Silent(None), shown, reference=True, fmus=form)
-
-
-class _Silent(Output):
-    """An output that takes nothing."""
-
-    def warn(self, line: str) -> None:
-        """Keep quiet."""
+    return execute(
+        scenario, None, engine, Output(None, quiet=True), shown, reference=True, fmus=form
+    )
 
 
 class _Job:
     """One run on its way: what it is made of, what it has so far, how it ends."""
 
     def __init__(
-        self,
-        scenario: Scenario,
-        engine: str,
-        output: Output,
-        ensure: Callable[..., Path],
+        self, scenario: Scenario, engine: str, output: Output, ensure: Callable[..., Path]
     ) -> None:
         self.scenario = scenario
         self.ensure = ensure
@@ -446,9 +438,7 @@ class _Job:
             values = simulate(self.scenario, REFERENCE_SUBSTEP if reference else LONGEST_SUBSTEP)
         except StoppedError as error:
             stopped, values = error, error.columns
-        columns = make_columns(
-            self.scenario, {c.name: c.description for c in self.scenario.components}
-        )
+        columns = make_columns(self.scenario)
         time = times(0, len(values["time"]), self.scenario.step)
         table = Table(time, columns, {c.name: values[c.name].astype(c.dtype) for c in columns})
         self.output.begin(table, self.made, self.scenario.remarks())
@@ -493,7 +483,7 @@ class _Job:
             if master.rows:
                 self.output.begin(master.table(), self.made, self.scenario.remarks())
         title = self.scenario.title
-        if isinstance(self.output, _Silent):  # one of several, which differ in it
+        if self.output.quiet:  # one of several, which differ in it
             title += f", a step of {1e3 * self.scenario.step:.4g} ms"
         with Progress(title, master.steps, progress) as bar:
             count, due = 1, time.perf_counter() + FLUSH
@@ -584,7 +574,3 @@ class _Job:
         sys.stderr.flush()
         master.forget()
         os._exit(130)
-
-
-def _folder(out: str | Path | None) -> Path | None:
-    return None if out is None else Path(out)

@@ -11,8 +11,6 @@ signals of the scenario stand in one vector `s`; each component is a record (see
 holds its numbers, the slots of its inputs in `s`, and the first of its outputs.
 """
 
-# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
-
 from __future__ import annotations
 
 from math import floor, inf, isfinite

@@ -15,8 +15,17 @@ from ..core.text import plain
 from ..data.cycles import largest
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
-from .results import NOTHING, Feed, Results, feeds_of
-from .summary import by_component, foreign, judged_by, reals, summarise
+from .results import (
+    NOTHING,
+    Feed,
+    Results,
+    by_component,
+    feeds_of,
+    foreign,
+    judged_by,
+    reals,
+    summarise,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -207,12 +216,9 @@ class _Run:
         if not tops:
             moved = [name for name in self.reals() if name.endswith(".displacement")]
             made += [partial(self.history, name, f"Displacement, {name[:-13]}") for name in moved]
-        made += [partial(self.history, name, f"Voltage, {name[:-8]}") for name in self._varying()]
+        driven = (n for n in self.reals() if n.endswith(".voltage") and self._moves(n))
+        made += [partial(self.history, name, f"Voltage, {name[:-8]}") for name in driven]
         return [make() for make in made[:_MOST_HISTORIES]]
-
-    def _varying(self) -> list[str]:
-        names = [name for name in self.reals() if name.endswith(".voltage")]
-        return [name for name in names if self._moves(name)]
 
     @cached_property
     def feeds(self) -> dict[str, Feed]:

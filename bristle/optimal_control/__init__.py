@@ -1,6 +1,6 @@
 """How far any control of a scenario's damper could lower a peak or RMS: the limit.
 
-    from bristle.limit import limit
+    from bristle.optimal_control import limit
     found = limit("el_centro_0p6g_constant_voltage")
     found.value, found.bound, found.previews, found.sure
 
@@ -10,7 +10,6 @@ voltage's history makes the search short; `Limit` says how sure the outcome is.
 
 from __future__ import annotations
 
-from .limit import limit
-from .result import Limit, Start
+from .limit import Limit, Start, limit
 
 __all__ = ["Limit", "Start", "limit"]

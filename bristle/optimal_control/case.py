@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ FINER = 4
 """By how much they are finer where friction sticks: its force is then held over a step."""
 
 
-FEWEST = 50
+MIN_INSTANTS = 50
 """Instants that a ground motion must have."""
 
 
@@ -216,10 +217,10 @@ def _ground(system: System, building: str, h: float, scenario: Scenario) -> Arra
     for k in range(len(found)):
         source.output(k * h, shown, constants, shown, shown, shown)
         found[k] = shown[0]
-    if len(found) < FEWEST:
+    if len(found) < MIN_INSTANTS:
         raise ScenarioError(
             f"{scenario.file}: stop = {scenario.stop:g} s is too short for a limit; "
-            f"{FEWEST * h:g} s or more is right."
+            f"{MIN_INSTANTS * h:g} s or more is right."
         )
     if not found.any():
         raise ScenarioError(f"{scenario.file}: the ground does not move: nothing is to be lowered.")
@@ -323,17 +324,24 @@ def write_scenario(case: Case, time: Array, voltage: Array, folder: Path) -> Sce
     RunError
         If the folder cannot be written, exit code 2.
     """
-    rows = [f"time [s],{case.command} [{case.command_unit}]"]
-    rows += [f"{t:.9g},{V:.9g}" for t, V in zip(time.tolist(), voltage.tolist(), strict=True)]
+    rows = history_text(time.tolist(), voltage.tolist(), case.command, case.command_unit)
     path = folder / SCENARIO_FILE
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / VOLTAGE_FILE).write_text("\n".join(rows) + "\n", encoding="utf-8")
+        (folder / VOLTAGE_FILE).write_text(rows, encoding="utf-8")
         text = scenario_text(with_voltage(case, folder / VOLTAGE_FILE))
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
     return load_scenario(path)
+
+
+def history_text(
+    times: Iterable[float], values: Iterable[float], name: str = "voltage", unit: str = "V"
+) -> str:
+    """Return a command's history as a two-column CSV; times in s."""
+    rows = (f"{t:.9g},{V:.9g}" for t, V in zip(times, values, strict=True))
+    return "\n".join([f"time [s],{name} [{unit}]", *rows]) + "\n"
 
 
 def with_voltage(case: Case, file: Path) -> Scenario:

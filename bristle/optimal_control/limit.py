@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 import time as clock
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,11 +18,10 @@ from ..engine.coupled import simulate
 from ..engine.run import run
 from ..errors import RunError, ScenarioError
 from ..system.scenario import Scenario, loaded_with
+from ..view import Viewable
 from .bound import FASTER, bound_of, largest_force
 from .case import Case, Problem, case_of, refuse_folder, write_scenario
-from .preview import foreseen
-from .result import Limit, Start
-from .search import descended, levelled, value_of
+from .search import descended, foreseen, levelled, value_of
 
 if TYPE_CHECKING:
     from ..engine.results import Results
@@ -39,6 +39,92 @@ STATISTICS = ("peak", "rms")
 QUIET = 0.35
 """Share of its peak under the best constant voltage that an output has fallen to for good where the
 search's window ends, two periods later; it is the whole motion where the rest then counts."""
+
+
+AGREE = 0.02
+"""Share by which starts that agree differ at most."""
+TRUST = 0.01
+"""Share by which the coupled engine may find another value than the search."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """A search: where it began, in words, the value there, and the one that it found."""
+
+    name: str
+    before: float
+    value: float
+
+
+@dataclass(frozen=True, repr=False)
+class Limit(Viewable):
+    """The least peak or RMS of an output that a damper's voltage reaches, the motion known.
+
+    Attributes
+    ----------
+    title : str
+        Of the scenario.
+    output, statistic, unit : str
+        What is judged: "component.port", "peak" or "rms", its unit.
+    value : float
+        What the scenario's run by the coupled engine under `voltage` has.
+    searched : float
+        What the search's own computation has under it.
+    starts : tuple of Start
+        The best one first.
+    bound : float or None
+        No force up to `most_force` gives less; None where none is known.
+    most_force : float
+        Largest force of the damper [N] up to twice the speed that it has here.
+    previews : dict
+        Time seen ahead [s] to the value that a receding horizon reaches.
+    constant : dict
+        Constant voltage [V] to value.
+    as_it_is : float
+        Value of the scenario with what commands its damper.
+    time, voltage : (n,) arrays
+        The history that reaches the limit [s, V], linear between.
+    command, command_unit : str
+        The damper's input that is free, and its unit.
+    results : Results
+        Of that run.
+    seconds : float
+    """
+
+    title: str
+    output: str
+    statistic: str
+    unit: str
+    value: float
+    searched: float
+    starts: tuple[Start, ...]
+    bound: float | None
+    most_force: float
+    previews: dict[float, float]
+    constant: dict[float, float]
+    as_it_is: float
+    time: Array = field(repr=False)
+    voltage: Array = field(repr=False)
+    command: str
+    command_unit: str
+    results: Results = field(repr=False)
+    seconds: float
+
+    @property
+    def agreeing(self) -> int:
+        """How many starts found a value within 2 % of the least."""
+        least = self.starts[0].value
+        return sum(start.value <= (1.0 + AGREE) * least for start in self.starts)
+
+    @property
+    def sure(self) -> bool:
+        """Whether two starts agree and the coupled engine confirms the value."""
+        return self.agreeing > 1 and abs(self.value / self.searched - 1.0) <= TRUST
+
+    @property
+    def best_constant(self) -> tuple[float, float]:
+        """The best of the constant voltages [V], and its value."""
+        return min(self.constant.items(), key=lambda one: one[1])
 
 
 def limit(
@@ -87,7 +173,7 @@ def limit(
 
     Examples
     --------
-    >>> from bristle.limit import limit
+    >>> from bristle.optimal_control import limit
     >>> found = limit("half_sine_pulse", {"run.stop": 1.0})  # doctest: +SKIP
     >>> found.bound < found.value <= min(found.constant.values())  # doctest: +SKIP
     True
@@ -107,7 +193,7 @@ def limit(
     best = min(constant, key=lambda V: constant[V])
     last = _window(whole, best) if statistic == "peak" else whole.last
     problem, found = _searched_from_all(whole, last, statistic, best, starts)
-    if not _in_window(problem, whole, found[0][1]):
+    if int(np.abs(whole.respond(found[0][1])).argmax()) > problem.last:  # the peak comes later
         problem, found = _searched_from_all(whole, whole.last, statistic, best, starts)
     searched, voltage = found[0][0].value, found[0][1]
     ahead = {}
@@ -167,11 +253,6 @@ def _searched_from_all(
     return problem, sorted(found, key=lambda one: one[0].value)
 
 
-def _in_window(problem: Problem, whole: Problem, voltage: Array) -> bool:
-    """Return whether the peak under a voltage (N + 1,) lies within the window."""
-    return int(np.abs(whole.respond(voltage)).argmax()) <= problem.last
-
-
 def _begins(problem: Problem, best: float, count: int) -> dict[str, Array]:
     """Return where searches begin, by name: constant voltages, then random ones."""
     n, v_max = len(problem.nodes), problem.case.v_max
@@ -187,18 +268,19 @@ def _searched(
     problem: Problem, whole: Problem, name: str, values: Array, statistic: str, rest: float
 ) -> tuple[Start, Array]:
     """Search from voltages (n,) at the nodes; return what came out, and the voltage (N + 1,)."""
-    before = value_of(whole.respond(_continued(problem, values, rest)), statistic)
+    begin = _continued(problem, problem.between(values), rest)
+    before = value_of(whole.respond(begin), statistic)
     values = descended(problem, values, statistic)
     if statistic == "peak":
         values = levelled(problem, values)[0]
-    voltage = _continued(problem, values, rest)
+    voltage = _continued(problem, problem.between(values), rest)
     return Start(name, before, value_of(whole.respond(voltage), statistic)), voltage
 
 
-def _continued(problem: Problem, values: Array, rest: float) -> Array:
-    """Return the voltage at all instants of a case: behind the window it is `rest` [V]."""
+def _continued(problem: Problem, voltage: Array, rest: float) -> Array:
+    """Return a voltage (n,) at all instants of a case: behind the window it is `rest` [V]."""
     tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
-    return np.append(problem.between(values), tail)
+    return np.append(voltage, tail)
 
 
 def _seen_ahead(
@@ -206,8 +288,7 @@ def _seen_ahead(
 ) -> float:
     """Return what a receding horizon reaches; the cost is never told by less than 2 % of least."""
     voltage = foreseen(problem, seconds, rest, 0.02 * least, statistic)
-    tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
-    return value_of(whole.respond(np.append(voltage, tail)), statistic)
+    return value_of(whole.respond(_continued(problem, voltage, rest)), statistic)
 
 
 def _bound(

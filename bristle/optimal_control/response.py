@@ -184,8 +184,7 @@ def respond(
 # What a voltage's history does to a response: its derivative, exactly as the response is computed.
 #
 # The adjoint of the discrete system (Cao, Li, Petzold & Serban 2003, SIAM J. Sci. Comput. 24(3)):
-# the
-# slopes of each step of the damper, by small changes, then one pass backwards. Written in plain
+# the slopes of each step of the damper, by small changes, then one pass backwards. Written in plain
 # Python and compiled by `jit`.
 
 

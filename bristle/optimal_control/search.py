@@ -9,13 +9,12 @@ Fletcher & Sainz de la Maza 1989, Math. Program. 43).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog, minimize
 
 from .case import Problem
+from .horizon import Horizon
 
 Array = NDArray[np.float64]
 
@@ -43,9 +42,7 @@ def value_of(y: Array, statistic: str) -> float:
     return float(np.abs(y).max())
 
 
-def descended(
-    problem: Problem, values: Array, statistic: str, done: Callable[[], None] = lambda: None
-) -> Array:
+def descended(problem: Problem, values: Array, statistic: str) -> Array:
     """Return the voltages (n,) at the nodes that lower a statistic from those given.
 
     Parameters
@@ -53,11 +50,9 @@ def descended(
     problem : Problem
     values : (n,) V, where the search begins
     statistic : "peak" or "rms"
-    done : called now and then
     """
     for norm in NORMS if statistic == "peak" else (2.0,):
         values = _descend(problem, values, norm)
-        done()
     return values
 
 
@@ -87,14 +82,12 @@ def _descend(problem: Problem, values: Array, norm: float) -> Array:
     return better
 
 
-def levelled(
-    problem: Problem, values: Array, done: Callable[[], None] = lambda: None
-) -> tuple[Array, float]:
+def levelled(problem: Problem, values: Array) -> tuple[Array, float]:
     """Return the voltages (n,) at the nodes after linear programs, and the peak with them.
 
     Parameters
     ----------
-    problem, values, done
+    problem, values
         As in `descended`.
     """
     v_max, region = problem.case.v_max, REGION * problem.case.v_max
@@ -110,7 +103,6 @@ def levelled(
             rows = np.array([_row(problem, k, float(np.sign(y[k]))) for k in at])
         low, high = np.maximum(-values, -region), np.minimum(v_max - values, region)
         promised, change = _program(rows, np.abs(y[at]), low, high)
-        done()
         if promised > (1.0 - GAIN) * peak and region >= REGION * v_max:
             break
         tried = np.clip(values + change, 0.0, v_max)
@@ -172,3 +164,50 @@ def _program(rows: Array, sizes: Array, low: Array, high: Array) -> tuple[float,
         return float(sizes.max()), np.zeros(n)
     change: Array = found.x[:-1]
     return float(found.x[-1]), change
+
+
+# What one reaches who sees the ground motion for some time ahead: a receding horizon's result.
+
+PERIODS = 1.0
+"""Length of the horizon behind what is seen, in periods of the first mode."""
+DECISIONS = 40
+"""Decisions in a period, about."""
+ROUNDS = 6
+"""Gradient steps of a decision."""
+POWERS = (2.0, 8.0)
+"""Of the output in a decision's cost; for a peak the better one counts. The less is seen, the lower
+is the better: what is not seen may be larger than all that is."""
+
+
+def foreseen(problem: Problem, seconds: float, start: float, least: float, statistic: str) -> Array:
+    """Return the voltage (N + 1,) [V] of a receding horizon at the instants of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    seconds : for which the ground motion is seen ahead [s]
+    start : voltage at the begin [V]
+    least : size of the output that counts for nothing
+    statistic : "peak" or "rms"
+    """
+    found = [
+        _receded(problem, seconds, start, least, power)
+        for power in (POWERS if statistic == "peak" else POWERS[:1])
+    ]
+    return min(found, key=lambda voltage: value_of(problem.respond(voltage), statistic))
+
+
+def _receded(problem: Problem, seconds: float, start: float, least: float, power: float) -> Array:
+    case = problem.case
+    h, period = case.plant.h, 1.0 / case.frequency
+    every = max(1, round(period / DECISIONS / h))
+    steps = every * max(2, round((seconds + PERIODS * period) / (every * h)))
+    n = steps // every
+    horizon = Horizon(
+        steps, every, ROUNDS, round(seconds / h), least, power, case.v_max, np.full(n, start),
+        np.zeros((5, n + 1)), np.zeros((4, steps + 1)), problem.course_of(steps),
+        problem.gradient_of(steps),
+    )  # fmt: skip
+    voltage = np.full(problem.last + 1, start)
+    problem.recede(voltage, horizon)
+    return voltage

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..core.text import plain
 from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import BLUE, GREY, INK, PALE, VERMILION, Page, look
-from .result import AGREE, TRUST, Limit
+from .limit import AGREE, TRUST, Limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

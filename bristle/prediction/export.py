@@ -28,8 +28,7 @@ from ..study.identify import as_model
 from ..study.rig import building_of, rig_of
 from ..study.runs import Runs
 from ..study.study import Study
-from ..system.from_model import Parameters, source_of, values_of
-from ..system.toml import DamperText, part_text
+from ..system.toml import DamperText, Parameters, part_text, source_of, values_of
 from ..user_code.load import own_effects
 from . import model_system
 from .held_out import FOLDER, HeldOut, Proof, held_out, prove, step_for, write_inputs, write_proof

@@ -25,8 +25,7 @@ from ..physics.drive import VOLTAGE, Drive, drive_named, states_for
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..study.identify import as_model
-from ..system.from_model import Parameters
-from ..system.toml import DamperText, model_scenario_text, part_text, signal_file
+from ..system.toml import DamperText, Parameters, model_scenario_text, part_text, signal_file
 from ..user_code.load import own_effects
 
 Array = NDArray[np.float64]

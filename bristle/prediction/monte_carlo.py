@@ -20,9 +20,8 @@ from ..model.draws import OpenEffect, drawn_models, in_short, reach, simulated_w
 from ..model.model import StudyModel
 from ..physics.drive import VOLTAGE
 from ..physics.forms import shown_law
-from ..system.from_model import Parameters, source_of, values_of
 from ..system.scenario import Scenario, load_scenario
-from ..system.toml import part_text
+from ..system.toml import Parameters, part_text, source_of, values_of
 from .closed_loop_result import KINDS, MISSED, PARAMETERS, Predicted
 from .excitation import Trial
 from .model_system import House, Shaking, loads, studied_ports, write_scenario, write_signals

@@ -73,12 +73,14 @@ def _setting(found: ControllerComparison) -> str:
     motions = [
         [m.name, f"{plain(m.peak, 3)} m/s²", f"{m.stop:g} s", m.source] for m in setting.motions
     ]
-    entries = [[one.name, one.about, _settings(one.part.parameters)] for one in setting.entries]
+    candidates = [
+        [one.name, one.about, _settings(one.part.parameters)] for one in setting.candidates
+    ]
     return html.section(
         "What was compared",
         html.paragraphs(*texts),
         html.table(["Ground motion", "peak as run", "run to", "source"], motions, [1, 2]),
-        html.table(["Controller", "what it is", "values"], entries),
+        html.table(["Controller", "what it is", "values"], candidates),
     )
 
 
@@ -161,12 +163,12 @@ def _again(found: ControllerComparison) -> str:
     """Return how each case is run again."""
     if found.setting.folder is None:
         return ""
-    motion, entry = found.setting.motions[0], found.setting.entries[0]
-    own = f"{SCENARIOS}/{plain_name(motion.name)}/{plain_name(entry.name)}.toml"
-    engine = found.table[found.table["controller"] == entry.name]["engine"].iloc[0]
+    motion, candidate = found.setting.motions[0], found.setting.candidates[0]
+    own = f"{SCENARIOS}/{plain_name(motion.name)}/{plain_name(candidate.name)}.toml"
+    engine = found.table[found.table["controller"] == candidate.name]["engine"].iloc[0]
     lines = [command("run", own, *(["--engine", "compiled"] if engine == "compiled" else []))]
     if found.setting.spread is not None:
-        ensemble = f"{ENSEMBLES}/{plain_name(motion.name)}/{plain_name(entry.name)}.toml"
+        ensemble = f"{ENSEMBLES}/{plain_name(motion.name)}/{plain_name(candidate.name)}.toml"
         lines.append(command("ensemble", ensemble))
     return html.section(
         "Run it again",

@@ -1,6 +1,6 @@
 """Controller synthesis, offline: a task in, a verified controller out.
 
-    from bristle.design import design, read_task
+    from bristle.synthesis import design, read_task
     result = design(read_task("my_design.toml"))
     result.controller.save("my_controller.json")
 

@@ -35,10 +35,17 @@ def gains(system: StateSpace, omega: Array) -> Array:
         terms = left[None] / (1j * omega[:, None, None] - values[:, None])
         response = (C @ vectors) @ terms + D
     else:
-        s = 1j * omega[:, None, None] * np.eye(len(A))
-        response = C @ np.linalg.solve(s - A, np.broadcast_to(B, (len(omega), *B.shape))) + D
+        response = _response(system, omega)
     largest: Array = np.linalg.norm(response, 2, axis=(1, 2))
     return largest
+
+
+def _response(system: StateSpace, omega: Array) -> NDArray[np.complex128]:
+    """Return the frequency response (k, outputs, inputs) at `omega` (k,) rad/s."""
+    A, B, C, D = system
+    s = 1j * omega[:, None, None] * np.eye(len(A))
+    found = C @ np.linalg.solve(s - A, np.broadcast_to(B, (len(omega), *B.shape))) + D
+    return np.asarray(found, dtype=np.complex128)
 
 
 def hinf_norm(system: StateSpace) -> float:
@@ -204,7 +211,7 @@ def margins(plant: Plant, K: StateSpace) -> Margins:
     )
     omega = _frequencies(plant.A, K.A, closed.A)
     G = StateSpace(plant.A, plant.B2, plant.C2, plant.D22)
-    L = -_response(G, omega) * _response(K, omega)
+    L = -_response(G, omega)[:, 0, 0] * _response(K, omega)[:, 0, 0]
     up, down = _gains(L)
     return Margins(1.0 / hinf_norm(sensitivity), up, down, _phase(L))
 
@@ -244,13 +251,6 @@ def _frequencies(*matrices: Array) -> Array:
     near = np.abs(poles.imag)[:, None] + _NEAR[None] * np.abs(poles.real)[:, None]
     omega = np.unique(np.concatenate([span, near[near > 0.0].ravel()]))
     return np.asarray(omega, dtype=np.float64)
-
-
-def _response(system: StateSpace, omega: Array) -> NDArray[np.complex128]:
-    A, B, C, D = system
-    s = 1j * omega[:, None, None] * np.eye(len(A))
-    response = C @ np.linalg.solve(s - A, np.broadcast_to(B, (len(omega), *B.shape))) + D
-    return np.asarray(response[:, 0, 0], dtype=np.complex128)
 
 
 def _gains(L: NDArray[np.complex128]) -> tuple[float | None, float | None]:
@@ -317,7 +317,7 @@ def responses(result: DesignResult, omega: Array, row: int = 0) -> dict[str, Arr
     return {
         "open_loop": gains(plant.open_loop(), omega),
         "closed_loop": gains(closed, omega),
-        "acceleration_open": gains(_to_acceleration(plant), omega),
+        "acceleration_open": gains(StateSpace(plant.A, plant.B1[:, :1], plant.C2, nothing), omega),
         "acceleration_closed": gains(StateSpace(closed.A, ground, acceleration, nothing), omega),
         "command": gains(StateSpace(closed.A, ground, command, nothing), omega),
         "controller": gains(K, omega),
@@ -376,10 +376,6 @@ def task_curves(task: Task) -> dict[str, Array]:
         "acceleration_weight": np.abs(task.weights.acceleration.response(omega)),
         "command_weight": np.abs(task.weights.command.response(omega)),
     }
-
-
-def _to_acceleration(plant: Plant) -> StateSpace:
-    return StateSpace(plant.A, plant.B1[:, :1], plant.C2, np.zeros((1, 1)))
 
 
 # Checks a designed controller without the solver: poles, sampling, closed-loop norms.

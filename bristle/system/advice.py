@@ -14,9 +14,8 @@ from ..errors import BristleError, PhysicsError
 from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, laws_of
-from .connections import Wire
 from .library import Library
-from .model import Part, Run
+from .model import Connection, Part, Run
 from .parameters import check_rod
 
 # The step from which the coupling of a mass with a damper is unstable, for each algorithm.
@@ -42,7 +41,7 @@ def longest_step(algorithm: str, mass: float, c: float, k: float) -> float:
     Parameters
     ----------
     algorithm : str
-        One of `parts.ALGORITHMS`.
+        One of `model.ALGORITHMS`.
     mass, c, k : float
         kg; N.s/m, above 0; N/m.
     """
@@ -94,7 +93,7 @@ _RELATIVE = 1e-3
 class Network:
     """The components and connections of a scenario, for questions about who feeds whom."""
 
-    def __init__(self, parts: Mapping[str, Part], wires: Sequence[Wire]) -> None:
+    def __init__(self, parts: Mapping[str, Part], wires: Sequence[Connection]) -> None:
         self.parts = parts
         self.order = list(parts)
         self.wires = [wire for wire in wires if wire.target in parts and wire.source in parts]
@@ -141,7 +140,11 @@ def own_velocity(force: str) -> str:
 
 
 def advise(
-    run: Run, parts: Mapping[str, Part], wires: Sequence[Wire], library: Library, document: Document
+    run: Run,
+    parts: Mapping[str, Part],
+    wires: Sequence[Connection],
+    library: Library,
+    document: Document,
 ) -> None:
     """Add warnings, notes, and the errors of ports that must be used together.
 
@@ -151,7 +154,7 @@ def advise(
         As far as it could be read.
     parts : mapping
         Name to component, in the order of the file.
-    wires : sequence of Wire
+    wires : sequence of Connection
         The connections that could be read.
     library : Library
         Knows masses and designs of what is installed.

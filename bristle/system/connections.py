@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from ..core.config import Document
@@ -12,7 +11,7 @@ from ..core.toml_lines import KeyPath
 from ..errors import UnitError
 from ..fmu.description import Variable, passes
 from ..units import Measure
-from .model import Part
+from .model import Connection, Part
 from .overrides import flatten
 from .parameters import shown_items
 from .ssp_read import SAME
@@ -23,32 +22,11 @@ FROM, FACTOR, OFFSET = TRANSFORMED = ("from", "factor", "offset")
 _ARTICLE = {"input": "an input", "output": "an output"}
 
 
-@dataclass(frozen=True)
-class Wire:
-    """One connection that could be read, with the path of its key; input = factor output + offset.
-
-    `transformed` is whether the scenario says so, even if by 1 and 0.
-    """
-
-    target: str
-    input: str
-    source: str
-    output: str
-    path: KeyPath
-    factor: float = 1.0
-    offset: float = 0.0
-    transformed: bool = False
-
-    def given(self, value: float) -> float:
-        """Return what the input gets where the output has a value."""
-        return self.factor * value + self.offset
-
-
 def check_connections(
     document: Document, connections: Mapping[str, Any], parts: Mapping[str, Part]
-) -> list[Wire]:
+) -> list[Connection]:
     """Check every connection and that every input has exactly one source."""
-    wires: dict[str, Wire] = {}
+    wires: dict[str, Connection] = {}
     claimed: set[str] = set()  # inputs whose connection stands in the file, right or wrong
     if not isinstance(document.data.get("connections", {}), dict):
         return []  # without asking for a source of every input
@@ -100,7 +78,7 @@ def _check_wire(
     path: KeyPath,
     parts: Mapping[str, Part],
     document: Document,
-) -> Wire | None:
+) -> Connection | None:
     source = said[FROM] if isinstance(said, dict) else said
     if not isinstance(source, str):
         document.error(
@@ -144,8 +122,8 @@ def _check_wire(
             f'"{target}" is connected here and set in the parameters of {to.name} too; '
             "one of them must go.",
         )
-    return Wire(
-        to.name, entry.name, origin.name, exit_.name, path, *transformation, isinstance(said, dict)
+    return Connection(
+        to.name, entry.name, origin.name, exit_.name, *transformation, isinstance(said, dict), path
     )
 
 
@@ -272,7 +250,10 @@ def _check_units(
 
 
 def _check_inputs(
-    parts: Mapping[str, Part], wires: Mapping[str, Wire], claimed: set[str], document: Document
+    parts: Mapping[str, Part],
+    wires: Mapping[str, Connection],
+    claimed: set[str],
+    document: Document,
 ) -> None:
     """Report every input that nothing feeds."""
     for part in parts.values():

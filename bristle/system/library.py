@@ -8,7 +8,6 @@ import zipfile
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..component.controller_file import KINDS, Controller, parse_controller
 from ..core.text import unknown
@@ -17,11 +16,8 @@ from ..errors import DesignError, PhysicsError
 from ..fmu.description import Description
 from ..physics.forms import joined_form
 from ..physics.laws import LAWS, laws_of
-from .model import DamperLaw
+from .model import Component, DamperLaw
 from .overrides import FILE_PARAMETERS, MADE_FROM
-
-if TYPE_CHECKING:
-    from .scenario import Component
 
 
 @dataclass(frozen=True)

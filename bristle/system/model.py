@@ -1,4 +1,4 @@
-"""What a check knows of a scenario while it reads it: the run, the components."""
+"""A scenario as plain data, and what a check knows of it while it reads it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..core.config import Document
-from ..core.text import command, nearest
+from ..core.text import Finding, command, nearest, worded
 from ..core.toml_lines import KeyPath
 from ..fmu.description import Description, Value, Variable
 
@@ -77,6 +77,106 @@ class Part:
         """Return a parameter's value if it is a number."""
         value = self.value(name)
         return float(value) if isinstance(value, int | float) else None
+
+
+@dataclass(frozen=True)
+class Component:
+    """One FMU of a scenario.
+
+    `path` is the file of a foreign FMU, None for a built-in; `building` the data file that a
+    Structure is made from, None for the default; `controller` the controller file of a designed
+    controller, None for the one that it carries; `effects` the files of a user's own effects that a
+    built-in one carries besides the library's; `parameters` the values that the scenario sets,
+    inputs that are held constant included; `step` its own step [s], None for the run's; `law` that
+    of a damper where the scenario names it; `over_step` what the scenario says of a foreign FMU's
+    ports (see `parameters.choose_over_step`).
+    """
+
+    name: str
+    fmu: str
+    path: Path | None
+    building: Path | None
+    parameters: dict[str, Value]
+    step: float | None
+    description: Description
+    effects: tuple[Path, ...] = ()
+    controller: Path | None = None
+    law: DamperLaw | None = None
+    over_step: dict[str, str] = field(default_factory=dict)
+
+    def made_of(self) -> str:
+        """Return what the catalogue makes it from; a law of a user's own is registered then."""
+        if self.law is None:
+            return self.fmu
+        if self.law.file is not None:  # this process may not have read it yet
+            from ..trust import load_file
+
+            load_file(self.law.file, "law")
+        return self.law.component
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Component and port that take a value, component and port that give it.
+
+    input = factor output + offset; `transformed` is whether the scenario says so, even if by 1 and
+    0: units are its own matter then. `path` leads to its key in the file.
+    """
+
+    target: str
+    input: str
+    source: str
+    output: str
+    factor: float = 1.0
+    offset: float = 0.0
+    transformed: bool = False
+    path: KeyPath = field(default=(), compare=False, repr=False)
+
+    @property
+    def changes(self) -> bool:
+        """Whether a value changes on its way."""
+        return (self.factor, self.offset) != (1.0, 0.0)
+
+    def given(self, value: float) -> float:
+        """Return what the input gets where the output has a value."""
+        return self.factor * value + self.offset
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A checked scenario; `stop` [s] is a whole number of steps of `step` [s].
+
+    `title` is the file's unless overrides changed what runs (see `library.changed_title`).
+
+    `algorithm` is one of `ALGORITHMS`; components step in their order. `findings` are the
+    warnings and notes of its check; `overrides` what was laid over the file. `package` is the SSP
+    package that it was read from, None without one.
+    """
+
+    file: Path
+    title: str
+    stop: float
+    step: float
+    algorithm: str
+    components: tuple[Component, ...]
+    connections: tuple[Connection, ...]
+    findings: tuple[Finding, ...] = ()
+    overrides: dict[str, object] = field(default_factory=dict)
+    package: Path | None = None
+
+    @property
+    def steps(self) -> int:
+        """Number of communication steps."""
+        return round(self.stop / self.step)
+
+    def remarks(self) -> list[str]:
+        """Return the warnings and notes of the check, a line each with its place."""
+        name = (self.package or self.file).name
+        return [f"{found.level}: {worded(name, found)}" for found in self.findings]
+
+    def component(self, name: str) -> Component:
+        """Return the component of a name."""
+        return next(component for component in self.components if component.name == name)
 
 
 def existing_file(

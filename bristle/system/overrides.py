@@ -26,6 +26,8 @@ MADE_FROM = ("building", "controller")
 """Keys that name a file which a component is made from."""
 FILE_PARAMETERS = ("record", "file")
 """Parameters that may name a file, relative to the scenario's folder."""
+FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
+"""Last words of names whose value may be a file."""
 
 _SHORT = re.compile(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 """Numbers that TOML does not know: .5 and 5."""
@@ -179,8 +181,7 @@ def _as_in_file(value: object, key: str) -> object:
     value = plain(value)
     if isinstance(value, list):
         return [_as_in_file(one, key) for one in value]
-    is_file_name = key in (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
-    if is_file_name and isinstance(value, str) and Path(value).suffix:
+    if key in FILES and isinstance(value, str) and Path(value).suffix:
         here = Path(value).absolute()
         return str(here) if exists(here) else value
     return value

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import pi, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..component import SAMPLED
 from ..core.config import Document
@@ -21,12 +21,8 @@ from ..physics.forms import TABLE_FORM
 from ..physics.motion_file import read_two_column
 from ..physics.signals import KINDS, PARAMETERS, STEPS, TAKEN, read_steps
 from .library import Library
-from .model import Part, Run, existing_file
+from .model import Component, Part, Run, existing_file
 from .overrides import FILE_PARAMETERS
-
-if TYPE_CHECKING:
-    from .scenario import Component
-
 
 # Checks of built-in test signals: their samples, parameters that do nothing, rods that jump.
 

@@ -5,19 +5,19 @@ Every mistake of a file is found at once, with its line and what would be right.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..core import files
-from ..core.config import Document, raised
-from ..core.text import Finding, nearest, worded
+from ..core.config import Document, raised, toml_content
+from ..core.text import Finding, nearest, unknown
 from ..errors import ScenarioError
-from ..fmu.description import Description, Value
+from ..fmu.description import Value
 from .advice import advise
 from .connections import check_connections
 from .library import Library, changed_title, installed, needs_title
-from .model import DamperLaw, Run
+from .model import Component, Connection, Run, Scenario
 from .overrides import (
     FILE_PARAMETERS,
     SCENARIO,
@@ -36,6 +36,7 @@ __all__ = [
     "Finding",
     "Scenario",
     "check_scenario",
+    "copy_scenario",
     "fmu_parameters",
     "load_scenario",
     "loaded_with",
@@ -45,95 +46,7 @@ __all__ = [
     "stock_scenarios",
 ]
 
-
-@dataclass(frozen=True)
-class Component:
-    """One FMU of a scenario.
-
-    `path` is the file of a foreign FMU, None for a built-in; `building` the data file that a
-    Structure is made from, None for the default; `controller` the controller file of a designed
-    controller, None for the one that it carries; `effects` the files of a user's own effects that a
-    built-in one carries besides the library's; `parameters` the values that the scenario sets,
-    inputs that are held constant included; `step` its own step [s], None for the run's; `law` that
-    of a damper where the scenario names it; `over_step` what the scenario says of a foreign FMU's
-    ports (see `over_step.choose_over_step`).
-    """
-
-    name: str
-    fmu: str
-    path: Path | None
-    building: Path | None
-    parameters: dict[str, Value]
-    step: float | None
-    description: Description
-    effects: tuple[Path, ...] = ()
-    controller: Path | None = None
-    law: DamperLaw | None = None
-    over_step: dict[str, str] = field(default_factory=dict)
-
-    def made_of(self) -> str:
-        """Return what the catalogue makes it from; a law of a user's own is registered then."""
-        if self.law is None:
-            return self.fmu
-        if self.law.file is not None:  # this process may not have read it yet
-            from ..trust import load_file
-
-            load_file(self.law.file, "law")
-        return self.law.component
-
-
-@dataclass(frozen=True)
-class Connection:
-    """Component and port that take a value, component and port that give it.
-
-    input = factor output + offset; `transformed` is whether the scenario says so, even if by 1 and
-    0: units are its own matter then.
-    """
-
-    target: str
-    input: str
-    source: str
-    output: str
-    factor: float = 1.0
-    offset: float = 0.0
-    transformed: bool = False
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """A checked scenario; `stop` [s] is a whole number of steps of `step` [s].
-
-    `title` is the file's unless overrides changed what runs (see `naming.changed_title`).
-
-    `algorithm` is one of `parts.ALGORITHMS`; components step in their order. `findings` are the
-    warnings and notes of its check; `overrides` what was laid over the file. `package` is the SSP
-    package that it was read from, None without one.
-    """
-
-    file: Path
-    title: str
-    stop: float
-    step: float
-    algorithm: str
-    components: tuple[Component, ...]
-    connections: tuple[Connection, ...]
-    findings: tuple[Finding, ...] = ()
-    overrides: dict[str, object] = field(default_factory=dict)
-    package: Path | None = None
-
-    @property
-    def steps(self) -> int:
-        """Number of communication steps."""
-        return round(self.stop / self.step)
-
-    def remarks(self) -> list[str]:
-        """Return the warnings and notes of the check, a line each with its place."""
-        name = (self.package or self.file).name
-        return [f"{found.level}: {worded(name, found)}" for found in self.findings]
-
-    def component(self, name: str) -> Component:
-        """Return the component of a name."""
-        return next(component for component in self.components if component.name == name)
+_SCHEMA = re.compile(r"^#:schema .*\n", re.MULTILINE)
 
 
 def load_scenario(
@@ -237,31 +150,18 @@ def _read(
     assert run.step is not None
     components = tuple(
         Component(
-            part.name,
-            part.fmu,
-            part.file,
-            part.building,
-            part.parameters,
-            part.step,
-            description,
-            part.effects,
-            part.controller,
-            part.law,
-            part.over_step,
+            part.name, part.fmu, part.file, part.building, part.parameters, part.step, description,
+            part.effects, part.controller, part.law, part.over_step,
         )
         for part in parts.values()
         if (description := part.description) is not None
-    )
+    )  # fmt: skip
     title = path.stem if title is None else title
     if ("title",) not in document.overridden and needs_title(changed):
         title = changed_title(components, changed)
-    connections = tuple(
-        Connection(w.target, w.input, w.source, w.output, w.factor, w.offset, w.transformed)
-        for w in wires
-    )
     laid_over = {str(name): plain(value) for name, value in overrides.items()}
     scenario = Scenario(
-        path, title, run.stop, run.step, run.algorithm, components, connections, tuple(found),
+        path, title, run.stop, run.step, run.algorithm, components, tuple(wires), tuple(found),
         laid_over, package,
     )  # fmt: skip
     return scenario, found
@@ -329,3 +229,49 @@ def resolve_scenario(name: str | Path) -> Path:
     hint = f' Did you mean "{by_stem[close[0]]}"?' if close else ""
     listed = f" Stock scenarios: {', '.join(names)}." if names else ""
     raise ScenarioError(f'there is no scenario file "{name}".{hint}{listed}')
+
+
+def copy_scenario(name: str, target: Path | None = None) -> Path:
+    """Copy a stock scenario; return the file that was written.
+
+    Parameters
+    ----------
+    name : str
+        Of a stock scenario.
+    target : Path, optional
+        The file that is written; else NAME.toml in the current folder. The line that tells editors
+        where the schema stands is left out: it holds beside the stock scenarios alone. A building
+        of the scenario's own goes with it, to the same place beside it.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scenario, or a file is there already or cannot be written.
+    """
+    stock = {file.stem: file for file in stock_scenarios()}
+    source = stock.get(name.removesuffix(".toml"))
+    if source is None:
+        raise ScenarioError(unknown("stock scenario", name, list(stock)))
+    file = target or Path(source.name)
+    text = source.read_text(encoding="utf-8")
+    components = toml_content(source)["components"].values()
+    buildings = [component["building"] for component in components if "building" in component]
+    _write_new(file, _SCHEMA.sub("", text))
+    for building in buildings:
+        copied = file.parent / building
+        content = (source.parent / building).read_text(encoding="utf-8")
+        if not copied.is_file() or copied.read_text(encoding="utf-8") != content:
+            copied.parent.mkdir(parents=True, exist_ok=True)
+            _write_new(copied, content)
+    return file
+
+
+def _write_new(file: Path, text: str) -> None:
+    """Write a file that is not there yet."""
+    try:
+        with file.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+    except FileExistsError:
+        raise ScenarioError(f"{file} is there already; another file, or remove it.") from None
+    except OSError as error:
+        raise ScenarioError(f"{file}: cannot be written ({error.strerror or error}).") from None

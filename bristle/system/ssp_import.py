@@ -8,14 +8,14 @@ import math
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..core import files
 from ..core.text import listed
-from ..core.toml_write import toml_key, toml_value
+from ..core.toml_write import toml_value
 from ..errors import FmuError, ScenarioError, UnitError
 from ..fmu.description import Description, Value, Variable, passes, read_description, read_root
 from ..units import Measure
@@ -33,7 +33,7 @@ from .ssp_read import (
     open_package,
     read_structure,
 )
-from .toml import NAME, RESERVED, STEP_TOLERANCE
+from .toml import NAME, RESERVED, STEP_TOLERANCE, component_text, joined_text
 
 Names = tuple[str, ...]
 Port = tuple[Names, str]
@@ -70,10 +70,8 @@ class _Network:
     given: dict[Port, Given] = field(default_factory=dict)
 
 
-def flatten_system(
-    structure: Structure, package: Package, describe: Callable[[str, str], Description]
-) -> FlatSystem:
-    """Return a structure as components side by side.
+class _Flattener:
+    """Puts the components of a structure side by side.
 
     Parameters
     ----------
@@ -88,15 +86,9 @@ def flatten_system(
     ScenarioError
         If nothing can be run, or a connection or value is wrong: with file and element.
     """
-    return _Flattener(structure, package, describe).flat()
 
-
-class _Flattener:
     def __init__(
-        self,
-        structure: Structure,
-        package: Package,
-        describe: Callable[[str, str], Description],
+        self, structure: Structure, package: Package, describe: Callable[[str, str], Description]
     ) -> None:
         self.package = package
         self.net = _Network()
@@ -438,7 +430,7 @@ def _unpack(path: Path, folder: Path) -> ImportedPackage:
     with open_package(path) as package:
         structure = read_structure(package)
         fmus = _Fmus(package, folder)
-        flat = flatten_system(structure, package, fmus.describe)
+        flat = _Flattener(structure, package, fmus.describe).flat()
         notes = [Note(text) for text in package.notes]
     stop, step = _times(structure, fmus.files.values(), notes)
     algorithm = structure.algorithm or ALGORITHMS[0]
@@ -446,19 +438,14 @@ def _unpack(path: Path, folder: Path) -> ImportedPackage:
         text = f'There is no algorithm "{algorithm}": {ALGORITHMS[0]} is taken.'
         notes.append(Note(text, "algorithm"))
         algorithm = ALGORITHMS[0]
-    lines = [
-        "schema = 1",
-        f"title = {toml_value(structure.name or path.stem)}",
-        "",
-        "[run]",
-        f"stop = {toml_value(stop)}",
-        f"step = {toml_value(step)}",
-        f"algorithm = {toml_value(algorithm)}",
-    ]
-    lines += _components(flat, fmus, notes)
+    run = {"stop": stop, "step": step, "algorithm": algorithm}
+    names = _names(flat)
+    parts = _components(flat, fmus, names, notes)
+    wires = dict(_connection(one, flat, names) for one in flat.connections)
+    text = joined_text(structure.name or path.stem, run, parts, wires)
     scenario = folder / f"{path.stem}.toml"
     heads = [f"# {note}" for note in (f"From {path.name}.", *(note.text for note in notes))]
-    scenario.write_text("\n".join([*heads, "", *lines]) + "\n", encoding="utf-8")
+    scenario.write_text("\n".join([*heads, "", text]), encoding="utf-8")
     return ImportedPackage(scenario, tuple(dict.fromkeys(fmus.files.values())), tuple(notes))
 
 
@@ -497,14 +484,13 @@ def _unique(name: str, taken: Iterable[str], other: Callable[[int], str]) -> str
     return name
 
 
-def _components(flat: FlatSystem, fmus: _Fmus, notes: list[Note]) -> list[str]:
-    """Return the lines of the components and of their connections."""
-    names = _names(flat)
+def _components(
+    flat: FlatSystem, fmus: _Fmus, names: Mapping[Names, str], notes: list[Note]
+) -> list[str]:
+    """Return the tables of the components."""
     fed = {connection.target for connection in flat.connections}
-    lines = []
+    parts = []
     for path, member in flat.components.items():
-        lines += ["", f"[components.{toml_key(names[path])}]"]
-        lines.append(f"fmu = {toml_value(fmus.files[member].name)}")
         variables = flat.descriptions[path].variables
         values = {
             name: _typed(variables[name], value)
@@ -521,21 +507,22 @@ def _components(flat: FlatSystem, fmus: _Fmus, notes: list[Note]) -> list[str]:
                     text = f'The input "{port}" has neither source nor start value: '
                     notes.append(Note(f"{text}{toml_value(start)} is taken."))
                 values[variable.name] = start
-        if values:
-            pairs = [f"{toml_key(name)} = {toml_value(value)}" for name, value in values.items()]
-            lines.append(f"parameters = {{ {', '.join(pairs)} }}")
-    lines += ["", "[connections]"]
-    return lines + [_connection(one, flat, names) for one in flat.connections]
+        table = {"fmu": fmus.files[member].name, **({"parameters": values} if values else {})}
+        parts.append(component_text(names[path], table))
+    return parts
 
 
-def _connection(one: FlatConnection, flat: FlatSystem, names: dict[Names, str]) -> str:
+def _connection(
+    one: FlatConnection, flat: FlatSystem, names: Mapping[Names, str]
+) -> tuple[str, Any]:
+    """Return a connection as a key and its value."""
     ends = (one.target, one.source)
-    target, source = (toml_value(f"{names[path]}.{port}") for path, port in ends)
+    target, source = (f"{names[path]}.{port}" for path, port in ends)
     wanted, given = (flat.descriptions[path].variables[port].measure for path, port in ends)
     if one.change == SAME and _are_one(given, wanted):
-        return f"{target} = {source}"
-    factor, offset = (toml_value(float(number)) for number in one.change)
-    return f"{target} = {{ from = {source}, factor = {factor}, offset = {offset} }}"
+        return target, source
+    factor, offset = map(float, one.change)
+    return target, {"from": source, "factor": factor, "offset": offset}
 
 
 def _are_one(given: Measure | None, wanted: Measure | None) -> bool:

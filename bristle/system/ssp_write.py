@@ -9,70 +9,26 @@ import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ScenarioError
 from ..fmu.build import Plan, build, plan
 from ..fmu.description import Value, Variable
 from ..units import DIMENSIONS, Unit, alike
+from .model import Component, Connection, Scenario
 from .overrides import FILE_PARAMETERS
-from .scenario import Component, Scenario, fmu_parameters
+from .scenario import fmu_parameters
 from .ssp_read import FMU_TYPE, NAMESPACES, OMS, OSP, OSP_SYSTEM, OWN, OWN_TYPE, STRUCTURE
 
 Element = ElementTree.Element
 
 
-@dataclass(frozen=True)
-class WrittenComponent:
-    """A component of a flat system that is written.
-
-    `source` is its FMU, relative to the text; `ports` are its connected inputs and outputs;
-    `values` those of parameters, and of inputs that are held, with their variables; `step` its own
-    step [s], None for the system's.
-    """
-
-    name: str
-    source: str
-    ports: tuple[Variable, ...]
-    values: tuple[tuple[Variable, Value], ...]
-    step: float | None = None
+Sources = Mapping[str, str]
+"""The FMU of each component by its name, relative to the text that names it."""
 
 
-@dataclass(frozen=True)
-class WrittenConnection:
-    """Component and port that give a value, those that take factor value + offset.
-
-    `transformed` is whether factor and offset are told: no unit is converted then.
-    """
-
-    source: str
-    output: str
-    target: str
-    input: str
-    factor: float = 1.0
-    offset: float = 0.0
-    transformed: bool = False
-
-    @property
-    def changes(self) -> bool:
-        """Whether a value changes on its way."""
-        return (self.factor, self.offset) != (1.0, 0.0)
-
-
-@dataclass(frozen=True)
-class WrittenSystem:
-    """A flat system: title, stop and step [s], algorithm, components, connections."""
-
-    title: str
-    stop: float
-    step: float
-    algorithm: str
-    components: tuple[WrittenComponent, ...]
-    connections: tuple[WrittenConnection, ...] = field(default=())
-
-
-def ssd_text(system: WrittenSystem) -> str:
+def ssd_text(system: Scenario, sources: Sources) -> str:
     """Return the text of SystemStructure.ssd, SSP 1.0.
 
     The step stands in it as libcosim and Ecos read it and as OMSimulator does.
@@ -82,9 +38,15 @@ def ssd_text(system: WrittenSystem) -> str:
     root.set("version", "1.0")
     whole = _add(root, "ssd:System", name=_NAME_OF_SYSTEM)
     elements = _add(whole, "ssd:Elements")
-    declared = _declared(system.components)
+    ports = {component.name: _ports(component, system) for component in system.components}
+    declared = _declared(ports.values())
     for component in system.components:
-        _component(elements, component, declared)
+        values = _values(component, system.file.parent)
+        element = _add(
+            elements, "ssd:Component", name=component.name, type=FMU_TYPE,
+            source=sources[component.name],
+        )  # fmt: skip
+        _component(element, component.name, ports[component.name], values, declared)
     if system.connections:
         connections = _add(whole, "ssd:Connections")
         for connection in system.connections:
@@ -112,50 +74,42 @@ _OMS_TOLERANCE = "0.0001"
 
 
 def _component(
-    elements: Element, component: WrittenComponent, declared: Mapping[str, Unit]
-) -> None:
-    element = _add(
-        elements, "ssd:Component", name=component.name, type=FMU_TYPE, source=component.source,
-    )  # fmt: skip
-    if component.ports:
+    element: Element, name: str, ports: list[Variable], values: list[tuple[Variable, Value]],
+    declared: Mapping[str, Unit],
+) -> None:  # fmt: skip
+    if ports:
         connectors = _add(element, "ssd:Connectors")
-        for port in component.ports:
+        for port in ports:
             connector = _add(connectors, "ssd:Connector", name=port.name, kind=port.causality)
             _add(connector, f"ssc:{_kind(port)}", **_unit(port, declared))
-    if component.values:
+    if values:
         binding = _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding")
-        values = _add(binding, "ssd:ParameterValues")
-        found = _add(values, "ssv:ParameterSet", version="1.0", name=component.name)
+        found = _add(
+            _add(binding, "ssd:ParameterValues"), "ssv:ParameterSet", version="1.0", name=name
+        )
         parameters = _add(found, "ssv:Parameters")
-        for variable, value in component.values:
+        for variable, value in values:
             parameter = _add(parameters, "ssv:Parameter", name=variable.name)
             _add(parameter, f"ssv:{_kind(variable)}", value=_written(value))
 
 
-def _connection(connections: Element, connection: WrittenConnection) -> None:
+def _connection(connections: Element, connection: Connection) -> None:
     element = _add(
-        connections,
-        "ssd:Connection",
-        startElement=connection.source,
-        startConnector=connection.output,
-        endElement=connection.target,
+        connections, "ssd:Connection", startElement=connection.source,
+        startConnector=connection.output, endElement=connection.target,
         endConnector=connection.input,
-    )
+    )  # fmt: skip
     if connection.transformed:
         element.set("suppressUnitConversion", "true")
     if connection.changes:
-        _add(
-            element,
-            "ssc:LinearTransformation",
-            factor=repr(connection.factor),
-            offset=repr(connection.offset),
-        )
+        factor, offset = repr(connection.factor), repr(connection.offset)
+        _add(element, "ssc:LinearTransformation", factor=factor, offset=offset)
 
 
-def _declared(components: Iterable[WrittenComponent]) -> dict[str, Unit]:
+def _declared(ports: Iterable[Iterable[Variable]]) -> dict[str, Unit]:
     """Return the units of the ports by name, but for names by which FMUs mean different ones."""
     found: dict[str, Unit | None] = {}
-    for port in (port for component in components for port in component.ports):
+    for port in (port for own in ports for port in own):
         measure = port.measure if port.kind == "Real" else None
         if measure is None or measure.unit is None:  # a foreign FMU's own
             continue
@@ -196,7 +150,7 @@ def _annotation(parent: Element, kind: str) -> Element:
     return _add(_add(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
 
 
-def osp_text(system: WrittenSystem) -> str:
+def osp_text(system: Scenario, sources: Sources) -> str:
     """Return the text of OspSystemStructure.xml."""
     root = Element("OspSystemStructure", {"xmlns": OSP_SYSTEM, "version": "0.1"})
     for name, text in (
@@ -208,13 +162,14 @@ def osp_text(system: WrittenSystem) -> str:
         _add(root, name).text = text
     simulators = _add(root, "Simulators")
     for component in system.components:
-        simulator = _add(simulators, "Simulator", name=component.name, source=component.source)
+        source = sources[component.name]
+        simulator = _add(simulators, "Simulator", name=component.name, source=source)
         if component.step is not None:
             simulator.set("stepSize", repr(component.step))
-        if component.values:
-            values = _add(simulator, "InitialValues")
-            for variable, value in component.values:
-                initial = _add(values, "InitialValue", variable=variable.name)
+        if values := _values(component, system.file.parent):
+            initials = _add(simulator, "InitialValues")
+            for variable, value in values:
+                initial = _add(initials, "InitialValue", variable=variable.name)
                 _add(initial, _kind(variable), value=_written(value))
     changed = [one for one in system.connections if one.changes]
     if changed:
@@ -231,12 +186,12 @@ def osp_text(system: WrittenSystem) -> str:
     return _text(root)
 
 
-def _function(connection: WrittenConnection) -> str:
+def _function(connection: Connection) -> str:
     # A dot, which no component has in its name: d_x.in and d.x_in are two.
     return f"{connection.target}.{connection.input}"
 
 
-def _osp_connection(connections: Element, one: WrittenConnection) -> None:
+def _osp_connection(connections: Element, one: Connection) -> None:
     if not one.changes:
         joined = _add(connections, "VariableConnection")
         _add(joined, "Variable", simulator=one.source, name=one.output)
@@ -309,13 +264,13 @@ def export_ssp(
         raise ScenarioError(f"{file}: the name of an SSP package ends with .ssp.")
     with tempfile.TemporaryDirectory(prefix="bristle_ssp_") as temporary:
         fmus = _fmus(scenario, Path(temporary), build)
-        system = _system(scenario, fmus)
+        inside = {name: f"{RESOURCES}/{fmu.name}" for name, fmu in fmus.items()}
         with _writing(file):
-            _pack(file, ssd_text(system), list(fmus.values()))
+            _pack(file, ssd_text(scenario, inside), list(fmus.values()))
         written = [file]
         if osp is not None:
             with _writing(osp):
-                written += _lay_out(osp, system, list(fmus.values()))
+                written += _lay_out(osp, scenario, fmus)
     return ExportedPackage(tuple(written), tuple(_notes(scenario)))
 
 
@@ -353,43 +308,20 @@ def _fmu(component: Component, home: Path, folder: Path, name: str, build: Build
     return build(what, folder)
 
 
-def _system(scenario: Scenario, fmus: dict[str, Path]) -> WrittenSystem:
+def _ports(component: Component, scenario: Scenario) -> list[Variable]:
+    """Return the connected inputs and outputs of a component."""
     ends = {(c.target, c.input) for c in scenario.connections}
     ends |= {(c.source, c.output) for c in scenario.connections}
-    components = tuple(
-        WrittenComponent(
-            component.name,
-            f"{RESOURCES}/{fmus[component.name].name}",
-            tuple(
-                variable
-                for variable in component.description.variables.values()
-                if (component.name, variable.name) in ends
-            ),
-            tuple(
-                (component.description.variables[key], value)
-                for key, value in _values(component, scenario.file.parent).items()
-            ),
-            component.step,
-        )
-        for component in scenario.components
-    )
-    connections = tuple(
-        WrittenConnection(
-            c.source, c.output, c.target, c.input, c.factor, c.offset, c.transformed
-        )
-        for c in scenario.connections
-    )  # fmt: skip
-    return WrittenSystem(
-        scenario.title, scenario.stop, scenario.step, scenario.algorithm, components, connections
-    )
+    there = component.description.variables.values()
+    return [variable for variable in there if (component.name, variable.name) in ends]
 
 
-def _values(component: Component, home: Path) -> dict[str, Value]:
-    """Return the values that stand in the package; files are in the FMUs."""
-    values = fmu_parameters(component, home)
-    if component.path is None:
-        values = {key: value for key, value in values.items() if key not in FILE_PARAMETERS}
-    return values
+def _values(component: Component, home: Path) -> list[tuple[Variable, Value]]:
+    """Return the values that stand in the package; files of built-in ones are in their FMUs."""
+    inside = FILE_PARAMETERS if component.path is None else ()
+    values = fmu_parameters(component, home).items()
+    variables = component.description.variables
+    return [(variables[key], value) for key, value in values if key not in inside]
 
 
 def _notes(scenario: Scenario) -> Iterator[str]:
@@ -433,13 +365,13 @@ def _write(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     archive.writestr(entry, data)
 
 
-def _lay_out(folder: Path, system: WrittenSystem, fmus: list[Path]) -> list[Path]:
+def _lay_out(folder: Path, scenario: Scenario, fmus: Mapping[str, Path]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
-    beside = tuple(replace(c, source=Path(c.source).name) for c in system.components)
     structure = folder / "OspSystemStructure.xml"
-    for fmu in fmus:
+    for fmu in fmus.values():
         (folder / fmu.name).write_bytes(fmu.read_bytes())
-    structure.write_text(osp_text(replace(system, components=beside)), encoding="utf-8")
+    beside = {name: fmu.name for name, fmu in fmus.items()}
+    structure.write_text(osp_text(scenario, beside), encoding="utf-8")
     return [structure]
 
 

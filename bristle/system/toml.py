@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -13,19 +13,17 @@ from ..core.config import ANY, Document
 from ..core.files import write_whole
 from ..core.text import unknown
 from ..core.toml_lines import KeyPath
-from ..core.toml_write import toml_key, toml_value
+from ..core.toml_write import toml_key, toml_table, toml_value
 from ..errors import BristleError, PhysicsError, TrustError
+from ..fmu.description import Value
+from ..model.model import StudyModel
+from ..physics.effect import EFFECTS
 from ..physics.forms import split_form
-from .from_model import Parameters
+from ..user_code.load import own_effects, own_laws
 from .library import Library
-from .model import Part, Run, existing_file
+from .model import Component, Part, Run, Scenario, existing_file
 from .overrides import COMPONENT, FILE_PARAMETERS, LAW_KEYS, MADE_FROM, SCENARIO, flatten
 from .parameters import check_parameter, check_storeys, check_together, choose_law, choose_over_step
-
-if TYPE_CHECKING:
-    from .model import DamperLaw
-    from .scenario import Component, Scenario
-
 
 MAX_RESULT_BYTES = 2**31
 """Results are kept in memory; a run that would need more [byte] is refused."""
@@ -238,11 +236,152 @@ def _check_begin(part: Part, path: KeyPath, document: Document) -> None:
     document.note(path, f"[components.{part.name}]: {text}.")
 
 
-# The text and the signal files of a scenario that is written from a model and a measurement.
+# A scenario as TOML text: as it is run, or made of a model and a measurement.
 
-Value = float | bool | str
+
+def scenario_text(scenario: Scenario) -> str:
+    """Return the TOML text of a scenario; read again it gives the same run.
+
+    Files are written as absolute paths, so that the text holds wherever it is put.
+    """
+    folder = scenario.file.parent
+    parts = [component_text(c.name, _table_of(c, folder)) for c in scenario.components]
+    wires: dict[str, Any] = {}
+    for wire in scenario.connections:
+        source = f"{wire.source}.{wire.output}"
+        transformed = {"from": source, "factor": wire.factor, "offset": wire.offset}
+        wires[f"{wire.target}.{wire.input}"] = transformed if wire.transformed else source
+    run = {"stop": scenario.stop, "step": scenario.step, "algorithm": scenario.algorithm}
+    return joined_text(scenario.title, run, parts, wires)
+
+
+def joined_text(
+    title: str, run: Mapping[str, Any], parts: Iterable[str], wires: Mapping[str, Any]
+) -> str:
+    """Return the text of a scenario.
+
+    Parameters
+    ----------
+    title : of the scenario
+    run : stop and step [s], algorithm
+    parts : the components' tables, in the order in which they step
+    wires : input "component.port" to output, or to a table of `from`, `factor`, `offset`
+    """
+    lines = ["schema = 1", f"title = {toml_value(title)}", "", "[run]", *toml_table(run)]
+    for part in parts:
+        lines += ["", part]
+    return "\n".join([*lines, "", "[connections]", *toml_table(wires)]) + "\n"
+
+
+def component_text(name: str, table: Mapping[str, Any]) -> str:
+    """Return the table of a component as text."""
+    return "\n".join([f"[components.{toml_key(name)}]", *toml_table(table)])
+
+
+def _table_of(component: Component, folder: Path) -> dict[str, Any]:
+    """Return the table of a component; relative files are in `folder`."""
+    found: dict[str, Any] = {}
+    if (law := component.law) is not None:
+        name, form, knots = split_form(law.name)
+        given = {"command": form, "command_knots": list(knots)}
+        found["law"] = law.file.absolute().as_posix() if law.file else name
+        found |= {key: value for key, value in given.items() if value}
+    else:
+        path = component.path
+        found["fmu"] = component.fmu if path is None else path.absolute().as_posix()
+    effects = [file.absolute().as_posix() for file in component.effects]
+    values = dict(component.parameters)
+    for name in FILE_PARAMETERS:
+        if (folder / str(values.get(name, ""))).is_file():
+            values[name] = (folder / str(values[name])).absolute().as_posix()
+    building, controller = (
+        file.absolute().as_posix() if file is not None else None
+        for file in (component.building, component.controller)
+    )
+    more = {
+        "building": building, "effects": effects or None, "controller": controller,
+        "step": component.step, "over_step": component.over_step or None,
+        "parameters": values or None,
+    }  # fmt: skip
+    return found | {key: value for key, value in more.items() if value is not None}
+
+
+Parameters = dict[str, float | bool]
 DamperText = Callable[[Parameters], str]
 """Parameters that the scenario knows to the table of its damper."""
+
+
+def source_of(damper: StudyModel) -> dict[str, Any]:
+    """Return what a damper is made from where it is no FMU of its own: law, form, own effects.
+
+    Parameters
+    ----------
+    damper : the model with the effects of the damper alone
+    """
+    plain, form, knots = split_form(damper.base_law)
+    source: dict[str, Any] = {"law": own_laws().get(plain, plain)}
+    source |= {"command": form} if form else {}
+    source |= {"command_knots": list(knots)} if knots else {}
+    own = [own_effects()[name] for name in damper.effects if EFFECTS[name].own]
+    return source | ({"effects": own} if own else {})
+
+
+def values_of(damper: StudyModel) -> Parameters:
+    """Return what such a damper is given: values of its law and effects, and their switches."""
+    values = {
+        name: value
+        for name, value in damper.values().items()
+        if "." not in name or name.partition(".")[0] in damper.effects
+    }
+    return {**values, **{f"{effect}.on": True for effect in damper.effects}}
+
+
+def model_scenario_text(
+    head: tuple[str, str], run: tuple[float, float], parts: list[str], wires: Mapping[str, str]
+) -> str:
+    """Return the text of a scenario that is made of a model.
+
+    Parameters
+    ----------
+    head : its title, and the comment above
+    run : stop and step [s]
+    parts : the components' tables
+    wires : input to output, both "component.port"
+    """
+    title, about = head
+    plain = title.replace("\\", "/").replace('"', "'")
+    # A SignalSource names no unit. Its file holds that of the input: a factor says so to the check.
+    told = {
+        target: {"from": source, "factor": 1.0} if source.endswith(".value") else source
+        for target, source in wires.items()
+    }
+    settings = {"stop": run[0], "step": run[1], "algorithm": "gauss-seidel"}
+    return f"{about}\n\n{joined_text(plain, settings, parts, told)}"
+
+
+def part_text(name: str, source: Mapping[str, Any], parameters: Mapping[str, Value]) -> str:
+    """Return the table of a component that is made of a model.
+
+    Parameters
+    ----------
+    name : of the component
+    source : what it is made from: `fmu` or `law`, `building`, `effects` ...
+    parameters : the values that it is given
+    """
+    lines = [component_text(name, {key: _plain(value) for key, value in source.items()})]
+    if parameters:
+        pairs = (f"{toml_value(k)} = {toml_value(_plain(v))}" for k, v in parameters.items())
+        lines.append(f"parameters = {{ {', '.join(pairs)} }}")
+    return "\n".join(lines)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as TOML has it: files are texts, and all numbers are real."""
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, bool | str | Path):
+        return str(value) if isinstance(value, Path) else value
+    return float(value)
 
 
 def signal_file(
@@ -260,127 +399,3 @@ def signal_file(
     rows += [f"{t:.12g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
     write_whole(path, "\n".join(rows) + "\n")
     return path
-
-
-def part_text(name: str, source: Mapping[str, Any], parameters: Mapping[str, Value]) -> str:
-    """Return the table of a component.
-
-    Parameters
-    ----------
-    name : of the component
-    source : what it is made from: `fmu` or `law`, `building`, `effects` ...
-    parameters : the values that it is given
-    """
-    lines = [f"[components.{name}]", *(f"{key} = {_text(value)}" for key, value in source.items())]
-    if parameters:
-        pairs = [f"{_text(key)} = {_text(value)}" for key, value in parameters.items()]
-        lines.append(f"parameters = {{ {', '.join(pairs)} }}")
-    return "\n".join(lines)
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_text, value))}]"
-    if isinstance(value, str | Path):
-        plain = str(value).replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{plain}"'
-    return repr(float(value))
-
-
-def model_scenario_text(
-    head: tuple[str, str], run: tuple[float, float], parts: list[str], wires: Mapping[str, str]
-) -> str:
-    """Return the text of a scenario.
-
-    Parameters
-    ----------
-    head : its title, and the comment above
-    run : stop and step [s]
-    parts : the components' tables
-    wires : input to output, both "component.port"
-    """
-    title, about = head
-    plain = title.replace("\\", "/").replace('"', "'")
-    text = f'{about}\n\nschema = 1\ntitle = "{plain}"\n\n[run]\nstop = {run[0]!r}\n'
-    text += f'step = {run[1]!r}\nalgorithm = "gauss-seidel"\n'
-    # A SignalSource names no unit. Its file holds that of the input: a factor says so to the check.
-    lines = [
-        f'"{target}" = {{ from = "{source}", factor = 1.0 }}'
-        if source.endswith(".value")
-        else f'"{target}" = "{source}"'
-        for target, source in wires.items()
-    ]
-    return "\n".join([text, "\n\n".join(parts), "\n[connections]", *lines]) + "\n"
-
-
-# A scenario as TOML text: as it is run, with what was overridden.
-
-
-def scenario_text(scenario: Scenario) -> str:
-    """Return the TOML text of a scenario; read again it gives the same run.
-
-    Files are written as absolute paths, so that the text holds wherever it is put.
-    """
-    lines = [
-        "schema = 1",
-        f"title = {toml_value(scenario.title)}",
-        "",
-        "[run]",
-        f"stop = {toml_value(scenario.stop)}",
-        f"step = {toml_value(scenario.step)}",
-        f"algorithm = {toml_value(scenario.algorithm)}",
-    ]
-    for component in scenario.components:
-        lines += [
-            "",
-            f"[components.{toml_key(component.name)}]",
-            *_component(component, scenario.file.parent),
-        ]
-    lines += ["", "[connections]"]
-    for wire in scenario.connections:
-        target, source = f"{wire.target}.{wire.input}", f"{wire.source}.{wire.output}"
-        said = toml_value(source)
-        if wire.transformed:
-            numbers = f"factor = {toml_value(wire.factor)}, offset = {toml_value(wire.offset)}"
-            said = f"{{ from = {said}, {numbers} }}"
-        lines.append(f"{toml_value(target)} = {said}")
-    return "\n".join(lines) + "\n"
-
-
-def _component(component: Component, folder: Path) -> list[str]:
-    fmu = component.fmu if component.path is None else component.path.absolute().as_posix()
-    lines = [f"fmu = {toml_value(fmu)}"] if component.law is None else _law(component.law)
-    if component.building is not None:
-        lines.append(f"building = {toml_value(component.building.absolute().as_posix())}")
-    if component.effects:
-        files = ", ".join(toml_value(file.absolute().as_posix()) for file in component.effects)
-        lines.append(f"effects = [{files}]")
-    if component.controller is not None:
-        lines.append(f"controller = {toml_value(component.controller.absolute().as_posix())}")
-    if component.step is not None:
-        lines.append(f"step = {toml_value(component.step)}")
-    if component.over_step:
-        told = [
-            f"{toml_key(name)} = {toml_value(word)}" for name, word in component.over_step.items()
-        ]
-        lines.append(f"over_step = {{ {', '.join(told)} }}")
-    if component.parameters:
-        values = dict(component.parameters)
-        for name in FILE_PARAMETERS:
-            if (folder / str(values.get(name, ""))).is_file():
-                values[name] = (folder / str(values[name])).absolute().as_posix()
-        pairs = [f"{toml_key(name)} = {toml_value(value)}" for name, value in values.items()]
-        lines.append(f"parameters = {{ {', '.join(pairs)} }}")
-    return lines
-
-
-def _law(law: DamperLaw) -> list[str]:
-    name, form, knots = split_form(law.name)
-    lines = [f"law = {toml_value(law.file.absolute().as_posix() if law.file else name)}"]
-    if form:
-        lines.append(f"command = {toml_value(form)}")
-    if knots:
-        lines.append(f"command_knots = {list(knots)}")
-    return lines

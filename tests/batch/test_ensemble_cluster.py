@@ -14,7 +14,7 @@ import pytest
 
 import bristle
 from bristle.campaign import cluster, read_ensemble
-from bristle.campaign.plan import Outcome, Plan
+from bristle.campaign.campaign import Outcome, Plan
 from bristle.cli import main
 from bristle.errors import EnsembleError
 

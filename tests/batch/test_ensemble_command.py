@@ -134,7 +134,6 @@ def test_the_figure_says_how_many_runs_failed(write: Write) -> None:
 
 
 def test_an_output_that_never_differs_is_drawn(write: Write, tmp_path: Path) -> None:
-    from bristle.campaign.view import ensemble_figure
 
     path = write(
         ('"damper.sigma_a" = { normal = [650.0, 65.0], within = [500.0, 800.0] }', ""),
@@ -142,5 +141,5 @@ def test_an_output_that_never_differs_is_drawn(write: Write, tmp_path: Path) -> 
         ("each = [0.0, 4.0]", "each = [4.0]"),
     )
     found = bristle.ensemble(path, runs=3)
-    ensemble_figure(found, tmp_path / "figure.svg")
+    draw_ensemble(found).save(tmp_path / "figure.svg", dpi=160)
     assert (tmp_path / "figure.svg").stat().st_size > 1000

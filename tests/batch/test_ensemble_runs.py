@@ -17,7 +17,7 @@ import pytest
 
 import bristle
 from bristle.campaign import Ensemble, campaign, pool, read_ensemble
-from bristle.campaign.plan import Outcome, Output, Plan
+from bristle.campaign.campaign import Outcome, Output, Plan
 from bristle.campaign.table import LEVELS, RunsTable, failures
 from bristle.core import files
 from bristle.errors import EnsembleError, RunError

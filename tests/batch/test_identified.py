@@ -12,9 +12,8 @@ import pytest
 
 import bristle
 from bristle.campaign import campaign, read_ensemble
-from bristle.campaign.campaign import scenario_of
+from bristle.campaign.campaign import Plan, scenario_of
 from bristle.campaign.identified import Places, _fixed
-from bristle.campaign.plan import Plan
 from bristle.campaign.table import LEVELS, VARIES, notes, quantiles
 from bristle.cli import main
 from bristle.errors import BristleError, EnsembleError, RunError

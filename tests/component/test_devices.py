@@ -284,7 +284,7 @@ def test_a_device_tells_its_place_and_what_it_acts_across() -> None:
 
 
 def test_a_batch_writes_the_devices_of_a_building(tmp_path: Path) -> None:
-    from bristle.campaign.ensemble_file import write
+    from bristle.campaign.campaign import write_building as write
 
     data = {**TOWER, "devices": [BRACE, TIE]}
     write(data, tmp_path / "tower.toml")

@@ -194,7 +194,7 @@ def test_a_building_in_another_unit_of_mass_gets_the_same_design(tmp_path: Path)
 def test_stock_designs_stay_on_the_building_they_were_made_for() -> None:
     found = compare_controllers([MOTION], {"a": "ClippedOptimal", "b": "Lpv"}, grid=3, workers=1)
     assert found.notes == ()
-    assert all(entry.part.source.keys() == {"fmu"} for entry in found.setting.entries)
+    assert all(candidate.part.source.keys() == {"fmu"} for candidate in found.setting.candidates)
     assert found.controllers == ["a", "b"]
     assert found.setting.folder is None
 

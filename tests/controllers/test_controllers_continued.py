@@ -9,8 +9,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bristle.campaign.plan import Outcome
-from bristle.controller_comparison import Spread, compare_controllers, runs
+from bristle.campaign import pool
+from bristle.campaign.campaign import Outcome
+from bristle.controller_comparison import Spread, compare_controllers
 
 MOTION = "el_centro_1940_ns,peak=0.4g,factor=0.45,stop=2,label=weak"
 LEVELS, MEMBERS = 3, 2
@@ -29,7 +30,7 @@ def test_an_interrupted_comparison_makes_no_run_of_its_ensembles_twice(
 ) -> None:
     made = [0]
     most = [6]
-    own = runs.run_local
+    own = pool.run_local
 
     def counted(*given: Any) -> Iterator[Outcome]:
         for outcome in own(*given):
@@ -38,7 +39,7 @@ def test_an_interrupted_comparison_makes_no_run_of_its_ensembles_twice(
             made[0] += 1
             yield outcome
 
-    monkeypatch.setattr(runs, "run_local", counted)
+    monkeypatch.setattr(pool, "run_local", counted)
     with pytest.raises(KeyboardInterrupt):
         compared(tmp_path)
     assert made == [6]

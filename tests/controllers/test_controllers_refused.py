@@ -137,8 +137,8 @@ def test_a_design_for_another_damper_of_the_building_is_refused(
     assert said in capsys.readouterr().err
     out = Folder(folder / "same")
     same_place = site_from("braced.toml", "low", out)
-    (entry,) = Maker(same_place, damper_from(DEFAULT, out), out).entries(["base.json"])
-    assert entry.name == "base"
+    (candidate,) = Maker(same_place, damper_from(DEFAULT, out), out).candidates(["base.json"])
+    assert candidate.name == "base"
 
 
 def test_fmus_without_the_ports_are_refused(

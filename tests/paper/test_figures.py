@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from benchmarks.paper import stiction
 from benchmarks.paper.command import main
 from benchmarks.paper.figures import make, paper_figures
-from bristle.engine.summary import summarise
+from bristle.engine.results import summarise
 from bristle.engine.view import draw_run, run_figure
 from bristle.errors import RunError, ScenarioError
 from bristle.view.style import COLOURS, ramp

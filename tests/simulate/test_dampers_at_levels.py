@@ -18,8 +18,7 @@ from bristle.engine.schedule import make_nodes
 from bristle.fmu import catalogue
 from bristle.physics.building import Building, Device
 from bristle.system.library import driven_mass
-from bristle.system.scenario import check_scenario, load_scenario
-from bristle.system.stock import copy_scenario
+from bristle.system.scenario import check_scenario, copy_scenario, load_scenario
 
 STOCK = "dampers_at_two_levels"
 BUILDING = """

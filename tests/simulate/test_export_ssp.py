@@ -21,8 +21,9 @@ from bristle.engine.coupling_error import expect
 from bristle.engine.run import run_quietly
 from bristle.errors import ScenarioError
 from bristle.fmu.description import read_description
+from bristle.system.model import Connection
 from bristle.system.scenario import Scenario, load_scenario
-from bristle.system.ssp_write import WrittenConnection, WrittenSystem, export_ssp, osp_text
+from bristle.system.ssp_write import export_ssp, osp_text
 
 SCENARIO = """
 schema = 1
@@ -363,6 +364,6 @@ def test_the_package_runs_here_as_the_scenario_does(package: Path, rows: pd.Data
 
 def test_functions_of_osp_have_names_of_their_own() -> None:
     ends = (("d", "x_in"), ("d_x", "in"))
-    wires = tuple(WrittenConnection("a", "y", *end, 2.0, 0.0, True) for end in ends)
-    text = osp_text(WrittenSystem("t", 1.0, 0.1, "jacobi", (), wires))
+    wires = tuple(Connection(*end, "a", "y", 2.0, 0.0, True) for end in ends)
+    text = osp_text(Scenario(Path("t.toml"), "t", 1.0, 0.1, "jacobi", (), wires), {})
     assert len(set(re.findall(r'<LinearTransformation name="([^"]*)"', text))) == len(ends)

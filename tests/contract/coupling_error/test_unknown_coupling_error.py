@@ -14,7 +14,7 @@ from toys import Maker
 
 from bristle.cli import main
 from bristle.engine.coupling_error import expect, find_step
-from bristle.engine.summary import judged_by
+from bristle.engine.results import judged_by
 from bristle.errors import ScenarioError
 from bristle.system.scenario import load_scenario
 
