@@ -30,10 +30,8 @@ def add_run_facts(parser: argparse.ArgumentParser) -> None:
         ("--label", "NAME=PATTERN", "other labels in the names of files: --label 'oil=batch{}'"),
     ):  # fmt: skip
         parser.add_argument(option, action="append", default=[], metavar=value, help=text)
-    parser.add_argument(
-        "--runs", type=Path, metavar="FILE",
-        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
-    )  # fmt: skip
+    text = "a table with a row per run: file, role, current [A], temperature [degC], ..."
+    parser.add_argument("--runs", type=Path, metavar="FILE", help=text)
 
 
 def test_files(patterns: list[str], files: list[str]) -> list[str]:
@@ -148,9 +146,8 @@ def add_overrides(
 
 def add_details(parser: argparse.ArgumentParser) -> None:
     """Add --details to a command whose answer has some."""
-    parser.add_argument(
-        "--details", action="store_true", help="print the evidence below the answer: all tables"
-    )
+    text = "print the evidence below the answer: all tables"
+    parser.add_argument("--details", action="store_true", help=text)
 
 
 def _add(parser: argparse.ArgumentParser, default: object) -> None:

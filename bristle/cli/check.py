@@ -31,18 +31,13 @@ _COLOURS = {"error": "31", "warning": "33", "note": "36"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle check`."""
-    parser.add_argument(
-        "files",
-        nargs="*",
-        metavar="FILE",
-        help="scenario files, names of stock scenarios, or the file of your own effect or law",
-    )
+    text = "scenario files, names of stock scenarios, or the file of your own effect or law"
+    parser.add_argument("files", nargs="*", metavar="FILE", help=text)
     add_overrides(parser)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
-    parser.add_argument(
-        "--schema", action="store_true", help="print the JSON schema of scenario files"
-    )
+    text = "print the JSON schema of scenario files"
+    parser.add_argument("--schema", action="store_true", help=text)
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -24,22 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("fmu", metavar="FILE.fmu", help="an FMU of any tool")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
-    parser.add_argument(
-        "--strict", action="store_true", help="exit with 1 for a lack of robustness as well"
-    )
-    parser.add_argument(
-        "--timeout",
-        type=float,
-        default=20.0,
-        metavar="S",
-        help="time limit of one call in s (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--only", action="append", metavar="PROBE", help="try this probe only; may be repeated"
-    )
-    parser.add_argument(
-        "--beside", metavar="OTHER.fmu", help="another FMU to load into the same process"
-    )
+    text = "exit with 1 for a lack of robustness as well"
+    parser.add_argument("--strict", action="store_true", help=text)
+    text = "time limit of one call in s (default: %(default)g)"
+    parser.add_argument("--timeout", type=float, default=20.0, metavar="S", help=text)
+    text = "try this probe only; may be repeated"
+    parser.add_argument("--only", action="append", metavar="PROBE", help=text)
+    text = "another FMU to load into the same process"
+    parser.add_argument("--beside", metavar="OTHER.fmu", help=text)
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -29,19 +29,17 @@ ANSWER = "answer.json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle controllers`."""
-    parser.add_argument(
-        "--motions", nargs="+", metavar="RECORD",
-        help="ground motions: names or files, with values, e.g. "
-        "el_centro_1940_ns,peak=0.4g,factor=0.5",
-    )  # fmt: skip
+    text = (
+        "ground motions: names or files, with values, e.g. el_centro_1940_ns,peak=0.4g,factor=0.5"
+    )
+    parser.add_argument("--motions", nargs="+", metavar="RECORD", help=text)
     parser.add_argument(
         "--controller", nargs="+", action="extend", metavar="WHAT",
         help="stock names, controller files (.json) or design files (.toml) of `bristle design`, "
         "your own components (.py), FMUs, with values, e.g. Skyhook,gain=80,label=mine",
     )  # fmt: skip
-    parser.add_argument(
-        "--building", metavar="FILE", help="building file; else the library's building"
-    )
+    text = "building file; else the library's building"
+    parser.add_argument("--building", metavar="FILE", help=text)
     parser.add_argument(
         "--damper", metavar="WHAT",
         help="a component, a law, the folder of a study or a model.toml, an FMU, with values; "
@@ -54,14 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--statistic", choices=("peak", "rms"), help="its statistic; else peak")
     text = "number of constant voltages to try; else 17"
     parser.add_argument("--grid", type=int, metavar="N", help=text)
-    parser.add_argument(
-        "--limit", action="store_const", const=True,
-        help="compute the limit of any voltage under each motion: up to a minute each",
-    )  # fmt: skip
-    parser.add_argument(
-        "--ensemble", type=int, metavar="N",
-        help="run each case with N varied buildings, dampers and sensors, to find the worst case",
-    )  # fmt: skip
+    text = "compute the limit of any voltage under each motion: up to a minute each"
+    parser.add_argument("--limit", action="store_const", const=True, help=text)
+    text = "run each case with N varied buildings, dampers and sensors, to find the worst case"
+    parser.add_argument("--ensemble", type=int, metavar="N", help=text)
     text = "variation of masses, stiffnesses and damper parameters to either side; else 10%%"
     parser.add_argument("--spread", metavar="SHARE", help=text)
     text = "noise of the sensors, a share of each signal's RMS; else 1%%"
@@ -73,9 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "solve built-in components together (compiled), or step all as FMUs (fmu)"
     parser.add_argument("--engine", choices=("compiled", "fmu"), help=text)
     parser.add_argument("--fmus", choices=("python", "native"), help="kind of FMUs")
-    parser.add_argument(
-        "--workers", type=int, metavar="N", help="number of processes; else one per core"
-    )
+    text = "number of processes; else one per core"
+    parser.add_argument("--workers", type=int, metavar="N", help=text)
     parser.add_argument("--no-figure", action="store_true", help="write only tables, no report")
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER",

@@ -27,12 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle design`."""
     parser.add_argument("kind", choices=tuple(_COMPONENTS), help="kind of controller")
     parser.add_argument("file", type=Path, metavar="FILE", help="design file, TOML")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE.json",
-        help="controller file, with figure and answer beside it; else named after the design file",
-    )
+    text = "controller file, with figure and answer beside it; else named after the design file"
+    parser.add_argument("--out", type=Path, metavar="FILE.json", help=text)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

@@ -25,14 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="all: search for the law together with its missing effects (default on a test bench "
         "if no law was chosen); the model's law: keep it",
     )
-    parser.add_argument(
-        "--limits", action="store_true",
-        help="refit the model at the limit of every effect: exact also if the model is far from "
-        "linear",
-    )  # fmt: skip
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
+    text = (
+        "refit the model at the limit of every effect: exact also if the model is far from linear"
     )
+    parser.add_argument("--limits", action="store_true", help=text)
+    text = "show the verdict; do not change verdict.json"
+    parser.add_argument("--dry-run", action="store_true", help=text)
     add_trust(parser)
     add_details(parser)
     parser.add_argument("--json", action="store_true", help="print verdict.json")

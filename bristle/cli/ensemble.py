@@ -19,27 +19,21 @@ HELP = "run a scenario hundreds of times with varied parameters"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle ensemble`."""
     parser.add_argument("file", metavar="FILE", help="ensemble file, or name of a stock ensemble")
-    parser.add_argument(
-        "--runs", type=int, metavar="N", help="number of runs, instead of the file's"
-    )
+    text = "number of runs, instead of the file's"
+    parser.add_argument("--runs", type=int, metavar="N", help=text)
     where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers", type=int, metavar="N", help="number of processes; else one per core"
+    text = "number of processes; else one per core"
+    where.add_argument("--workers", type=int, metavar="N", help=text)
+    text = "run on a Dask cluster, e.g. tcp://host:8786"
+    where.add_argument("--cluster", metavar="ADDRESS", help=text)
+    text = (
+        "folder of runs, quantiles and figure; a stopped ensemble continues there; else "
+        "results/NAME/"
     )
-    where.add_argument(
-        "--cluster", metavar="ADDRESS", help="run on a Dask cluster, e.g. tcp://host:8786"
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of runs, quantiles and figure; a stopped ensemble continues there; else "
-        "results/NAME/",
-    )
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help=text)
     parser.add_argument("--fresh", action="store_true", help="start again and replace earlier runs")
-    parser.add_argument(
-        "--retry", action="store_true", help="repeat runs that failed, alone or with an effect"
-    )
+    text = "repeat runs that failed, alone or with an effect"
+    parser.add_argument("--retry", action="store_true", help=text)
     parser.add_argument(
         "--with-limits", action="store_true",
         help="widen the quantiles by the effects that the verdict of [identified] does not "

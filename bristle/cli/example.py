@@ -18,16 +18,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown.set_defaults(act=_list)
     bench = commands.add_parser("bench", help="an MR damper on a test bench")
     _add_choices(bench)
-    bench.add_argument(
-        "--held", action="store_true",
-        help="keep the voltage constant in each run, at 2 or 6 V, as many laboratories do",
-    )  # fmt: skip
+    text = "keep the voltage constant in each run, at 2 or 6 V, as many laboratories do"
+    bench.add_argument("--held", action="store_true", help=text)
     bench.set_defaults(act=_bench)
     building = commands.add_parser("building", help="a base-isolated building on a shake table")
     _add_choices(building)
-    building.add_argument(
-        "--no-load-cell", action="store_true", help="leave the damper's force out of the files"
-    )
+    text = "leave the damper's force out of the files"
+    building.add_argument("--no-load-cell", action="store_true", help=text)
     building.set_defaults(act=_building)
     reveal = commands.add_parser("reveal", help="show the hidden answer and what the study found")
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
@@ -36,15 +33,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     performing = commands.add_parser("perform", help="perform a plan on the simulated rig")
     performing.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     performing.add_argument("plan", type=Path, metavar="PLAN", help="the folder of the plan")
-    performing.add_argument(
-        "--as-runs", default="", metavar="NAME",
-        help="name the runs NAME_1, NAME_2 ...; else they have the names of the plan",
-    )  # fmt: skip
-    performing.add_argument(
-        "--insist",
-        action="store_true",
-        help="perform the plan even if it was made for another study",
-    )
+    text = "name the runs NAME_1, NAME_2 ...; else they have the names of the plan"
+    performing.add_argument("--as-runs", default="", metavar="NAME", help=text)
+    text = "perform the plan even if it was made for another study"
+    performing.add_argument("--insist", action="store_true", help=text)
     performing.add_argument("--json", action="store_true", help="print the answer as JSON")
     performing.set_defaults(act=_perform)
     add_common_to_actions(commands)
@@ -52,25 +44,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the new study")
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="effect to hide, see bristle example list; give it twice for two; else the seed "
-        "draws one",
+    text = (
+        "effect to hide, see bristle example list; give it twice for two; else the seed draws one"
     )
+    parser.add_argument("--effect", action="append", default=[], metavar="NAME", help=text)
     parser.add_argument("--none", action="store_true", help="hide nothing")
-    parser.add_argument(
-        "--outside", action="store_true", help="hide an effect that is not in the library"
-    )
-    parser.add_argument(
-        "--law", default="", help="law of the damper: bingham or lugre; in a building lugre"
-    )
-    parser.add_argument(
-        "--noise", type=float, default=0.01, metavar="SHARE",
-        help="noise on every channel as a share of its RMS; 0.01 by default",
-    )  # fmt: skip
+    text = "hide an effect that is not in the library"
+    parser.add_argument("--outside", action="store_true", help=text)
+    text = "law of the damper: bingham or lugre; in a building lugre"
+    parser.add_argument("--law", default="", help=text)
+    text = "noise on every channel as a share of its RMS; 0.01 by default"
+    parser.add_argument("--noise", type=float, default=0.01, metavar="SHARE", help=text)
     parser.add_argument("--seed", type=int, default=1, help="draws the rig; 1 by default")
 
 

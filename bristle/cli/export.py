@@ -24,12 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "a scenario, or the name of a component"
     )
     parser.add_argument("what", metavar="FOLDER", help=text)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="output folder; else export/ in the study, with --as-one the current folder",
-    )
+    text = "output folder; else export/ in the study, with --as-one the current folder"
+    parser.add_argument("--out", type=Path, metavar="DIR", help=text)
     text = "write the whole scenario as one FMU, with --native"
     parser.add_argument("--as-one", action="store_true", help=text)
     text = (

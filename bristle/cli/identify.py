@@ -29,39 +29,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="another law than the model's, see `bristle list laws`; all: keep the model's law, "
         "and compare all laws on a test bench",
     )
-    parser.add_argument(
-        "--command",
-        dest="form",
-        metavar="FORM",
-        help="how the command enters: linear, quadratic or table; several with commas, or all, to "
-        "compare their errors on held-out runs; else the form of the model",
+    text = (
+        "how the command enters: linear, quadratic or table; several with commas, or all, to "
+        "compare their errors on held-out runs; else the form of the model"
     )
-    parser.add_argument(
-        "--cutoff",
-        type=float,
-        metavar="HZ",
-        help="low-pass for the table of laws and for the low-passed errors beside the error; 0 for "
-        "none; else study.toml's cut_off (18 Hz)",
+    parser.add_argument("--command", dest="form", metavar="FORM", help=text)
+    text = (
+        "low-pass for the table of laws and for the low-passed errors beside the error; 0 for "
+        "none; else study.toml's cut_off (18 Hz)"
     )
-    parser.add_argument(
-        "--starts",
-        type=int,
-        default=4,
-        metavar="N",
-        help="number of starting points of the fit; else 4",
+    parser.add_argument("--cutoff", type=float, metavar="HZ", help=text)
+    text = "number of starting points of the fit; else 4"
+    parser.add_argument("--starts", type=int, default=4, metavar="N", help=text)
+    text = "leave out the table that compares the laws"
+    parser.add_argument("--no-table", action="store_true", help=text)
+    text = "show the result; do not change the study"
+    parser.add_argument("--dry-run", action="store_true", help=text)
+    text = (
+        "for a building: identify only the building (stiffnesses, frequencies and damping ratios "
+        "from its response) and write a building file"
     )
-    parser.add_argument(
-        "--no-table", action="store_true", help="leave out the table that compares the laws"
-    )
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show the result; do not change the study"
-    )
-    parser.add_argument(
-        "--structure",
-        action="store_true",
-        help="for a building: identify only the building (stiffnesses, frequencies and damping "
-        "ratios from its response) and write a building file",
-    )
+    parser.add_argument("--structure", action="store_true", help=text)
     add_trust(parser)
     add_details(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

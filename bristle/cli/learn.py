@@ -39,15 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="site in a building: damper, layer, storey1, storey2 ...; by default the site whose "
         "verdict is unknown, or else the one with the largest error",
     )  # fmt: skip
-    parser.add_argument(
-        "--name", default="", help="name of the effect; default learned_1, learned_2"
-    )
-    parser.add_argument(
-        "--table", action="store_true", help="keep the table even if a formula fits as well"
-    )
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show the learned effect; write nothing"
-    )
+    text = "name of the effect; default learned_1, learned_2"
+    parser.add_argument("--name", default="", help=text)
+    text = "keep the table even if a formula fits as well"
+    parser.add_argument("--table", action="store_true", help=text)
+    text = "show the learned effect; write nothing"
+    parser.add_argument("--dry-run", action="store_true", help=text)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 

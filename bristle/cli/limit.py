@@ -35,9 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="output of the structure; else the second floor's absolute acceleration",
     )
-    parser.add_argument(
-        "--statistic", choices=("peak", "rms"), default="peak", help="statistic to minimise"
-    )
+    text = "statistic to minimise"
+    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
     parser.add_argument(
         "--preview",
         nargs="*",
@@ -46,15 +45,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="preview times [s] of a receding horizon; none: no such runs; else 0 0.1 0.5",
     )
-    parser.add_argument(
-        "--starts", type=int, default=3, metavar="N", help="number of starts of the search; else 3"
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of voltage, scenario, results and picture; else results/limit/SCENARIO/",
-    )
+    text = "number of starts of the search; else 3"
+    parser.add_argument("--starts", type=int, default=3, metavar="N", help=text)
+    text = "folder of voltage, scenario, results and picture; else results/limit/SCENARIO/"
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help=text)
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_overrides(parser, "scenario", "ground.peak=3.924")
     add_trust(parser)

@@ -47,25 +47,18 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
         metavar="RECORD",
         help="names of ground motions, or files; see `bristle list records`",
     )
-    parser.add_argument(
-        "--intensities",
-        nargs="+",
-        type=float,
-        metavar="G",
-        help="peaks [g] to which each motion is scaled, 0: as recorded; else 0.2 0.4 0.6 0.8",
-    )
+    text = "peaks [g] to which each motion is scaled, 0: as recorded; else 0.2 0.4 0.6 0.8"
+    parser.add_argument("--intensities", nargs="+", type=float, metavar="G", help=text)
     parser.add_argument(
         "--output",
         default="structure.floor2_acceleration_absolute",
         metavar="NAME",
         help="the output to minimise; else the second floor's absolute acceleration",
     )
-    parser.add_argument(
-        "--statistic", choices=("peak", "rms"), default="peak", help="statistic to minimise"
-    )
-    parser.add_argument(
-        "--grid", type=int, default=17, metavar="N", help="number of voltages in the grid; else 17"
-    )
+    text = "statistic to minimise"
+    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
+    text = "number of voltages in the grid; else 17"
+    parser.add_argument("--grid", type=int, default=17, metavar="N", help=text)
     add_overrides(parser, "scenario", "damper.sigma_a=600")
 
 

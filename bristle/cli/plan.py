@@ -29,41 +29,25 @@ HELP = "plan the next tests of a rig: motions and commands as files for its cont
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle plan`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", nargs="?", help="the study")
-    parser.add_argument(
-        "--new", type=Path, metavar="FILE",
-        help="a rig.toml with [damper] and [limits]: plan before the first measurement",
-    )  # fmt: skip
-    parser.add_argument(
-        "--separate", nargs="+", metavar="NAME",
-        help="distinguish alternatives: effects, laws, or none for the present model",
-    )  # fmt: skip
-    parser.add_argument(
-        "--see",
-        nargs="*",
-        metavar="EFFECT",
-        help="make effects visible; without names, all effects",
-    )
-    parser.add_argument(
-        "--sharpen", nargs="*", metavar="PARAMETER",
-        help="narrow the intervals of parameters, or of those of an effect; without names, of all",
-    )  # fmt: skip
-    parser.add_argument(
-        "--learn", nargs="*", metavar="COORDINATE",
-        help="cover coordinates on which an unknown part may depend; without names, the usual ones",
-    )  # fmt: skip
+    text = "a rig.toml with [damper] and [limits]: plan before the first measurement"
+    parser.add_argument("--new", type=Path, metavar="FILE", help=text)
+    text = "distinguish alternatives: effects, laws, or none for the present model"
+    parser.add_argument("--separate", nargs="+", metavar="NAME", help=text)
+    text = "make effects visible; without names, all effects"
+    parser.add_argument("--see", nargs="*", metavar="EFFECT", help=text)
+    text = "narrow the intervals of parameters, or of those of an effect; without names, of all"
+    parser.add_argument("--sharpen", nargs="*", metavar="PARAMETER", help=text)
+    text = "cover coordinates on which an unknown part may depend; without names, the usual ones"
+    parser.add_argument("--learn", nargs="*", metavar="COORDINATE", help=text)
     parser.add_argument("--rig", type=Path, metavar="FILE", help="a rig.toml with [limits]")
     for name, text in LIMITS.items():
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="QUANTITY", help=text)
-    parser.add_argument(
-        "--record", nargs="+", default=[], metavar="FILE",
-        help="for a building: more ground motions that the plan may scale, files or names",
-    )  # fmt: skip
+    text = "for a building: more ground motions that the plan may scale, files or names"
+    parser.add_argument("--record", nargs="+", default=[], metavar="FILE", help=text)
     parser.add_argument("--runs", type=int, metavar="N", help="number of tests; 4 by default")
     parser.add_argument("--seed", type=int, default=1, help="seed of the candidate tests")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="FOLDER",
-        help="folder of the files; by default plan, plan_2 ... in the study",
-    )  # fmt: skip
+    text = "folder of the files; by default plan, plan_2 ... in the study"
+    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=text)
     parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
     add_trust(parser)
     add_details(parser)

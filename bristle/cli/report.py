@@ -15,23 +15,16 @@ HELP = "write a study's report as one HTML file: verdict, history, loops, parame
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle report`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="file of the report; else FOLDER/reports/report.html",
-    )
-    parser.add_argument(
-        "--keep-test-closed", action="store_true", help="leave the study's test runs closed"
-    )
+    text = "file of the report; else FOLDER/reports/report.html"
+    parser.add_argument("--out", type=Path, metavar="FILE", help=text)
+    text = "leave the study's test runs closed"
+    parser.add_argument("--keep-test-closed", action="store_true", help=text)
     text = (
         "add sliders for the model's parameters; the page computes the run (needs bristle[native])"
     )
     parser.add_argument("--what-if", action="store_true", help=text)
-    parser.add_argument(
-        "--static", action="store_true",
-        help="leave out the interactive pictures and all scripts",
-    )  # fmt: skip
+    text = "leave out the interactive pictures and all scripts"
+    parser.add_argument("--static", action="store_true", help=text)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 

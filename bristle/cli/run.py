@@ -21,43 +21,26 @@ HELP = "run a scenario: results, a figure, peaks and RMS"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle run`."""
-    parser.add_argument(
-        "file", metavar="FILE", help="scenario file, name of a stock scenario, or SSP package"
+    text = "scenario file, name of a stock scenario, or SSP package"
+    parser.add_argument("file", metavar="FILE", help=text)
+    text = (
+        "folder of results, figure and log; older ones are replaced; else results/NAME/, or "
+        "results/NAME_a.b=value/ with --set a.b=value"
     )
-    parser.add_argument(
-        "--out",
-        metavar="FOLDER",
-        help="folder of results, figure and log; older ones are replaced; else results/NAME/, or "
-        "results/NAME_a.b=value/ with --set a.b=value",
-    )
+    parser.add_argument("--out", metavar="FOLDER", help=text)
     add_overrides(parser)
-    parser.add_argument(
-        "--engine",
-        choices=("fmu", "compiled"),
-        default="fmu",
-        help="step FMUs (fmu), or solve built-in components together (compiled)",
-    )
+    text = "step FMUs (fmu), or solve built-in components together (compiled)"
+    parser.add_argument("--engine", choices=("fmu", "compiled"), default="fmu", help=text)
     text = "kind of FMUs: those that run in Python, or compiled native ones"
     parser.add_argument("--fmus", choices=("python", "native"), default="python", help=text)
-    parser.add_argument(
-        "--format", choices=("csv", "parquet"), default="csv", help="format of the results"
-    )
-    parser.add_argument(
-        "--coupling-error",
-        action="store_true",
-        help="estimate the coupling error of every output with additional runs",
-    )
-    parser.add_argument(
-        "--tolerance",
-        metavar="SHARE",
-        help="find the step at which the coupling error stays below a share of the peaks, e.g. "
-        "0.2%%",
-    )
-    parser.add_argument(
-        "--spectrum",
-        action="store_true",
-        help="write the response spectra of ground and floors, 5 %% damped, as spectrum.csv",
-    )
+    text = "format of the results"
+    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help=text)
+    text = "estimate the coupling error of every output with additional runs"
+    parser.add_argument("--coupling-error", action="store_true", help=text)
+    text = "find the step at which the coupling error stays below a share of the peaks, e.g. 0.2%%"
+    parser.add_argument("--tolerance", metavar="SHARE", help=text)
+    text = "write the response spectra of ground and floors, 5 %% damped, as spectrum.csv"
+    parser.add_argument("--spectrum", action="store_true", help=text)
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

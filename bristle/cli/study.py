@@ -39,16 +39,12 @@ def add_channels(parser: argparse.ArgumentParser) -> None:
         help="new column of a channel; a minus before COLUMN reverses its sign: --channel "
         "'force=-Ch3@kN'; without @UNIT the unit stays, or is that of the title",
     )  # fmt: skip
-    parser.add_argument(
-        "--without", action="append", default=[], metavar="CHANNEL",
-        help="do not read this channel any more",
-    )  # fmt: skip
-    parser.add_argument(
-        "--step", type=float, metavar="S", help="sampling step in s of files without a time"
-    )
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show the changes, and write nothing"
-    )
+    text = "do not read this channel any more"
+    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
+    text = "sampling step in s of files without a time"
+    parser.add_argument("--step", type=float, metavar="S", help=text)
+    text = "show the changes, and write nothing"
+    parser.add_argument("--dry-run", action="store_true", help=text)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_channels)
 
@@ -137,20 +133,16 @@ def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
 def add_extend(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study extend`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument(
-        "data", nargs="+", metavar="FILES",
-        help="measurement files, or a folder of them, with the columns of the study's others",
-    )  # fmt: skip
+    text = "measurement files, or a folder of them, with the columns of the study's others"
+    parser.add_argument("data", nargs="+", metavar="FILES", help=text)
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="GLOB",
         help="held-out runs among them, by file name; else those of the plan, or by the usual "
         "names, or every third run",
     )  # fmt: skip
     add_run_facts(parser)
-    parser.add_argument(
-        "--plan", type=Path, metavar="PLAN",
-        help="the plan of these tests: take its roles, and report differences from it",
-    )  # fmt: skip
+    text = "the plan of these tests: take its roles, and report differences from it"
+    parser.add_argument("--plan", type=Path, metavar="PLAN", help=text)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_extend)
 
@@ -281,19 +273,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
     auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    auto.add_argument(
-        "--learn", action="store_true",
-        help="if no known effect explains the error, learn a curve and continue",
-    )  # fmt: skip
+    text = "if no known effect explains the error, learn a curve and continue"
+    auto.add_argument("--learn", action="store_true", help=text)
     auto.add_argument(
         "--law",
         help="all: search for the law together with its effects (default on a test bench if no law "
         "was chosen); a name: begin with that law",
     )
-    auto.add_argument(
-        "--greedy", action="store_true",
-        help="if no effect explains the error, add the one that lowers it most, and continue",
-    )  # fmt: skip
+    text = "if no effect explains the error, add the one that lowers it most, and continue"
+    auto.add_argument("--greedy", action="store_true", help=text)
     add_trust(auto)
     add_details(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
@@ -308,9 +296,8 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument(
-        "--mask", action="store_true", help="treat isolated spikes as not measured from now on"
-    )
+    text = "treat isolated spikes as not measured from now on"
+    parser.add_argument("--mask", action="store_true", help=text)
     parser.add_argument(
         "--correct", action="store_true",
         help="correct what can be corrected in study.toml: lines, and gain, zero or sign of a run "
@@ -330,17 +317,12 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         "--data", nargs="+", action="extend", required=True, metavar="GLOB",
         help="measurement files, or a folder of them; quote a pattern: 'lab/*.csv'",
     )  # fmt: skip
-    parser.add_argument(
-        "--rig", choices=("bench", "structure"), default="bench",
-        help="motion prescribed and force measured, or ground motion in and response out",
-    )  # fmt: skip
-    parser.add_argument(
-        "--building", type=Path, metavar="FILE",
-        help="the structure's data file, with --rig structure",
-    )  # fmt: skip
-    parser.add_argument(
-        "--device", metavar="NAME", help="device to identify, if the building has several"
-    )
+    text = "motion prescribed and force measured, or ground motion in and response out"
+    parser.add_argument("--rig", choices=("bench", "structure"), default="bench", help=text)
+    text = "the structure's data file, with --rig structure"
+    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
+    text = "device to identify, if the building has several"
+    parser.add_argument("--device", metavar="NAME", help=text)
     parser.add_argument(
         "--channel",
         action="append",
@@ -349,17 +331,12 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="column of a channel, instead of the guess; a minus before COLUMN reverses its sign: "
         "--channel 'force=-Ch3@kN'",
     )
-    parser.add_argument(
-        "--without", action="append", default=[], metavar="CHANNEL",
-        help="a channel that is not read, though a column was taken for it",
-    )  # fmt: skip
-    parser.add_argument(
-        "--step", type=float, metavar="S", help="sampling step in s of files without a time"
-    )
-    parser.add_argument(
-        "--test", nargs="+", action="extend", default=[], metavar="GLOB",
-        help="test runs, which no fit and no verdict uses: names among the data, or more files",
-    )  # fmt: skip
+    text = "a channel that is not read, though a column was taken for it"
+    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
+    text = "sampling step in s of files without a time"
+    parser.add_argument("--step", type=float, metavar="S", help=text)
+    text = "test runs, which no fit and no verdict uses: names among the data, or more files"
+    parser.add_argument("--test", nargs="+", action="extend", default=[], metavar="GLOB", help=text)
     _add_runs(parser)
     parser.add_argument(
         "--law",
@@ -374,14 +351,10 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add what is known of whole runs, and how files hold them."""
     add_run_facts(parser)
-    parser.add_argument(
-        "--split", default="", metavar="HOW",
-        help="files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'",
-    )  # fmt: skip
-    parser.add_argument(
-        "--rate", type=float, metavar="HZ",
-        help="decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on",
-    )  # fmt: skip
+    text = "files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'"
+    parser.add_argument("--split", default="", metavar="HOW", help=text)
+    text = "decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on"
+    parser.add_argument("--rate", type=float, metavar="HZ", help=text)
     parser.add_argument("--mask", action="store_true", help="treat isolated spikes as not measured")
 
 
