@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
-from ._options import add_native, add_trust, builder
+from ._options import add_json, add_native, add_trust, builder, print_json
 
 if TYPE_CHECKING:
     from ..fmu.build import Plan
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=Path(), metavar="FOLDER", help=text)
     add_native(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -68,10 +68,8 @@ def main(arguments: argparse.Namespace) -> int:
         _build(make, what, target)
     description = read_description(target, any_platform=True)
     if arguments.json:
-        import json
-
         answer = {"file": str(target.absolute()), "built": not fresh, **_port_counts(description)}
-        print(json.dumps(answer, indent=2))
+        print_json(answer)
     else:
         _print(target, description, fresh)
     return 0

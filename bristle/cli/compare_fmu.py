@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_details, channels_of, print_json
+from ._options import add_details, add_json, channels_of, print_json
 
 if TYPE_CHECKING:
     from ..prediction.compare_fmu import FmuComparison
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help=text)
     parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
     add_details(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:

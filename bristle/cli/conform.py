@@ -6,6 +6,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from ._options import add_json
+
 if TYPE_CHECKING:
     from ..conformance.report import Report
 
@@ -23,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in separate processes, with a time limit, with your rights."
     )
     parser.add_argument("fmu", metavar="FILE.fmu", help="an FMU of any tool")
-    parser.add_argument("--json", action="store_true", help="print the table as JSON")
+    add_json(parser, "print the table as JSON")
     text = "exit with 1 for a lack of robustness as well"
     parser.add_argument("--strict", action="store_true", help=text)
     text = "time limit of one call in s (default: %(default)g)"

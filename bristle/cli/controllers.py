@@ -11,7 +11,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_trust
+from ._options import add_json, add_no_figure, add_trust, finite, print_json, print_view, share_of
 
 if TYPE_CHECKING:
     from ..controller_comparison.result import ControllerComparison
@@ -69,13 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fmus", choices=("python", "native"), help="kind of FMUs")
     text = "number of processes; else one per core"
     parser.add_argument("--workers", type=int, metavar="N", help=text)
-    parser.add_argument("--no-figure", action="store_true", help="write only tables, no report")
+    add_no_figure(parser, "write only tables, no report")
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER",
         help="folder of report, tables and scenarios; older ones are replaced; else "
         "results/comparison/BUILDING/",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
     add_trust(parser)
 
 
@@ -108,9 +108,12 @@ def main(arguments: argparse.Namespace) -> int:
     answer = {"command": _said(arguments), **_answer(found, files)}
     write_whole(folder / ANSWER, json.dumps(answer, indent=1, allow_nan=False))
     if arguments.json:
-        print(json.dumps(answer, indent=2, allow_nan=False))
+        print_json(answer)
     else:
-        _print(found, folder, files)
+        print_view(found.view(), ())
+        print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
+        for path in files:
+            print(f"  {path}")
     return 0
 
 
@@ -141,15 +144,11 @@ def _spread(arguments: argparse.Namespace) -> Any:
 
 
 def _share(option: str, text: str | None) -> float | None:
-    """Return a share [1] from a text such as "10%" or "0.1"."""
     from ..errors import not_usable
 
     if text is None:
         return None
-    try:
-        value = float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
-    except ValueError:
-        value = float("nan")
+    value = share_of(text)
     if not (isfinite(value) and value >= 0.0):
         raise not_usable(f"{option} {text!r}: a share, as 10% or 0.1, is right.")
     return value
@@ -158,19 +157,13 @@ def _share(option: str, text: str | None) -> float | None:
 def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
     from ..controller_comparison.view import footnotes, header, lowest, rows
 
-    def values(frame: Any) -> list[dict[str, Any]]:
-        return [
-            {key: None if value != value else value for key, value in row.items()}
-            for row in frame.to_dict(orient="records")
-        ]  # JSON has no NaN
-
     judged = found.setting.judged
     return {
         "verdict": found.verdict,
         "judged": {"output": judged.column, "statistic": judged.statistic, "unit": judged.unit},
         "units": found.units,
-        "cases": values(found.table),
-        "worst": None if found.worst is None else values(found.worst),
+        "cases": finite(found.table.to_dict(orient="records")),
+        "worst": None if found.worst is None else finite(found.worst.to_dict(orient="records")),
         "limits": {name: one._asdict() for name, one in found.limits.items()},
         "notes": list(found.notes),
         "tables": [
@@ -181,12 +174,3 @@ def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
         "seconds": round(found.seconds, 1),
         "files": [str(path.absolute()) for path in files],
     }  # fmt: skip
-
-
-def _print(found: ControllerComparison, folder: Path, files: list[Path]) -> None:
-    from ..view import terminal
-
-    print(terminal.text(found.view()))
-    print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
-    for path in files:
-        print(f"  {path}")

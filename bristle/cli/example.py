@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ._options import add_common_to_actions
+from ._options import add_common_to_actions, add_json, print_json
 
 HELP = "make an example study: measurements of a rig with a hidden effect"
 
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle example`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     shown = commands.add_parser("list", help="list the effects that each rig can hide")
-    shown.add_argument("--json", action="store_true", help="print as JSON")
+    add_json(shown, "print as JSON")
     shown.set_defaults(act=_list)
     bench = commands.add_parser("bench", help="an MR damper on a test bench")
     _add_choices(bench)
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     building.set_defaults(act=_building)
     reveal = commands.add_parser("reveal", help="show the hidden answer and what the study found")
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
-    reveal.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(reveal)
     reveal.set_defaults(act=_reveal)
     performing = commands.add_parser("perform", help="perform a plan on the simulated rig")
     performing.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     performing.add_argument("--as-runs", default="", metavar="NAME", help=text)
     text = "perform the plan even if it was made for another study"
     performing.add_argument("--insist", action="store_true", help=text)
-    performing.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(performing)
     performing.set_defaults(act=_perform)
     add_common_to_actions(commands)
 
@@ -74,9 +74,7 @@ def _list(arguments: argparse.Namespace) -> int:
         for one in HIDDEN.values()
     ]  # fmt: skip
     if arguments.json:
-        import json
-
-        print(json.dumps(rows, indent=2))
+        print_json(rows)
         return 0
     print(f"{'hidden effect':20} {'in':16} what it is")
     for one in HIDDEN.values():
@@ -150,9 +148,7 @@ def _reveal(arguments: argparse.Namespace) -> int:
     named = [*study.model().effects, *verdict.get("effects", [])]
     found, kind = tuple(dict.fromkeys(named)), str(verdict.get("kind", ""))
     if arguments.json:
-        import json
-
-        print(json.dumps(answer | {"found": list(found), "verdict": kind}, indent=2))
+        print_json(answer | {"found": list(found), "verdict": kind})
     else:
         print(told(answer, found, kind))
     return 0

@@ -10,19 +10,17 @@ stiffness. The command keeps it if it lowers the error on held-out runs beyond c
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Collection
-from pathlib import Path
 
 from ..core.text import command
-from ._options import add_trust
+from ._options import add_json, add_study, add_trust, print_json
 
 HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle learn`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     parser.add_argument(
         "--along", metavar="SIGNAL[,SIGNAL]", default="",
         help="signals that the curve may depend on, such as displacement,speed, or an extra "
@@ -46,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "show the learned effect; write nothing"
     parser.add_argument("--dry-run", action="store_true", help=text)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -69,7 +67,7 @@ def main(arguments: argparse.Namespace) -> int:
         write=not arguments.dry_run,
     )
     if arguments.json:
-        print(json.dumps(found.as_dict(), indent=2, ensure_ascii=False))
+        print_json(found.as_dict())
         return 0
     print("\n".join(found.sentences()))
     for one in found.found.others:

@@ -11,8 +11,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..view import terminal
-from ._options import add_overrides, add_trust
+from ._options import add_json, add_no_figure, add_overrides, add_trust, print_json, print_view
 
 if TYPE_CHECKING:
     from ..optimal_control import Limit
@@ -49,10 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--starts", type=int, default=3, metavar="N", help=text)
     text = "folder of voltage, scenario, results and picture; else results/limit/SCENARIO/"
     parser.add_argument("--out", type=Path, metavar="FOLDER", help=text)
-    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_no_figure(parser)
     add_overrides(parser, "scenario", "ground.peak=3.924")
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -79,11 +78,9 @@ def main(arguments: argparse.Namespace) -> int:
         files.append(folder / "limit.png")
         draw_limit(found).save(files[-1], dpi=160)
     if arguments.json:
-        import json
-
-        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+        print_json(_answer(found, files))
     else:
-        _print(found, files)
+        print_view(found.view(), files)
     return 0
 
 
@@ -105,9 +102,3 @@ def _answer(found: Limit, files: list[Path]) -> dict[str, Any]:
         "seconds": round(found.seconds, 1),
         "files": [str(path.absolute()) for path in files],
     }
-
-
-def _print(found: Limit, files: list[Path]) -> None:
-    print(terminal.text(found.view()))
-    for path in files:
-        print(f"  {path}")

@@ -6,14 +6,13 @@ Your own begin with `bristle new`.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.text import tick, typed
-from ._options import add_trust
+from ._options import add_json, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..fmu.description import Description, Variable
@@ -36,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "with effects, laws: a study whose own count too"
     parser.add_argument("--study", type=Path, metavar="FOLDER", help=text)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print as JSON")
+    add_json(parser, "print as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -66,7 +65,7 @@ def main(arguments: argparse.Namespace) -> int:
     if kind is None:
         tables["effects"], tables["laws"] = _effects(), _laws()
     if arguments.json:
-        print(json.dumps(tables[kind] if kind else tables, indent=2))
+        print_json(tables[kind] if kind else tables)
         return 0
     for title, rows in tables.items():
         _print(title, rows)
@@ -77,7 +76,7 @@ def _physics(word: str, arguments: argparse.Namespace) -> int:
     """Print a table of effects or laws, or everything about one."""
     kind, told, left_out = _found(word, arguments.name, arguments.study)
     if arguments.json:
-        print(json.dumps(told, indent=2))
+        print_json(told)
     elif isinstance(told, dict):
         kind.one(told)
     else:

@@ -12,13 +12,12 @@ more.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next, Text
-from ._options import add_details, add_trust
+from ._options import add_details, add_json, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..planning.plan import Plan
@@ -51,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
     add_trust(parser)
     add_details(parser)
-    parser.add_argument("--json", action="store_true", help="print the plan as JSON")
+    add_json(parser, "print the plan as JSON")
 
 
 LIMITS = {
@@ -101,7 +100,7 @@ def main(arguments: argparse.Namespace) -> int:
         folder = found.write(arguments.output or _free(arguments.folder or Path()))
     if arguments.json:
         place = {"folder": str(folder)} if folder else {}
-        print(json.dumps({**found.as_dict(), **place}, indent=2, ensure_ascii=False))
+        print_json({**found.as_dict(), **place})
     else:
         print(text(found, arguments.folder, folder, details=arguments.details))
     return 0

@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING
 from ._options import (
     add_common_to_actions,
     add_details,
+    add_json,
     add_run_facts,
+    add_study,
     add_trust,
     channels_of,
     files_of,
+    print_json,
     test_files,
 )
 
@@ -33,7 +36,7 @@ if TYPE_CHECKING:
 
 def add_channels(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study channels`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     parser.add_argument(
         "--channel", action="append", default=[], metavar="CHANNEL=COLUMN@UNIT",
         help="new column of a channel; a minus before COLUMN reverses its sign: --channel "
@@ -45,7 +48,7 @@ def add_channels(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--step", type=float, metavar="S", help=text)
     text = "show the changes, and write nothing"
     parser.add_argument("--dry-run", action="store_true", help=text)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
     parser.set_defaults(act=_channels)
 
 
@@ -75,21 +78,19 @@ def _channels(arguments: argparse.Namespace) -> int:
 
 
 def _print_channels(study: Study, *, as_json: bool) -> None:
-    import json
     from dataclasses import asdict
 
     from ..study.study_file import spec_text
 
     listed = study.settings.channels
     if as_json:
-        print(json.dumps({name: asdict(spec) for name, spec in listed.items()}, indent=2))
+        print_json({name: asdict(spec) for name, spec in listed.items()})
         return
     for name, spec in listed.items():
         print(f"{name:28} {spec_text(spec)}")
 
 
 def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
-    import json
     from dataclasses import asdict
 
     answer = {
@@ -100,7 +101,7 @@ def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
         "beside": list(done.results.beside),
         "kept": str(done.kept.absolute()) if done.kept else None,
     }
-    print(json.dumps(answer, indent=2, ensure_ascii=False))
+    print_json(answer)
 
 
 def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
@@ -132,7 +133,7 @@ def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
 
 def add_extend(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study extend`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     text = "measurement files, or a folder of them, with the columns of the study's others"
     parser.add_argument("data", nargs="+", metavar="FILES", help=text)
     parser.add_argument(
@@ -143,7 +144,7 @@ def add_extend(parser: argparse.ArgumentParser) -> None:
     add_run_facts(parser)
     text = "the plan of these tests: take its roles, and report differences from it"
     parser.add_argument("--plan", type=Path, metavar="PLAN", help=text)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
     parser.set_defaults(act=_extend)
 
 
@@ -190,7 +191,6 @@ def print_added(
 
 
 def _print_extended_json(extended: Extended, by_plan: Performed | None) -> None:
-    import json
     from dataclasses import asdict
 
     answer = {
@@ -199,7 +199,7 @@ def _print_extended_json(extended: Extended, by_plan: Performed | None) -> None:
         "notes": [*extended.notes, *(by_plan.notes if by_plan else ())],
         "plan": [asdict(pair) for pair in by_plan.pairs] if by_plan else None,
     }
-    print(json.dumps(answer, indent=2, ensure_ascii=False))
+    print_json(answer)
 
 
 # `bristle study roles`: what the runs of a study are for.
@@ -215,13 +215,13 @@ ROLES = {
 
 def add_roles(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study roles`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     for role, text in ROLES.items():
         parser.add_argument(
             f"--{role}", nargs="+", action="extend", default=[], metavar="RUN",
             help=f"these runs are {text}" if role != "test" else f"these are {text}",
         )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the runs as JSON")
+    add_json(parser, "print the runs as JSON")
     parser.set_defaults(act=_roles)
 
 
@@ -241,9 +241,7 @@ def _roles(arguments: argparse.Namespace) -> int:
         study = study.with_roles(roles)
     runs = (*study.settings.runs, *study.settings.excluded)
     if arguments.json:
-        import json
-
-        print(json.dumps([{"run": run.name, "role": run.role} for run in runs], indent=2))
+        print_json([{"run": run.name, "role": run.role} for run in runs])
         return 0
     for run in runs:
         print(f"{run.role:8} {run.name}")
@@ -272,7 +270,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     auto = commands.add_parser(
         "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
-    auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(auto)
     text = "if no known effect explains the error, learn a curve and continue"
     auto.add_argument("--learn", action="store_true", help=text)
     auto.add_argument(
@@ -284,7 +282,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     auto.add_argument("--greedy", action="store_true", help=text)
     add_trust(auto)
     add_details(auto)
-    auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
+    add_json(auto, "print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
     add_common_to_actions(commands)
 
@@ -295,7 +293,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     text = "treat isolated spikes as not measured from now on"
     parser.add_argument("--mask", action="store_true", help=text)
     parser.add_argument(
@@ -307,7 +305,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         "--exclude", nargs="+", action="extend", default=[], metavar="RUN",
         help="leave these runs out from now on: role = \"exclude\" in study.toml",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    add_json(parser, "print the findings as JSON")
     parser.set_defaults(act=_check)
 
 
@@ -344,7 +342,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         "law together with its effects",
     )
     parser.add_argument("--title", default="", help="the study's title; else its name")
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
     parser.set_defaults(act=_new)
 
 
@@ -400,7 +398,6 @@ def _new(arguments: argparse.Namespace) -> int:
 
 
 def _print_json(created: Created) -> None:
-    import json
     from dataclasses import asdict
 
     settings = created.study.settings
@@ -413,7 +410,7 @@ def _print_json(created: Created) -> None:
         "unused": list(created.unused),
         "notes": list(created.notes),
     }
-    print(json.dumps(answer, indent=2, ensure_ascii=False))
+    print_json(answer)
 
 
 def _print_new(created: Created) -> None:
@@ -471,11 +468,9 @@ def _check(arguments: argparse.Namespace) -> int:
         found = check_data(study)
     picture = study.write_report("data_check.png", png(found.page(), 110))
     if arguments.json:
-        import json
-
         answer = {**found.as_dict(), "picture": str(picture.absolute())}
         answer |= {"not_corrected": apart} if apart else {}
-        print(json.dumps(answer, indent=2, ensure_ascii=False))
+        print_json(answer)
     else:
         print(found.text())
         print(f"\nPicture: {picture}")
@@ -538,9 +533,7 @@ def _auto(arguments: argparse.Namespace) -> int:
         study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn, on_step=show
     )
     if arguments.json:
-        import json
-
-        print(json.dumps(done.as_dict(), indent=2, ensure_ascii=False))
+        print_json(done.as_dict())
         return 0
     if not shown:
         print(f"{staircase(study.steps(), cut_off=low)}\n")
