@@ -35,7 +35,7 @@ from .orders import (
     values_of,
 )
 from .requests import RequestError
-from .simulate_view import Asked, damper_of, record_of, records, stock_file
+from .simulate_view import RunRequest, damper_of, record_of, records, stock_file
 
 ANSWER = "passive/passive.json"
 """What `bristle optimise passive` leaves in the folder of designs."""
@@ -193,20 +193,20 @@ def _house(folder: Path) -> dict[str, Any]:
     return {"structure.building": f"{folder.name}/{building}"} if building else {}
 
 
-def _controlled(folder: Path, name: str, ground: Mapping[str, Any]) -> Asked:
+def _controlled(folder: Path, name: str, ground: Mapping[str, Any]) -> RunRequest:
     kind = kind_of_design(name)
     scenario = KINDS[kind]
     overrides = {
         **damper_of(folder.parent, scenario, folder.name), **_house(folder),
         "controller.controller": f"{folder.name}/{FOLDER}/{name}.json", **ground,
     }  # fmt: skip
-    asked = Asked(folder.parent, scenario, overrides)
+    asked = RunRequest(folder.parent, scenario, overrides)
     if kind == "hinf":
-        asked = Asked(folder.parent, scenario, {**overrides, **_inverse(folder, asked)})
+        asked = RunRequest(folder.parent, scenario, {**overrides, **_inverse(folder, asked)})
     return asked
 
 
-def _inverse(folder: Path, asked: Asked) -> dict[str, Any]:
+def _inverse(folder: Path, asked: RunRequest) -> dict[str, Any]:
     """Return what makes the inverse of a force controller that of the study's law, as overrides."""
     model = Study(folder).model()
     law = base_and_variant(model.law)[0].name
@@ -226,12 +226,12 @@ def _inverse(folder: Path, asked: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _passive(folder: Path, ground: Mapping[str, Any]) -> Asked:
+def _passive(folder: Path, ground: Mapping[str, Any]) -> RunRequest:
     damper = damper_of(folder.parent, PASSIVE, folder.name)
-    return Asked(folder.parent, PASSIVE, {**damper, **_house(folder), **ground})
+    return RunRequest(folder.parent, PASSIVE, {**damper, **_house(folder), **ground})
 
 
-def _response(asked: Asked) -> dict[str, Any]:
+def _response(asked: RunRequest) -> dict[str, Any]:
     scenario = asked.load()
     columns = simulate(scenario)
     every = -(-len(columns["time"]) // ROWS)

@@ -170,7 +170,7 @@ LONGEST = 120.0
 
 
 @dataclass(frozen=True)
-class Asked:
+class RunRequest:
     """A stock scenario and what takes the place of its values, files named from `folder`."""
 
     folder: Path
@@ -198,7 +198,7 @@ class Asked:
         return [f"{name}={_text(value)}" for name, value in self.overrides.items()]
 
 
-def asked_for(folder: Path, arguments: Mapping[str, Any]) -> Asked:
+def asked_for(folder: Path, arguments: Mapping[str, Any]) -> RunRequest:
     """Return the run that a page asks for.
 
     Parameters
@@ -220,7 +220,7 @@ def asked_for(folder: Path, arguments: Mapping[str, Any]) -> Asked:
     name, overrides = control_of(name, str(arguments.get("control") or ""))
     overrides |= damper_of(folder, name, arguments.get("study"))
     overrides |= record_of(folder, name, arguments.get("record"))
-    return Asked(folder, name, {**overrides, **values})
+    return RunRequest(folder, name, {**overrides, **values})
 
 
 def damper_of(folder: Path, scenario: str, study: object) -> dict[str, Any]:
@@ -422,14 +422,14 @@ def spectrum(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _columns(asked: Asked) -> dict[str, NDArray[Any]]:
+def _columns(asked: RunRequest) -> dict[str, NDArray[Any]]:
     """Return the columns of a run; those of the last ones are kept, for their spectra."""
     return _run(asked.folder, asked.scenario, json.dumps(dict(asked.overrides)))
 
 
 @lru_cache(maxsize=2)
 def _run(folder: Path, scenario: str, overrides: str) -> dict[str, NDArray[Any]]:
-    return simulate(Asked(folder, scenario, json.loads(overrides)).load())
+    return simulate(RunRequest(folder, scenario, json.loads(overrides)).load())
 
 
 def _unit(scenario: Scenario, name: str) -> str:

@@ -16,7 +16,7 @@ from ..data.sampling import Sampling
 from ..errors import RunError
 from ..model.model import StudyModel
 from ..physics.drive import VOLTAGE
-from ..prediction.model_system import House, Shaking, write_signals
+from ..prediction.model_system import BuildingWithFile, Excitation, write_signals
 from ..prediction.monte_carlo import Simulator
 from ..system.scenario import Scenario
 from .data_sheet import NOISE
@@ -27,7 +27,7 @@ Columns = Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Shaken:
+class SimulatedTest:
     """A test, simulated.
 
     `signals` what it prescribes; `columns` every output; `held_out` whether it is to judge by.
@@ -54,7 +54,7 @@ class ShakingTable:
     ----------
     model : StudyModel
         The damper's law with the effects of all sites.
-    house : House
+    house : BuildingWithFile
     like : Measurement
         A run of the study: planned ones have its channels, and its labels.
     noise : mapping
@@ -66,7 +66,7 @@ class ShakingTable:
     """
 
     model: StudyModel
-    house: House
+    house: BuildingWithFile
     like: Measurement
     noise: Mapping[str, float]
     most: float
@@ -94,9 +94,9 @@ class ShakingTable:
             except RunError:
                 return None
 
-    def _shaking(self, signals: Signals) -> Shaking:
+    def _shaking(self, signals: Signals) -> Excitation:
         command = signals.V if self.drive else None
-        return Shaking("plan", signals.time, signals.a, command, drive=VOLTAGE)
+        return Excitation("plan", signals.time, signals.a, command, drive=VOLTAGE)
 
     def _ready(self, signals: Signals) -> tuple[Simulator, Scenario]:
         """Return what simulates a test of that length, made once."""

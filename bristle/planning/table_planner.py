@@ -9,10 +9,10 @@ from typing import ClassVar
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..identification.building_sites import StructureProblem
-from .information import Seen
+from .information import JudgedTest
 from .limits import Signals, Test
 from .search import LEAST, Planner
-from .shaking_table import Columns, Shaken, ShakingTable
+from .shaking_table import Columns, ShakingTable, SimulatedTest
 from .waveforms import Waveform
 
 TRIES, GENTLE, STEEP = 6, 0.97, 0.3
@@ -42,15 +42,15 @@ class TablePlanner(Planner):
     def _why_nothing(self, tests: Sequence[Test]) -> str:
         return self.nothing_kept
 
-    def response(self, one: Seen) -> Shaken:
+    def response(self, one: JudgedTest) -> SimulatedTest:
         """Return what a test prescribes, and every output of the simulation."""
         assert self.table is not None
         signals = one.test.signals(self.limits, self.rate)
         columns = self.table.response(signals)
         assert columns is not None
-        return Shaken(signals, columns, one.held_out)
+        return SimulatedTest(signals, columns, one.held_out)
 
-    def _look(self, test: Test) -> Seen | None:
+    def _look(self, test: Test) -> JudgedTest | None:
         assert self.table is not None
         for _ in range(TRIES):
             signals = test.signals(self.limits, self.rate)
@@ -63,7 +63,7 @@ class TablePlanner(Planner):
             test = test.smaller(max(STEEP, GENTLE / most))
         return None
 
-    def _judged(self, test: Test, signals: Signals, columns: Columns) -> Seen | None:
+    def _judged(self, test: Test, signals: Signals, columns: Columns) -> JudgedTest | None:
         """Return a test that keeps the limits as it would be seen, None where nothing moves."""
         assert self.table is not None
         assert self.show is not None
@@ -75,7 +75,7 @@ class TablePlanner(Planner):
             asked.evidence(found[site].runs if site in found else [])
             for site, asked in zip(self.places, self.goal.asked, strict=True)
         )
-        return Seen(test, signals, tuple(shown))
+        return JudgedTest(test, signals, tuple(shown))
 
     def _motion(self, which: float, at: float, seed: int) -> Waveform:
         """Return a motion by two numbers between 0 and 1: a record, or its kind and frequency."""

@@ -127,7 +127,7 @@ def kept_folder(study: Path, number: int) -> Path:
     return study / "history" / KEPT.format(number)
 
 
-def set_aside(study: Path, number: int, first: int) -> None:
+def set_results_aside(study: Path, number: int, first: int) -> None:
     """Move all results into a folder of the history, and make the draft the study.toml.
 
     It may be called again where a process was killed in it: what is moved stays moved.
@@ -419,7 +419,7 @@ class History:
                 kept.parent.mkdir(exist_ok=True)
                 self.path(number).replace(kept)
         if "channels" in unfinished:
-            set_aside(self.study, int(unfinished["channels"]), int(unfinished["first"]))
+            set_results_aside(self.study, int(unfinished["channels"]), int(unfinished["first"]))
         for draft in self.folder.glob(".draft-*"):
             shutil.rmtree(draft, ignore_errors=True)
         self.pending.unlink(missing_ok=True)
