@@ -35,9 +35,8 @@ from .limits import RESERVE, SLOWEST, ZERO, RigLimits, Signals, with_given
 from .outcome import Outcome, outcomes
 from .plan import Plan
 from .questions import Measured, PlanRequest, Stated, cost_of, misfit_note, note_of_missing, stated
-from .shaking_table import ShakingTable
+from .shaking_table import ShakingTable, TablePlanner
 from .site_questions import SiteRequest, default_requests, largest_motion, of_one_force, purposes_at
-from .table_planner import TablePlanner
 from .waveforms import Waveform, displacement_of, records_at_hand, scalable
 
 if TYPE_CHECKING:
@@ -103,16 +102,27 @@ class BuildingPlan(Plan):
             return "they add up to one force while the damper's is not measured; no motion helps."
         return super()._why(one)
 
-    def files(self) -> dict[str, str | bytes]:
-        """Return the further files of the plan's folder by name."""
-        from .building_picture import building_files
+    def _text(self) -> list[str]:
+        sensors = [f"- {one.sentence()}" for one in self.sensors]
+        return super()._text() + (["", "## Sensors to add", "", *sensors] if sensors else [])
 
-        return building_files(self)
+    def _demand(self) -> str:
+        units = zip(self._peaks(), ("m", "m/s", "m/s2"), strict=True)
+        asked = [quantity(peak, unit) for peak, unit in units]
+        moved = max(float(np.max(np.abs(one))) for one in self.predicted)
+        return (
+            f"The tests ask the table for {asked[0]} to either side, {asked[1]} and {asked[2]} at "
+            f"the most, and move {place_of(self.level)} by {quantity(moved, 'm')}, as the model "
+            "predicts: nine tenths of what the rig can do, or less. Each begins and ends at rest. "
+            "Command the table by its acceleration, or integrate it twice: the displacement comes "
+            "back to zero."
+        )
 
     def _page(self, k: int) -> Page:
-        from .building_picture import draw_shaking
+        from .pictures import draw_shaking
 
-        return draw_shaking(self.runs()[k], self.predicted[k], self.drive, self.level)
+        run, moved = self.runs()[k], self.predicted[k]
+        return draw_shaking(run, moved, self.drive, place_of(self.level))
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""

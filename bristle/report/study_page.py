@@ -198,10 +198,7 @@ def plan_section(study: Study) -> str:
         if performed
         else f"{folder.name} holds tests for the rig's controller, one file each."
     )
-    runs = [
-        [run.name, "training" if run.role == "train" else "held out", run.about]
-        for run in plan.runs
-    ]
+    runs = [[run.name, run.purpose, run.about] for run in plan.runs]
     return html.section(
         "Planned tests" if performed else "Next tests",
         html.paragraphs(lead, kind="lead"),

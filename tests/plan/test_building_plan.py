@@ -27,9 +27,8 @@ from bristle.planning.folder import ROLES, read_plan
 from bristle.planning.information import Goal
 from bristle.planning.limits import RESERVE, RigLimits, Signals, Test, read_rig
 from bristle.planning.outcome import Outcome
-from bristle.planning.shaking_table import Columns, ShakingTable
+from bristle.planning.shaking_table import Columns, ShakingTable, TablePlanner
 from bristle.planning.site_questions import are_twins, default_requests, twins_of
-from bristle.planning.table_planner import TablePlanner
 from bristle.planning.waveforms import (
     Command,
     Waveform,
