@@ -19,7 +19,7 @@ from ..physics.law import base_and_variant
 from ..study.study import Study
 from ..synthesis import implausible, read_task, task_from_data
 from ..synthesis.analysis import task_curves
-from ..system.scenario import Scenario, load_scenario
+from ..system.scenario import load_scenario
 from .orders import (
     FIELDS,
     FOLDER,
@@ -35,7 +35,7 @@ from .orders import (
     values_of,
 )
 from .requests import RequestError
-from .simulate_view import RunRequest, damper_of, record_of, records, stock_file
+from .simulate_view import RunRequest, damper_of, record_of, records, stock_file, unit_of
 
 ANSWER = "passive/passive.json"
 """What `bristle optimise passive` leaves in the folder of designs."""
@@ -239,13 +239,8 @@ def _response(asked: RunRequest) -> dict[str, Any]:
         "command": asked.run(), "time": columns["time"][::every],
         "values": columns[OUTPUT][::every], "unit": "m/s2",
         "peaks": {name: float(np.max(np.abs(columns[name]))) for name in JUDGED},
-        "units": {name: _unit(scenario, name) for name in JUDGED},
+        "units": {name: unit_of(scenario, name) for name in JUDGED},
     }  # fmt: skip
-
-
-def _unit(scenario: Scenario, name: str) -> str:
-    component, _, port = name.partition(".")
-    return scenario.component(component).description.variables[port].unit or ""
 
 
 def _best(folder: Path) -> dict[tuple[str, float], float]:

@@ -15,6 +15,7 @@ from ..diagnosis.rig_runs import BenchRuns
 from ..errors import StudyError
 from ..identification.problem import Run
 from ..physics.effect import plain_name
+from ..study.identified import is_identified
 from ..study.identify import as_model
 from ..study.study import Study
 from .information import DRAWS, Question
@@ -101,7 +102,7 @@ def _opened(study: Study) -> Opening:
     """Return the model of a study with its runs."""
     study.usable_effects()
     model, runs = study.model(), study.runs()
-    identified = any(value.origin == "identified" for value in model.flat().values())
+    identified = is_identified(model)
     opened = BenchRuns(runs.train, runs.holdout, as_model(model), identified, tell).open_damper()
     if not isinstance(opened, Opening):
         raise StudyError(f"{study.folder}: {' '.join(opened.reasons)}")

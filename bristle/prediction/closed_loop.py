@@ -22,7 +22,7 @@ from ..model.model_file import read_model
 from ..study.changes import behind_data
 from ..study.history import history_steps
 from ..study.rig import building_of
-from ..study.steps import count_opening, opened_text, openings, runs_for_test
+from ..study.steps import count_test_set_use, opened_text, runs_for_test, test_set_uses
 from ..study.study import Study
 from ..study.study_file import TEST
 from .closed_loop_result import ClosedLoop, Predicted
@@ -78,8 +78,8 @@ def closed_loop(
             f"{building.studied} alone"
         )
     if role == TEST:
-        count_opening(study)
-        notes.append(opened_text(len(openings(study))))
+        count_test_set_use(study)
+        notes.append(opened_text(len(test_set_uses(study))))
     return replace(found, role=role, notes=(*found.notes, *notes))
 
 

@@ -1,7 +1,5 @@
 """A new study's folder from files: channels guessed with reasons, runs to train on or held out."""
 
-# Longer than 300 lines: a folder is made whole or not at all, so that all of its checks are here.
-
 from __future__ import annotations
 
 import re
