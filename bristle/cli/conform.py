@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from ._options import add_json
+from ._options import add_json, print_table
 
 if TYPE_CHECKING:
     from ..conformance.report import Report
@@ -52,14 +52,12 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _show(report: Report) -> None:
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
-    table = Table("probe", "tried", "seen", "what the standard says", "verdict", show_lines=True)
-    for row in report.rows:
-        verdict = Text(row.verdict, style=_COLOURS[row.verdict])
-        # Text, not str: what an FMU says may hold what rich would read as markup.
-        table.add_row(*map(Text, (row.probe, row.tried, row.seen, row.standard)), verdict)
-    console = Console()
-    console.print(table)
-    console.print(Text(report.summary()))
+    heads = ("probe", "tried", "seen", "what the standard says", "verdict")
+    rows = [
+        (row.probe, row.tried, row.seen, row.standard, Text(row.verdict, _COLOURS[row.verdict]))
+        for row in report.rows
+    ]
+    print_table(heads, rows, lines=True)
+    Console().print(Text(report.summary()))

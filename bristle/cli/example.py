@@ -20,12 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_choices(bench)
     text = "keep the voltage constant in each run, at 2 or 6 V, as many laboratories do"
     bench.add_argument("--held", action="store_true", help=text)
-    bench.set_defaults(act=_bench)
+    bench.set_defaults(act=_make)
     building = commands.add_parser("building", help="a base-isolated building on a shake table")
     _add_choices(building)
     text = "leave the damper's force out of the files"
     building.add_argument("--no-load-cell", action="store_true", help=text)
-    building.set_defaults(act=_building)
+    building.set_defaults(act=_make)
     reveal = commands.add_parser("reveal", help="show the hidden answer and what the study found")
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     add_json(reveal)
@@ -87,38 +87,21 @@ def _list(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _bench(arguments: argparse.Namespace) -> int:
-    from ..examples.make import make_bench
-
-    make_bench(arguments.folder, _choice(arguments))
-    return _made(arguments.folder)
-
-
-def _building(arguments: argparse.Namespace) -> int:
-    from ..examples.make import make_building
-
-    make_building(arguments.folder, _choice(arguments), load_cell=not arguments.no_load_cell)
-    return _made(arguments.folder)
-
-
-def _choice(arguments: argparse.Namespace):  # type: ignore[no-untyped-def]
-    from ..examples.make import Choice
-
-    return Choice(
-        effects=tuple(arguments.effect),
-        law=arguments.law,
-        noise=arguments.noise,
-        seed=arguments.seed,
-        nothing=arguments.none,
-        outside=arguments.outside,
-        held=getattr(arguments, "held", False),
-    )
-
-
-def _made(folder: Path) -> int:
+def _make(arguments: argparse.Namespace) -> int:
     from ..examples.hidden import FILE
+    from ..examples.make import Choice, make_bench, make_building
     from ..study.study import Study
 
+    folder: Path = arguments.folder
+    choice = Choice(
+        effects=tuple(arguments.effect), law=arguments.law, noise=arguments.noise,
+        seed=arguments.seed, nothing=arguments.none, outside=arguments.outside,
+        held=getattr(arguments, "held", False),
+    )  # fmt: skip
+    if arguments.action == "bench":
+        make_bench(folder, choice)
+    else:
+        make_building(folder, choice, load_cell=not arguments.no_load_cell)
     runs = Study(folder).settings.runs
     held = sum(run.role == "holdout" for run in runs)
     print(f"{folder}: a study of {len(runs) - held} runs for training and {held} held out.")

@@ -20,14 +20,13 @@ from .information import Information, of_roles
 from .outcome import Outcome, along
 from .questions import Purposes, Stated
 from .shaking_table import FORCE, ShakingTable, SimulatedTest
-from .site_questions import of_one_force, with_measured_force
+from .site_questions import Key, of_one_force, with_measured_force
 
 HELPS, SOME = 1.5, 1.15
 """Factors from which on a sensor is said to help, and from which on the best one is named."""
 
 Sites = dict[str, StructureProblem]
 Show = Callable[[list[Measurement]], Sites]
-Key = tuple[str, str, str]  # site, purpose, name of the figure
 
 
 @dataclass(frozen=True)

@@ -47,9 +47,6 @@ class SimulatedTest:
 
 
 FORCE = "force"
-DEMANDS = ("damper_stroke", "drift", "force", "heat")
-"""What a building's response asks for, by the names of `RigLimits`."""
-
 KINDS = ("displacement", "velocity", "acceleration_absolute")
 """What can be measured of a level."""
 

@@ -319,7 +319,7 @@ def largest_motion(runs: Sequence[Any]) -> tuple[float, float]:
 
 LAYER = "layer"
 BOTH = (DAMPER, LAYER)
-Key = tuple[str, str, str]
+Key = tuple[str, str, str]  # site, purpose, name of the figure
 
 
 def of_one_force(stand: Mapping[str, Stated]) -> set[str]:
