@@ -458,7 +458,7 @@ def test_a_data_sheet_with_mistakes_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("verdict", "request"),
+    ("verdict", "wanted"),
     [
         ({"kind": "ambiguous", "effects": ["gas_spring", "duffing"]},
          PlanRequest(separate=("gas_spring", "duffing"))),
@@ -468,10 +468,10 @@ def test_a_data_sheet_with_mistakes_is_refused(
     ],
 )  # fmt: skip
 def test_without_a_purpose_the_verdict_says_what_for(
-    rig: bristle.Study, monkeypatch: pytest.MonkeyPatch, verdict: object, request: PlanRequest
+    rig: bristle.Study, monkeypatch: pytest.MonkeyPatch, verdict: object, wanted: PlanRequest
 ) -> None:
     monkeypatch.setattr(type(rig), "verdict", lambda _self: verdict)
-    assert default_request(rig) == request
+    assert default_request(rig) == wanted
 
 
 def test_a_plan_says_that_its_model_or_verdict_is_of_other_data(
