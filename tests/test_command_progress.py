@@ -17,8 +17,7 @@ from pathlib import Path
 import pytest
 from study.made import write_runs
 
-from bristle.cli import build_parser, main
-from bristle.cli._kept import KEPT
+from bristle.cli import KEPT, build_parser, main
 from bristle.study import create_study
 from bristle.study.study import Study
 

@@ -7,7 +7,7 @@ import importlib
 import json
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from fnmatch import fnmatchcase
 from functools import partial
@@ -18,8 +18,11 @@ from typing import TYPE_CHECKING, Any
 from ..errors import TrustError
 
 if TYPE_CHECKING:
+    from rich.text import Text
+
     from ..data.channels import ChannelSpec
     from ..fmu.build import Plan
+    from ..view.blocks import View
 
 
 def add_run_facts(parser: argparse.ArgumentParser) -> None:
@@ -30,10 +33,8 @@ def add_run_facts(parser: argparse.ArgumentParser) -> None:
         ("--label", "NAME=PATTERN", "other labels in the names of files: --label 'oil=batch{}'"),
     ):  # fmt: skip
         parser.add_argument(option, action="append", default=[], metavar=value, help=text)
-    parser.add_argument(
-        "--runs", type=Path, metavar="FILE",
-        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
-    )  # fmt: skip
+    text = "a table with a row per run: file, role, current [A], temperature [degC], ..."
+    parser.add_argument("--runs", type=Path, metavar="FILE", help=text)
 
 
 def test_files(patterns: list[str], files: list[str]) -> list[str]:
@@ -132,25 +133,35 @@ def add_common_to_actions(commands: argparse._SubParsersAction[argparse.Argument
         _add(action, argparse.SUPPRESS)
 
 
+def add_study(parser: argparse.ArgumentParser) -> None:
+    """Add the folder of the study that a command is about."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+
+
+def add_json(parser: argparse.ArgumentParser, text: str = "print the answer as JSON") -> None:
+    """Add --json."""
+    parser.add_argument("--json", action="store_true", help=text)
+
+
+def add_no_figure(parser: argparse.ArgumentParser, text: str = "draw nothing") -> None:
+    """Add --no-figure."""
+    parser.add_argument("--no-figure", action="store_true", help=text)
+
+
 def add_overrides(
     parser: argparse.ArgumentParser, of: str = "file", example: str = "damper.f_c=2"
 ) -> None:
     """Add --set to a command that loads a scenario; `of` is what the values are else taken from."""
     parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
+        "--set", dest="overrides", action="append", default=[], metavar="NAME=VALUE",
         help=f"use this value instead of the {of}'s, e.g. --set {example}",
-    )
+    )  # fmt: skip
 
 
 def add_details(parser: argparse.ArgumentParser) -> None:
     """Add --details to a command whose answer has some."""
-    parser.add_argument(
-        "--details", action="store_true", help="print the evidence below the answer: all tables"
-    )
+    text = "print the evidence below the answer: all tables"
+    parser.add_argument("--details", action="store_true", help=text)
 
 
 def _add(parser: argparse.ArgumentParser, default: object) -> None:
@@ -160,16 +171,57 @@ def _add(parser: argparse.ArgumentParser, default: object) -> None:
     parser.add_argument("--debug", action="store_true", default=default, help=text)
 
 
-def print_json(answer: dict[str, Any]) -> None:
-    """Print an answer as JSON has it: what is not finite is null."""
-    print(json.dumps(_finite(answer), indent=2, ensure_ascii=False))
+def json_text(answer: Any) -> str:
+    """Return an answer as JSON has it: what is not finite is null."""
+    return json.dumps(finite(answer), indent=2, ensure_ascii=False)
 
 
-def _finite(value: Any) -> Any:
+def print_json(answer: Any) -> None:
+    """Print an answer as JSON."""
+    print(json_text(answer))
+
+
+def print_view(view: View, files: Iterable[Path | str]) -> None:
+    """Print a view, and the files that were written."""
+    from ..view import terminal
+
+    print(terminal.text(view))
+    for path in files:
+        print(f"  {path}")
+
+
+def print_table(
+    heads: Sequence[str], rows: Iterable[Sequence[str | Text]], title: str | None = None, *,
+    lines: bool = False,
+) -> None:  # fmt: skip
+    """Print a table with rules, for a terminal."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title, title_justify="left", show_lines=lines)
+    for head in heads:
+        table.add_column(Text(head))
+    for row in rows:
+        # Text, not str: rich would read units in brackets, and what an FMU says, as markup.
+        table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in row))
+    Console().print(table)
+
+
+def share_of(text: str) -> float:
+    """Return a share [1] from a text such as "10%" or "0.1"; NaN where it is none."""
+    try:
+        return float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
+    except ValueError:
+        return float("nan")
+
+
+def finite(value: Any) -> Any:
+    """Return plain data with None, which JSON has, in place of NaN and infinities."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
         return None
     return value

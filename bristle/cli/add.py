@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.text import command
 from ..view.blocks import Next, Text, View
-from ._options import add_trust
+from ._options import add_json, add_study, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..study.steps import Added
@@ -21,11 +20,11 @@ HELP = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle add`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     parser.add_argument("effects", nargs="+", metavar="EFFECT", help="see `bristle list effects`")
     parser.add_argument("--why", default="", help="the reason, for the history")
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -38,7 +37,7 @@ def main(arguments: argparse.Namespace) -> int:
     added = add_effects(study, arguments.effects, why=arguments.why)
     keeps("The new step is kept in the study's history.")
     if arguments.json:
-        print(json.dumps(added.as_dict(), indent=2, ensure_ascii=False))
+        print_json(added.as_dict())
     else:
         print(text(added, arguments.folder))
     return 0

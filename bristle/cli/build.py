@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
-from ._options import add_native, add_trust, builder
+from ._options import add_json, add_native, add_trust, builder, print_json
 
 if TYPE_CHECKING:
     from ..fmu.build import Plan
@@ -20,27 +20,17 @@ HELP = "build a component into an FMU"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle build`."""
-    parser.add_argument(
-        "component",
-        metavar="COMPONENT",
-        help="a name of `bristle list components`, or the Python file of your own component (this "
-        "runs it)",
+    text = (
+        "a name of `bristle list components`, or the Python file of your own component (this runs "
+        "it)"
     )
-    parser.add_argument(
-        "--from", dest="building", type=Path, metavar="FILE", help="building file, for a Structure"
-    )
-    parser.add_argument(
-        "--record",
-        type=Path,
-        metavar="FILE",
-        help="ground motion (PEER AT2, CSV or a name), for a GroundMotion",
-    )
-    parser.add_argument(
-        "--controller",
-        type=Path,
-        metavar="FILE",
-        help="controller file of `bristle design`, for a controller of its kind",
-    )
+    parser.add_argument("component", metavar="COMPONENT", help=text)
+    text = "building file, for a Structure"
+    parser.add_argument("--from", dest="building", type=Path, metavar="FILE", help=text)
+    text = "ground motion (PEER AT2, CSV or a name), for a GroundMotion"
+    parser.add_argument("--record", type=Path, metavar="FILE", help=text)
+    text = "controller file of `bristle design`, for a controller of its kind"
+    parser.add_argument("--controller", type=Path, metavar="FILE", help=text)
     parser.add_argument(
         "--effect",
         dest="effects",
@@ -51,16 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file with your own effect, for a damper or a Structure; may be repeated",
     )
     parser.add_argument("--name", help="name of the model and its file; else the component's")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path(),
-        metavar="FOLDER",
-        help="folder of NAME.fmu; an older one is replaced; else the current folder",
-    )
+    text = "folder of NAME.fmu; an older one is replaced; else the current folder"
+    parser.add_argument("--out", type=Path, default=Path(), metavar="FOLDER", help=text)
     add_native(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -83,10 +68,8 @@ def main(arguments: argparse.Namespace) -> int:
         _build(make, what, target)
     description = read_description(target, any_platform=True)
     if arguments.json:
-        import json
-
         answer = {"file": str(target.absolute()), "built": not fresh, **_port_counts(description)}
-        print(json.dumps(answer, indent=2))
+        print_json(answer)
     else:
         _print(target, description, fresh)
     return 0

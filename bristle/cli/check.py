@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import cut_short
-from ._options import add_overrides, add_trust
+from ._options import add_json, add_overrides, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..system.scenario import Finding
@@ -31,18 +31,13 @@ _COLOURS = {"error": "31", "warning": "33", "note": "36"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle check`."""
-    parser.add_argument(
-        "files",
-        nargs="*",
-        metavar="FILE",
-        help="scenario files, names of stock scenarios, or the file of your own effect or law",
-    )
+    text = "scenario files, names of stock scenarios, or the file of your own effect or law"
+    parser.add_argument("files", nargs="*", metavar="FILE", help=text)
     add_overrides(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
-    parser.add_argument(
-        "--schema", action="store_true", help="print the JSON schema of scenario files"
-    )
+    add_json(parser, "print the findings as JSON")
+    text = "print the JSON schema of scenario files"
+    parser.add_argument("--schema", action="store_true", help=text)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -82,7 +77,7 @@ def _print_json(found: dict[str, list[Finding]]) -> None:
         }
         for file, findings in found.items()
     ]
-    print(json.dumps({"files": answer}, indent=2))
+    print_json({"files": answer})
 
 
 def print_findings(file: str, findings: list[Finding], around: Sequence[str] = ()) -> None:
@@ -144,7 +139,7 @@ def _own(file: Path, as_json: bool) -> int:
     checks: list[dict[str, Any]] = json.loads(child.stdout)
     good = all(one["holds"] for one in checks)
     if as_json:
-        print(json.dumps({word: made.name, "conforms": good, "checks": checks}, indent=2))
+        print_json({word: made.name, "conforms": good, "checks": checks})
         return 0 if good else 2
     for one in checks:
         found = f": {one['found']}" if one["found"] else ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Block, Next, Text
-from ._options import add_details, add_trust, print_json
+from ._options import add_details, add_json, add_study, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -22,12 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "z is the error divided by the noise floor, the error of a true model: 1 is the best that "
         "the data can confirm."
     )
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     add_role(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
     add_trust(parser)
     add_details(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def add_role(parser: argparse.ArgumentParser) -> None:
@@ -82,8 +82,8 @@ def _opened(study: Study) -> dict[str, Any]:
     """Return when the test runs were opened, nothing where the study has none."""
     from dataclasses import asdict
 
-    from ..study.steps import openings
+    from ..study.steps import test_set_uses
     from ..study.study_file import TEST
 
-    opened = [asdict(one) for one in openings(study)]
+    opened = [asdict(one) for one in test_set_uses(study)]
     return {"test_openings": opened} if study.files(TEST) else {}

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_details, channels_of, print_json
+from ._options import add_details, add_json, channels_of, print_json
 
 if TYPE_CHECKING:
     from ..prediction.compare_fmu import FmuComparison
@@ -44,12 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL=COLUMN@UNIT",
         help="the column of a channel in the file, instead of the guess",
     )
-    parser.add_argument(
-        "--timeout", type=float, default=300.0, metavar="S", help="time limit of the run in s"
-    )
+    text = "time limit of the run in s"
+    parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help=text)
     parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
     add_details(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:

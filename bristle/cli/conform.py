@@ -6,6 +6,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from ._options import add_json, print_table
+
 if TYPE_CHECKING:
     from ..conformance.report import Report
 
@@ -23,23 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in separate processes, with a time limit, with your rights."
     )
     parser.add_argument("fmu", metavar="FILE.fmu", help="an FMU of any tool")
-    parser.add_argument("--json", action="store_true", help="print the table as JSON")
-    parser.add_argument(
-        "--strict", action="store_true", help="exit with 1 for a lack of robustness as well"
-    )
-    parser.add_argument(
-        "--timeout",
-        type=float,
-        default=20.0,
-        metavar="S",
-        help="time limit of one call in s (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--only", action="append", metavar="PROBE", help="try this probe only; may be repeated"
-    )
-    parser.add_argument(
-        "--beside", metavar="OTHER.fmu", help="another FMU to load into the same process"
-    )
+    add_json(parser, "print the table as JSON")
+    text = "exit with 1 for a lack of robustness as well"
+    parser.add_argument("--strict", action="store_true", help=text)
+    text = "time limit of one call in s (default: %(default)g)"
+    parser.add_argument("--timeout", type=float, default=20.0, metavar="S", help=text)
+    text = "try this probe only; may be repeated"
+    parser.add_argument("--only", action="append", metavar="PROBE", help=text)
+    text = "another FMU to load into the same process"
+    parser.add_argument("--beside", metavar="OTHER.fmu", help=text)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -58,14 +52,12 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _show(report: Report) -> None:
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
-    table = Table("probe", "tried", "seen", "what the standard says", "verdict", show_lines=True)
-    for row in report.rows:
-        verdict = Text(row.verdict, style=_COLOURS[row.verdict])
-        # Text, not str: what an FMU says may hold what rich would read as markup.
-        table.add_row(*map(Text, (row.probe, row.tried, row.seen, row.standard)), verdict)
-    console = Console()
-    console.print(table)
-    console.print(Text(report.summary()))
+    heads = ("probe", "tried", "seen", "what the standard says", "verdict")
+    rows = [
+        (row.probe, row.tried, row.seen, row.standard, Text(row.verdict, _COLOURS[row.verdict]))
+        for row in report.rows
+    ]
+    print_table(heads, rows, lines=True)
+    Console().print(Text(report.summary()))

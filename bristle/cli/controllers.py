@@ -11,7 +11,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_trust
+from ._options import add_json, add_no_figure, add_trust, finite, print_json, print_view, share_of
 
 if TYPE_CHECKING:
     from ..controller_comparison.result import ControllerComparison
@@ -29,19 +29,17 @@ ANSWER = "answer.json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle controllers`."""
-    parser.add_argument(
-        "--motions", nargs="+", metavar="RECORD",
-        help="ground motions: names or files, with values, e.g. "
-        "el_centro_1940_ns,peak=0.4g,factor=0.5",
-    )  # fmt: skip
+    text = (
+        "ground motions: names or files, with values, e.g. el_centro_1940_ns,peak=0.4g,factor=0.5"
+    )
+    parser.add_argument("--motions", nargs="+", metavar="RECORD", help=text)
     parser.add_argument(
         "--controller", nargs="+", action="extend", metavar="WHAT",
         help="stock names, controller files (.json) or design files (.toml) of `bristle design`, "
         "your own components (.py), FMUs, with values, e.g. Skyhook,gain=80,label=mine",
     )  # fmt: skip
-    parser.add_argument(
-        "--building", metavar="FILE", help="building file; else the library's building"
-    )
+    text = "building file; else the library's building"
+    parser.add_argument("--building", metavar="FILE", help=text)
     parser.add_argument(
         "--damper", metavar="WHAT",
         help="a component, a law, the folder of a study or a model.toml, an FMU, with values; "
@@ -54,14 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--statistic", choices=("peak", "rms"), help="its statistic; else peak")
     text = "number of constant voltages to try; else 17"
     parser.add_argument("--grid", type=int, metavar="N", help=text)
-    parser.add_argument(
-        "--limit", action="store_const", const=True,
-        help="compute the limit of any voltage under each motion: up to a minute each",
-    )  # fmt: skip
-    parser.add_argument(
-        "--ensemble", type=int, metavar="N",
-        help="run each case with N varied buildings, dampers and sensors, to find the worst case",
-    )  # fmt: skip
+    text = "compute the limit of any voltage under each motion: up to a minute each"
+    parser.add_argument("--limit", action="store_const", const=True, help=text)
+    text = "run each case with N varied buildings, dampers and sensors, to find the worst case"
+    parser.add_argument("--ensemble", type=int, metavar="N", help=text)
     text = "variation of masses, stiffnesses and damper parameters to either side; else 10%%"
     parser.add_argument("--spread", metavar="SHARE", help=text)
     text = "noise of the sensors, a share of each signal's RMS; else 1%%"
@@ -73,16 +67,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "solve built-in components together (compiled), or step all as FMUs (fmu)"
     parser.add_argument("--engine", choices=("compiled", "fmu"), help=text)
     parser.add_argument("--fmus", choices=("python", "native"), help="kind of FMUs")
-    parser.add_argument(
-        "--workers", type=int, metavar="N", help="number of processes; else one per core"
-    )
-    parser.add_argument("--no-figure", action="store_true", help="write only tables, no report")
+    text = "number of processes; else one per core"
+    parser.add_argument("--workers", type=int, metavar="N", help=text)
+    add_no_figure(parser, "write only tables, no report")
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER",
         help="folder of report, tables and scenarios; older ones are replaced; else "
         "results/comparison/BUILDING/",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
     add_trust(parser)
 
 
@@ -115,9 +108,12 @@ def main(arguments: argparse.Namespace) -> int:
     answer = {"command": _said(arguments), **_answer(found, files)}
     write_whole(folder / ANSWER, json.dumps(answer, indent=1, allow_nan=False))
     if arguments.json:
-        print(json.dumps(answer, indent=2, allow_nan=False))
+        print_json(answer)
     else:
-        _print(found, folder, files)
+        print_view(found.view(), ())
+        print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
+        for path in files:
+            print(f"  {path}")
     return 0
 
 
@@ -148,15 +144,11 @@ def _spread(arguments: argparse.Namespace) -> Any:
 
 
 def _share(option: str, text: str | None) -> float | None:
-    """Return a share [1] from a text such as "10%" or "0.1"."""
     from ..errors import not_usable
 
     if text is None:
         return None
-    try:
-        value = float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
-    except ValueError:
-        value = float("nan")
+    value = share_of(text)
     if not (isfinite(value) and value >= 0.0):
         raise not_usable(f"{option} {text!r}: a share, as 10% or 0.1, is right.")
     return value
@@ -165,19 +157,13 @@ def _share(option: str, text: str | None) -> float | None:
 def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
     from ..controller_comparison.view import footnotes, header, lowest, rows
 
-    def values(frame: Any) -> list[dict[str, Any]]:
-        return [
-            {key: None if value != value else value for key, value in row.items()}
-            for row in frame.to_dict(orient="records")
-        ]  # JSON has no NaN
-
     judged = found.setting.judged
     return {
         "verdict": found.verdict,
         "judged": {"output": judged.column, "statistic": judged.statistic, "unit": judged.unit},
         "units": found.units,
-        "cases": values(found.table),
-        "worst": None if found.worst is None else values(found.worst),
+        "cases": finite(found.table.to_dict(orient="records")),
+        "worst": None if found.worst is None else finite(found.worst.to_dict(orient="records")),
         "limits": {name: one._asdict() for name, one in found.limits.items()},
         "notes": list(found.notes),
         "tables": [
@@ -188,12 +174,3 @@ def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
         "seconds": round(found.seconds, 1),
         "files": [str(path.absolute()) for path in files],
     }  # fmt: skip
-
-
-def _print(found: ControllerComparison, folder: Path, files: list[Path]) -> None:
-    from ..view import terminal
-
-    print(terminal.text(found.view()))
-    print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
-    for path in files:
-        print(f"  {path}")

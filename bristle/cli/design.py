@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
-from ..view import terminal
 from ..view.blocks import Next
+from ._options import add_json, print_json, print_view
 
 if TYPE_CHECKING:
     from ..synthesis import DesignResult
@@ -27,13 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle design`."""
     parser.add_argument("kind", choices=tuple(_COMPONENTS), help="kind of controller")
     parser.add_argument("file", type=Path, metavar="FILE", help="design file, TOML")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE.json",
-        help="controller file, with figure and answer beside it; else named after the design file",
-    )
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    text = "controller file, with figure and answer beside it; else named after the design file"
+    parser.add_argument("--out", type=Path, metavar="FILE.json", help=text)
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -56,9 +52,7 @@ def main(arguments: argparse.Namespace) -> int:
     answer = {**_answer(result), "warnings": warnings}
     answer["files"] = [str(path.absolute()) for path in _write(result, answer, out)]
     if arguments.json:
-        import json
-
-        print(json.dumps(answer, indent=2, allow_nan=False))
+        print_json(answer)
     else:
         _print(result, answer["files"], out)
     return 0
@@ -103,6 +97,4 @@ def _print(result: DesignResult, files: list[str], out: Path) -> None:
     component = _COMPONENTS[result.controller.kind].split()[0]
     bake = Next(command("build", component, "--controller", out), "bakes it in")
     view = result.view()
-    print(terminal.text(view._replace(blocks=(*view.blocks, bake))))
-    for path in files:
-        print(f"  {path}")
+    print_view(view._replace(blocks=(*view.blocks, bake)), files)

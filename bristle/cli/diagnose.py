@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.text import command
 from ..view.blocks import Next
-from ._options import add_details, add_trust
+from ._options import add_details, add_json, add_study, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..diagnosis.words import Verdict
@@ -19,23 +18,21 @@ HELP = "find the effects that a study's model misses, with confidence and altern
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle diagnose`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     parser.add_argument(
         "--law",
         help="all: search for the law together with its missing effects (default on a test bench "
         "if no law was chosen); the model's law: keep it",
     )
-    parser.add_argument(
-        "--limits", action="store_true",
-        help="refit the model at the limit of every effect: exact also if the model is far from "
-        "linear",
-    )  # fmt: skip
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
+    text = (
+        "refit the model at the limit of every effect: exact also if the model is far from linear"
     )
+    parser.add_argument("--limits", action="store_true", help=text)
+    text = "show the verdict; do not change verdict.json"
+    parser.add_argument("--dry-run", action="store_true", help=text)
     add_trust(parser)
     add_details(parser)
-    parser.add_argument("--json", action="store_true", help="print verdict.json")
+    add_json(parser, "print verdict.json")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -58,7 +55,7 @@ def main(arguments: argparse.Namespace) -> int:
         tell("drawing")
         picture = study.write_report("diagnose.png", png(draw_verdict(verdict)))
     if arguments.json:
-        print(json.dumps(verdict, indent=2, ensure_ascii=False))
+        print_json(verdict)
     else:
         print(text(verdict, arguments.folder, details=arguments.details))
         if picture:

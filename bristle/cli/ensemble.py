@@ -7,8 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..view import terminal
-from ._options import add_trust
+from ._options import add_json, add_no_figure, add_trust, print_json, print_view
 
 if TYPE_CHECKING:
     from ..campaign.ensemble import Ensemble
@@ -19,35 +18,29 @@ HELP = "run a scenario hundreds of times with varied parameters"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle ensemble`."""
     parser.add_argument("file", metavar="FILE", help="ensemble file, or name of a stock ensemble")
-    parser.add_argument(
-        "--runs", type=int, metavar="N", help="number of runs, instead of the file's"
-    )
+    text = "number of runs, instead of the file's"
+    parser.add_argument("--runs", type=int, metavar="N", help=text)
     where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers", type=int, metavar="N", help="number of processes; else one per core"
+    text = "number of processes; else one per core"
+    where.add_argument("--workers", type=int, metavar="N", help=text)
+    text = "run on a Dask cluster, e.g. tcp://host:8786"
+    where.add_argument("--cluster", metavar="ADDRESS", help=text)
+    text = (
+        "folder of runs, quantiles and figure; a stopped ensemble continues there; else "
+        "results/NAME/"
     )
-    where.add_argument(
-        "--cluster", metavar="ADDRESS", help="run on a Dask cluster, e.g. tcp://host:8786"
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of runs, quantiles and figure; a stopped ensemble continues there; else "
-        "results/NAME/",
-    )
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help=text)
     parser.add_argument("--fresh", action="store_true", help="start again and replace earlier runs")
-    parser.add_argument(
-        "--retry", action="store_true", help="repeat runs that failed, alone or with an effect"
-    )
+    text = "repeat runs that failed, alone or with an effect"
+    parser.add_argument("--retry", action="store_true", help=text)
     parser.add_argument(
         "--with-limits", action="store_true",
         help="widen the quantiles by the effects that the verdict of [identified] does not "
         "exclude, and list the part of each in the variance",
     )  # fmt: skip
-    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_no_figure(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -74,11 +67,9 @@ def main(arguments: argparse.Namespace) -> int:
         return 130
     files = _write(found, folder, not arguments.no_figure)
     if arguments.json:
-        import json
-
-        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+        print_json(_answer(found, files))
     else:
-        _print(found, files)
+        print_view(found.view(), files.values())
     if not (found.runs["status"] == "done").any():
         print(f"RunError: all {len(found.runs)} runs failed.", file=sys.stderr)
         return 1
@@ -111,10 +102,6 @@ def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
     table = found.quantiles
     levels = [name for name in table if str(name).endswith(" %")]
     done = int((found.runs["status"] == "done").sum())
-    outputs = [
-        {key: None if value != value else value for key, value in row.items()}  # JSON has no NaN
-        for row in table[["unit", *levels]].reset_index().to_dict("records")
-    ]
     return {
         "title": found.plan.title,
         "runs": len(found.runs),
@@ -122,15 +109,9 @@ def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
         "failed": len(found.runs) - done,
         "continued": found.continued,
         "wall_time": round(found.wall_time, 3),
-        "quantiles": outputs,
+        "quantiles": table[["unit", *levels]].reset_index().to_dict("records"),
         "parts": found.parts,
         "notes": found.notes,
         "failures": [asdict(failure) for failure in found.failures],
         "files": {name: str(path.absolute()) for name, path in files.items()},
     }
-
-
-def _print(found: Ensemble, files: dict[str, Path]) -> None:
-    print(terminal.text(found.view()))
-    for path in files.values():
-        print(f"  {path}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ._options import add_common_to_actions
+from ._options import add_common_to_actions, add_json, print_json
 
 HELP = "make an example study: measurements of a rig with a hidden effect"
 
@@ -14,63 +14,47 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle example`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     shown = commands.add_parser("list", help="list the effects that each rig can hide")
-    shown.add_argument("--json", action="store_true", help="print as JSON")
+    add_json(shown, "print as JSON")
     shown.set_defaults(act=_list)
     bench = commands.add_parser("bench", help="an MR damper on a test bench")
     _add_choices(bench)
-    bench.add_argument(
-        "--held", action="store_true",
-        help="keep the voltage constant in each run, at 2 or 6 V, as many laboratories do",
-    )  # fmt: skip
-    bench.set_defaults(act=_bench)
+    text = "keep the voltage constant in each run, at 2 or 6 V, as many laboratories do"
+    bench.add_argument("--held", action="store_true", help=text)
+    bench.set_defaults(act=_make)
     building = commands.add_parser("building", help="a base-isolated building on a shake table")
     _add_choices(building)
-    building.add_argument(
-        "--no-load-cell", action="store_true", help="leave the damper's force out of the files"
-    )
-    building.set_defaults(act=_building)
+    text = "leave the damper's force out of the files"
+    building.add_argument("--no-load-cell", action="store_true", help=text)
+    building.set_defaults(act=_make)
     reveal = commands.add_parser("reveal", help="show the hidden answer and what the study found")
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
-    reveal.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(reveal)
     reveal.set_defaults(act=_reveal)
     performing = commands.add_parser("perform", help="perform a plan on the simulated rig")
     performing.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     performing.add_argument("plan", type=Path, metavar="PLAN", help="the folder of the plan")
-    performing.add_argument(
-        "--as-runs", default="", metavar="NAME",
-        help="name the runs NAME_1, NAME_2 ...; else they have the names of the plan",
-    )  # fmt: skip
-    performing.add_argument(
-        "--insist",
-        action="store_true",
-        help="perform the plan even if it was made for another study",
-    )
-    performing.add_argument("--json", action="store_true", help="print the answer as JSON")
+    text = "name the runs NAME_1, NAME_2 ...; else they have the names of the plan"
+    performing.add_argument("--as-runs", default="", metavar="NAME", help=text)
+    text = "perform the plan even if it was made for another study"
+    performing.add_argument("--insist", action="store_true", help=text)
+    add_json(performing)
     performing.set_defaults(act=_perform)
     add_common_to_actions(commands)
 
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the new study")
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="effect to hide, see bristle example list; give it twice for two; else the seed "
-        "draws one",
+    text = (
+        "effect to hide, see bristle example list; give it twice for two; else the seed draws one"
     )
+    parser.add_argument("--effect", action="append", default=[], metavar="NAME", help=text)
     parser.add_argument("--none", action="store_true", help="hide nothing")
-    parser.add_argument(
-        "--outside", action="store_true", help="hide an effect that is not in the library"
-    )
-    parser.add_argument(
-        "--law", default="", help="law of the damper: bingham or lugre; in a building lugre"
-    )
-    parser.add_argument(
-        "--noise", type=float, default=0.01, metavar="SHARE",
-        help="noise on every channel as a share of its RMS; 0.01 by default",
-    )  # fmt: skip
+    text = "hide an effect that is not in the library"
+    parser.add_argument("--outside", action="store_true", help=text)
+    text = "law of the damper: bingham or lugre; in a building lugre"
+    parser.add_argument("--law", default="", help=text)
+    text = "noise on every channel as a share of its RMS; 0.01 by default"
+    parser.add_argument("--noise", type=float, default=0.01, metavar="SHARE", help=text)
     parser.add_argument("--seed", type=int, default=1, help="draws the rig; 1 by default")
 
 
@@ -90,9 +74,7 @@ def _list(arguments: argparse.Namespace) -> int:
         for one in HIDDEN.values()
     ]  # fmt: skip
     if arguments.json:
-        import json
-
-        print(json.dumps(rows, indent=2))
+        print_json(rows)
         return 0
     print(f"{'hidden effect':20} {'in':16} what it is")
     for one in HIDDEN.values():
@@ -105,38 +87,21 @@ def _list(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _bench(arguments: argparse.Namespace) -> int:
-    from ..examples.make import make_bench
-
-    make_bench(arguments.folder, _choice(arguments))
-    return _made(arguments.folder)
-
-
-def _building(arguments: argparse.Namespace) -> int:
-    from ..examples.make import make_building
-
-    make_building(arguments.folder, _choice(arguments), load_cell=not arguments.no_load_cell)
-    return _made(arguments.folder)
-
-
-def _choice(arguments: argparse.Namespace):  # type: ignore[no-untyped-def]
-    from ..examples.make import Choice
-
-    return Choice(
-        effects=tuple(arguments.effect),
-        law=arguments.law,
-        noise=arguments.noise,
-        seed=arguments.seed,
-        nothing=arguments.none,
-        outside=arguments.outside,
-        held=getattr(arguments, "held", False),
-    )
-
-
-def _made(folder: Path) -> int:
+def _make(arguments: argparse.Namespace) -> int:
     from ..examples.hidden import FILE
+    from ..examples.make import Choice, make_bench, make_building
     from ..study.study import Study
 
+    folder: Path = arguments.folder
+    choice = Choice(
+        effects=tuple(arguments.effect), law=arguments.law, noise=arguments.noise,
+        seed=arguments.seed, nothing=arguments.none, outside=arguments.outside,
+        held=getattr(arguments, "held", False),
+    )  # fmt: skip
+    if arguments.action == "bench":
+        make_bench(folder, choice)
+    else:
+        make_building(folder, choice, load_cell=not arguments.no_load_cell)
     runs = Study(folder).settings.runs
     held = sum(run.role == "holdout" for run in runs)
     print(f"{folder}: a study of {len(runs) - held} runs for training and {held} held out.")
@@ -166,9 +131,7 @@ def _reveal(arguments: argparse.Namespace) -> int:
     named = [*study.model().effects, *verdict.get("effects", [])]
     found, kind = tuple(dict.fromkeys(named)), str(verdict.get("kind", ""))
     if arguments.json:
-        import json
-
-        print(json.dumps(answer | {"found": list(found), "verdict": kind}, indent=2))
+        print_json(answer | {"found": list(found), "verdict": kind})
     else:
         print(told(answer, found, kind))
     return 0

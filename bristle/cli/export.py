@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..core.text import command
 from ..errors import ScenarioError, StudyError
-from ._options import add_native, add_overrides, add_trust, builder
+from ._options import add_json, add_native, add_overrides, add_trust, builder, print_json
 
 HELP = "write a study's model as an FMU; or a scenario as one FMU, or as a web page"
 
@@ -24,12 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "a scenario, or the name of a component"
     )
     parser.add_argument("what", metavar="FOLDER", help=text)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="output folder; else export/ in the study, with --as-one the current folder",
-    )
+    text = "output folder; else export/ in the study, with --as-one the current folder"
+    parser.add_argument("--out", type=Path, metavar="DIR", help=text)
     text = "write the whole scenario as one FMU, with --native"
     parser.add_argument("--as-one", action="store_true", help=text)
     text = (
@@ -46,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_overrides(parser)
     add_native(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -68,8 +64,6 @@ def main(arguments: argparse.Namespace) -> int:
 
     found = export_study(Study(Path(arguments.what)), arguments.out, builder(arguments))
     if arguments.json:
-        import json
-
         answer = {
             "fmu": str(found.fmu.absolute()),
             "scenario": str(found.scenario.absolute()),
@@ -78,7 +72,7 @@ def main(arguments: argparse.Namespace) -> int:
             "notes": list(found.notes),
             "proof": found.proof and found.proof.as_dict(),
         }
-        print(json.dumps(answer, indent=2))
+        print_json(answer)
         return 0
     print(f"{found.fmu}: the damper with the model's values.")
     print(f"{found.scenario}: applies the motion of {found.run} to it.")
@@ -119,11 +113,9 @@ def _as_one(arguments: argparse.Namespace) -> int:
     inputs = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in about.of("input")]
     counts = {one: len(about.of(one)) for one in ("output", "parameter")}
     if arguments.json:
-        import json
-
         answer = {"file": str(path.absolute()), "guid": about.guid}
         named = {"inputs": [v.name for v in about.of("input")], **counts}
-        print(json.dumps({**answer, **named}, indent=2))
+        print_json({**answer, **named})
         return 0
     print(f"{path}: built, guid {about.guid}")
     print(f"  inputs: {', '.join(inputs) or 'none'}")
@@ -156,9 +148,7 @@ def _web(arguments: argparse.Namespace) -> int:
             arguments.what, arguments.web, sliders, parse_overrides(arguments.overrides)
         )
     if arguments.json:
-        import json
-
-        print(json.dumps({"files": [str(file.absolute()) for file in files]}, indent=2))
+        print_json({"files": [str(file.absolute()) for file in files]})
         return 0
     for file in files:
         print(f"{file}  {file.stat().st_size / 1e3:.0f} kB")

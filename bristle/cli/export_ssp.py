@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_native, add_overrides, add_trust, builder
+from ._options import add_json, add_native, add_overrides, add_trust, builder, print_json
 
 if TYPE_CHECKING:
     from ..engine.coupling_error import Expected
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-coupling-error", action="store_true", help=text)
     add_native(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -72,7 +72,6 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _print_json(exported: ExportedPackage, expected: tuple[Expected, ...]) -> None:
-    import json
     from dataclasses import asdict
 
     answer = {
@@ -80,4 +79,4 @@ def _print_json(exported: ExportedPackage, expected: tuple[Expected, ...]) -> No
         "notes": list(exported.notes),
         "coupling_error": [asdict(one) for one in expected],
     }
-    print(json.dumps(answer, indent=2))
+    print_json(answer)

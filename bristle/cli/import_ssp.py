@@ -9,6 +9,7 @@ import argparse
 from pathlib import Path
 
 from ..core.text import command, cut_short
+from ._options import add_json, print_json
 
 HELP = "convert an SSP package of another tool to a scenario"
 
@@ -18,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("package", type=Path, metavar="FILE.ssp", help="SSP 1.0 or 2.0")
     text = "folder of scenario and FMUs; else NAME/ in the current folder"
     parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help=text)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -34,15 +35,13 @@ def main(arguments: argparse.Namespace) -> int:
     findings = check_scenario(made.scenario)
     wrong = any(finding.level == "error" for finding in findings)
     if arguments.json:
-        import json
-
         answer = {
             "scenario": str(made.scenario.absolute()),
             "fmus": [str(file.absolute()) for file in made.fmus],
             "notes": [note.text for note in made.notes],
             "findings": [finding._asdict() for finding in findings],
         }
-        print(json.dumps(answer, indent=2))
+        print_json(answer)
         return 2 if wrong else 0
     begin = f"{made.scenario}: a scenario of {len(made.fmus)} FMUs."
     end = "" if wrong else f"Run it:  {command('run', made.scenario)}"

@@ -10,19 +10,17 @@ stiffness. The command keeps it if it lowers the error on held-out runs beyond c
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Collection
-from pathlib import Path
 
 from ..core.text import command
-from ._options import add_trust
+from ._options import add_json, add_study, add_trust, print_json
 
 HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle learn`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     parser.add_argument(
         "--along", metavar="SIGNAL[,SIGNAL]", default="",
         help="signals that the curve may depend on, such as displacement,speed, or an extra "
@@ -39,17 +37,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="site in a building: damper, layer, storey1, storey2 ...; by default the site whose "
         "verdict is unknown, or else the one with the largest error",
     )  # fmt: skip
-    parser.add_argument(
-        "--name", default="", help="name of the effect; default learned_1, learned_2"
-    )
-    parser.add_argument(
-        "--table", action="store_true", help="keep the table even if a formula fits as well"
-    )
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show the learned effect; write nothing"
-    )
+    text = "name of the effect; default learned_1, learned_2"
+    parser.add_argument("--name", default="", help=text)
+    text = "keep the table even if a formula fits as well"
+    parser.add_argument("--table", action="store_true", help=text)
+    text = "show the learned effect; write nothing"
+    parser.add_argument("--dry-run", action="store_true", help=text)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -72,7 +67,7 @@ def main(arguments: argparse.Namespace) -> int:
         write=not arguments.dry_run,
     )
     if arguments.json:
-        print(json.dumps(found.as_dict(), indent=2, ensure_ascii=False))
+        print_json(found.as_dict())
         return 0
     print("\n".join(found.sentences()))
     for one in found.found.others:

@@ -11,8 +11,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..view import terminal
-from ._options import add_overrides, add_trust
+from ._options import add_json, add_no_figure, add_overrides, add_trust, print_json, print_view
 
 if TYPE_CHECKING:
     from ..optimal_control import Limit
@@ -35,9 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="output of the structure; else the second floor's absolute acceleration",
     )
-    parser.add_argument(
-        "--statistic", choices=("peak", "rms"), default="peak", help="statistic to minimise"
-    )
+    text = "statistic to minimise"
+    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
     parser.add_argument(
         "--preview",
         nargs="*",
@@ -46,19 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="preview times [s] of a receding horizon; none: no such runs; else 0 0.1 0.5",
     )
-    parser.add_argument(
-        "--starts", type=int, default=3, metavar="N", help="number of starts of the search; else 3"
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of voltage, scenario, results and picture; else results/limit/SCENARIO/",
-    )
-    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    text = "number of starts of the search; else 3"
+    parser.add_argument("--starts", type=int, default=3, metavar="N", help=text)
+    text = "folder of voltage, scenario, results and picture; else results/limit/SCENARIO/"
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help=text)
+    add_no_figure(parser)
     add_overrides(parser, "scenario", "ground.peak=3.924")
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -85,11 +78,9 @@ def main(arguments: argparse.Namespace) -> int:
         files.append(folder / "limit.png")
         draw_limit(found).save(files[-1], dpi=160)
     if arguments.json:
-        import json
-
-        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+        print_json(_answer(found, files))
     else:
-        _print(found, files)
+        print_view(found.view(), files)
     return 0
 
 
@@ -111,9 +102,3 @@ def _answer(found: Limit, files: list[Path]) -> dict[str, Any]:
         "seconds": round(found.seconds, 1),
         "files": [str(path.absolute()) for path in files],
     }
-
-
-def _print(found: Limit, files: list[Path]) -> None:
-    print(terminal.text(found.view()))
-    for path in files:
-        print(f"  {path}")

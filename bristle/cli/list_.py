@@ -6,14 +6,13 @@ Your own begin with `bristle new`.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.text import tick, typed
-from ._options import add_trust
+from ._options import add_json, add_trust, print_json, print_table
 
 if TYPE_CHECKING:
     from ..fmu.description import Description, Variable
@@ -36,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "with effects, laws: a study whose own count too"
     parser.add_argument("--study", type=Path, metavar="FOLDER", help=text)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print as JSON")
+    add_json(parser, "print as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -66,7 +65,7 @@ def main(arguments: argparse.Namespace) -> int:
     if kind is None:
         tables["effects"], tables["laws"] = _effects(), _laws()
     if arguments.json:
-        print(json.dumps(tables[kind] if kind else tables, indent=2))
+        print_json(tables[kind] if kind else tables)
         return 0
     for title, rows in tables.items():
         _print(title, rows)
@@ -77,7 +76,7 @@ def _physics(word: str, arguments: argparse.Namespace) -> int:
     """Print a table of effects or laws, or everything about one."""
     kind, told, left_out = _found(word, arguments.name, arguments.study)
     if arguments.json:
-        print(json.dumps(told, indent=2))
+        print_json(told)
     elif isinstance(told, dict):
         kind.one(told)
     else:
@@ -180,17 +179,8 @@ def _print(title: str, rows: Rows) -> None:
     ]
     heads = [f"{column} [{_UNITS[column]}]" if column in _UNITS else column for column in columns]
     cells = [[_cell(row[column]) for column in columns] for row in rows]
-    if sys.stdout.isatty():
-        from rich.console import Console
-        from rich.table import Table
-
-        table = Table(title=title, title_justify="left")
-        # Text, not markup: units in brackets are no styles.
-        for head in heads:
-            table.add_column(head.replace("[", r"\["))
-        for row in cells:
-            table.add_row(*(cell.replace("[", r"\[") for cell in row))
-        Console().print(table if rows else f"{title}: none")
+    if sys.stdout.isatty() and rows:
+        print_table(heads, cells, title)
         return
     print(title if rows else f"{title}: none")
     if rows:
@@ -329,17 +319,15 @@ def _print_effect(found: dict[str, Any]) -> None:
 def _print_effects(rows: list[dict[str, Any]]) -> None:
     """Print the effects; each in a block of lines in a pipe, in a table on a terminal."""
     if sys.stdout.isatty():
-        from rich.console import Console
-        from rich.table import Table
-
-        table = Table(show_lines=True)
-        for title in ("effect", "site, laws", "what it does", "when it is missing", "parameters"):
-            table.add_column(title)
-        for row in rows:
-            where = "\n".join([*row["sites"], *row["laws"]])
-            about = f"{row['about']}\n({row['source']})".replace("[", r"\[")
-            table.add_row(row["name"], where, about, row["expect"], "\n".join(_shortly(row)))
-        Console().print(table)
+        heads = ("effect", "site, laws", "what it does", "when it is missing", "parameters")
+        cells = [
+            (
+                row["name"], "\n".join([*row["sites"], *row["laws"]]),
+                f"{row['about']}\n({row['source']})", row["expect"], "\n".join(_shortly(row)),
+            )
+            for row in rows
+        ]  # fmt: skip
+        print_table(heads, cells, lines=True)
     else:
         for row in rows:
             where = ", ".join([*row["sites"], *row["laws"]])

@@ -10,6 +10,8 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+from ._options import add_json
+
 HELP = "start your own effect, law, controller or scenario"
 
 _KINDS = ("effect", "law", "controller", "scenario")
@@ -24,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--study", type=Path, metavar="FOLDER", help=text)
     text = "with scenario: the stock scenario to begin with, see `bristle list scenarios`"
     parser.add_argument("--like", metavar="SCENARIO", help=text)
-    parser.add_argument("--json", action="store_true", help="print as JSON")
+    add_json(parser, "print as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..view import terminal
-from ._options import add_overrides, add_trust
+from ._options import add_json, add_no_figure, add_overrides, add_trust, print_json, print_view
 
 if TYPE_CHECKING:
     from ..campaign.best_constant import Passive
@@ -26,9 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="folder of passive.csv, .json and .png; else results/optimise/",
     )
-    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_no_figure(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def _add_problem(parser: argparse.ArgumentParser) -> None:
@@ -47,25 +46,18 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
         metavar="RECORD",
         help="names of ground motions, or files; see `bristle list records`",
     )
-    parser.add_argument(
-        "--intensities",
-        nargs="+",
-        type=float,
-        metavar="G",
-        help="peaks [g] to which each motion is scaled, 0: as recorded; else 0.2 0.4 0.6 0.8",
-    )
+    text = "peaks [g] to which each motion is scaled, 0: as recorded; else 0.2 0.4 0.6 0.8"
+    parser.add_argument("--intensities", nargs="+", type=float, metavar="G", help=text)
     parser.add_argument(
         "--output",
         default="structure.floor2_acceleration_absolute",
         metavar="NAME",
         help="the output to minimise; else the second floor's absolute acceleration",
     )
-    parser.add_argument(
-        "--statistic", choices=("peak", "rms"), default="peak", help="statistic to minimise"
-    )
-    parser.add_argument(
-        "--grid", type=int, default=17, metavar="N", help="number of voltages in the grid; else 17"
-    )
+    text = "statistic to minimise"
+    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
+    text = "number of voltages in the grid; else 17"
+    parser.add_argument("--grid", type=int, default=17, metavar="N", help=text)
     add_overrides(parser, "scenario", "damper.sigma_a=600")
 
 
@@ -90,12 +82,10 @@ def main(arguments: argparse.Namespace) -> int:
     )
     files = _write(found, arguments.out, not arguments.no_figure)
     if arguments.json:
-        import json
-
         named = {name: str(path.absolute()) for name, path in files.items()}
-        print(json.dumps({**_answer(found), **named}, indent=2, allow_nan=False))
+        print_json({**_answer(found), **named})
     else:
-        _print(found, files)
+        print_view(found.view(), files.values())
     return 0
 
 
@@ -137,9 +127,3 @@ def _answer(found: Passive) -> dict[str, Any]:
         "runs": found.runs,
         "notes": list(found.notes),
     }
-
-
-def _print(found: Passive, files: dict[str, Path]) -> None:
-    print(terminal.text(found.view()))
-    for path in files.values():
-        print(f"  {path}")

@@ -14,13 +14,10 @@ HELP = "open a local page in the browser: data, fit, diagnosis, and simulation w
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle page`."""
-    parser.add_argument(
-        "folder", nargs="?", type=Path, default=Path(), metavar="FOLDER",
-        help="a study, or a folder of studies; else the current folder",
-    )  # fmt: skip
-    parser.add_argument(
-        "--port", type=int, default=0, metavar="N", help="port of the server; else a free one"
-    )
+    text = "a study, or a folder of studies; else the current folder"
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help=text)
+    text = "port of the server; else a free one"
+    parser.add_argument("--port", type=int, default=0, metavar="N", help=text)
     parser.add_argument("--no-browser", action="store_true", help="print the address; open nothing")
 
 

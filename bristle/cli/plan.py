@@ -12,13 +12,12 @@ more.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next, Text
-from ._options import add_details, add_trust
+from ._options import add_details, add_json, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..planning.plan import Plan
@@ -29,45 +28,29 @@ HELP = "plan the next tests of a rig: motions and commands as files for its cont
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle plan`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", nargs="?", help="the study")
-    parser.add_argument(
-        "--new", type=Path, metavar="FILE",
-        help="a rig.toml with [damper] and [limits]: plan before the first measurement",
-    )  # fmt: skip
-    parser.add_argument(
-        "--separate", nargs="+", metavar="NAME",
-        help="distinguish alternatives: effects, laws, or none for the present model",
-    )  # fmt: skip
-    parser.add_argument(
-        "--see",
-        nargs="*",
-        metavar="EFFECT",
-        help="make effects visible; without names, all effects",
-    )
-    parser.add_argument(
-        "--sharpen", nargs="*", metavar="PARAMETER",
-        help="narrow the intervals of parameters, or of those of an effect; without names, of all",
-    )  # fmt: skip
-    parser.add_argument(
-        "--learn", nargs="*", metavar="COORDINATE",
-        help="cover coordinates on which an unknown part may depend; without names, the usual ones",
-    )  # fmt: skip
+    text = "a rig.toml with [damper] and [limits]: plan before the first measurement"
+    parser.add_argument("--new", type=Path, metavar="FILE", help=text)
+    text = "distinguish alternatives: effects, laws, or none for the present model"
+    parser.add_argument("--separate", nargs="+", metavar="NAME", help=text)
+    text = "make effects visible; without names, all effects"
+    parser.add_argument("--see", nargs="*", metavar="EFFECT", help=text)
+    text = "narrow the intervals of parameters, or of those of an effect; without names, of all"
+    parser.add_argument("--sharpen", nargs="*", metavar="PARAMETER", help=text)
+    text = "cover coordinates on which an unknown part may depend; without names, the usual ones"
+    parser.add_argument("--learn", nargs="*", metavar="COORDINATE", help=text)
     parser.add_argument("--rig", type=Path, metavar="FILE", help="a rig.toml with [limits]")
     for name, text in LIMITS.items():
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="QUANTITY", help=text)
-    parser.add_argument(
-        "--record", nargs="+", default=[], metavar="FILE",
-        help="for a building: more ground motions that the plan may scale, files or names",
-    )  # fmt: skip
+    text = "for a building: more ground motions that the plan may scale, files or names"
+    parser.add_argument("--record", nargs="+", default=[], metavar="FILE", help=text)
     parser.add_argument("--runs", type=int, metavar="N", help="number of tests; 4 by default")
     parser.add_argument("--seed", type=int, default=1, help="seed of the candidate tests")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="FOLDER",
-        help="folder of the files; by default plan, plan_2 ... in the study",
-    )  # fmt: skip
+    text = "folder of the files; by default plan, plan_2 ... in the study"
+    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=text)
     parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
     add_trust(parser)
     add_details(parser)
-    parser.add_argument("--json", action="store_true", help="print the plan as JSON")
+    add_json(parser, "print the plan as JSON")
 
 
 LIMITS = {
@@ -117,7 +100,7 @@ def main(arguments: argparse.Namespace) -> int:
         folder = found.write(arguments.output or _free(arguments.folder or Path()))
     if arguments.json:
         place = {"folder": str(folder)} if folder else {}
-        print(json.dumps({**found.as_dict(), **place}, indent=2, ensure_ascii=False))
+        print_json({**found.as_dict(), **place})
     else:
         print(text(found, arguments.folder, folder, details=arguments.details))
     return 0

@@ -11,7 +11,7 @@ import argparse
 from math import isfinite
 from pathlib import Path
 
-from ._options import add_trust, print_json
+from ._options import add_json, add_study, add_trust, print_json
 from .compare import add_role
 
 HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 %% band"
@@ -19,13 +19,10 @@ HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 %% b
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle predict`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     add_role(parser)
-    parser.add_argument(
-        "--in", dest="house", type=Path, metavar="FILE",
-        help="simulate a damper from a bench in the building of this file, under --ground or "
-        "--data",
-    )  # fmt: skip
+    text = "simulate a damper from a bench in the building of this file, under --ground or --data"
+    parser.add_argument("--in", dest="house", type=Path, metavar="FILE", help=text)
     text = "with --in: a measurement of that building"
     parser.add_argument("--data", type=Path, metavar="FILE", help=text)
     text = "with --in: name or file of a ground motion, for a prediction without a measurement"
@@ -40,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--with-limits", action="store_true", help=text)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:

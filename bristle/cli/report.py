@@ -7,33 +7,26 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from ._options import add_trust
+from ._options import add_json, add_study, add_trust, print_json
 
 HELP = "write a study's report as one HTML file: verdict, history, loops, parameters, data"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle report`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="file of the report; else FOLDER/reports/report.html",
-    )
-    parser.add_argument(
-        "--keep-test-closed", action="store_true", help="leave the study's test runs closed"
-    )
+    add_study(parser)
+    text = "file of the report; else FOLDER/reports/report.html"
+    parser.add_argument("--out", type=Path, metavar="FILE", help=text)
+    text = "leave the study's test runs closed"
+    parser.add_argument("--keep-test-closed", action="store_true", help=text)
     text = (
         "add sliders for the model's parameters; the page computes the run (needs bristle[native])"
     )
     parser.add_argument("--what-if", action="store_true", help=text)
-    parser.add_argument(
-        "--static", action="store_true",
-        help="leave out the interactive pictures and all scripts",
-    )  # fmt: skip
+    text = "leave out the interactive pictures and all scripts"
+    parser.add_argument("--static", action="store_true", help=text)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -57,8 +50,6 @@ def main(arguments: argparse.Namespace) -> int:
         file = arguments.out
         write_whole(file, page)
     if arguments.json:
-        import json
-
         answer = {
             "report": str(file.absolute()),
             "z_holdout": content.now.z if content.now else None,
@@ -66,7 +57,7 @@ def main(arguments: argparse.Namespace) -> int:
             "verdict": (content.verdict or {}).get("kind"),
             "trouble": content.trouble or None,
         }
-        print(json.dumps(answer, indent=2, ensure_ascii=False))
+        print_json(answer)
         return 0
     stairs = Staircase(content.history_steps, cut_off=study.settings.cut_off)
     if sys.stdout.isatty():

@@ -9,58 +9,48 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_overrides, add_trust
+from ._options import (
+    add_json,
+    add_no_figure,
+    add_overrides,
+    add_trust,
+    print_json,
+    print_view,
+    share_of,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..engine.results import Results
 
 HELP = "run a scenario: results, a figure, peaks and RMS"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle run`."""
-    parser.add_argument(
-        "file", metavar="FILE", help="scenario file, name of a stock scenario, or SSP package"
+    text = "scenario file, name of a stock scenario, or SSP package"
+    parser.add_argument("file", metavar="FILE", help=text)
+    text = (
+        "folder of results, figure and log; older ones are replaced; else results/NAME/, or "
+        "results/NAME_a.b=value/ with --set a.b=value"
     )
-    parser.add_argument(
-        "--out",
-        metavar="FOLDER",
-        help="folder of results, figure and log; older ones are replaced; else results/NAME/, or "
-        "results/NAME_a.b=value/ with --set a.b=value",
-    )
+    parser.add_argument("--out", metavar="FOLDER", help=text)
     add_overrides(parser)
-    parser.add_argument(
-        "--engine",
-        choices=("fmu", "compiled"),
-        default="fmu",
-        help="step FMUs (fmu), or solve built-in components together (compiled)",
-    )
+    text = "step FMUs (fmu), or solve built-in components together (compiled)"
+    parser.add_argument("--engine", choices=("fmu", "compiled"), default="fmu", help=text)
     text = "kind of FMUs: those that run in Python, or compiled native ones"
     parser.add_argument("--fmus", choices=("python", "native"), default="python", help=text)
-    parser.add_argument(
-        "--format", choices=("csv", "parquet"), default="csv", help="format of the results"
-    )
-    parser.add_argument(
-        "--coupling-error",
-        action="store_true",
-        help="estimate the coupling error of every output with additional runs",
-    )
-    parser.add_argument(
-        "--tolerance",
-        metavar="SHARE",
-        help="find the step at which the coupling error stays below a share of the peaks, e.g. "
-        "0.2%%",
-    )
-    parser.add_argument(
-        "--spectrum",
-        action="store_true",
-        help="write the response spectra of ground and floors, 5 %% damped, as spectrum.csv",
-    )
-    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    text = "format of the results"
+    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help=text)
+    text = "estimate the coupling error of every output with additional runs"
+    parser.add_argument("--coupling-error", action="store_true", help=text)
+    text = "find the step at which the coupling error stays below a share of the peaks, e.g. 0.2%%"
+    parser.add_argument("--tolerance", metavar="SHARE", help=text)
+    text = "write the response spectra of ground and floors, 5 %% damped, as spectrum.csv"
+    parser.add_argument("--spectrum", action="store_true", help=text)
+    add_no_figure(parser)
     add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -98,7 +88,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         _print_json(frame, written, trouble)
     else:
-        _print_plain(frame, written)
+        print_view(frame.view(), written.values())
     if trouble:
         kind = "RunError: " if code == 1 else ""
         print(f"{kind}{trouble}", file=sys.stderr)
@@ -147,21 +137,15 @@ def _steps_for(
 
 def _share(text: str) -> float:
     """Return a share [1] from a text such as "0.2%" or "0.002"."""
-    from math import isfinite
-
     from ..errors import not_usable
 
-    try:
-        value = float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
-    except ValueError:
-        value = 0.0
-    if not (isfinite(value) and 0.0 < value < 1.0):
+    value = share_of(text)
+    if not 0.0 < value < 1.0:
         raise not_usable(f"--tolerance {text!r}: a share above 0 and below 1, as 0.2% or 0.002.")
     return value
 
 
 def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> None:
-    import json
     from dataclasses import asdict
 
     from ..engine.results import summarise
@@ -173,22 +157,8 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
         "window": [float(frame.index[0]), float(frame.index[-1])],
         "wall_time": frame.attrs["made"]["wall_time"],
         "energy_residual": frame.attrs["made"].get("energy_residual", {}),
-        "coupling_error": {
-            name: {key: None if value != value else value for key, value in error.items()}
-            for name, error in frame.attrs.get("coupling_error", {}).items()
-        },
-        "outputs": [
-            {key: None if value != value else value for key, value in asdict(summary).items()}
-            for summary in summarise(frame, everything=True)  # JSON has no NaN
-        ],
+        "coupling_error": dict(frame.attrs.get("coupling_error", {})),
+        "outputs": [asdict(summary) for summary in summarise(frame, everything=True)],
         **{name: str(path.absolute()) for name, path in written.items()},
     }
-    print(json.dumps(answer, indent=2))
-
-
-def _print_plain(frame: Results, written: dict[str, Path]) -> None:
-    from ..view import terminal
-
-    print(terminal.text(frame.view()))
-    for path in written.values():
-        print(f"  {path}")
+    print_json(answer)

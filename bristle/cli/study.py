@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING
 from ._options import (
     add_common_to_actions,
     add_details,
+    add_json,
     add_run_facts,
+    add_study,
     add_trust,
     channels_of,
     files_of,
+    print_json,
     test_files,
 )
 
@@ -33,23 +36,19 @@ if TYPE_CHECKING:
 
 def add_channels(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study channels`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     parser.add_argument(
         "--channel", action="append", default=[], metavar="CHANNEL=COLUMN@UNIT",
         help="new column of a channel; a minus before COLUMN reverses its sign: --channel "
         "'force=-Ch3@kN'; without @UNIT the unit stays, or is that of the title",
     )  # fmt: skip
-    parser.add_argument(
-        "--without", action="append", default=[], metavar="CHANNEL",
-        help="do not read this channel any more",
-    )  # fmt: skip
-    parser.add_argument(
-        "--step", type=float, metavar="S", help="sampling step in s of files without a time"
-    )
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show the changes, and write nothing"
-    )
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    text = "do not read this channel any more"
+    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
+    text = "sampling step in s of files without a time"
+    parser.add_argument("--step", type=float, metavar="S", help=text)
+    text = "show the changes, and write nothing"
+    parser.add_argument("--dry-run", action="store_true", help=text)
+    add_json(parser)
     parser.set_defaults(act=_channels)
 
 
@@ -79,21 +78,19 @@ def _channels(arguments: argparse.Namespace) -> int:
 
 
 def _print_channels(study: Study, *, as_json: bool) -> None:
-    import json
     from dataclasses import asdict
 
     from ..study.study_file import spec_text
 
     listed = study.settings.channels
     if as_json:
-        print(json.dumps({name: asdict(spec) for name, spec in listed.items()}, indent=2))
+        print_json({name: asdict(spec) for name, spec in listed.items()})
         return
     for name, spec in listed.items():
         print(f"{name:28} {spec_text(spec)}")
 
 
 def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
-    import json
     from dataclasses import asdict
 
     answer = {
@@ -104,7 +101,7 @@ def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
         "beside": list(done.results.beside),
         "kept": str(done.kept.absolute()) if done.kept else None,
     }
-    print(json.dumps(answer, indent=2, ensure_ascii=False))
+    print_json(answer)
 
 
 def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
@@ -136,22 +133,18 @@ def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
 
 def add_extend(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study extend`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument(
-        "data", nargs="+", metavar="FILES",
-        help="measurement files, or a folder of them, with the columns of the study's others",
-    )  # fmt: skip
+    add_study(parser)
+    text = "measurement files, or a folder of them, with the columns of the study's others"
+    parser.add_argument("data", nargs="+", metavar="FILES", help=text)
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="GLOB",
         help="held-out runs among them, by file name; else those of the plan, or by the usual "
         "names, or every third run",
     )  # fmt: skip
     add_run_facts(parser)
-    parser.add_argument(
-        "--plan", type=Path, metavar="PLAN",
-        help="the plan of these tests: take its roles, and report differences from it",
-    )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    text = "the plan of these tests: take its roles, and report differences from it"
+    parser.add_argument("--plan", type=Path, metavar="PLAN", help=text)
+    add_json(parser)
     parser.set_defaults(act=_extend)
 
 
@@ -198,7 +191,6 @@ def print_added(
 
 
 def _print_extended_json(extended: Extended, by_plan: Performed | None) -> None:
-    import json
     from dataclasses import asdict
 
     answer = {
@@ -207,7 +199,7 @@ def _print_extended_json(extended: Extended, by_plan: Performed | None) -> None:
         "notes": [*extended.notes, *(by_plan.notes if by_plan else ())],
         "plan": [asdict(pair) for pair in by_plan.pairs] if by_plan else None,
     }
-    print(json.dumps(answer, indent=2, ensure_ascii=False))
+    print_json(answer)
 
 
 # `bristle study roles`: what the runs of a study are for.
@@ -223,13 +215,13 @@ ROLES = {
 
 def add_roles(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study roles`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_study(parser)
     for role, text in ROLES.items():
         parser.add_argument(
             f"--{role}", nargs="+", action="extend", default=[], metavar="RUN",
             help=f"these runs are {text}" if role != "test" else f"these are {text}",
         )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the runs as JSON")
+    add_json(parser, "print the runs as JSON")
     parser.set_defaults(act=_roles)
 
 
@@ -249,9 +241,7 @@ def _roles(arguments: argparse.Namespace) -> int:
         study = study.with_roles(roles)
     runs = (*study.settings.runs, *study.settings.excluded)
     if arguments.json:
-        import json
-
-        print(json.dumps([{"run": run.name, "role": run.role} for run in runs], indent=2))
+        print_json([{"run": run.name, "role": run.role} for run in runs])
         return 0
     for run in runs:
         print(f"{run.role:8} {run.name}")
@@ -280,23 +270,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     auto = commands.add_parser(
         "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
-    auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    auto.add_argument(
-        "--learn", action="store_true",
-        help="if no known effect explains the error, learn a curve and continue",
-    )  # fmt: skip
+    add_study(auto)
+    text = "if no known effect explains the error, learn a curve and continue"
+    auto.add_argument("--learn", action="store_true", help=text)
     auto.add_argument(
         "--law",
         help="all: search for the law together with its effects (default on a test bench if no law "
         "was chosen); a name: begin with that law",
     )
-    auto.add_argument(
-        "--greedy", action="store_true",
-        help="if no effect explains the error, add the one that lowers it most, and continue",
-    )  # fmt: skip
+    text = "if no effect explains the error, add the one that lowers it most, and continue"
+    auto.add_argument("--greedy", action="store_true", help=text)
     add_trust(auto)
     add_details(auto)
-    auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
+    add_json(auto, "print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
     add_common_to_actions(commands)
 
@@ -307,10 +293,9 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument(
-        "--mask", action="store_true", help="treat isolated spikes as not measured from now on"
-    )
+    add_study(parser)
+    text = "treat isolated spikes as not measured from now on"
+    parser.add_argument("--mask", action="store_true", help=text)
     parser.add_argument(
         "--correct", action="store_true",
         help="correct what can be corrected in study.toml: lines, and gain, zero or sign of a run "
@@ -320,7 +305,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         "--exclude", nargs="+", action="extend", default=[], metavar="RUN",
         help="leave these runs out from now on: role = \"exclude\" in study.toml",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    add_json(parser, "print the findings as JSON")
     parser.set_defaults(act=_check)
 
 
@@ -330,17 +315,12 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         "--data", nargs="+", action="extend", required=True, metavar="GLOB",
         help="measurement files, or a folder of them; quote a pattern: 'lab/*.csv'",
     )  # fmt: skip
-    parser.add_argument(
-        "--rig", choices=("bench", "structure"), default="bench",
-        help="motion prescribed and force measured, or ground motion in and response out",
-    )  # fmt: skip
-    parser.add_argument(
-        "--building", type=Path, metavar="FILE",
-        help="the structure's data file, with --rig structure",
-    )  # fmt: skip
-    parser.add_argument(
-        "--device", metavar="NAME", help="device to identify, if the building has several"
-    )
+    text = "motion prescribed and force measured, or ground motion in and response out"
+    parser.add_argument("--rig", choices=("bench", "structure"), default="bench", help=text)
+    text = "the structure's data file, with --rig structure"
+    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
+    text = "device to identify, if the building has several"
+    parser.add_argument("--device", metavar="NAME", help=text)
     parser.add_argument(
         "--channel",
         action="append",
@@ -349,17 +329,12 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="column of a channel, instead of the guess; a minus before COLUMN reverses its sign: "
         "--channel 'force=-Ch3@kN'",
     )
-    parser.add_argument(
-        "--without", action="append", default=[], metavar="CHANNEL",
-        help="a channel that is not read, though a column was taken for it",
-    )  # fmt: skip
-    parser.add_argument(
-        "--step", type=float, metavar="S", help="sampling step in s of files without a time"
-    )
-    parser.add_argument(
-        "--test", nargs="+", action="extend", default=[], metavar="GLOB",
-        help="test runs, which no fit and no verdict uses: names among the data, or more files",
-    )  # fmt: skip
+    text = "a channel that is not read, though a column was taken for it"
+    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
+    text = "sampling step in s of files without a time"
+    parser.add_argument("--step", type=float, metavar="S", help=text)
+    text = "test runs, which no fit and no verdict uses: names among the data, or more files"
+    parser.add_argument("--test", nargs="+", action="extend", default=[], metavar="GLOB", help=text)
     _add_runs(parser)
     parser.add_argument(
         "--law",
@@ -367,21 +342,17 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         "law together with its effects",
     )
     parser.add_argument("--title", default="", help="the study's title; else its name")
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_json(parser)
     parser.set_defaults(act=_new)
 
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add what is known of whole runs, and how files hold them."""
     add_run_facts(parser)
-    parser.add_argument(
-        "--split", default="", metavar="HOW",
-        help="files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'",
-    )  # fmt: skip
-    parser.add_argument(
-        "--rate", type=float, metavar="HZ",
-        help="decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on",
-    )  # fmt: skip
+    text = "files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'"
+    parser.add_argument("--split", default="", metavar="HOW", help=text)
+    text = "decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on"
+    parser.add_argument("--rate", type=float, metavar="HZ", help=text)
     parser.add_argument("--mask", action="store_true", help="treat isolated spikes as not measured")
 
 
@@ -427,7 +398,6 @@ def _new(arguments: argparse.Namespace) -> int:
 
 
 def _print_json(created: Created) -> None:
-    import json
     from dataclasses import asdict
 
     settings = created.study.settings
@@ -440,7 +410,7 @@ def _print_json(created: Created) -> None:
         "unused": list(created.unused),
         "notes": list(created.notes),
     }
-    print(json.dumps(answer, indent=2, ensure_ascii=False))
+    print_json(answer)
 
 
 def _print_new(created: Created) -> None:
@@ -498,11 +468,9 @@ def _check(arguments: argparse.Namespace) -> int:
         found = check_data(study)
     picture = study.write_report("data_check.png", png(found.page(), 110))
     if arguments.json:
-        import json
-
         answer = {**found.as_dict(), "picture": str(picture.absolute())}
         answer |= {"not_corrected": apart} if apart else {}
-        print(json.dumps(answer, indent=2, ensure_ascii=False))
+        print_json(answer)
     else:
         print(found.text())
         print(f"\nPicture: {picture}")
@@ -565,9 +533,7 @@ def _auto(arguments: argparse.Namespace) -> int:
         study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn, on_step=show
     )
     if arguments.json:
-        import json
-
-        print(json.dumps(done.as_dict(), indent=2, ensure_ascii=False))
+        print_json(done.as_dict())
         return 0
     if not shown:
         print(f"{staircase(study.steps(), cut_off=low)}\n")

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+
+from ._options import add_json, add_study, print_json
 
 HELP = "undo the last step of a study's model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle undo`."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    add_study(parser)
+    add_json(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -22,10 +23,9 @@ def main(arguments: argparse.Namespace) -> int:
     undone = study.undo()
     now = study.history.step(study.history.numbers()[-1])
     if arguments.json:
-        import json
         from dataclasses import asdict
 
-        print(json.dumps({"undone": asdict(undone), "now": asdict(now)}, indent=2))
+        print_json({"undone": asdict(undone), "now": asdict(now)})
         return 0
     kept = study.history.undone(undone.number)
     print(f'{study.folder}: step {undone.number}, "{undone.what}", is taken back ({kept}).')

@@ -16,8 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from ..errors import RunError, StudyError
-from .hidden import Scales
-from .hidden import Values as HiddenValues
+from .hidden import Scales, Values
 
 # The damper of an example: a yield force, a drag, and what may be hidden in it.
 #
@@ -34,9 +33,6 @@ STICK, SETTLE = 2e-5, 2e-4
 
 STILL = 1e-8
 """Speed [m/s] below which a bench stands still: its spline leaves rest to rounding."""
-
-Values = Mapping[str, float]
-
 
 NAMES = {
     "bingham": {"f_c": "Y_0", "f_v": "Y_1", "c_0": "D_0", "c_v": "D_1", "v_n": "w_n"},
@@ -467,7 +463,7 @@ class Tower:
 
     frame: Frame
     damper: Damper
-    hidden: HiddenValues
+    hidden: Values
     scales: Scales
 
     def loads(
@@ -600,7 +596,7 @@ def scales_of(rig: str, law: str) -> Scales:
     return Scales(FORCE, SPEED, STROKE, CENTRE[law]["w_n"], drift)
 
 
-def draw_damper(law: str, rng: np.random.Generator) -> HiddenValues:
+def draw_damper(law: str, rng: np.random.Generator) -> Values:
     """Return the values of a damper's law."""
     table = CENTRE[law]
     spread = _spread(tuple(table.values()), rng)
@@ -612,7 +608,7 @@ def draw_frame(rng: np.random.Generator) -> Frame:
     return frame(_spread(MASSES, rng), _spread(STIFFNESSES, rng))
 
 
-def tower_of(frame: Frame, law: str, values: HiddenValues, secret: HiddenValues) -> Tower:
+def tower_of(frame: Frame, law: str, values: Values, secret: Values) -> Tower:
     """Return a building with its damper, and what is hidden in either.
 
     Parameters

@@ -20,7 +20,6 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from ..core.config import Document, toml_content
 from ..errors import BristleError, StudyError
 from ..version import __version__
-from .answers import Answers, Compiling, stamp
 from .jobs import Jobs
 from .orders import COMMANDS, order_of, write_design
 from .requests import (
@@ -42,6 +41,7 @@ from .requests import (
     kind_of,
     waiting_texts,
 )
+from .view_cache import Compiling, ViewCache, fingerprint
 
 LARGEST_UPLOAD = 256 * 1024**2
 """Bytes of a file that may be dropped: as much as the reader of measurements takes."""
@@ -82,7 +82,7 @@ class App:
         self.home = folder.parent if is_study else folder
         self.first = folder.name if is_study else ""
         self.jobs = Jobs(self.home)
-        self.answers = Answers()
+        self.answers = ViewCache()
         self._compiling = Compiling()
         self._routes: list[tuple[str, re.Pattern[str], Handler]] = [
             (method, re.compile(pattern), handler)
@@ -156,7 +156,7 @@ class App:
         since = _whole(request.query.get("since", "0"))
         after = _whole(request.query.get("after", "0"))
         jobs = [job.as_dict(since if job.at_work else 0, after) for job in self.jobs.all()]
-        return as_json({"jobs": jobs, "stamp": stamp(self.home / name) if known else ""})
+        return as_json({"jobs": jobs, "stamp": fingerprint(self.home / name) if known else ""})
 
     def _view(self, request: Request) -> Answer:
         name, view = request.parts

@@ -19,7 +19,7 @@ from ..physics.law import base_and_variant
 from ..study.study import Study
 from ..synthesis import implausible, read_task, task_from_data
 from ..synthesis.analysis import task_curves
-from ..system.scenario import Scenario, load_scenario
+from ..system.scenario import load_scenario
 from .orders import (
     FIELDS,
     FOLDER,
@@ -35,7 +35,7 @@ from .orders import (
     values_of,
 )
 from .requests import RequestError
-from .simulate_view import Asked, damper_of, record_of, records, stock_file
+from .simulate_view import RunRequest, damper_of, record_of, records, stock_file, unit_of
 
 ANSWER = "passive/passive.json"
 """What `bristle optimise passive` leaves in the folder of designs."""
@@ -193,20 +193,20 @@ def _house(folder: Path) -> dict[str, Any]:
     return {"structure.building": f"{folder.name}/{building}"} if building else {}
 
 
-def _controlled(folder: Path, name: str, ground: Mapping[str, Any]) -> Asked:
+def _controlled(folder: Path, name: str, ground: Mapping[str, Any]) -> RunRequest:
     kind = kind_of_design(name)
     scenario = KINDS[kind]
     overrides = {
         **damper_of(folder.parent, scenario, folder.name), **_house(folder),
         "controller.controller": f"{folder.name}/{FOLDER}/{name}.json", **ground,
     }  # fmt: skip
-    asked = Asked(folder.parent, scenario, overrides)
+    asked = RunRequest(folder.parent, scenario, overrides)
     if kind == "hinf":
-        asked = Asked(folder.parent, scenario, {**overrides, **_inverse(folder, asked)})
+        asked = RunRequest(folder.parent, scenario, {**overrides, **_inverse(folder, asked)})
     return asked
 
 
-def _inverse(folder: Path, asked: Asked) -> dict[str, Any]:
+def _inverse(folder: Path, asked: RunRequest) -> dict[str, Any]:
     """Return what makes the inverse of a force controller that of the study's law, as overrides."""
     model = Study(folder).model()
     law = base_and_variant(model.law)[0].name
@@ -226,12 +226,12 @@ def _inverse(folder: Path, asked: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _passive(folder: Path, ground: Mapping[str, Any]) -> Asked:
+def _passive(folder: Path, ground: Mapping[str, Any]) -> RunRequest:
     damper = damper_of(folder.parent, PASSIVE, folder.name)
-    return Asked(folder.parent, PASSIVE, {**damper, **_house(folder), **ground})
+    return RunRequest(folder.parent, PASSIVE, {**damper, **_house(folder), **ground})
 
 
-def _response(asked: Asked) -> dict[str, Any]:
+def _response(asked: RunRequest) -> dict[str, Any]:
     scenario = asked.load()
     columns = simulate(scenario)
     every = -(-len(columns["time"]) // ROWS)
@@ -239,13 +239,8 @@ def _response(asked: Asked) -> dict[str, Any]:
         "command": asked.run(), "time": columns["time"][::every],
         "values": columns[OUTPUT][::every], "unit": "m/s2",
         "peaks": {name: float(np.max(np.abs(columns[name]))) for name in JUDGED},
-        "units": {name: _unit(scenario, name) for name in JUDGED},
+        "units": {name: unit_of(scenario, name) for name in JUDGED},
     }  # fmt: skip
-
-
-def _unit(scenario: Scenario, name: str) -> str:
-    component, _, port = name.partition(".")
-    return scenario.component(component).description.variables[port].unit or ""
 
 
 def _best(folder: Path) -> dict[tuple[str, float], float]:

@@ -1,4 +1,4 @@
-"""View 3, Where it fails: every sample of the compared runs, for views that are linked."""
+"""View 3, Where it fails: every sample of the compared runs; view 4: without and with an effect."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..comparison.comparison import Comparison
+from ..comparison.misfit import run_error
 from ..comparison.names import name_of, site_name
 from ..comparison.patterns import ResidualPattern
 from ..comparison.predictions import RunPrediction, shown
 from ..errors import StudyError
-from ..study.steps import compare_study
+from ..study.steps import before_after, compare_study, predictions
 from ..study.study import Study
 from ..study.study_file import ROLES, TEST
 
@@ -104,4 +105,53 @@ def _pattern(one: ResidualPattern, found: Comparison) -> dict[str, Any]:
         "name": name_of(one.coordinate, found.site), "unit": unit, "share": one.share, "p": one.p,
         "significant": one.significant, "turned": one.turned, "centre": factor * one.centre,
         "mean": one.mean, "std": one.std,
+    }  # fmt: skip
+
+
+def residual(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the residuals of the models of `before_after` on held-out runs, for view 4.
+
+    Parameters
+    ----------
+    folder : of the study
+    arguments : none are taken
+
+    Raises
+    ------
+    StudyError, RecordError, TrustError
+        As `before_after` and `predictions`.
+    """
+    study = Study(folder)
+    pair = before_after(study)
+    if pair is None:
+        return {"effects": []}
+    found = predictions(study, pair)
+    every = every_of(found.before)
+    one = found.before[0]
+    return {
+        "effects": list(pair.effects), "step": pair.step,
+        "kind": (study.verdict() or {}).get("kind", ""), "quantity": one.quantity, "unit": one.unit,
+        "site": site_name(one.site) if one.site else "", "every": every,
+        "before": found.z_before, "after": found.z_after,
+        "runs": [_residuals(*both, every) for both in zip(found.before, found.after, strict=True)],
+    }  # fmt: skip
+
+
+def _residuals(before: RunPrediction, after: RunPrediction, every: int) -> dict[str, Any]:
+    """Return a run's motion, and of both models residual and expected noise, in SI."""
+    part = slice(before.skip, None, every)
+    motion: dict[str, Any] = {
+        name: before.coordinates[name][part]
+        for name in ("displacement", "velocity")
+        if name in before.coordinates
+    }
+    return {
+        "name": before.name, "time": before.time[part], **motion,
+        **{
+            when: {
+                "z": run_error(one.name, [one]).z, "residual": one.residual[::every],
+                "sigma": one.sigma[part], "normalised": one.normalised[::every],
+            }
+            for when, one in (("before", before), ("after", after))
+        },
     }  # fmt: skip

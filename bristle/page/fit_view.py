@@ -12,6 +12,7 @@ from ..model.model import StudyModel
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, base_and_variant
 from ..study.changes import other_data
+from ..study.identified import is_identified
 from ..study.study import Study
 
 ANSWER = "identify.json"
@@ -41,7 +42,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "law": model.law, "effects": list(model.effects), "building": model.building,
         "about": [] if hidden else _about(model), "waiting": sorted(hidden),
-        "identified": any(value.origin == "identified" for value in model.flat().values()),
+        "identified": is_identified(model),
         "parameters": rows_of(model, found if fresh else {}),
         "answer": found if fresh else None, "laws": sorted(LAWS),
         "step": numbers[-1] if numbers else None, "other_data": other_data(study),

@@ -17,6 +17,8 @@ from typing import Any, NamedTuple
 from ..core.text import command, unknown, written
 from .requests import UPLOADS, RequestError, batch_name, file_name
 
+Options = Mapping[str, Any]
+
 # Design files that the page writes, from the numbers of its form: design/KIND_1.toml and so on.
 #
 # The page solves nothing: `bristle design` reads such a file, and what it found is beside it.
@@ -176,7 +178,7 @@ MEMBERS = 200
 COMPARED_PEAK = 3.0
 """Largest peak [g] to which a motion may be scaled."""
 
-_COMPARED_WORD = re.compile(r"[A-Za-z]\w{0,79}")
+_PLAIN_NAME = re.compile(r"[A-Za-z]\w{0,79}")
 _NUMBER = re.compile(r"[1-9][0-9]{0,3}")
 
 
@@ -186,7 +188,7 @@ def numbers_of(folder: Path) -> list[int]:
     return sorted(int(one.name) for one in found if _NUMBER.fullmatch(one.name))
 
 
-def words(study: str, options: Mapping[str, Any]) -> list[str]:
+def _controllers(study: str, options: Options) -> list[str]:
     """Return the words of `bristle controllers` for what a page asks for.
 
     Parameters
@@ -207,7 +209,7 @@ def words(study: str, options: Mapping[str, Any]) -> list[str]:
         raise RequestError(
             f"motions: {len(motions)}; 1 to {COMPARED_MOTIONS} ground motions are right."
         )
-    controllers = [_compared_word("controllers", one) for one in _list(options, "controllers")]
+    controllers = [_plain_name("controllers", one) for one in _list(options, "controllers")]
     designs = [design_name(one) for one in _list(options, "designs")]
     chosen = [*controllers, *(f"{study}/{FOLDER}/{name}.json" for name in designs)]
     if not chosen:
@@ -222,7 +224,7 @@ def words(study: str, options: Mapping[str, Any]) -> list[str]:
     return [*found, f"--out={study}/{COMPARISONS}/{_whole(options, 'number', 1, 9999)}"]
 
 
-def _place(options: Mapping[str, Any]) -> list[str]:
+def _place(options: Options) -> list[str]:
     """Return the words about the building and where its damper is."""
     building, device = options.get("building"), options.get("device")
     if not building:
@@ -232,7 +234,7 @@ def _place(options: Mapping[str, Any]) -> list[str]:
     path = "/".join(file_name(part, "the building") for part in building.split("/"))
     return [
         f"--building={path}",
-        *([f"--device={_compared_word('device', device)}"] if device else []),
+        *([f"--device={_plain_name('device', device)}"] if device else []),
     ]
 
 
@@ -249,7 +251,7 @@ def record_name(record: object) -> str:
     if isinstance(record, str) and record.startswith(f"{UPLOADS}/") and record.count("/") == 2:
         _, batch, name = record.split("/")
         return f"{UPLOADS}/{batch_name(batch)}/{file_name(name, 'the record')}"
-    return _compared_word("motions", record)
+    return _plain_name("motions", record)
 
 
 def peak_of(motion: str, peak: object) -> float:
@@ -263,20 +265,20 @@ def peak_of(motion: str, peak: object) -> float:
     return float(peak)
 
 
-def _list(options: Mapping[str, Any], key: str) -> list[Any]:
+def _list(options: Options, key: str, of: str = "") -> list[Any]:
     found = options.get(key, [])
     if not isinstance(found, list):
-        raise RequestError(f"{key}: {written(found)}; a list is right.")
+        raise RequestError(f"{key}: {written(found)}; a list{of and f' of {of}'} is right.")
     return found
 
 
-def _compared_word(key: str, text: object) -> str:
-    if not isinstance(text, str) or not _COMPARED_WORD.fullmatch(text):
+def _plain_name(key: str, text: object) -> str:
+    if not isinstance(text, str) or not _PLAIN_NAME.fullmatch(text):
         raise RequestError(f"{key}: {written(text)}; a name is right.")
     return text
 
 
-def _whole(options: Mapping[str, Any], key: str, low: int, high: int) -> int:
+def _whole(options: Options, key: str, low: int, high: int) -> int:
     value = options.get(key, 0)
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise RequestError(f"{key}: {written(value)}; a whole number, {low} to {high}, is right.")
@@ -285,8 +287,6 @@ def _whole(options: Mapping[str, Any], key: str, low: int, high: int) -> int:
 
 _WORD = re.compile(r"[A-Za-z][\w.]{0,79}")
 _SET = re.compile(r"[A-Za-z][\w.\[\]]{0,99}=\w[\w .+-]*(/\w[\w .+-]*)*|[\w.\[\]]{1,100}=-[\d.e+-]+")
-
-Options = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -335,10 +335,7 @@ def _word(options: Options, key: str) -> list[str]:
 
 def _words(options: Options, key: str) -> list[str]:
     """Return a list of names among the options."""
-    texts = options.get(key, [])
-    if not isinstance(texts, list):
-        raise RequestError(f"{key}: {written(texts)}; a list of names is right.")
-    return [one for text in texts for one in _word({key: text}, key)]
+    return [one for text in _list(options, key, "names") for one in _word({key: text}, key)]
 
 
 def _option(name: str, values: Sequence[str]) -> list[str]:
@@ -383,9 +380,7 @@ def _new(study: str, options: Options) -> list[str]:
 
 def _channel_words(options: Options) -> list[str]:
     """Return the words about where channels are."""
-    texts = options.get("channels", [])
-    if not isinstance(texts, list):
-        raise RequestError(f"channels: {written(texts)}; a list of CHANNEL=COLUMN@UNIT is right.")
+    texts = _list(options, "channels", "CHANNEL=COLUMN@UNIT")
     for text in texts:
         if not isinstance(text, str) or not text.isprintable() or len(text) > 300:
             raise RequestError(f"channels: {written(text)}; CHANNEL=COLUMN@UNIT is right.")
@@ -415,9 +410,7 @@ def _check(study: str, options: Options) -> list[str]:
 def _roles(study: str, options: Options) -> list[str]:
     words = ["study", "roles", study]
     for role in ("train", "holdout", "test", "exclude"):
-        runs = options.get(role, [])
-        if not isinstance(runs, list):
-            raise RequestError(f"{role}: {written(runs)}; a list of runs is right.")
+        runs = _list(options, role, "runs")
         for run in runs:
             if not isinstance(run, str) or not run.isprintable() or len(run) > 200:
                 raise RequestError(f"{role}: {written(run)} is no run.")
@@ -498,7 +491,7 @@ COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "auto": _auto,
     "channels": _channels,
     "check": _check,
-    "controllers": words,
+    "controllers": _controllers,
     "design": _design,
     "diagnose": _diagnose,
     "example": _example,

@@ -167,9 +167,9 @@ def as_json(content: Any, status: HTTPStatus = HTTPStatus.OK) -> Answer:
     return Answer(json.dumps(content, ensure_ascii=False).encode(), status=status)
 
 
-def as_error(text: str, status: HTTPStatus, **more: Any) -> Answer:
+def as_error(text: str, status: HTTPStatus) -> Answer:
     """Return a sentence about what is wrong as an answer."""
-    return as_json({"error": text, **more}, status)
+    return as_json({"error": text}, status)
 
 
 # Consent to a study's own effects and laws from the page: to the text that was shown, to no other.

@@ -20,7 +20,7 @@ from ..engine.coupled import simulate
 from ..engine.results import accelerations, spectra
 from ..errors import BristleError, ScenarioError
 from ..export.web import Shown, described, offered
-from ..export.web_module import Numbers
+from ..export.web_module import Numbers, module
 from ..fmu import catalogue
 from ..fmu.catalogue import component_of_law
 from ..fmu.controller import ControllerSlave
@@ -34,8 +34,7 @@ from .requests import UPLOADS, batch_name, file_name
 # What may command a scenario's damper: a constant voltage, and every controller of the library.
 #
 # A scenario wires its controller. So another control is another stock scenario with the same
-# ground,
-# structure and damper, and where none has that controller, one whose own takes the same inputs.
+# ground, structure and damper, and where none has it, one whose own takes the same inputs.
 
 CONSTANT = "ConstantVoltage"
 
@@ -170,7 +169,7 @@ LONGEST = 120.0
 
 
 @dataclass(frozen=True)
-class Asked:
+class RunRequest:
     """A stock scenario and what takes the place of its values, files named from `folder`."""
 
     folder: Path
@@ -198,7 +197,7 @@ class Asked:
         return [f"{name}={_text(value)}" for name, value in self.overrides.items()]
 
 
-def asked_for(folder: Path, arguments: Mapping[str, Any]) -> Asked:
+def asked_for(folder: Path, arguments: Mapping[str, Any]) -> RunRequest:
     """Return the run that a page asks for.
 
     Parameters
@@ -220,7 +219,7 @@ def asked_for(folder: Path, arguments: Mapping[str, Any]) -> Asked:
     name, overrides = control_of(name, str(arguments.get("control") or ""))
     overrides |= damper_of(folder, name, arguments.get("study"))
     overrides |= record_of(folder, name, arguments.get("record"))
-    return Asked(folder, name, {**overrides, **values})
+    return RunRequest(folder, name, {**overrides, **values})
 
 
 def damper_of(folder: Path, scenario: str, study: object) -> dict[str, Any]:
@@ -362,7 +361,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     every = -(-len(columns["time"]) // ROWS)
     outputs = [
         {
-            "name": name, "unit": _unit(scenario, name), "values": column[::every],
+            "name": name, "unit": unit_of(scenario, name), "values": column[::every],
             "peak": float(np.max(np.abs(column))), "rms": float(np.sqrt(np.mean(column**2))),
         }
         for name, column in columns.items()
@@ -400,6 +399,40 @@ def numbers(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return described(Numbers(stock_file(asked.scenario), asked.given()), shown=Shown(sliders))
 
 
+def compiled(folder: Path, arguments: Mapping[str, Any]) -> bytes:
+    """Return the WebAssembly module by which a page runs scenarios itself.
+
+    It is compiled once for all scenarios, which takes a minute or two: a process of its own does
+    it, so that views are answered meanwhile.
+
+    Parameters
+    ----------
+    folder, arguments : none are used
+
+    Raises
+    ------
+    BuildError
+        If zig is not installed, or cannot compile.
+    """
+    return module()
+
+
+def choices(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the stock scenarios by name, the studies with a damper for them, the ground motions.
+
+    Parameters
+    ----------
+    folder : that holds studies
+    arguments : none are taken
+    """
+    studies = [file.parent.name for file in sorted(folder.glob("*/study.toml"))]
+    return {
+        "scenarios": [file.stem for file in stock_scenarios()],
+        "studies": [name for name in studies if not name.startswith(".")],
+        "records": records(folder),
+    }
+
+
 def spectrum(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return the response spectra of a run's ground and floors.
 
@@ -422,17 +455,18 @@ def spectrum(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _columns(asked: Asked) -> dict[str, NDArray[Any]]:
+def _columns(asked: RunRequest) -> dict[str, NDArray[Any]]:
     """Return the columns of a run; those of the last ones are kept, for their spectra."""
     return _run(asked.folder, asked.scenario, json.dumps(dict(asked.overrides)))
 
 
 @lru_cache(maxsize=2)
 def _run(folder: Path, scenario: str, overrides: str) -> dict[str, NDArray[Any]]:
-    return simulate(Asked(folder, scenario, json.loads(overrides)).load())
+    return simulate(RunRequest(folder, scenario, json.loads(overrides)).load())
 
 
-def _unit(scenario: Scenario, name: str) -> str:
+def unit_of(scenario: Scenario, name: str) -> str:
+    """Return the unit of an output by its name, "component.port"."""
     component, _, port = name.partition(".")
     return scenario.component(component).description.variables[port].unit or ""
 

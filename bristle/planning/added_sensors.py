@@ -16,18 +16,17 @@ from ..data.measurement import Measurement
 from ..diagnosis.rule import BENCH
 from ..identification.building_sites import StructureProblem
 from ..identification.rig import DAMPER
-from .information import Known, of_roles
+from .information import Information, of_roles
 from .outcome import Outcome, along
 from .questions import Purposes, Stated
-from .shaking_table import FORCE, Shaken, ShakingTable
-from .site_questions import of_one_force, with_measured_force
+from .shaking_table import FORCE, ShakingTable, SimulatedTest
+from .site_questions import Key, of_one_force, with_measured_force
 
 HELPS, SOME = 1.5, 1.15
 """Factors from which on a sensor is said to help, and from which on the best one is named."""
 
 Sites = dict[str, StructureProblem]
 Show = Callable[[list[Measurement]], Sites]
-Key = tuple[str, str, str]  # site, purpose, name of the figure
 
 
 @dataclass(frozen=True)
@@ -92,8 +91,8 @@ def added_sensors(
     table: ShakingTable,
     show: Show,
     stand: Mapping[str, Stated],
-    tests: Sequence[Shaken],
-    then: Mapping[str, Sequence[Known]],
+    tests: Sequence[SimulatedTest],
+    then: Mapping[str, Sequence[Information]],
     rows: Sequence[Outcome],
 ) -> list[Added]:
     """Return what sensors that the study lacks would add, the most useful one first.

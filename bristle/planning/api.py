@@ -16,7 +16,7 @@ from .building import plan_building
 from .data_sheet import plan_new
 from .limits import limits_given, read_rig
 from .plan import NAMED, Plan
-from .questions import Wish, notes_of_change
+from .questions import PlanRequest, notes_of_change
 
 Names = str | Sequence[str] | bool | None
 
@@ -92,13 +92,13 @@ def plan(
     >>> [run.role for run in tests.runs()]
     ['train', 'holdout']
     """
-    wish = Wish(*(_names(one) for one in (separate, see, sharpen, learn)))
+    request = PlanRequest(*(_names(one) for one in (separate, see, sharpen, learn)))
     _refuse_seed(seed)
     if isinstance(study, str | Path) and Path(study).is_file():
         if rig is not None:
             raise StudyError(f"{study} is a rig.toml itself; rig = {written(rig)} is one too many.")
         _refuse_of_building(study, limits, record)
-        return plan_new(Path(study), wish, limits=limits, seed=seed)
+        return plan_new(Path(study), request, limits=limits, seed=seed)
     opened = study if isinstance(study, Study) else Study(study)
     given = limits_given(limits, opened.drive)
     of_file = read_rig(Path(rig), opened.drive) if rig is not None else {}
@@ -110,9 +110,9 @@ def plan(
     found: Plan
     if opened.settings.has_building:
         names = [str(one) for one in ((record,) if isinstance(record, str | Path) else record)]
-        found = plan_building(opened, wish, limits=limits, records=names, seed=seed)
+        found = plan_building(opened, request, limits=limits, records=names, seed=seed)
     else:
-        found = plan_study(opened, wish, limits=limits, seed=seed)
+        found = plan_study(opened, request, limits=limits, seed=seed)
     opened.refuse_if_changed()
     notes = (*notes_of_change(opened), *found.notes)
     return replace(found, notes=notes, first=_first_free(opened))

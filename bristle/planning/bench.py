@@ -15,6 +15,7 @@ from ..diagnosis.rig_runs import BenchRuns
 from ..errors import StudyError
 from ..identification.problem import Run
 from ..physics.effect import plain_name
+from ..study.identified import is_identified
 from ..study.identify import as_model
 from ..study.study import Study
 from .information import DRAWS, Question
@@ -23,14 +24,14 @@ from .outcome import Outcome, outcomes
 from .plan import Plan
 from .questions import (
     Measured,
+    PlanRequest,
     Purposes,
     SizedRival,
     Stated,
-    Wish,
     cost_of,
-    default_wish,
+    default_request,
     effects_beside,
-    errs,
+    misfit_note,
     note_of_missing,
     open_parts,
     parameters_of,
@@ -43,7 +44,7 @@ from .waveforms import Waveform
 
 def plan_study(
     study: Study,
-    wish: Wish | None = None,
+    request: PlanRequest | None = None,
     *,
     limits: Mapping[str, Any] | None = None,
     record: Waveform | None = None,
@@ -54,7 +55,7 @@ def plan_study(
     Parameters
     ----------
     study : Study
-    wish : what they shall be for; None for what the verdict leaves open, or else all
+    request : what they shall be for; None for what the verdict leaves open, or else all
     limits : of the rig, as arguments of `RigLimits`; what is not given is what the runs have done
     record : a recorded motion that may be scaled
     seed : of what is drawn
@@ -69,8 +70,8 @@ def plan_study(
     opened = _opened(study)
     runs = [*opened.problem.runs, *opened.held_out.runs]
     rig = with_given(limits_of_runs(runs), limits or {})
-    wish = wish if wish is not None and not wish.nothing else default_wish(study)
-    purposes = _purposes(wish, opened, rig, study.drive)
+    request = request if request is not None and not request.nothing else default_request(study)
+    purposes = _purposes(request, opened, rig, study.drive)
     measured = Measured(opened.problem.runs, opened.held_out.runs)
     found = stated(purposes, opened.searched, measured, max(opened.before.z, 1.0), seed)
     tell("looking at tests")
@@ -86,7 +87,7 @@ def _notes(study: Study, opened: Opening) -> tuple[str, ...]:
     """Return what weakens a plan: an error that an effect would take away first."""
     missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
     if not missing and opened.before.z > opened.rule.clean:
-        return (f"The model {errs(opened.before.z)}",)
+        return (f"The model {misfit_note(opened.before.z)}",)
     return missing
 
 
@@ -101,7 +102,7 @@ def _opened(study: Study) -> Opening:
     """Return the model of a study with its runs."""
     study.usable_effects()
     model, runs = study.model(), study.runs()
-    identified = any(value.origin == "identified" for value in model.flat().values())
+    identified = is_identified(model)
     opened = BenchRuns(runs.train, runs.holdout, as_model(model), identified, tell).open_damper()
     if not isinstance(opened, Opening):
         raise StudyError(f"{study.folder}: {' '.join(opened.reasons)}")
@@ -109,20 +110,20 @@ def _opened(study: Study) -> Opening:
     return opened
 
 
-def _purposes(wish: Wish, opened: Opening, limits: RigLimits, drive: str) -> Purposes:
+def _purposes(request: PlanRequest, opened: Opening, limits: RigLimits, drive: str) -> Purposes:
     """Return what a plan is for, with the models and effects that this takes."""
     model = opened.before.model
     effects: tuple[SizedRival, ...] = ()
     others: tuple[Question, ...] = ()
     parts = None
-    if wish.see is not None:
+    if request.see is not None:
         tell("looking at effects")
-        effects = tuple(effects_beside(opened, wish.see))
-    if wish.separate is not None:
-        others = tuple(rivals(opened, wish.separate))
-    if wish.learn is not None:
-        parts = open_parts(model, limits, wish.learn, drive or "voltage")
-    parameters = () if wish.sharpen is None else parameters_of(model.free(), wish.sharpen)
+        effects = tuple(effects_beside(opened, request.see))
+    if request.separate is not None:
+        others = tuple(rivals(opened, request.separate))
+    if request.learn is not None:
+        parts = open_parts(model, limits, request.learn, drive or "voltage")
+    parameters = () if request.sharpen is None else parameters_of(model.free(), request.sharpen)
     return Purposes(model, effects, others, parameters, parts, drive=drive)
 
 

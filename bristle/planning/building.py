@@ -24,20 +24,19 @@ from ..identification.smoothing import smooth_steps
 from ..physics.building import Building, frequencies
 from ..physics.drive import DRIVES
 from ..physics.effect import plain_name
-from ..prediction.model_system import House
+from ..prediction.model_system import BuildingWithFile
 from ..study.identify import as_model
 from ..study.rig import building_of
 from ..study.study import Study
 from .added_sensors import Added, added_sensors, place_of
 from .folder import PlannedRun
-from .information import DRAWS, Goal, Known
+from .information import DRAWS, Goal, Information
 from .limits import RESERVE, SLOWEST, ZERO, RigLimits, Signals, with_given
 from .outcome import Outcome, outcomes
 from .plan import Plan
-from .questions import Measured, Stated, Wish, cost_of, errs, note_of_missing, stated
-from .shaking_table import ShakingTable
-from .site_questions import SiteWish, default_wishes, largest_motion, of_one_force, purposes_at
-from .table_planner import TablePlanner
+from .questions import Measured, PlanRequest, Stated, cost_of, misfit_note, note_of_missing, stated
+from .shaking_table import ShakingTable, TablePlanner
+from .site_questions import SiteRequest, default_requests, largest_motion, of_one_force, purposes_at
 from .waveforms import Waveform, displacement_of, records_at_hand, scalable
 
 if TYPE_CHECKING:
@@ -103,16 +102,27 @@ class BuildingPlan(Plan):
             return "they add up to one force while the damper's is not measured; no motion helps."
         return super()._why(one)
 
-    def files(self) -> dict[str, str | bytes]:
-        """Return the further files of the plan's folder by name."""
-        from .building_picture import building_files
+    def _text(self) -> list[str]:
+        sensors = [f"- {one.sentence()}" for one in self.sensors]
+        return super()._text() + (["", "## Sensors to add", "", *sensors] if sensors else [])
 
-        return building_files(self)
+    def _demand(self) -> str:
+        units = zip(self._peaks(), ("m", "m/s", "m/s2"), strict=True)
+        asked = [quantity(peak, unit) for peak, unit in units]
+        moved = max(float(np.max(np.abs(one))) for one in self.predicted)
+        return (
+            f"The tests ask the table for {asked[0]} to either side, {asked[1]} and {asked[2]} at "
+            f"the most, and move {place_of(self.level)} by {quantity(moved, 'm')}, as the model "
+            "predicts: nine tenths of what the rig can do, or less. Each begins and ends at rest. "
+            "Command the table by its acceleration, or integrate it twice: the displacement comes "
+            "back to zero."
+        )
 
     def _page(self, k: int) -> Page:
-        from .building_picture import draw_shaking
+        from .pictures import draw_shaking
 
-        return draw_shaking(self.runs()[k], self.predicted[k], self.drive, self.level)
+        run, moved = self.runs()[k], self.predicted[k]
+        return draw_shaking(run, moved, self.drive, place_of(self.level))
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
@@ -141,7 +151,7 @@ BELOW, ABOVE = 0.3, 1.3
 
 
 def limits_of_shaking(
-    runs: Sequence[Measurement], sites: Mapping[str, Opening], house: House
+    runs: Sequence[Measurement], sites: Mapping[str, Opening], house: BuildingWithFile
 ) -> RigLimits:
     """Return what table, building and amplifier have done already.
 
@@ -202,7 +212,7 @@ TIE = 0.01
 
 def plan_building(
     study: Study,
-    wish: Wish | None = None,
+    request: PlanRequest | None = None,
     *,
     limits: Mapping[str, Any] | None = None,
     records: Sequence[str] = (),
@@ -213,7 +223,7 @@ def plan_building(
     Parameters
     ----------
     study : Study
-    wish : what they shall be for; None for what the verdict leaves open, or else all
+    request : what they shall be for; None for what the verdict leaves open, or else all
     limits : of table and building, as arguments of `RigLimits`; what is not given is what the runs
         have done
     records : further ground motions that may be scaled: names, or files
@@ -233,13 +243,15 @@ def plan_building(
     _refuse_devices(building)
     measured = [*runs.train, *runs.holdout]
     motions = records_at_hand(measured, records, Path.cwd())
-    house = House(building, study.folder / model.building if model.building else None)
+    house = BuildingWithFile(building, study.folder / model.building if model.building else None)
     found = BuildingRuns(runs.train, runs.holdout, as_model(model), building, tell)
     sites = _opened(study, found)
     rig = _within(limits_of_shaking(measured, sites, house), limits or {})
-    given = wish is not None and not wish.nothing
-    wishes = [SiteWish(wish)] if given and wish else default_wishes(study.verdict() or {})
-    purposes = purposes_at(sites, wishes, rig, study.drive)
+    given = request is not None and not request.nothing
+    requests = (
+        [SiteRequest(request)] if given and request else default_requests(study.verdict() or {})
+    )
+    purposes = purposes_at(sites, requests, rig, study.drive)
     stand = {site: _stated(one, sites[site], seed) for site, one in purposes.items()}
     tell("looking at ground motions")
     with tempfile.TemporaryDirectory(prefix="bristle_plan_") as folder:
@@ -320,7 +332,7 @@ def _notes(study: Study, sites: Mapping[str, Opening]) -> tuple[str, ...]:
     if missing:
         return missing
     loud = {site: one.before.z for site, one in sites.items() if one.before.z > one.rule.clean}
-    return tuple(f"At {site_name(site)} the model {errs(z)}" for site, z in loud.items())
+    return tuple(f"At {site_name(site)} the model {misfit_note(z)}" for site, z in loud.items())
 
 
 def _stated(purposes: Any, opened: Opening, seed: int) -> Stated:
@@ -333,7 +345,7 @@ def _joint(stand: Mapping[str, Stated]) -> Goal:
     asked = tuple(a for one in stand.values() for a in one.goal.asked)
     known = tuple(k for one in stand.values() for k in one.goal.known)
 
-    def cost(found: Sequence[Known]) -> float:
+    def cost(found: Sequence[Information]) -> float:
         total, first = [], 0
         for one in stand.values():
             count = len(one.goal.asked)
@@ -369,7 +381,9 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
     )  # fmt: skip
 
 
-def _by_site(stand: Mapping[str, Stated], found: Sequence[Known]) -> dict[str, list[Known]]:
+def _by_site(
+    stand: Mapping[str, Stated], found: Sequence[Information]
+) -> dict[str, list[Information]]:
     """Return what is known of the questions of each site, with the fitted parameters."""
     out, first = {}, 0
     for site, one in stand.items():
@@ -378,7 +392,7 @@ def _by_site(stand: Mapping[str, Stated], found: Sequence[Known]) -> dict[str, l
     return out
 
 
-def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Known]]) -> list[Outcome]:
+def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Information]]) -> list[Outcome]:
     """Return what tests will show, site by site."""
     rows = []
     for site, one in stand.items():

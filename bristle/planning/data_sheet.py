@@ -22,9 +22,9 @@ from .plan import Plan
 from .questions import (
     NONE,
     Measured,
+    PlanRequest,
     Purposes,
     SizedRival,
-    Wish,
     able_beside,
     law_rivals,
     open_parts,
@@ -105,14 +105,18 @@ def read_new_rig(path: Path, given: Mapping[str, Any] | None = None) -> NewRig:
 
 
 def plan_new(
-    path: Path, wish: Wish | None = None, *, limits: Mapping[str, Any] | None = None, seed: int = 1
+    path: Path,
+    request: PlanRequest | None = None,
+    *,
+    limits: Mapping[str, Any] | None = None,
+    seed: int = 1,
 ) -> Plan:
     """Return the first tests of a rig that a rig.toml describes.
 
     Parameters
     ----------
     path : rig.toml
-    wish : what the tests shall be for; None for the law's parameters and all effects
+    request : what the tests shall be for; None for the law's parameters and all effects
     limits : in place of those of the file
     seed : of what is drawn
 
@@ -122,15 +126,19 @@ def plan_new(
         If the file is wrong, or its limits allow no test.
     """
     rig = read_new_rig(path, limits)
-    wish = wish if wish is not None and not wish.nothing else Wish(see=(), sharpen=())
+    request = (
+        request if request is not None and not request.nothing else PlanRequest(see=(), sharpen=())
+    )
     stand_in = _stand_in(rig)
     problem = Problem([stand_in])
     model = _scaled(rig, problem)
     stand_in = replace(stand_in, force=problem.predict(model, stand_in))
     problem = Problem([stand_in])
-    effects, others = _beside(wish, model, problem)
-    parameters = () if wish.sharpen is None else parameters_of(model.free(), wish.sharpen)
-    parts = None if wish.learn is None else open_parts(model, rig.limits, wish.learn, rig.drive)
+    effects, others = _beside(request, model, problem)
+    parameters = () if request.sharpen is None else parameters_of(model.free(), request.sharpen)
+    parts = (
+        None if request.learn is None else open_parts(model, rig.limits, request.learn, rig.drive)
+    )
     purposes = Purposes(model, effects, others, parameters, parts, drive=rig.drive)
     found = stated(purposes, problem, Measured(), 1.0, seed)
     planner = Planner(
@@ -141,17 +149,19 @@ def plan_new(
 
 
 def _beside(
-    wish: Wish, model: Model, problem: Problem
+    request: PlanRequest, model: Model, problem: Problem
 ) -> tuple[tuple[SizedRival, ...], tuple[Question, ...]]:
     """Return the effects to be seen and the rivals to be told apart, at typical sizes."""
     fitted = Fitted(problem, model, problem.expectation(model), 0)
     able = able_beside(model, problem, ("force",))
-    for name in wish.see or ():
+    for name in request.see or ():
         refuse_unable(name, able, model)
-    effects = () if wish.see is None else tuple(sized_rival(n, fitted) for n in wish.see or able)
-    if wish.separate is None:
+    effects = (
+        () if request.see is None else tuple(sized_rival(n, fitted) for n in request.see or able)
+    )
+    if request.separate is None:
         return effects, ()
-    names = sorted(wish.separate, key=lambda name: name == NONE)  # the model as it is comes last
+    names = sorted(request.separate, key=lambda name: name == NONE)  # the model as it is comes last
     return effects, tuple(rivals_of({name: _rival(name, able, fitted) for name in names}))
 
 

@@ -75,6 +75,11 @@ class PlannedRun:
     signals: dict[str, Array] = field(repr=False)
 
     @property
+    def purpose(self) -> str:
+        """What the run is for, in words."""
+        return "training" if self.role == "train" else "held out"
+
+    @property
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])

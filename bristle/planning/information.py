@@ -139,7 +139,7 @@ class Question:
         return len(self.model.free()) + len(self.rivals) + sum(one.size for one in self.bases)
 
 
-class Asked:
+class PreparedQuestion:
     """A question on a rig: makes the normal equations of runs, with one scale for all of them.
 
     Parameters
@@ -191,7 +191,7 @@ class Asked:
             return abs(self.question.model.value(name)), True
         return float(self._scaled.scale[k]), False
 
-    def drawn(self, known: Known, generator: np.random.Generator) -> Asked:
+    def drawn(self, known: Information, generator: np.random.Generator) -> PreparedQuestion:
         """Return the question with other values of the parameters, drawn from what is known.
 
         Parameters
@@ -211,7 +211,7 @@ class Asked:
                 for one in self.question.rivals
             ),
         )  # fmt: skip
-        return Asked(question, self.problem, self._z)
+        return PreparedQuestion(question, self.problem, self._z)
 
     def _change(self, rival: Rival, problem: Problem, expected: Expected) -> Array:
         return residuals(problem, rival.model, expected) - residuals(
@@ -281,7 +281,7 @@ def samples_of(runs: Sequence[Run]) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class Information:
     """What runs say of a question.
 
     Parameters are known from the runs that are fitted to, what is beside them from all. `typical`
@@ -292,7 +292,7 @@ class Known:
     told: Evidence
     typical: Array | None = None
 
-    def with_runs(self, told: Iterable[Evidence]) -> Known:
+    def with_runs(self, told: Iterable[Evidence]) -> Information:
         """Return what these runs and further ones say."""
         return replace(self, told=sum(told, start=self.told))
 
@@ -398,7 +398,7 @@ def roles_of(count: int, judged: bool) -> list[bool]:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class JudgedTest:
     """A test as it would be seen: what it prescribes.
 
     `shown` what it would say per question if it is fitted to; `held_out` whether it is to judge by.
@@ -414,7 +414,7 @@ class Seen:
         """What the test is for, as files have it."""
         return "holdout" if self.held_out else "train"
 
-    def told(self, k: int) -> Evidence:
+    def evidence_for(self, k: int) -> Evidence:
         """Return what it would say of a question."""
         return self.shown[k].judging() if self.held_out else self.shown[k]
 
@@ -428,21 +428,24 @@ class Goal:
     runs would say; `judged` whether it is a verdict, which the tests that are held out decide.
     """
 
-    asked: tuple[Asked, ...]
-    known: tuple[Known, ...]
+    asked: tuple[PreparedQuestion, ...]
+    known: tuple[Information, ...]
     count: int
-    cost: Callable[[Sequence[Known]], float]
+    cost: Callable[[Sequence[Information]], float]
     judged: bool = True
 
-    def with_tests(self, tests: Sequence[Seen]) -> list[Known]:
+    def with_tests(self, tests: Sequence[JudgedTest]) -> list[Information]:
         """Return what the runs at hand and tests would say of each question."""
-        return [known.with_runs(one.told(k) for one in tests) for k, known in enumerate(self.known)]
+        return [
+            known.with_runs(one.evidence_for(k) for one in tests)
+            for k, known in enumerate(self.known)
+        ]
 
-    def with_pair(self, one: Seen) -> list[Known]:
+    def with_pair(self, one: JudgedTest) -> list[Information]:
         """Return what the runs at hand, a test and another one to judge by would say."""
         return self.with_tests([one, replace(one, held_out=True)])
 
-    def among(self, tests: Sequence[Seen]) -> Goal:
+    def among(self, tests: Sequence[JudgedTest]) -> Goal:
         """Return the goal where tests show what the rig can do."""
         known = []
         for k, one in enumerate(self.known):
@@ -451,6 +454,6 @@ class Goal:
             known.append(replace(one, typical=np.mean(normals, axis=0) if told else None))
         return replace(self, known=tuple(known))
 
-    def value(self, tests: Sequence[Seen]) -> float:
+    def value(self, tests: Sequence[JudgedTest]) -> float:
         """Return the cost of the runs at hand with tests."""
         return self.cost(self.with_tests(tests))

@@ -12,7 +12,7 @@ from ..diagnosis.effect_size import ONE_SIDED, TWO_SIDED
 from ..diagnosis.rule import BENCH
 from ..identification.problem import parameter
 from ..physics.drive import VOLTAGE, drive_named, unit_for
-from .information import Asked, Known
+from .information import Information, PreparedQuestion
 from .questions import Purposes, SizedRival, seen, separated
 
 OUTCOMES = "outcomes.json"
@@ -77,8 +77,11 @@ class Outcome:
 
 
 def outcomes(
-    purposes: Purposes, asked: Sequence[Asked], now: Sequence[Known], then: Sequence[Known]
-) -> list[Outcome]:
+    purposes: Purposes,
+    asked: Sequence[PreparedQuestion],
+    now: Sequence[Information],
+    then: Sequence[Information],
+) -> list[Outcome]:  # fmt: skip
     """Return what tests will show.
 
     Parameters
@@ -93,7 +96,7 @@ def outcomes(
     return out + _learned(purposes, now[0], then[0])
 
 
-def _separated(now: Sequence[Known], then: Sequence[Known]) -> list[Outcome]:
+def _separated(now: Sequence[Information], then: Sequence[Information]) -> list[Outcome]:
     before = {one.name: BENCH.tells / one.value if one.value else inf for one in separated(now)}
     after = {one.name: BENCH.tells / one.value if one.value else inf for one in separated(then)}
     return [
@@ -105,7 +108,7 @@ def _separated(now: Sequence[Known], then: Sequence[Known]) -> list[Outcome]:
     ]  # fmt: skip
 
 
-def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
+def _seen(purposes: Purposes, now: Information, then: Information) -> list[Outcome]:
     """Return from what size each effect is named, largest gain first, and how large it may be."""
     before = {one.name: one.value for one in seen(now, purposes.rule)}
     after = {one.name: one.value for one in seen(then, purposes.rule)}
@@ -122,7 +125,7 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
             sized.value(max(size, one.least)) if shown else inf
             for size, shown in zip(sizes, visible, strict=True)
         ]
-        # Where the model errs, the runs allow sizes that they would name beside a true one.
+        # Where the model misfit_note, the runs allow sizes that they would name beside a true one.
         found = max(_named(one, before[name], after[name]), one.least, sizes[1])
         text = f"{sized.parameter}, limit at 95 %"
         if visible[1] and not sized.ended(found):
@@ -171,7 +174,9 @@ def _allowed(one: SizedRival, now: float, then: float) -> tuple[float, float]:
     return apart / now if now > 0.0 else inf, apart / then if then > 0.0 else inf
 
 
-def _sharpened(purposes: Purposes, asked: Asked, now: Known, then: Known) -> list[Outcome]:
+def _sharpened(
+    purposes: Purposes, asked: PreparedQuestion, now: Information, then: Information
+) -> list[Outcome]:
     before, after = now.deviations(), then.deviations()
     out = []
     for name in purposes.parameters:
@@ -189,7 +194,7 @@ def _sharpened(purposes: Purposes, asked: Asked, now: Known, then: Known) -> lis
     return out
 
 
-def _learned(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
+def _learned(purposes: Purposes, now: Information, then: Information) -> list[Outcome]:
     if purposes.parts is None:
         return []
     before, after = now.of_bases(), then.of_bases()

@@ -1,68 +1,23 @@
-"""The pictures of a plan's tests, and its table as text."""
+"""The pictures of planned tests, on a bench and of a building."""
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..core.text import quantity
 from ..physics.drive import DRIVES
-from ..view.style import BLUE, VERMILION, Page, look, png
-from .outcome import HEADER, OUTCOMES
+from ..view.style import BLUE, GREEN, VERMILION, Page, look
 
 if TYPE_CHECKING:
     from .folder import PlannedRun
     from .limits import Signals
-    from .plan import Plan
+
+Array = NDArray[np.float64]
 
 SHOWN = 4000
 """Samples per line: more are not seen."""
-
-
-def plan_files(plan: Plan) -> dict[str, str | bytes]:
-    """Return the further files of a plan's folder by name: pictures, and plan.md."""
-    pictures: dict[str, str | bytes] = {
-        f"{run.name}.png": png(draw_test(run, signals, plan.drive), 110)
-        for run, signals in zip(plan.runs(), plan.signals, strict=True)
-    }
-    return {**pictures, "plan.md": plan_text(plan, _limits(plan)), OUTCOMES: outcomes_json(plan)}
-
-
-def outcomes_json(plan: Plan) -> str:
-    """Return the table of what the tests will show, as a report takes it."""
-    told = {"header": HEADER, "rows": [one.cells() for one in plan.outcomes]}
-    return json.dumps(told, indent=2, ensure_ascii=False) + "\n"
-
-
-def plan_text(plan: Plan, limits: list[str]) -> str:
-    """Return the plan as a page of text; `limits` says what it asks of the rig."""
-    lines = [f"# Tests for {plan.study or 'a new rig'}", "", *limits]
-    if plan.limits.pause:
-        lines.append(f"The rig rests for {quantity(plan.limits.pause, 's')} between two of them.")
-    lines += ["", "## Runs", ""]
-    lines += ["| run | for | what |", "|---|---|---|"]
-    lines += [
-        f"| [{run.name}]({run.name}.csv) | {'training' if run.role == 'train' else 'held out'} | "
-        f"{run.about} |"
-        for run in plan.runs()
-    ]
-    lines += ["", "## What they will show", "", f"| {' | '.join(HEADER)} |", "|---|---|---|---|"]
-    lines += [f"| {' | '.join(one.cells())} |" for one in plan.outcomes]
-    return "\n".join([*lines, ""])
-
-
-def _limits(plan: Plan) -> list[str]:
-    """Return what the largest motion asks of the rig."""
-    stroke = max(float(np.max(np.abs(one.x))) for one in plan.signals)
-    speed = max(float(np.max(np.abs(one.v))) for one in plan.signals)
-    acceleration = max(float(np.max(np.abs(one.a))) for one in plan.signals)
-    return [
-        f"The tests ask for {1e3 * stroke:.3g} mm to either side, {1e3 * speed:.3g} mm/s and "
-        f"{acceleration:.3g} m/s2 at the most: nine tenths of what the rig can do, or less. Each "
-        f"begins and ends at rest."
-    ]
 
 
 def draw_test(run: PlannedRun, signals: Signals, drive: str) -> Page:
@@ -90,4 +45,37 @@ def draw_test(run: PlannedRun, signals: Signals, drive: str) -> Page:
         axes.plot(1e3 * signals.x[::every], 1e3 * signals.v[::every], color=BLUE, lw=0.6)
         axes.set_title("velocity [mm/s]")
         axes.set_xlabel("displacement [mm]")
+    return page
+
+
+def draw_shaking(run: PlannedRun, moved: Array, drive: str, level: str) -> Page:
+    """Return the picture of a planned test: ground, first level as predicted, command over time.
+
+    Parameters
+    ----------
+    run : as the plan's folder holds it
+    moved : (n,) displacement of the first level [m]
+    level : the first level in words
+    drive : the channel of the command, "" where there is none
+    """
+    every = max(1, len(run.time) // SHOWN)
+    rows = [
+        ("ground acceleration [m/s2]", run.signals["ground_acceleration"], BLUE),
+        (f"displacement of {level}, predicted [mm]", 1e3 * moved, GREEN),
+    ]
+    if drive in DRIVES:
+        name, unit = DRIVES[drive].name, DRIVES[drive].unit
+        rows.append((f"{name} [{unit}]", run.signals[name], VERMILION))
+    with look():
+        page = Page(9.2, 1.5 * len(rows), f"{run.name}: {run.about}", "")
+        grid = page.grid(len(rows), 1, top=0.4, bottom=0.5, left=0.7, row_gap=0.5)
+        first = None
+        for k, (title, values, colour) in enumerate(rows):
+            axes = page.figure.add_subplot(grid[k, 0], sharex=first)
+            first = first or axes
+            axes.plot(run.time[::every], values[::every], color=colour, lw=0.8)
+            axes.set_title(title)
+            axes.margins(x=0.0)
+            axes.tick_params(labelbottom=k == len(rows) - 1)
+        axes.set_xlabel("time [s]", loc="right", labelpad=0)
     return page

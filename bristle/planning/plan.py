@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..core.text import plain
+import numpy as np
+
+from ..core.text import plain, quantity
 from ..diagnosis.rule import BENCH
 from ..errors import StudyError
 from ..physics.drive import DRIVES
@@ -15,7 +18,7 @@ from ..physics.effect import EFFECTS, plain_name
 from ..view import Viewable
 from .folder import PlanFolder, PlannedRun, write_plan
 from .limits import RigLimits, Signals, Test
-from .outcome import NEAR, Outcome
+from .outcome import HEADER, NEAR, OUTCOMES, Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -180,10 +183,50 @@ class Plan(Viewable):
         return path
 
     def files(self) -> dict[str, str | bytes]:
-        """Return the further files of the plan's folder by name."""
-        from .pictures import plan_files
+        """Return the further files of the plan's folder by name: pictures, plan.md, the table."""
+        from ..view.style import png
 
-        return plan_files(self)
+        runs = enumerate(self.runs())
+        pictures = {f"{run.name}.png": png(self._page(k), 110) for k, run in runs}
+        told = {"header": HEADER, "rows": [one.cells() for one in self.outcomes]}
+        table = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
+        return {**pictures, "plan.md": "\n".join([*self._text(), ""]), OUTCOMES: table}
+
+    def _text(self) -> list[str]:
+        """Return the lines of the plan as a page of text."""
+        lines = [f"# Tests for {self.study or 'a new rig'}", "", self._demand()]
+        if self.limits.pause:
+            rest = quantity(self.limits.pause, "s")
+            lines.append(f"The rig rests for {rest} between two of them.")
+        lines += ["", "## Runs", "", "| run | for | what |", "|---|---|---|"]
+        lines += [
+            f"| [{run.name}]({run.name}.csv) | {run.purpose} | {run.about} |" for run in self.runs()
+        ]
+        lines += [
+            "",
+            "## What they will show",
+            "",
+            f"| {' | '.join(HEADER)} |",
+            "|---|---|---|---|",
+        ]
+        return lines + [f"| {' | '.join(one.cells())} |" for one in self.outcomes]
+
+    def _peaks(self) -> list[float]:
+        """Return the largest displacement, velocity and acceleration of all tests, in SI."""
+        motions = ((one.x, one.v, one.a) for one in self.signals)
+        return [
+            max(float(np.max(np.abs(values))) for values in column)
+            for column in zip(*motions, strict=True)
+        ]
+
+    def _demand(self) -> str:
+        """Return what the largest motion asks of the rig."""
+        stroke, speed, acceleration = self._peaks()
+        return (
+            f"The tests ask for {1e3 * stroke:.3g} mm to either side, {1e3 * speed:.3g} mm/s and "
+            f"{acceleration:.3g} m/s2 at the most: nine tenths of what the rig can do, or less. "
+            "Each begins and ends at rest."
+        )
 
     def plot(self, number: int = 1) -> Figure:
         """Return the figure of a test, the first one being number 1: motion and command.

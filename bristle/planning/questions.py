@@ -26,8 +26,16 @@ from ..physics.effect import EFFECTS, exclude, plain_name
 from ..physics.laws import laws_of
 from ..study.changes import behind_data
 from ..study.study import Study
-from .information import USUAL, Asked, Goal, Question, Rival, basis_along, ranges
-from .information import Known as InformationKnown
+from .information import (
+    USUAL,
+    Goal,
+    Information,
+    PreparedQuestion,
+    Question,
+    Rival,
+    basis_along,
+    ranges,
+)
 from .limits import RigLimits
 
 AT = " or "
@@ -299,7 +307,7 @@ class Figure:
 
 
 def seen(
-    known: InformationKnown, rule: DecisionRule = BENCH, least: Mapping[str, float] | None = None
+    known: Information, rule: DecisionRule = BENCH, least: Mapping[str, float] | None = None
 ) -> list[Figure]:
     """Return from what size each effect would be named, over the size that was asked for.
 
@@ -324,7 +332,7 @@ def seen(
     ]  # fmt: skip
 
 
-def separated(known: Sequence[InformationKnown], rule: DecisionRule = BENCH) -> list[Figure]:
+def separated(known: Sequence[Information], rule: DecisionRule = BENCH) -> list[Figure]:
     """Return by how much rivals are too near to be told apart: 1 where a verdict just can."""
     apart: dict[str, float] = {}
     for one in known:
@@ -336,13 +344,13 @@ def separated(known: Sequence[InformationKnown], rule: DecisionRule = BENCH) -> 
     ]
 
 
-def sharpened(known: InformationKnown, names: Sequence[str]) -> list[Figure]:
+def sharpened(known: Information, names: Sequence[str]) -> list[Figure]:
     """Return the standard deviation of each parameter, over its size."""
     found = known.deviations()
     return [Figure("sharpen", name, found[name], SMALL) for name in names or found]
 
 
-def learned(known: InformationKnown) -> list[Figure]:
+def learned(known: Information) -> list[Figure]:
     """Return how well a part without a form is held: over all the rig can do, or by coordinate."""
     if known.typical is not None:
         return [Figure("learn", "force", known.of_force(), HELD)]
@@ -405,7 +413,7 @@ class Purposes:
         own = Question(self.model, rivals, bases)
         return [own, *self.rivals]
 
-    def figures(self, known: Sequence[InformationKnown]) -> list[Figure]:
+    def figures(self, known: Sequence[Information]) -> list[Figure]:
         """Return what a plan makes smaller, of what runs say of the questions."""
         own, *rivals = known
         least = {one.sized.name: one.least / one.size for one in self.effects}
@@ -423,8 +431,8 @@ class Stated:
     """
 
     purposes: Purposes
-    asked: tuple[Asked, ...]
-    known: tuple[InformationKnown, ...]
+    asked: tuple[PreparedQuestion, ...]
+    known: tuple[Information, ...]
     goal: Goal = field(repr=False)
 
 
@@ -439,7 +447,7 @@ def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, s
     z : error over noise of the model
     seed : of the values that are drawn
     """
-    asked = tuple(Asked(one, problem, z) for one in purposes.questions())
+    asked = tuple(PreparedQuestion(one, problem, z) for one in purposes.questions())
     known = tuple(_known(one, measured) for one in asked)
     generator = np.random.default_rng(seed)
     unsure = max((max(one.deviations().values(), default=0.0) for one in known), default=0.0)
@@ -449,7 +457,7 @@ def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, s
         sets.append(tuple(a.drawn(k, generator) for a, k in zip(asked, known, strict=True)))
     width = len(asked)
 
-    def cost(found: Sequence[InformationKnown]) -> float:
+    def cost(found: Sequence[Information]) -> float:
         parts = [found[k : k + width] for k in range(0, len(found), width)]
         return float(np.mean([cost_of(purposes.figures(one)) for one in parts]))
 
@@ -459,16 +467,16 @@ def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, s
     return Stated(purposes, asked, known, goal)
 
 
-def _known(asked: Asked, measured: Measured) -> InformationKnown:
+def _known(asked: PreparedQuestion, measured: Measured) -> Information:
     train, held_out = (asked.evidence(runs) for runs in (measured.train, measured.held_out))
-    return InformationKnown(asked.question, train + held_out.judging())
+    return Information(asked.question, train + held_out.judging())
 
 
 # What a plan shall be for, as it is asked for, or as a verdict leaves it open.
 
 
 @dataclass(frozen=True)
-class Wish:
+class PlanRequest:
     """What a plan shall be for: None for a purpose that is not asked for, () for all it can be.
 
     Attributes
@@ -491,19 +499,19 @@ class Wish:
     @property
     def nothing(self) -> bool:
         """Whether no purpose is given."""
-        return self == Wish()
+        return self == PlanRequest()
 
 
-def default_wish(study: Study) -> Wish:
+def default_request(study: Study) -> PlanRequest:
     """Return what a plan is for where nobody says: what the verdict leaves open, or else all."""
     verdict = study.verdict() or {}
     kind = verdict.get("kind", "")
     named = tuple(dict.fromkeys(map(plain_name, verdict.get("effects", ()))))
     if kind == "ambiguous" and len(named) > 1 and all(name in EFFECTS for name in named):
-        return Wish(separate=named)
+        return PlanRequest(separate=named)
     if kind == "unknown":
-        return Wish(learn=())
-    return Wish(see=(), sharpen=())
+        return PlanRequest(learn=())
+    return PlanRequest(see=(), sharpen=())
 
 
 def parameters_of(free: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
@@ -549,6 +557,6 @@ def note_of_missing(study: Study, there: Sequence[str]) -> tuple[str, ...]:
     return (f"The model misses {', '.join(missing)}; a plan shows more after  {add} .",)
 
 
-def errs(z: float) -> str:
+def misfit_note(z: float) -> str:
     """Return what is said of a model's error over noise."""
     return f"errs by {short_z(z)} times the noise; the plan counts that as noise."

@@ -18,7 +18,7 @@ from ..data.noise import white_noise
 from ..errors import StudyError
 from ..identification.problem import Run
 from ..identification.search import in_threads
-from .information import Asked, Goal, Seen, roles_of
+from .information import Goal, JudgedTest, PreparedQuestion, roles_of
 from .limits import RESERVE, RigLimits, Signals, Test
 from .waveforms import Command, Waveform
 
@@ -83,13 +83,13 @@ class Planner:
     drive: str = "voltage"
     candidates: int = CANDIDATES
     improved: int = IMPROVED
-    _seen: dict[Test, Seen | None] = field(default_factory=dict, repr=False)
+    _seen: dict[Test, JudgedTest | None] = field(default_factory=dict, repr=False)
     nothing_kept: ClassVar[str] = (
         "no test stays within the limits: even small motions ask for more force or put more heat "
         "into the damper than the rig allows. More force, more heat or a smaller command is needed."
     )
 
-    def plan(self) -> list[Seen]:
+    def plan(self) -> list[JudgedTest]:
         """Return the tests: those to fit to, and others of their kind to judge by.
 
         Raises
@@ -100,7 +100,7 @@ class Planner:
         tests = self._candidates()
         count = Count("test", len(tests))
 
-        def look(test: Test) -> Seen | None:
+        def look(test: Test) -> JudgedTest | None:
             found = self.see(test)
             count.done(test.motion.kind)
             return found
@@ -109,7 +109,7 @@ class Planner:
         if not found:
             raise StudyError(self._why_nothing(tests))
         roles = roles_of(self.limits.runs, self.goal.judged)
-        goal, picked = self.goal.among(found), list[Seen]()
+        goal, picked = self.goal.among(found), list[JudgedTest]()
         for own, following in pairwise([*roles, False]):
             if not own:
                 tell(f"improving test {len(picked) + 1}")
@@ -117,8 +117,8 @@ class Planner:
         return picked
 
     def _next(
-        self, goal: Goal, found: list[Seen], picked: Sequence[Seen], judged: bool
-    ) -> list[Seen]:
+        self, goal: Goal, found: list[JudgedTest], picked: Sequence[JudgedTest], judged: bool
+    ) -> list[JudgedTest]:
         """Return the test that serves best beside others, and where it is judged one of its kind.
 
         Parameters
@@ -129,7 +129,7 @@ class Planner:
         judged : whether a second one is held out
         """
 
-        def cost(one: Seen) -> float:
+        def cost(one: JudgedTest) -> float:
             second = [replace(one, held_out=True)] if judged else []  # until it matters alike
             return goal.value([*picked, one, *second])
 
@@ -158,11 +158,11 @@ class Planner:
             "needed."
         )
 
-    def looked_at(self) -> list[Seen]:
+    def looked_at(self) -> list[JudgedTest]:
         """Return the tests that were looked at and keep the limits."""
         return [one for one in self._seen.values() if one is not None]
 
-    def see(self, test: Test) -> Seen | None:
+    def see(self, test: Test) -> JudgedTest | None:
         """Return a test as it would be seen, with less motion where that keeps force and heat.
 
         None where no motion does.
@@ -171,7 +171,7 @@ class Planner:
             self._seen[test] = self._look(test)
         return self._seen[test]
 
-    def _look(self, test: Test) -> Seen | None:
+    def _look(self, test: Test) -> JudgedTest | None:
         for _ in range(TRIES):
             signals = test.signals(self.limits, self.rate)
             if float(np.max(np.abs(signals.x))) < LEAST * self.limits.stroke:
@@ -183,7 +183,7 @@ class Planner:
         else:
             return None
         shown = (asked.evidence([self._recorded(asked, run)]) for asked in self.goal.asked)
-        return Seen(test, signals, tuple(shown))
+        return JudgedTest(test, signals, tuple(shown))
 
     def _run(self, signals: Signals) -> Run:
         count = len(signals.x)
@@ -195,7 +195,7 @@ class Planner:
             draws, drive=self.drive,
         )  # fmt: skip
 
-    def _recorded(self, asked: Asked, run: Run) -> Run:
+    def _recorded(self, asked: PreparedQuestion, run: Run) -> Run:
         """Return a run with the noise that will be estimated of its force.
 
         A force that turns within a few samples is taken for noise in part, and weighs less.
@@ -267,7 +267,7 @@ class Planner:
         bottom, top = self.limits.nearest(bottom), self.limits.nearest(top)
         return Command(kind, bottom, top, period, seed)
 
-    def _improved(self, best: Seen, cost: Callable[[Seen], float]) -> Seen:
+    def _improved(self, best: JudgedTest, cost: Callable[[JudgedTest], float]) -> JudgedTest:
         """Return a test after a search about it for size, frequencies, levels and dwell."""
         known = {best.test: best}
 

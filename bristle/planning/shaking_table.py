@@ -1,11 +1,15 @@
-"""A study's building on its shaking table, simulated: what its channels would show of a test."""
+"""A study's building on its shaking table, simulated, and the search for its tests.
+
+Each candidate is simulated, then judged at every site.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Lock
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,21 +17,25 @@ from numpy.typing import NDArray
 from ..data.channels import channel_unit
 from ..data.measurement import Measurement
 from ..data.sampling import Sampling
-from ..errors import RunError
+from ..errors import RecordError, RunError
+from ..identification.building_sites import StructureProblem
 from ..model.model import StudyModel
 from ..physics.drive import VOLTAGE
-from ..prediction.model_system import House, Shaking, write_signals
+from ..prediction.model_system import BuildingWithFile, Excitation, write_signals
 from ..prediction.monte_carlo import Simulator
 from ..system.scenario import Scenario
 from .data_sheet import NOISE
-from .limits import RESERVE, RigLimits, Signals
+from .information import JudgedTest
+from .limits import RESERVE, RigLimits, Signals, Test
+from .search import LEAST, Planner
+from .waveforms import Waveform
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Shaken:
+class SimulatedTest:
     """A test, simulated.
 
     `signals` what it prescribes; `columns` every output; `held_out` whether it is to judge by.
@@ -39,9 +47,6 @@ class Shaken:
 
 
 FORCE = "force"
-DEMANDS = ("damper_stroke", "drift", "force", "heat")
-"""What a building's response asks for, by the names of `RigLimits`."""
-
 KINDS = ("displacement", "velocity", "acceleration_absolute")
 """What can be measured of a level."""
 
@@ -54,7 +59,7 @@ class ShakingTable:
     ----------
     model : StudyModel
         The damper's law with the effects of all sites.
-    house : House
+    house : BuildingWithFile
     like : Measurement
         A run of the study: planned ones have its channels, and its labels.
     noise : mapping
@@ -66,7 +71,7 @@ class ShakingTable:
     """
 
     model: StudyModel
-    house: House
+    house: BuildingWithFile
     like: Measurement
     noise: Mapping[str, float]
     most: float
@@ -94,9 +99,9 @@ class ShakingTable:
             except RunError:
                 return None
 
-    def _shaking(self, signals: Signals) -> Shaking:
+    def _shaking(self, signals: Signals) -> Excitation:
         command = signals.V if self.drive else None
-        return Shaking("plan", signals.time, signals.a, command, drive=VOLTAGE)
+        return Excitation("plan", signals.time, signals.a, command, drive=VOLTAGE)
 
     def _ready(self, signals: Signals) -> tuple[Simulator, Scenario]:
         """Return what simulates a test of that length, made once."""
@@ -196,3 +201,74 @@ class ShakingTable:
 def _port(channel: str) -> str:
     """Return the output of the simulation that a channel shows."""
     return f"damper.{channel}" if channel == FORCE else f"structure.{channel}"
+
+
+TRIES, GENTLE, STEEP = 6, 0.97, 0.3
+"""How often a motion beyond a limit is made smaller, how far below that limit, at the most by."""
+
+RECORDS = 0.5
+"""Share of the tests that are looked at with a recorded ground motion."""
+
+
+@dataclass(frozen=True)
+class TablePlanner(Planner):
+    """Finds the tests of a building on its table; `places` has the site of each question.
+
+    `table` simulates them; `show` returns the sites of runs that were not measured yet; `records`
+    are motions that may be scaled.
+    """
+
+    table: ShakingTable | None = None
+    show: Callable[[list[Measurement]], dict[str, StructureProblem]] | None = None
+    places: tuple[str, ...] = ()
+    records: tuple[Waveform, ...] = ()
+    nothing_kept: ClassVar[str] = (
+        "no ground motion stays within the limits and moves the building: a larger stroke, speed "
+        "or acceleration of the table, or a larger stroke of the damper or drift, is needed."
+    )
+
+    def _why_nothing(self, tests: Sequence[Test]) -> str:
+        return self.nothing_kept
+
+    def response(self, one: JudgedTest) -> SimulatedTest:
+        """Return what a test prescribes, and every output of the simulation."""
+        assert self.table is not None
+        signals = one.test.signals(self.limits, self.rate)
+        columns = self.table.response(signals)
+        assert columns is not None
+        return SimulatedTest(signals, columns, one.held_out)
+
+    def _look(self, test: Test) -> JudgedTest | None:
+        assert self.table is not None
+        for _ in range(TRIES):
+            signals = test.signals(self.limits, self.rate)
+            columns = self.table.response(signals)
+            if columns is None:
+                return None
+            most = self.table.excess(columns, self.limits)
+            if most <= 1.0:
+                return self._judged(test, signals, columns) if most >= LEAST else None
+            test = test.smaller(max(STEEP, GENTLE / most))
+        return None
+
+    def _judged(self, test: Test, signals: Signals, columns: Columns) -> JudgedTest | None:
+        """Return a test that keeps the limits as it would be seen, None where nothing moves."""
+        assert self.table is not None
+        assert self.show is not None
+        try:
+            found = self.show([self.table.measured(signals, columns)])
+        except RecordError:  # the base does not move
+            return None
+        shown = (
+            asked.evidence(found[site].runs if site in found else [])
+            for site, asked in zip(self.places, self.goal.asked, strict=True)
+        )
+        return JudgedTest(test, signals, tuple(shown))
+
+    def _motion(self, which: float, at: float, seed: int) -> Waveform:
+        """Return a motion by two numbers between 0 and 1: a record, or its kind and frequency."""
+        if not self.records or which >= RECORDS:
+            low = RECORDS if self.records else 0.0
+            return super()._motion((which - low) / (1.0 - low), at, seed)
+        count = len(self.records)
+        return self.records[min(int(which / RECORDS * count), count - 1)]

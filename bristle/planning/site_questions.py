@@ -30,15 +30,24 @@ from ..learning.signals import ALONG
 from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
 from ..physics.laws import LAWS, law_of_part
-from .information import USUAL, Asked, Evidence, Known, Question, Rival, of_roles, ranges
+from .information import (
+    USUAL,
+    Evidence,
+    Information,
+    PreparedQuestion,
+    Question,
+    Rival,
+    of_roles,
+    ranges,
+)
 from .limits import RESERVE, RigLimits
 from .questions import (
     AT,
     NONE,
+    PlanRequest,
     Purposes,
     SizedRival,
     Stated,
-    Wish,
     able_beside,
     coordinates_of,
     fitted_with,
@@ -51,14 +60,14 @@ from .questions import (
 
 
 @dataclass(frozen=True)
-class SiteWish:
+class SiteRequest:
     """What a plan shall be for, and at which sites: empty for all."""
 
-    wish: Wish
+    request: PlanRequest
     sites: tuple[str, ...] = ()
 
 
-def default_wishes(verdict: Mapping[str, Any]) -> list[SiteWish]:
+def default_requests(verdict: Mapping[str, Any]) -> list[SiteRequest]:
     """Return what a plan is for where nobody says: what the verdict leaves open, or else all."""
     findings = verdict.get("findings") or []
     out = []
@@ -66,14 +75,16 @@ def default_wishes(verdict: Mapping[str, Any]) -> list[SiteWish]:
         named = [name for one in findings if one["site"] == DAMPER for name in one["effects"]]
         alike = [twin for name in named for twin in twins_of(name)]
         if alike:
-            out.append(SiteWish(Wish(separate=tuple(dict.fromkeys([*named, *alike]))), (DAMPER,)))
+            out.append(
+                SiteRequest(PlanRequest(separate=tuple(dict.fromkeys([*named, *alike]))), (DAMPER,))
+            )
     for one in findings if not out else ():
         site, names = one["site"], tuple(dict.fromkeys(one.get("effects") or ()))
         if one["kind"] == "ambiguous" and len(names) > 1:
-            out.append(SiteWish(Wish(separate=names), (site,)))
+            out.append(SiteRequest(PlanRequest(separate=names), (site,)))
         elif one["kind"] == "unknown":
-            out.append(SiteWish(Wish(learn=()), (site,)))
-    return out or [SiteWish(Wish(see=(), sharpen=()))]
+            out.append(SiteRequest(PlanRequest(learn=()), (site,)))
+    return out or [SiteRequest(PlanRequest(see=(), sharpen=()))]
 
 
 def twins_of(name: str) -> list[str]:
@@ -107,34 +118,36 @@ def able_at(site: str, opened: Opening) -> list[str]:
 
 
 def purposes_at(
-    sites: Mapping[str, Opening], wishes: Sequence[SiteWish], limits: RigLimits, drive: str
+    sites: Mapping[str, Opening], requests: Sequence[SiteRequest], limits: RigLimits, drive: str
 ) -> dict[str, Purposes]:
     """Return what a plan is for, by site; sites of which nothing is asked are left out.
 
     Parameters
     ----------
     sites : the models, fitted to the runs at hand
-    wishes : what is asked for
+    requests : what is asked for
     limits : of table and building
     drive : the channel of the command
 
     Raises
     ------
     StudyError
-        If a wish names what no site has.
+        If a request names what no site has.
     """
     able = {site: able_at(site, opened) for site, opened in sites.items()}
-    for one in wishes:
-        _refuse_unknown(one.wish, able, sites)
+    for one in requests:
+        _refuse_unknown(one.request, able, sites)
     out = {}
     for site, opened in sites.items():
         tell(f"looking at effects: {site}")
-        own = [one.wish for one in wishes if not one.sites or site in one.sites]
+        own = [one.request for one in requests if not one.sites or site in one.sites]
         found = Purposes(opened.before.model, rule=opened.rule, drive=drive)
-        for wish in own:
-            found = _with_wish(found, wish, site, opened, able[site])
-        if any(wish.learn is not None for wish in own) and site in _learned_at(wishes, sites):
-            coordinates = next(wish.learn for wish in own if wish.learn is not None) or ()
+        for request in own:
+            found = _with_request(found, request, site, opened, able[site])
+        if any(request.learn is not None for request in own) and site in _learned_at(
+            requests, sites
+        ):
+            coordinates = next(request.learn for request in own if request.learn is not None) or ()
             found = replace(found, parts=_parts(site, opened, coordinates, limits, drive))
         if found.effects or found.rivals or found.parameters or found.parts is not None:
             out[site] = found
@@ -143,19 +156,21 @@ def purposes_at(
     return out
 
 
-def _with_wish(
-    found: Purposes, wish: Wish, site: str, opened: Opening, able: Sequence[str]
+def _with_request(
+    found: Purposes, request: PlanRequest, site: str, opened: Opening, able: Sequence[str]
 ) -> Purposes:
-    """Return purposes with what a wish asks of a site, but for parts without a form."""
+    """Return purposes with what a request asks of a site, but for parts without a form."""
     model = opened.before.model
-    if wish.see is not None:
-        names = [name for name in able if not wish.see or _asked_for(name, wish.see)]
+    if request.see is not None:
+        names = [name for name in able if not request.see or _asked_for(name, request.see)]
         found = replace(found, effects=tuple(_sized(names, opened)))
-    if wish.separate is not None:
-        found = replace(found, rivals=tuple(_rivals(wish.separate, site, opened, able)))
-    if wish.sharpen is not None:
+    if request.separate is not None:
+        found = replace(found, rivals=tuple(_rivals(request.separate, site, opened, able)))
+    if request.sharpen is not None:
         own = _own_parameters(site, model)
-        asked = [name for name in own if not wish.sharpen or name in _meant(own, wish.sharpen)]
+        asked = [
+            name for name in own if not request.sharpen or name in _meant(own, request.sharpen)
+        ]
         found = replace(found, parameters=tuple(own[name] for name in asked))
     return found
 
@@ -235,20 +250,20 @@ def _meant(own: Mapping[str, str], names: Sequence[str]) -> set[str]:
 
 
 def _refuse_unknown(
-    wish: Wish, able: Mapping[str, Sequence[str]], sites: Mapping[str, Opening]
+    request: PlanRequest, able: Mapping[str, Sequence[str]], sites: Mapping[str, Opening]
 ) -> None:
     """Refuse names of effects and parameters that no site has."""
     there = sorted({name for names in able.values() for name in names})
-    for name in (*(wish.see or ()), *(wish.separate or ())):
-        law = wish.separate is not None and name in wish.separate and name in (*LAWS, NONE)
+    for name in (*(request.see or ()), *(request.separate or ())):
+        law = request.separate is not None and name in request.separate and name in (*LAWS, NONE)
         known = any(_asked_for(one, (name,)) for one in there)
         if not law and not known and not any(name in twins_of(one) for one in there):
             _refuse_effect(name, there, sites)
-    if wish.separate is not None and len(wish.separate) < 2:
+    if request.separate is not None and len(request.separate) < 2:
         raise StudyError("--separate needs two or more rivals, such as  --separate gas_spring none")
     own = [full for site, one in sites.items() for full in _own_parameters(site, one.before.model)]
     short = [name for one in sites.values() for name in one.before.model.free()]
-    for name in wish.sharpen or ():
+    for name in request.sharpen or ():
         if not any(one.startswith(f"{name}.") for one in (*own, *short)):
             parameters_of(own, (name,))
 
@@ -265,9 +280,9 @@ def _refuse_effect(name: str, there: Sequence[str], sites: Mapping[str, Opening]
     )
 
 
-def _learned_at(wishes: Sequence[SiteWish], sites: Mapping[str, Opening]) -> list[str]:
+def _learned_at(requests: Sequence[SiteRequest], sites: Mapping[str, Opening]) -> list[str]:
     """Return the sites at which a part without a form is to be learned: where the model errs."""
-    named = [site for one in wishes if one.wish.learn is not None for site in one.sites]
+    named = [site for one in requests if one.request.learn is not None for site in one.sites]
     loud = [site for site, one in sites.items() if one.before.z > one.rule.clean]
     return named or [max(loud, key=lambda site: sites[site].before.z) if loud else DAMPER]
 
@@ -304,7 +319,7 @@ def largest_motion(runs: Sequence[Any]) -> tuple[float, float]:
 
 LAYER = "layer"
 BOTH = (DAMPER, LAYER)
-Key = tuple[str, str, str]
+Key = tuple[str, str, str]  # site, purpose, name of the figure
 
 
 def of_one_force(stand: Mapping[str, Stated]) -> set[str]:
@@ -349,7 +364,9 @@ def with_measured_force(
     return found
 
 
-def _evidence(asked: Asked, runs: Sequence[Sequence[Run]], roles: Sequence[bool]) -> Evidence:
+def _evidence(
+    asked: PreparedQuestion, runs: Sequence[Sequence[Run]], roles: Sequence[bool]
+) -> Evidence:
     """Return what tests say of a question."""
     each = of_roles([asked.evidence(own) for own in runs], roles)
     return sum(each[1:], start=each[0])
@@ -394,7 +411,7 @@ def _of_layer(
     question = Question(line, tuple(_on_line(one, line) for one in effects))
     if not effects:
         return {}
-    known = Known(question, _evidence(Asked(question, problem), runs, roles))
+    known = Information(question, _evidence(PreparedQuestion(question, problem), runs, roles))
     return {(DAMPER, one.purpose, one.name): one.value for one in seen(known, SITE)}
 
 
@@ -434,5 +451,5 @@ def _distance(problem: Problem, runs: Sequence[Run], one: Model, other: Model) -
     if (one.law, one.effects) == (other.law, other.effects):
         return 0.0
     question = Question(one, (Rival("other", other, one),))
-    known = Known(question, Asked(question, problem).evidence(runs))
+    known = Information(question, PreparedQuestion(question, problem).evidence(runs))
     return known.distances()["other"]

@@ -11,9 +11,7 @@ from .plan import Plan
 def plan_view(plan: Plan) -> View:
     """Return the view of a plan."""
     runs = plan.runs() if plan.worth else []
-    rows = [
-        [run.name, "training" if run.role == "train" else "held out", run.about] for run in runs
-    ]
+    rows = [[run.name, run.purpose, run.about] for run in runs]
     told = Table(HEADER, [one.cells() for one in plan.outcomes], (2, 3))
     return View(
         f"Tests for {plan.study or 'a new rig'}",

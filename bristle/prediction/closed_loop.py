@@ -22,12 +22,12 @@ from ..model.model_file import read_model
 from ..study.changes import behind_data
 from ..study.history import history_steps
 from ..study.rig import building_of
-from ..study.steps import count_opening, opened_text, openings, runs_for_test
+from ..study.steps import count_test_set_use, opened_text, runs_for_test, test_set_uses
 from ..study.study import Study
 from ..study.study_file import TEST
 from .closed_loop_result import ClosedLoop, Predicted
-from .excitation import Trial, begins_in_motion, trial_of
-from .model_system import House
+from .excitation import PredictedRun, begins_in_motion, trial_of
+from .model_system import BuildingWithFile
 from .monte_carlo import DRAWS, FEWEST, figures_of
 
 
@@ -68,7 +68,7 @@ def closed_loop(
         runs = runs_for_test(study, runs)
     chosen = runs.train if role == "train" else runs.holdout
     trials, notes = _trials(study, chosen, split=role != TEST)
-    house = House(building, study.folder / model.building if model.building else None)
+    house = BuildingWithFile(building, study.folder / model.building if model.building else None)
     found = _predicted(study, model, (house, False), trials, draws, effects)
     notes += more
     others = [device.name for device in building.devices if device.name != building.studied]
@@ -78,15 +78,15 @@ def closed_loop(
             f"{building.studied} alone"
         )
     if role == TEST:
-        count_opening(study)
-        notes.append(opened_text(len(openings(study))))
+        count_test_set_use(study)
+        notes.append(opened_text(len(test_set_uses(study))))
     return replace(found, role=role, notes=(*found.notes, *notes))
 
 
 def closed_loop_in(
     study: Study,
-    house: House,
-    trials: Sequence[Trial],
+    house: BuildingWithFile,
+    trials: Sequence[PredictedRun],
     *,
     draws: int = DRAWS,
     with_limits: bool = False,
@@ -97,9 +97,9 @@ def closed_loop_in(
     ----------
     study : Study
         Of a damper on a bench, with a model that was identified.
-    house : House
+    house : BuildingWithFile
         The building, which may never have been measured.
-    trials : sequence of Trial
+    trials : sequence of PredictedRun
         Its ground motions, with responses where there are some; see `prediction.excitation`.
     draws : int
         Draws of the parameters for the band; 0 for none.
@@ -157,7 +157,7 @@ def _prepared(
     return effects, [*changed, *stale, *notes]
 
 
-def _refuse_other_command(study: Study, trials: Sequence[Trial]) -> None:
+def _refuse_other_command(study: Study, trials: Sequence[PredictedRun]) -> None:
     """Refuse a command in another unit than the one that the damper was identified with."""
     for trial in trials:
         given = trial.shaking.drive.name
@@ -170,7 +170,7 @@ def _refuse_other_command(study: Study, trials: Sequence[Trial]) -> None:
 
 def _trials(
     study: Study, chosen: Sequence[Measurement], *, split: bool
-) -> tuple[list[Trial], list[str]]:
+) -> tuple[list[PredictedRun], list[str]]:
     """Return what can be simulated from rest, and why the rest is left out.
 
     A single run that is `split` in time is simulated from the begin of its file, and judged on its
@@ -198,8 +198,8 @@ def _trials(
 def _predicted(
     study: Study,
     model: StudyModel,
-    place: tuple[House, bool],
-    trials: Sequence[Trial],
+    place: tuple[BuildingWithFile, bool],
+    trials: Sequence[PredictedRun],
     draws: int,
     effects: Sequence[OpenEffect],
 ) -> ClosedLoop:

@@ -17,7 +17,7 @@ from ..errors import StudyError
 from ..identification.smoothing import smooth_steps
 from ..physics.building import with_damper
 from ..study.inputs import measurements
-from .model_system import House, Shaking, shaking_of
+from .model_system import BuildingWithFile, Excitation, shaking_of
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ BEGIN = 0.02
 
 
 @dataclass(frozen=True)
-class Trial:
+class PredictedRun:
     """A run to predict: what drives it, what was measured, and the samples that count.
 
     `measured` maps a response to its values (n,) and their noise; `window` (n,) says which samples
@@ -36,7 +36,7 @@ class Trial:
     `labels` is what is known of the whole run.
     """
 
-    shaking: Shaking
+    shaking: Excitation
     measured: dict[str, tuple[Array, float]]
     window: NDArray[np.bool_]
     noise: tuple[float, float]
@@ -45,7 +45,7 @@ class Trial:
 
 def trial_of(
     run: Measurement, name: str = "", judged: tuple[float, float] = (-np.inf, np.inf)
-) -> Trial:
+) -> PredictedRun:
     """Return a measurement as a run to predict.
 
     Parameters
@@ -61,7 +61,7 @@ def trial_of(
         shaking = replace(shaking, command=smooth)
     window = (run.time >= judged[0]) & (run.time <= judged[1])
     ground = run.noise.get("ground_acceleration", 0.0)
-    return Trial(shaking, _measured(run), window, (ground, left), run.labels)
+    return PredictedRun(shaking, _measured(run), window, (ground, left), run.labels)
 
 
 def _measured(run: Measurement) -> dict[str, tuple[Array, float]]:
@@ -96,7 +96,7 @@ def _is_response(run: Measurement, name: str) -> bool:
     return what in ("displacement", "acceleration_absolute")
 
 
-def begins_in_motion(trial: Trial) -> str:
+def begins_in_motion(trial: PredictedRun) -> str:
     """Return the displacement or velocity that is not at rest when a run begins, "" for none."""
     first = max(1, round(BEGIN / trial.shaking.spacing))
     for name, (values, noise) in trial.measured.items():
@@ -111,7 +111,7 @@ def begins_in_motion(trial: Trial) -> str:
 # Ground motions for a building that a study has not measured: from a file, or a record by name.
 
 
-def house_of(file: Path) -> House:
+def house_of(file: Path) -> BuildingWithFile:
     """Return the building of a file, for a damper in it.
 
     Raises
@@ -128,12 +128,12 @@ def house_of(file: Path) -> House:
             f"{file}: places for {len(building.devices)} dampers ({names}), and a study is of one. "
             "Leave one [[devices]] in it, or none for the damper on the first level."
         )
-    return House(with_damper(building), file)
+    return BuildingWithFile(with_damper(building), file)
 
 
 def trials_in(
-    house: House, data: Path | None, ground: str | None, level: float | None
-) -> list[Trial]:
+    house: BuildingWithFile, data: Path | None, ground: str | None, level: float | None
+) -> list[PredictedRun]:
     """Return the runs to predict.
 
     Parameters
@@ -174,15 +174,15 @@ def trials_in(
     return [_at_level(trial, level or 0.0) for trial in trials]
 
 
-def _at_level(trial: Trial, level: float) -> Trial:
+def _at_level(trial: PredictedRun, level: float) -> PredictedRun:
     return replace(trial, shaking=replace(trial.shaking, level=level))
 
 
-def _of_record(name: str, time: Array, ground: Array, level: float) -> Trial:
+def _of_record(name: str, time: Array, ground: Array, level: float) -> PredictedRun:
     """Return a record at even times from 0, with nothing measured."""
     spacing = float(np.median(np.diff(time)))
     count = int((time[-1] - time[0]) / spacing + 1e-6) + 1
     even = np.asarray(spacing * np.arange(count), dtype=np.float64)
     shaken = np.asarray(np.interp(even, time - time[0], ground), dtype=np.float64)
-    shaking = Shaking(name, even, shaken, level=level)
-    return Trial(shaking, {}, np.ones(len(even), dtype=bool), (0.0, 0.0))
+    shaking = Excitation(name, even, shaken, level=level)
+    return PredictedRun(shaking, {}, np.ones(len(even), dtype=bool), (0.0, 0.0))

@@ -32,7 +32,7 @@ from ..system.toml import DamperText, Parameters, part_text, source_of, values_o
 from ..user_code.load import own_effects
 from . import model_system
 from .held_out import FOLDER, HeldOut, Proof, held_out, prove, step_for, write_inputs, write_proof
-from .model_system import House, Shaking, loads, shaking_of, write_scenario
+from .model_system import BuildingWithFile, Excitation, loads, shaking_of, write_scenario
 
 Build = Callable[[Plan, Path], Path]
 
@@ -276,14 +276,14 @@ def _model_name(name: str) -> str:
 
 
 def _structure(
-    study: Study, model: StudyModel, shaking: Shaking, folder: Path, damper: DamperText,
+    study: Study, model: StudyModel, shaking: Excitation, folder: Path, damper: DamperText,
     notes: list[str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of the study's building with the damper, under a run's ground motion."""
     file = study.folder / model.building if model.building else None
     building = building_of(study, model)
     assert building is not None  # `_scenario` asked
-    house = House(building, file)
+    house = BuildingWithFile(building, file)
     own = loads(model, house.building)
     notes += own.notes
     if channels := dict.fromkeys(following(model.effects).values()):

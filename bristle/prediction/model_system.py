@@ -36,7 +36,7 @@ GROUND, COMMAND = "ground.csv", "drive.csv"
 
 
 @dataclass(frozen=True)
-class House:
+class BuildingWithFile:
     """A building, and the file that describes it; None for the paper's."""
 
     building: Building
@@ -44,7 +44,7 @@ class House:
 
 
 @dataclass(frozen=True)
-class Shaking:
+class Excitation:
     """What drives a building with its damper.
 
     `time` (n,) s from 0 and the `ground`'s acceleration (n,) m/s2; the `command` (n,) in the unit
@@ -72,7 +72,7 @@ class Shaking:
         return float(np.median(np.diff(self.time)))
 
 
-def shaking_of(measurement: Measurement) -> Shaking:
+def shaking_of(measurement: Measurement) -> Excitation:
     """Return what drives the building in a measurement.
 
     Raises
@@ -86,7 +86,7 @@ def shaking_of(measurement: Measurement) -> Shaking:
             "scenario needs."
         )
     drive = measurement.drive
-    return Shaking(
+    return Excitation(
         measurement.name, measurement.time - measurement.time[0],
         measurement["ground_acceleration"], measurement[drive] if drive else None,
         force=measurement["force"] if measurement.has("force") else None,
@@ -156,7 +156,7 @@ def masses(damper: StudyModel) -> list[str]:
 
 
 def write_scenario(
-    folder: Path, head: tuple[str, str], house: House, shaking: Shaking, own: Loads,
+    folder: Path, head: tuple[str, str], house: BuildingWithFile, shaking: Excitation, own: Loads,
     damper: DamperText,
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of a building with its damper under a ground motion, and its files.
@@ -223,7 +223,7 @@ def studied_ports(building: Building) -> Ports:
     return building.ports(building.device(building.studied))
 
 
-def others_of(building: Building, shaking: Shaking) -> list[str]:
+def others_of(building: Building, shaking: Excitation) -> list[str]:
     """Return the devices of a building beside the damper, whose forces must be known.
 
     Parameters
@@ -247,7 +247,7 @@ def others_of(building: Building, shaking: Shaking) -> list[str]:
     return names
 
 
-def write_signals(folder: Path, shaking: Shaking) -> list[Path]:
+def write_signals(folder: Path, shaking: Excitation) -> list[Path]:
     """Write the ground motion, and the command where it moves; return the files."""
     ground = signal_file(shaking.time, shaking.ground, "acceleration", "m/s2", folder / GROUND)
     if shaking.command is None:

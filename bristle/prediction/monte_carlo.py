@@ -23,8 +23,15 @@ from ..physics.forms import shown_law
 from ..system.scenario import Scenario, load_scenario
 from ..system.toml import Parameters, part_text, source_of, values_of
 from .closed_loop_result import KINDS, MISSED, PARAMETERS, Predicted
-from .excitation import Trial
-from .model_system import House, Shaking, loads, studied_ports, write_scenario, write_signals
+from .excitation import PredictedRun
+from .model_system import (
+    BuildingWithFile,
+    Excitation,
+    loads,
+    studied_ports,
+    write_scenario,
+    write_signals,
+)
 
 # A model's damper in a building, simulated as it is and with draws of what is uncertain.
 
@@ -40,19 +47,19 @@ class Simulator:
     ----------
     model : StudyModel
         The law with the effects of all sites.
-    house : House
+    house : BuildingWithFile
     bench : bool
         Whether the model was identified on a bench.
-    shaking : Shaking
+    shaking : Excitation
         A built-in damper calls its command a voltage, whatever it is: its numbers are the same.
     folder : Path
         An empty folder for the scenario's files.
     """
 
     model: StudyModel
-    house: House
+    house: BuildingWithFile
     bench: bool
-    shaking: Shaking
+    shaking: Excitation
     folder: Path
 
     def scenario(self) -> Scenario:
@@ -149,7 +156,7 @@ class Simulator:
 Key = tuple[str, str]  # a response, and "peak" or "rms"
 
 
-def names_of(columns: Columns, trial: Trial) -> dict[str, str]:
+def names_of(columns: Columns, trial: PredictedRun) -> dict[str, str]:
     """Return the responses and the outputs that give them: those measured, else all but speeds."""
     given = {name.removeprefix("structure."): name for name in columns if _shown(name)}
     given["force"] = "damper.force"
@@ -172,7 +179,7 @@ def _shown(name: str) -> bool:
 def sizes_of(
     columns: Columns,
     names: dict[str, str],
-    trial: Trial,
+    trial: PredictedRun,
     generator: np.random.Generator,
     count: int,
 ) -> dict[Key, list[float]]:
@@ -217,10 +224,10 @@ SIZES = 6
 """Sizes of an effect that are drawn, each in a draw of the model's parameters."""
 
 
-def changes_left_open(
+def changes_not_excluded(
     model: StudyModel,
-    place: tuple[House, bool],
-    trial: Trial,
+    place: tuple[BuildingWithFile, bool],
+    trial: PredictedRun,
     effects: Sequence[OpenEffect],
     number: int,
 ) -> tuple[Left, dict[str, str]]:
@@ -261,7 +268,7 @@ def changes_left_open(
 
 
 def _tried(
-    models: list[StudyModel], place: tuple[House, bool], trial: Trial
+    models: list[StudyModel], place: tuple[BuildingWithFile, bool], trial: PredictedRun
 ) -> list[dict[Key, float] | str]:
     """Return the figures of models, or why they cannot be simulated."""
     try:
@@ -271,7 +278,10 @@ def _tried(
 
 
 def _figures(
-    model: StudyModel, models: list[StudyModel], place: tuple[House, bool], trial: Trial
+    model: StudyModel,
+    models: list[StudyModel],
+    place: tuple[BuildingWithFile, bool],
+    trial: PredictedRun,
 ) -> list[dict[Key, float] | str]:
     """Return peaks and RMS of models without noise, or why not, under a run's ground motion.
 
@@ -279,7 +289,7 @@ def _figures(
     ----------
     model : one that has the effects of the others
     models : with other values
-    place, trial : as in `changes_left_open`
+    place, trial : as in `changes_not_excluded`
     """
     house, bench = place
     quiet = np.random.default_rng(0)  # it draws nothing
@@ -349,7 +359,7 @@ class Figures:
         ends = {PARAMETERS: (wide, wide), MISSED: (misses, misses)}
         return ends | {name: reach(changes[key]) for name, changes in self.left.items()}
 
-    def rows(self, trial: Trial, then: Figures | None) -> list[Predicted]:
+    def rows(self, trial: PredictedRun, then: Figures | None) -> list[Predicted]:
         """Return a row per response and kind of figure."""
         out = []
         for (name, kind), best in self.best.items():
@@ -367,8 +377,8 @@ class Figures:
 
 def figures_of(
     model: StudyModel,
-    place: tuple[House, bool],
-    trial: Trial,
+    place: tuple[BuildingWithFile, bool],
+    trial: PredictedRun,
     draws: int,
     number: int,
     missed: float = 0.0,
@@ -414,7 +424,7 @@ def figures_of(
             for key, values in sizes_of(one, names, trial, generator, 1).items():
                 collected[key] += values
     changes, lost = (
-        ({}, {}) if not effects else changes_left_open(model, place, trial, effects, number)
+        ({}, {}) if not effects else changes_not_excluded(model, place, trial, effects, number)
     )
     across = studied_ports(house.building).displacement
     stroke = float(np.max(np.abs(columns[f"structure.{across}"])))

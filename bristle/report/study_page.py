@@ -25,6 +25,7 @@ from ..planning.performed import shows
 from ..study.budget_picture import budgets, draw_budget, sentence
 from ..study.history import HistoryStep, history_steps
 from ..study.study_file import TEST
+from ..study.view import or_dash
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
     from ..model.model import StudyModel
     from ..study.history import Step
     from ..study.study import Study
-
-
-# What the report of a study tells: everything that is read and computed for it.
 
 
 @dataclass(frozen=True)
@@ -198,10 +196,7 @@ def plan_section(study: Study) -> str:
         if performed
         else f"{folder.name} holds tests for the rig's controller, one file each."
     )
-    runs = [
-        [run.name, "training" if run.role == "train" else "held out", run.about]
-        for run in plan.runs
-    ]
+    runs = [[run.name, run.purpose, run.about] for run in plan.runs]
     return html.section(
         "Planned tests" if performed else "Next tests",
         html.paragraphs(lead, kind="lead"),
@@ -403,7 +398,7 @@ def _history(content: Content) -> str:
     with_z = [one for one in content.history_steps if one.z is not None]
     header = ["step", "what", "z held-out", "z training", "why"]
     rows = [
-        [str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train), step.why]
+        [str(step.number), step.what, or_dash(one.z), or_dash(one.z_train), step.why]
         for step, one in zip(content.steps, content.history_steps, strict=True)
     ]  # fmt: skip
     picture = ""
@@ -411,7 +406,7 @@ def _history(content: Content) -> str:
         from ..study.pictures import staircase_page
         from ..view.style import png
 
-        fall = " → ".join(_or_dash(one.z) for one in with_z)
+        fall = " → ".join(or_dash(one.z) for one in with_z)
         # Their forces are low-passed, and those of the rest of the page are not: z tells it all.
         picture = html.figure(
             png(staircase_page([replace(one, rms=None) for one in with_z])),
@@ -499,7 +494,3 @@ def _reproduce(content: Content) -> str:
         html.table(["file", "SHA-256, first 16 digits"], [*rows, ["model.toml", model]]),
         html.paragraphs(f"Made with {versions}.", kind="soft"),
     )
-
-
-def _or_dash(z: float | None) -> str:
-    return "-" if z is None else short_z(z)

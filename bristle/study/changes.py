@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 # A digest of what a fit and its judge see: by it a result on other data is known.
 #
 # It has three parts: what study.toml says, what the files of the runs hold, and the building.
-# Content
-# counts, and no date, so that a study that was copied or cloned stays as it is.
+# Content counts, and no date, so that a study that was copied or cloned stays as it is.
 
 _KIND = "2"
 """How the digest begins; that of older studies, `Settings.data` alone, has no such beginning."""
@@ -67,14 +66,6 @@ def other_than(known: str, now: str, settings: Settings) -> str:
         return _OTHER[0] if known not in ("", settings.data) else ""
     pairs = zip(known.split("-")[1:], now.split("-")[1:], _OTHER, strict=False)
     return next((text for one, other, text in pairs if one != other), "")
-
-
-def building_in(model: Path) -> str:
-    """Return the name of the building's file in a model.toml, "" for none.
-
-    What is wrong with the model is told where it is asked for.
-    """
-    return str(toml_content(model).get("building", ""))
 
 
 def _of_settings(settings: Settings) -> str:

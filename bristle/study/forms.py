@@ -32,14 +32,11 @@ from ..units import convert
 from ..version import __version__
 from .runs import Runs
 from .study import Study
-from .study_file import ALL as ALL_STUDY_FILE
+from .study_file import ALL
 
 if TYPE_CHECKING:
     from ..diagnosis.law_trials import LawTrial
 
-
-ALL = "all"
-"""The word for all forms."""
 
 _MOVING_KNOTS = 5  # of a table where the command moves continuously
 _TAIL = 0.005  # share of the samples beyond either end of such a table
@@ -193,7 +190,7 @@ def _carried(model: StudyModel, other: StudyModel) -> StudyModel:
         points = after.knots if quantity in after.tables else ()
         found = _numbers(at, points, top)
         new.update({n: v for n, v in zip(names, found, strict=False) if n not in kept})
-    bounded = {n: float(np.clip(v, *_bounds(other, n))) for n, v in new.items()}
+    bounded = {n: float(np.clip(v, *bounds_of(other, n))) for n, v in new.items()}
     return other.with_values(bounded, origin="assumed")
 
 
@@ -206,7 +203,8 @@ def _numbers(at: Any, knots: Sequence[float], top: float) -> Iterator[float]:
         yield from (at(0.0), (at(top) - at(0.0)) / top, 0.0)
 
 
-def _bounds(model: StudyModel, name: str) -> tuple[float, float]:
+def bounds_of(model: StudyModel, name: str) -> tuple[float, float]:
+    """Return the bounds of a parameter in SI."""
     own, unit = model.flat()[name], model.declared(name).unit
     return convert(own.low, own.unit, unit), convert(own.high, own.unit, unit)
 
@@ -281,7 +279,7 @@ def refuse_in_building(law: str | None, in_building: bool) -> None:
     StudyError
         If all laws were asked for and the damper is in a building.
     """
-    if law == ALL_STUDY_FILE and in_building:
+    if law == ALL and in_building:
         raise StudyError(
             "identify compares all laws on a test bench alone: in a building the law decides "
             "which samples its fit and z take. Name one law, or let diagnose seek it "
@@ -295,10 +293,10 @@ def law_or_all(study: Study, law: str | None) -> str | None:
     A study that was made without a law begins with a stand-in. Once its model has another law, or
     an effect, that is what somebody or a verdict chose.
     """
-    if law is not None or study.settings.law != ALL_STUDY_FILE or study.settings.has_building:
+    if law is not None or study.settings.law != ALL or study.settings.has_building:
         return law
     model = study.model()
-    return None if model.law != DEFAULT or model.effects else ALL_STUDY_FILE
+    return None if model.law != DEFAULT or model.effects else ALL
 
 
 def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
@@ -317,7 +315,7 @@ def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
     """
     from ..diagnosis.law_trials import try_laws  # takes long: most identify one law
 
-    refuse_in_building(ALL_STUDY_FILE, rig.building is not None)
+    refuse_in_building(ALL, rig.building is not None)
     tell("trying every law")
     site = rig.sites(present)[DAMPER]
     held_out = site.train if site.holdout is None else site.holdout

@@ -127,7 +127,7 @@ def kept_folder(study: Path, number: int) -> Path:
     return study / "history" / KEPT.format(number)
 
 
-def set_aside(study: Path, number: int, first: int) -> None:
+def set_results_aside(study: Path, number: int, first: int) -> None:
     """Move all results into a folder of the history, and make the draft the study.toml.
 
     It may be called again where a process was killed in it: what is moved stays moved.
@@ -144,7 +144,7 @@ def set_aside(study: Path, number: int, first: int) -> None:
         write_whole(kept / "study.toml", (study / "study.toml").read_bytes())
     last = max((one for one in _steps(study) if int(one.name) < first), key=_number)
     text = (last / "model.toml").read_bytes()
-    named = {*_effects_in(last / "model.toml"), _building_in(last / "model.toml")}
+    named = {*_effects_in(last / "model.toml"), building_in(last / "model.toml")}
     for one in [*_learned(study)]:
         if one.stem not in named:
             _move(one, kept / "effects" / one.name)
@@ -209,7 +209,11 @@ def _effects_in(model: Path) -> list[str]:
     return list(found) if isinstance(found, dict) else []
 
 
-def _building_in(model: Path) -> str:
+def building_in(model: Path) -> str:
+    """Return the name of the building's file in a model.toml, "" for none.
+
+    What is wrong with the model is told where it is asked for.
+    """
     return str(toml_content(model).get("building", ""))
 
 
@@ -220,8 +224,6 @@ def _learned(study: Path) -> Iterator[Path]:
             if LEARNED in file.read_text(encoding="utf-8"):
                 yield file
 
-
-_NUMBER = re.compile(r"\d{3,}")
 
 EARLIER = "verdict_before_runs.json"
 """Where a step keeps the verdict that was on other runs, or on the same with other corrections."""
@@ -258,7 +260,7 @@ class History:
         if not self.folder.is_dir():
             return []
         names = (path.name for path in self.folder.iterdir() if path.is_dir())
-        return sorted(int(name) for name in names if _NUMBER.fullmatch(name))
+        return sorted(int(name) for name in names if _STEP.fullmatch(name))
 
     def steps(self) -> list[Step]:
         """Return the steps, the first model included."""
@@ -419,7 +421,7 @@ class History:
                 kept.parent.mkdir(exist_ok=True)
                 self.path(number).replace(kept)
         if "channels" in unfinished:
-            set_aside(self.study, int(unfinished["channels"]), int(unfinished["first"]))
+            set_results_aside(self.study, int(unfinished["channels"]), int(unfinished["first"]))
         for draft in self.folder.glob(".draft-*"):
             shutil.rmtree(draft, ignore_errors=True)
         self.pending.unlink(missing_ok=True)

@@ -26,12 +26,12 @@ from ..model.model import StudyModel, new_model
 from ..physics.effect import AT, EFFECTS, exclude, laws_joined
 from ..physics.forms import shown_law
 from ..physics.laws import LAWS, base_and_variant, law_names
-from ..units import convert
 from ..user_code.load import waiting, why_left_out
 from .changes import behind_data
 from .forms import (
     FormError,
     all_laws,
+    bounds_of,
     form_of,
     forms_asked,
     in_form,
@@ -216,9 +216,6 @@ def refuse_effect(model: StudyModel, name: str, bench: bool) -> None:
     for other in model.effects:
         if exclude(name, other):
             raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
-
-
-# Longer than 300 lines: what a study's model is to a fit, and a fit to it, stand beside the fit.
 
 
 Show = Callable[[int], None]
@@ -488,13 +485,9 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
 
 def as_model(model: StudyModel) -> Model:
     """Return a study's model as the fit takes it: values, fixed parameters and bounds in SI."""
-    fixed, limits = [], {}
-    for name, value in model.flat().items():
-        unit = model.declared(name).unit
-        if not value.free:
-            fixed.append(name)
-        limits[name] = (convert(value.low, value.unit, unit), convert(value.high, value.unit, unit))
-    return Model(model.base_law, tuple(model.effects), model.values(), tuple(fixed), limits)
+    fixed = tuple(name for name, value in model.flat().items() if not value.free)
+    limits = {name: bounds_of(model, name) for name in model.flat()}
+    return Model(model.base_law, tuple(model.effects), model.values(), fixed, limits)
 
 
 def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
@@ -517,6 +510,4 @@ def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
 
 def _inside(model: StudyModel, name: str, value: float) -> float:
     """Return a value that rounding has not put outside of its bounds."""
-    own, unit = model.flat()[name], model.declared(name).unit
-    low, high = (convert(bound, own.unit, unit) for bound in (own.low, own.high))
-    return float(np.clip(value, low, high))
+    return float(np.clip(value, *bounds_of(model, name)))

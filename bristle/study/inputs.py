@@ -1,7 +1,5 @@
 """What a researcher has at hand, as runs and a model: files, frames, arrays, measurements."""
 
-# Longer than 300 lines: every type of what is given has a message of its own.
-
 from __future__ import annotations
 
 import glob

@@ -25,6 +25,7 @@ from ..physics.effect import EFFECTS
 from ..trust import remember_made
 from ..user_code.load import flaw_of
 from .history import LEARNED
+from .identified import is_identified
 from .identify import as_model
 from .rig import building_of
 from .study import Study
@@ -148,7 +149,7 @@ def _opened(study: Study, at: str) -> tuple[str, Opening]:
 
 def _rig(study: Study) -> Runs:
     model, runs = study.model(), study.runs()
-    known = any(value.origin == "identified" for value in model.flat().values())
+    known = is_identified(model)
     building, present = building_of(study, model), as_model(model)
     if building is None:
         return BenchRuns(runs.train, runs.holdout, present, known, tell)

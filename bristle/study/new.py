@@ -1,7 +1,5 @@
 """A new study's folder from files: channels guessed with reasons, runs to train on or held out."""
 
-# Longer than 300 lines: a folder is made whole or not at all, so that all of its checks are here.
-
 from __future__ import annotations
 
 import re
@@ -51,7 +49,7 @@ _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<un
 
 
 @dataclass(frozen=True)
-class Made:
+class NewStudy:
     """A study's folder that was made: what was guessed, what was left out, and what to know.
 
     `extra` are the channels besides those that bristle knows, by name.
@@ -75,7 +73,7 @@ def make_folder(
     runs: RunChoices | None = None,
     device: str | None = None,
     without: Sequence[str] = (),
-) -> Made:
+) -> NewStudy:
     """Make a study's folder from files.
 
     Parameters
@@ -147,7 +145,7 @@ def make_folder(
     _write(folder, settings, data, building, law or DEFAULT)
     taken += [spec.column for spec in extra.values()]
     unused = tuple(text for text in left_out(first, guesses) if text not in taken)
-    return Made(tuple(guesses), extra, unused, tuple(notes))
+    return NewStudy(tuple(guesses), extra, unused, tuple(notes))
 
 
 @dataclass(frozen=True)

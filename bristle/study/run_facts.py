@@ -31,12 +31,10 @@ from .study_file import EXCLUDE, ROLES
 # What the names of files tell of their runs: numbers with units, and how decimals are written.
 #
 # `0p5A`, `0,5A` and `0.5A` are half an ampere. In `0_5A`, `0-5A`, `0x5A` or `0d5A` the mark may be
-# a
-# decimal mark, or part a number from another one; `050V` may stand for 0.50 V. All names of a
+# a decimal mark, or part a number from another one; `050V` may stand for 0.50 V. All names of a
 # campaign settle that together: the frequency and the amplitude that they tell are held against the
 # measured motion, and numbers before the mark that count the runs are no part of a level. What
-# stays
-# open is not taken.
+# stays open is not taken.
 
 DOUBTFUL = "_- xXdD'~=;"
 """What may part two numbers, or be a decimal mark."""

@@ -247,8 +247,7 @@ def _measured(
 # Corrections of the parts of runs as corrections of the runs: study.toml has one table for each.
 #
 # A gap in a file cuts its run into parts, and each part is checked by itself: what was wrong with
-# the
-# whole run is found in every one of them, and must be set right once.
+# the whole run is found in every one of them, and must be set right once.
 
 LEFT = 0.25
 """Share of a part's fault that the correction of the run may leave there, or add to it."""

@@ -251,7 +251,7 @@ FILE = "test_openings.json"
 
 
 @dataclass(frozen=True)
-class Opening:
+class TestSetUse:
     """A comparison of a model with the test runs: when (UTC), and the step of that model."""
 
     date: str
@@ -284,7 +284,7 @@ def runs_for_test(study: Study, runs: Runs) -> Runs:
     return Runs(runs.train, found, idle)
 
 
-def openings(study: Study) -> tuple[Opening, ...]:
+def test_set_uses(study: Study) -> tuple[TestSetUse, ...]:
     """Return when the test runs were opened, the first time first.
 
     Raises
@@ -299,7 +299,7 @@ def openings(study: Study) -> tuple[Opening, ...]:
     if data.get("schema") != 1:
         raise StudyError(f"{path}: {other_schema(data.get('schema'))}")
     try:
-        return tuple(Opening(str(one["date"]), int(one["step"])) for one in data["openings"])
+        return tuple(TestSetUse(str(one["date"]), int(one["step"])) for one in data["openings"])
     except (KeyError, TypeError, ValueError):
         raise StudyError(
             f"{path}: it counts the openings of the test runs, and is damaged. Restore it from a "
@@ -307,7 +307,7 @@ def openings(study: Study) -> tuple[Opening, ...]:
         ) from None
 
 
-def count_opening(study: Study) -> None:
+def count_test_set_use(study: Study) -> None:
     """Write down that the test runs are opened now, for the present model.
 
     Raises
@@ -318,7 +318,7 @@ def count_opening(study: Study) -> None:
     with study.writing():
         numbers = study.history.numbers()
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        counted = (*openings(study), Opening(now, numbers[-1] if numbers else 0))
+        counted = (*test_set_uses(study), TestSetUse(now, numbers[-1] if numbers else 0))
         write_json(study.folder / FILE, {"schema": 1, "openings": [asdict(one) for one in counted]})
 
 
@@ -356,7 +356,7 @@ def comparer(study: Study, role: str = "holdout") -> RigComparer:
     tell("holding the model against the runs")
     made = RigComparer(rig_of(study, model, runs), role, as_model(model))
     if role == TEST:  # before anybody can have seen an error
-        count_opening(study)
+        count_test_set_use(study)
     return made
 
 
@@ -375,7 +375,7 @@ def compare_study(
     found = comparer(study, role).compare(as_model(model or study.model()))
     if role != TEST:
         return found
-    said = opened_text(len(openings(study)))
+    said = opened_text(len(test_set_uses(study)))
     return replace(found, sentences=(*found.sentences, said))
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from filelock import FileLock, Timeout
 
@@ -24,8 +24,8 @@ from ..trust import can_do_without, load
 from ..user_code.load import Loaded, waiting
 from ..version import __version__
 from ..view import Viewable
-from .changes import additions, behind_data, building_in, data_digest, note_undone, other_than
-from .history import History, Step
+from .changes import additions, behind_data, data_digest, note_undone, other_than
+from .history import History, Step, building_in
 from .new import make_folder, parse_channel
 from .roles import refuse_too_few, roles_by_place
 from .runs import (
@@ -94,12 +94,6 @@ def make_room(reports: Path, number: int, undone: str) -> None:
         place.parent.mkdir(exist_ok=True)
         kept.replace(place)
 
-
-# Longer than 300 lines: whatever reads or writes the folder is one class, for one lock guards it.
-
-
-if TYPE_CHECKING:
-    pass
 
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""

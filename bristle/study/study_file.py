@@ -11,8 +11,7 @@ from typing import Any
 
 from ..core.config import Document, Key, Spec, toml_content
 from ..core.files import write_whole
-from ..core.text import listed as listed_text
-from ..core.text import unknown, written
+from ..core.text import listed, unknown, written
 from ..core.toml_lines import KeyPath
 from ..data.building_file import read_building
 from ..data.channels import (
@@ -302,7 +301,7 @@ RIGS = ("bench", "structure")
 CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
 ALL = "all"
-"""The word for all laws."""
+"""The word for all laws, or all forms of the command."""
 
 
 @dataclass(frozen=True)
@@ -349,7 +348,7 @@ class Settings:
     @property
     def excluded_text(self) -> str:
         """The sentence that tells which runs are left out, "" where none is."""
-        names = listed_text(run.name for run in self.excluded)
+        names = listed(run.name for run in self.excluded)
         return f'Left out by role = "{EXCLUDE}" in study.toml: {names}.' if names else ""
 
     @property
@@ -633,8 +632,8 @@ def with_channels(
 
     document: Any = tomlkit.parse(text)
     own = {at_device(name, device): name for name in document["channels"]}
-    for key, listed in (("channels", channels), ("extra", extra)):
-        for name, spec in listed.items():
+    for key, specs in (("channels", channels), ("extra", extra)):
+        for name, spec in specs.items():
             place = own.get(name, name) if key == "channels" else name
             if spec is None:
                 document[key].remove(place)

@@ -30,7 +30,7 @@ def study_view(study: Study) -> View:
     settings, steps = study.settings, study.steps()
     rows = [
         [
-            str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train),
+            str(step.number), step.what, or_dash(one.z), or_dash(one.z_train),
             "-" if one.rms is None else _error_of(one),
         ]
         for step, one in zip(steps, history_steps(steps), strict=True)
@@ -77,5 +77,6 @@ def _error_of(step: HistoryStep) -> str:
     return f"{plain(step.rms or 0.0, 4)}{low}"
 
 
-def _or_dash(z: float | None) -> str:
+def or_dash(z: float | None) -> str:
+    """Return z as text, "-" where there is none."""
     return "-" if z is None else short_z(z)

@@ -10,7 +10,7 @@ from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
 from bristle.model.model import new_model
 from bristle.physics.building import paper_building
-from bristle.prediction.model_system import House, Shaking, loads, write_scenario
+from bristle.prediction.model_system import BuildingWithFile, Excitation, loads, write_scenario
 from bristle.system.toml import part_text
 from bristle.trust import load_file
 from bristle.user_code import load
@@ -37,8 +37,8 @@ def test_the_structure_is_given_the_effect_s_file_and_values(spring, tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
     file, _ = write_scenario(
-        folder, ("a house", "# a test"), House(paper_building()),
-        Shaking("quake", TIME, np.sin(TIME)), own,
+        folder, ("a house", "# a test"), BuildingWithFile(paper_building()),
+        Excitation("quake", TIME, np.sin(TIME)), own,
         lambda given: part_text("damper", {"law": "tanh"}, given),
     )  # fmt: skip
     structure = tomlkit.parse(file.read_text(encoding="utf-8"))["components"]["structure"]

@@ -27,11 +27,11 @@ from bristle.physics.effect import EFFECTS
 from bristle.physics.forms import joined_form
 from bristle.prediction.closed_loop import closed_loop, closed_loop_in
 from bristle.prediction.closed_loop_result import ClosedLoop, Predicted
-from bristle.prediction.excitation import Trial, house_of, trials_in
-from bristle.prediction.model_system import House, Shaking
+from bristle.prediction.excitation import PredictedRun, house_of, trials_in
+from bristle.prediction.model_system import BuildingWithFile, Excitation
 from bristle.prediction.monte_carlo import Figures, Simulator
 from bristle.study import Study, create_study
-from bristle.study.steps import openings
+from bristle.study.steps import test_set_uses
 
 DRAG = 8.0  # N s/m
 
@@ -154,7 +154,7 @@ def test_test_runs_are_counted_here_too(tmp_path: Path) -> None:
     found = closed_loop(study, role="test", draws=0)
     assert {one.run for one in found.rows} == {"train_0"}
     assert found.notes[-1].endswith("opened for the first time.")
-    assert len(openings(study)) == 1
+    assert len(test_set_uses(study)) == 1
     assert not found.step  # step 0 is nobody's guess
 
 
@@ -273,8 +273,8 @@ def test_a_command_in_another_unit_than_that_of_the_damper_is_refused(
     made: Path, bench: Study
 ) -> None:
     time = 0.01 * np.arange(101)
-    shaking = Shaking("pulse", time, np.sin(time), 2.0 * time, drive=drive_named("current"))
-    trial = Trial(shaking, {}, np.ones(101, dtype=bool), (0.0, 0.0))
+    shaking = Excitation("pulse", time, np.sin(time), 2.0 * time, drive=drive_named("current"))
+    trial = PredictedRun(shaking, {}, np.ones(101, dtype=bool), (0.0, 0.0))
     with pytest.raises(StudyError, match=r"command is a current, .* identified with a voltage"):
         closed_loop_in(bench, house_of(house(made)), [trial], draws=0)
 
@@ -298,8 +298,8 @@ def test_draws_have_the_joint_covariance_within_the_bounds() -> None:
 def test_law_form_effects_and_limits_are_in_the_scenario(tmp_path: Path) -> None:
     model = new_model(joined_form("bingham", "table", (0.0, 4.0, 10.0)), ("gas_spring", "duffing"))
     time = 0.01 * np.arange(101)
-    shaking = Shaking("pulse", time, np.sin(time), np.full(101, 9.0))
-    paper = House(paper_building())
+    shaking = Excitation("pulse", time, np.sin(time), np.full(101, 9.0))
+    paper = BuildingWithFile(paper_building())
     scenario = Simulator(model, paper, False, shaking, tmp_path).scenario()
     law = scenario.component("damper").law
     assert law is not None
@@ -317,8 +317,8 @@ def test_law_form_effects_and_limits_are_in_the_scenario(tmp_path: Path) -> None
 def test_a_mass_that_is_drawn_as_zero_is_attached_to_nothing(tmp_path: Path) -> None:
     mass = f"fluid_inertia.{EFFECTS['fluid_inertia'].mass}"
     model = new_model("bingham", ("fluid_inertia",)).with_values({mass: 0.4})
-    shaking = Shaking("pulse", 0.01 * np.arange(101), np.zeros(101))
-    simulator = Simulator(model, House(paper_building()), True, shaking, tmp_path)
+    shaking = Excitation("pulse", 0.01 * np.arange(101), np.zeros(101))
+    simulator = Simulator(model, BuildingWithFile(paper_building()), True, shaking, tmp_path)
     scenario = simulator.scenario()
     for drawn in (0.3, 0.0):
         other = simulator._with_values(scenario, model.with_values({mass: drawn}))
@@ -329,8 +329,8 @@ def test_a_mass_that_is_drawn_as_zero_is_attached_to_nothing(tmp_path: Path) -> 
 def test_a_command_of_another_kind_is_played_as_it_is(tmp_path: Path) -> None:
     time = 0.01 * np.arange(101)
     model = new_model("bingham").with_drive("current")
-    shaking = Shaking("pulse", time, np.sin(time), 2.0 * time, drive=drive_named("current"))
-    simulator = Simulator(model, House(paper_building()), False, shaking, tmp_path)
+    shaking = Excitation("pulse", time, np.sin(time), 2.0 * time, drive=drive_named("current"))
+    simulator = Simulator(model, BuildingWithFile(paper_building()), False, shaking, tmp_path)
     as_current = simulator.response(simulator.scenario())["damper.force"]
     (tmp_path / "volts").mkdir()
     volts = replace(shaking, drive=drive_named("voltage"))

@@ -18,7 +18,7 @@ from bristle.data import read_ground_motion
 from bristle.engine.results import spectra
 from bristle.errors import BristleError, BuildError, RecordError, RunError, ScenarioError
 from bristle.native import zig
-from bristle.page import answers, module_view, scenarios_view, simulate_view
+from bristle.page import simulate_view, view_cache
 from bristle.page.simulate_view import LONGEST, asked_for, controls, damper_of, stock_file
 from bristle.study import Study, create_study
 from bristle.system.scenario import load_scenario, parse_overrides, stock_scenarios
@@ -60,7 +60,7 @@ def test_a_slider_gives_what_the_run_gives(home: Path) -> None:
 
 def test_the_damper_of_a_study_takes_the_place_of_the_scenarios(home: Path) -> None:
     study = Study(home / "rig")
-    assert "rig" in scenarios_view.answer(home, {})["studies"]
+    assert "rig" in simulate_view.choices(home, {})["studies"]
     given = damper_of(home, BENCH, "rig")
     assert given["damper.fmu"] == "BinghamDamper"
     assert given["damper.f_c"] == study.model().values()["f_c"]
@@ -97,7 +97,7 @@ def test_controls_of_every_scenario_can_be_loaded(name: str) -> None:
 def test_a_dropped_record_is_the_ground_motion_of_the_run(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert RECORD in scenarios_view.answer(home, {})["records"]
+    assert RECORD in simulate_view.choices(home, {})["records"]
     asked = asked_for(home, {"scenario": PASSIVE, "record": RECORD})
     loaded = asked.load()
     assert Path(str(loaded.component("ground").parameters["record"])) == home / RECORD
@@ -183,7 +183,7 @@ def test_without_zig_the_page_is_told_and_the_server_goes_on(
     )
     try:
         with pytest.raises(BuildError, match=r"pip install bristle\[native\]"):
-            module_view.answer(home, {})
+            simulate_view.compiled(home, {})
     finally:
         zig.version.cache_clear()
 
@@ -191,15 +191,15 @@ def test_without_zig_the_page_is_told_and_the_server_goes_on(
 def test_the_module_is_made_once_by_a_process_that_ends(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: list[answers.Answers] = []
+    made: list[view_cache.ViewCache] = []
 
-    def get(self: answers.Answers, view: str, *_: object, **__: object) -> bytes:
+    def get(self: view_cache.ViewCache, view: str, *_: object, **__: object) -> bytes:
         made.append(self)
         if len(made) == 1:
-            raise answers.ViewError({"error": "zig is not installed", "kind": "BuildError"})
+            raise view_cache.ViewError({"error": "zig is not installed", "kind": "BuildError"})
         return b"\0asm"
 
-    monkeypatch.setattr(answers.Answers, "get", get)
+    monkeypatch.setattr(view_cache.ViewCache, "get", get)
     with page_on(home, start=False) as client:
         refused = client.get("/api/module")
         assert (refused.status, refused.error) == (422, "zig is not installed")

@@ -21,7 +21,6 @@ from bristle.page import (
     errors_view,
     fit_view,
     history_view,
-    residual_view,
     verdict_view,
 )
 from bristle.page.worker import VIEWS, answer, function_of
@@ -135,12 +134,12 @@ def test_view_4_says_that_nothing_was_diagnosed(home: Path) -> None:
 def test_view_4_has_the_residuals_without_and_with_what_was_found(
     home: Path, tmp_path: Path
 ) -> None:
-    assert residual_view.answer(home / "rig", {}) == {"effects": []}
+    assert errors_view.residual(home / "rig", {}) == {"effects": []}
     study = Study(shutil.copytree(home / "rig", tmp_path / "rig"))
     study.model()
     refined = {"effects": ["gas_spring"], "values": {"f_c": 1.3, "gas_spring.k": 50.0}}
     study.write_verdict({"schema": 2, "kind": "unknown", "effects": [], "refined": refined})
-    shown = unpack(pack(residual_view.answer(study.folder, {})))
+    shown = unpack(pack(errors_view.residual(study.folder, {})))
     assert (shown["effects"], shown["step"], shown["kind"]) == (["gas_spring"], None, "unknown")
     found = compare_study(study)
     assert shown["before"] == pytest.approx(found.z)

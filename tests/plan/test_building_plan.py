@@ -27,9 +27,8 @@ from bristle.planning.folder import ROLES, read_plan
 from bristle.planning.information import Goal
 from bristle.planning.limits import RESERVE, RigLimits, Signals, Test, read_rig
 from bristle.planning.outcome import Outcome
-from bristle.planning.shaking_table import Columns, ShakingTable
-from bristle.planning.site_questions import are_twins, default_wishes, twins_of
-from bristle.planning.table_planner import TablePlanner
+from bristle.planning.shaking_table import Columns, ShakingTable, TablePlanner
+from bristle.planning.site_questions import are_twins, default_requests, twins_of
 from bristle.planning.waveforms import (
     Command,
     Waveform,
@@ -38,7 +37,7 @@ from bristle.planning.waveforms import (
     scalable,
     shape_of,
 )
-from bristle.prediction.model_system import House
+from bristle.prediction.model_system import BuildingWithFile
 from bristle.study.steps import create_study
 from tests.shaken import building, friction, measured, shake
 
@@ -102,7 +101,7 @@ def test_a_record_that_is_still_or_missing_is_refused(run: Measurement) -> None:
 def table(run: Measurement, noise: dict[str, float] | None = None) -> ShakingTable:
     model: Any = None  # what simulates is not asked here
     std = run.noise if noise is None else noise
-    return ShakingTable(model, House(TOWER), run, std, 5.0, Path())
+    return ShakingTable(model, BuildingWithFile(TOWER), run, std, 5.0, Path())
 
 
 def response(signals: Signals, size: float = 0.1) -> dict[str, Array]:
@@ -161,7 +160,7 @@ class Still(ShakingTable):
 
 
 def planner(run: Measurement, size: float, limits: RigLimits = LIMITS) -> TablePlanner:
-    own = Still(None, House(TOWER), run, run.noise, 5.0, Path())  # type: ignore[arg-type]
+    own = Still(None, BuildingWithFile(TOWER), run, run.noise, 5.0, Path())  # type: ignore[arg-type]
     object.__setattr__(own, "size", size)
     return TablePlanner(
         Goal((), (), 0, lambda _: 0.0), limits, 0.0, np.zeros((0, 0, 4)), limits.rate,
@@ -194,7 +193,7 @@ def test_records_are_half_of_what_is_looked_at(run: Measurement) -> None:
 
 
 def test_limits_are_what_table_and_amplifier_have_done(run: Measurement) -> None:
-    found = limits_of_shaking([run], {}, House(TOWER))
+    found = limits_of_shaking([run], {}, BuildingWithFile(TOWER))
     peak = float(np.max(np.abs(run["ground_acceleration"])))
     assert found.acceleration == pytest.approx(peak / RESERVE, rel=0.1)
     assert found.command == pytest.approx((1.0, 3.0), abs=0.1)
@@ -214,13 +213,13 @@ def test_limits_of_a_building_are_read_with_their_units(tmp_path: Path) -> None:
 
 
 def test_what_the_verdict_leaves_open_is_the_purpose() -> None:
-    (all_of_it,) = default_wishes({})
-    assert (all_of_it.wish.see, all_of_it.wish.sharpen, all_of_it.sites) == ((), (), ())
+    (all_of_it,) = default_requests({})
+    assert (all_of_it.request.see, all_of_it.request.sharpen, all_of_it.sites) == ((), (), ())
     storey = {"site": "storey1", "kind": "ambiguous", "effects": ["storey_softening", "duffing"]}
     layer = {"site": "layer", "kind": "unknown", "effects": []}
-    first, second = default_wishes({"kind": "unknown", "findings": [storey, layer]})
-    assert (first.wish.separate, first.sites) == (("storey_softening", "duffing"), ("storey1",))
-    assert (second.wish.learn, second.sites) == ((), ("layer",))
+    first, second = default_requests({"kind": "unknown", "findings": [storey, layer]})
+    assert (first.request.separate, first.sites) == (("storey_softening", "duffing"), ("storey1",))
+    assert (second.request.learn, second.sites) == ((), ("layer",))
 
 
 @pytest.mark.parametrize(
@@ -236,12 +235,12 @@ def test_what_adds_up_to_one_force_is_to_be_told_apart(named: str, rivals: tuple
         "kind": "ambiguous", "force": "reconstructed",
         "findings": [{"site": "damper", "kind": "effect", "effects": [named]}],
     }  # fmt: skip
-    (found,) = default_wishes(verdict)
-    assert (found.wish.separate, found.sites) == (rivals, ("damper",))
+    (found,) = default_requests(verdict)
+    assert (found.request.separate, found.sites) == (rivals, ("damper",))
     assert are_twins(*rivals)
     assert are_twins(*rivals[::-1])
-    measured_force = default_wishes({**verdict, "force": "measured"})
-    assert measured_force[0].wish.separate is None
+    measured_force = default_requests({**verdict, "force": "measured"})
+    assert measured_force[0].request.separate is None
 
 
 def test_a_coil_has_no_twin_in_the_layer() -> None:

@@ -23,13 +23,13 @@ from bristle.identification.fit import intervals_of
 from bristle.identification.problem import Model, Problem, Run
 from bristle.planning.folder import read_plan
 from bristle.planning.information import (
-    Asked,
     Evidence,
     Goal,
-    Known,
+    Information,
+    JudgedTest,
+    PreparedQuestion,
     Question,
     Rival,
-    Seen,
     roles_of,
 )
 from bristle.planning.limits import RigLimits, Test
@@ -38,10 +38,10 @@ from bristle.planning.questions import (
     LEAST,
     Figure,
     Measured,
+    PlanRequest,
     Purposes,
-    Wish,
     cost_of,
-    default_wish,
+    default_request,
     effects_beside,
     notes_of_change,
     open_parts,
@@ -102,8 +102,8 @@ def test_deviations_and_distances_are_those_of_least_squares() -> None:
     run = a_run()
     more = Model("bingham", values={**PLAIN.values, "c_0": 23.0}, fixed=PLAIN.fixed)
     question = Question(PLAIN, (Rival("thicker", more, PLAIN),))
-    asked = Asked(question, Problem([run]))
-    known = Known(question, asked.evidence([run]))
+    asked = PreparedQuestion(question, Problem([run]))
+    known = Information(question, asked.evidence([run]))
     J = np.stack([np.sign(run.v), run.v], axis=1)[run.skip :] / run.noise
     exact = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
     for name, std in zip(("f_c", "c_0"), exact, strict=True):
@@ -116,8 +116,8 @@ def test_deviations_and_distances_are_those_of_least_squares() -> None:
 def test_what_a_parameter_takes_up_whole_is_not_seen_on_short_runs_either() -> None:
     run = a_run(noise=1.0)
     more = Model("bingham", values={**PLAIN.values, "c_0": 23.0}, fixed=PLAIN.fixed)
-    asked = Asked(Question(PLAIN, (Rival("thicker", more, PLAIN),)), Problem([run]))
-    known = Known(asked.question, asked.evidence([run]) + asked.evidence([run]).judging())
+    asked = PreparedQuestion(Question(PLAIN, (Rival("thicker", more, PLAIN),)), Problem([run]))
+    known = Information(asked.question, asked.evidence([run]) + asked.evidence([run]).judging())
     # What is known of the dashpot beforehand would tell of thicker oil.
     assert known.distances()["thicker"] > LEAST * known.raw()["thicker"] > 0.0
     assert known.kept()["thicker"] < LEAST
@@ -126,10 +126,10 @@ def test_what_a_parameter_takes_up_whole_is_not_seen_on_short_runs_either() -> N
 
 def test_runs_add_up_and_never_tell_less() -> None:
     runs = [a_run(0.01), a_run(0.004)]
-    asked = Asked(Question(PLAIN), Problem(runs))
+    asked = PreparedQuestion(Question(PLAIN), Problem(runs))
     first, second = (asked.evidence([run]) for run in runs)
     assert asked.evidence(runs).normal == pytest.approx((first + second).normal)
-    one = Known(asked.question, first)
+    one = Information(asked.question, first)
     more = one.with_runs([second])
     assert all(more.deviations()[name] < one.deviations()[name] for name in ("f_c", "c_0"))
 
@@ -145,8 +145,8 @@ def test_the_deviations_are_the_intervals_that_a_fit_would_give() -> None:
     white = generator.normal(0.0, run.noise, len(run.x))
     run = replace(run, force=Problem([run]).predict(PLAIN, run) + white)
     problem = Problem([run])
-    asked = Asked(Question(PLAIN), problem)
-    known = Known(asked.question, asked.evidence([run], draws=24))
+    asked = PreparedQuestion(Question(PLAIN), problem)
+    known = Information(asked.question, asked.evidence([run], draws=24))
     std = intervals_of(problem, PLAIN).std
     for name, found in known.deviations().items():
         assert found * asked.spread(name)[0] == pytest.approx(std[name], rel=0.1)
@@ -156,15 +156,15 @@ def test_the_deviations_are_the_intervals_that_a_fit_would_give() -> None:
 
 def test_the_mean_variance_of_the_force_on_the_runs_of_the_fit_is_that_of_the_parameters() -> None:
     run = a_run()
-    asked = Asked(Question(PLAIN), Problem([run]))
+    asked = PreparedQuestion(Question(PLAIN), Problem([run]))
     told = asked.evidence([run])
-    known = Known(asked.question, told, told.normal / told.samples)
+    known = Information(asked.question, told, told.normal / told.samples)
     assert known.of_force() == pytest.approx(np.sqrt(2.0 / told.samples), rel=1e-3)
 
 
 def test_a_force_that_turns_within_samples_is_taken_for_noise_in_part() -> None:
     run = a_run()
-    asked = Asked(Question(PLAIN), Problem([run]))
+    asked = PreparedQuestion(Question(PLAIN), Problem([run]))
     own = RigLimits(stroke=0.02, speed=0.25, rate=1.0 / run.dt)
     planner = Planner(Goal((asked,), (), 1, cost=len), own, run.noise, run.draws, 1.0 / run.dt)
     t = np.arange(len(run.x)) * run.dt
@@ -178,21 +178,23 @@ def test_a_force_that_turns_within_samples_is_taken_for_noise_in_part() -> None:
 
 def test_a_run_that_is_held_out_decides_and_is_not_fitted_to() -> None:
     run = a_run()
-    asked = Asked(Question(PLAIN), Problem([run]))
-    one = Known(asked.question, asked.evidence([run]))
+    asked = PreparedQuestion(Question(PLAIN), Problem([run]))
+    one = Information(asked.question, asked.evidence([run]))
     more = one.with_runs([asked.evidence([run]).judging()])
     assert more.deviations() == one.deviations()
     assert (more.told.held_out, more.told.samples) == (one.told.samples, 2 * one.told.samples)
 
 
 def test_a_question_that_no_test_tells_of_has_no_typical_test() -> None:
-    asked = Asked(Question(PLAIN), Problem([a_run()]))
+    asked = PreparedQuestion(Question(PLAIN), Problem([a_run()]))
     nothing = asked.evidence([])
     signals = Test(Waveform("sine", 0.3, 1.0), Command("held", 0.0, 0.0)).signals(
         RigLimits(stroke=0.02, speed=0.25)
     )
-    still = Seen(Test(Waveform("sine", 0.3, 1.0), Command("held", 0.0, 0.0)), signals, (nothing,))
-    goal = Goal((asked,), (Known(asked.question, nothing),), 1, cost=len).among([still])
+    still = JudgedTest(
+        Test(Waveform("sine", 0.3, 1.0), Command("held", 0.0, 0.0)), signals, (nothing,)
+    )
+    goal = Goal((asked,), (Information(asked.question, nothing),), 1, cost=len).among([still])
     assert goal.known[0].typical is None
 
 
@@ -359,7 +361,7 @@ def test_the_same_seed_gives_the_same_plan(sheet: Path) -> None:
 def test_what_is_at_the_resolution_of_the_integration_gains_nothing() -> None:
     question = Question(PLAIN, (Rival("lag", PLAIN, PLAIN),))
     normal = 4e4 * np.eye(question.width)
-    known = Known(question, Evidence(normal, normal, normal, 1000, 500))
+    known = Information(question, Evidence(normal, normal, normal, 1000, 500))
     coarse, fine = (seen(known, least={"lag": least})[0].cost for least in (1.0, 1e-6))
     assert coarse == 0.0 < fine
 
@@ -456,20 +458,20 @@ def test_a_data_sheet_with_mistakes_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("verdict", "wish"),
+    ("verdict", "wanted"),
     [
         ({"kind": "ambiguous", "effects": ["gas_spring", "duffing"]},
-         Wish(separate=("gas_spring", "duffing"))),
-        ({"kind": "unknown", "effects": []}, Wish(learn=())),
-        ({"kind": "none", "effects": []}, Wish(see=(), sharpen=())),
-        (None, Wish(see=(), sharpen=())),
+         PlanRequest(separate=("gas_spring", "duffing"))),
+        ({"kind": "unknown", "effects": []}, PlanRequest(learn=())),
+        ({"kind": "none", "effects": []}, PlanRequest(see=(), sharpen=())),
+        (None, PlanRequest(see=(), sharpen=())),
     ],
 )  # fmt: skip
 def test_without_a_purpose_the_verdict_says_what_for(
-    rig: bristle.Study, monkeypatch: pytest.MonkeyPatch, verdict: object, wish: Wish
+    rig: bristle.Study, monkeypatch: pytest.MonkeyPatch, verdict: object, wanted: PlanRequest
 ) -> None:
     monkeypatch.setattr(type(rig), "verdict", lambda _self: verdict)
-    assert default_wish(rig) == wish
+    assert default_request(rig) == wanted
 
 
 def test_a_plan_says_that_its_model_or_verdict_is_of_other_data(

@@ -1,4 +1,4 @@
-"""Answers of views: asked of the worker, kept as long as the study's files are the same."""
+"""ViewCache of views: asked of the worker, kept as long as the study's files are the same."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _FOLDERS = ("history", "history/undone", "reports", "export", "design", "compari
 _DESIGNED = ("design/passive/passive.json",)
 
 
-def stamp(folder: Path) -> str:
+def fingerprint(folder: Path) -> str:
     """Return a text that changes with a study's files, its data, its own code and its history.
 
     Parameters
@@ -87,7 +87,7 @@ class ViewError(BristleError):
         self.told = {key: told[key] for key in ("error", "kind", "file", "text") if key in told}
 
 
-class Answers:
+class ViewCache:
     """Asks a worker process, one question at a time; starts it, and replaces it where needed."""
 
     def __init__(self) -> None:
@@ -119,7 +119,7 @@ class Answers:
             If the worker cannot answer, or takes longer than `LONGEST`.
         """
         asked = json.dumps({"view": view, "folder": str(folder), "arguments": dict(arguments)})
-        key = (asked, stamp(folder))
+        key = (asked, fingerprint(folder))
         if keep and (known := self._known(key)) is not None:
             return known
         with self._lock:
@@ -202,7 +202,7 @@ class Compiling:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._found = b""
-        self._maker: Answers | None = None
+        self._maker: ViewCache | None = None
 
     def get(self, folder: Path) -> bytes:
         """Return the module; whoever asks meanwhile waits for the same.
@@ -214,7 +214,7 @@ class Compiling:
         """
         with self._lock:
             if not self._found:
-                self._maker = Answers()
+                self._maker = ViewCache()
                 try:
                     self._found = self._maker.get("module", folder, {}, keep=False)
                 finally:

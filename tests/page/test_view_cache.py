@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from study.made import bench_run, write, write_runs
 
-from bristle.page.answers import Answers, stamp
+from bristle.page.view_cache import ViewCache, fingerprint
 from bristle.study import create_study
 
 
@@ -21,26 +21,26 @@ def folder(tmp_path: Path) -> Path:
 def test_a_stamp_changes_with_every_file_that_a_view_depends_on(folder: Path, name: str) -> None:
     model = folder / "model.toml"
     model.write_text('building = "house.toml"\n' + model.read_text())
-    before = stamp(folder)
+    before = fingerprint(folder)
     file = folder / name
     file.parent.mkdir(exist_ok=True)
     file.write_text(file.read_text() + "\n" if file.is_file() else "# new\n")
-    assert stamp(folder) != before
-    before = stamp(folder)
+    assert fingerprint(folder) != before
+    before = fingerprint(folder)
     file.unlink()
-    assert stamp(folder) != before
-    assert stamp(folder) == stamp(folder)
+    assert fingerprint(folder) != before
+    assert fingerprint(folder) == fingerprint(folder)
 
 
 @pytest.mark.parametrize("text", ["", "runs = 3", "[[runs]]\nfile = [1]", "runs = [1]", "no toml"])
 def test_a_stamp_needs_no_study_that_is_right(folder: Path, text: str) -> None:
     (folder / "study.toml").write_text(text)
-    assert "model.toml:" in stamp(folder)
-    assert stamp(folder / "nowhere") == ""
+    assert "model.toml:" in fingerprint(folder)
+    assert fingerprint(folder / "nowhere") == ""
 
 
 def test_a_view_follows_data_that_were_changed(folder: Path) -> None:
-    answers = Answers()
+    answers = ViewCache()
     try:
         first = answers.get("data", folder, {})
         assert answers.get("data", folder, {}) is first
