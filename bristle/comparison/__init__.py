@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from .comparison import Comparison, compare, compare_predictions, compare_sites
-from .misfit import RunError, SiteError
-from .patterns import ResidualPattern, dependence
+from .comparison import compare, compare_predictions, compare_sites
+from .misfit import RunMisfit, SiteMisfit
+from .patterns import ResidualPattern
 from .predictions import RunPrediction, run_predictions
+from .result import Comparison
 
 __all__ = [
     "Comparison",
     "ResidualPattern",
-    "RunError",
+    "RunMisfit",
     "RunPrediction",
-    "SiteError",
+    "SiteMisfit",
     "compare",
     "compare_predictions",
     "compare_sites",
-    "dependence",
     "run_predictions",
 ]

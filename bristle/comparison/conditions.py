@@ -192,7 +192,7 @@ Mask = NDArray[np.bool_]
 
 RIGHT = 1.1
 """z up to which a model is right within its noise, when so many samples are asked."""
-_FEWEST = 200  # samples of a regime that says something
+_MIN_SAMPLES = 200  # of a regime that says something
 
 
 @dataclass(frozen=True)
@@ -236,17 +236,11 @@ def regimes(
     cells += [(s, V) for s in speeds for V in levels]
     out = []
     for s, V in cells:
-        chosen = np.ones(len(r), dtype=bool)
-        names = []
-        for kind in (s, V):
-            if kind is not None:
-                chosen &= kind[1]
-                names.append(kind[0])
-        if chosen.sum() >= _FEWEST:
-            name = [kind[0] if kind else "" for kind in (s, V)]
-            out.append(
-                Regime(" and ".join(names), name[0], name[1], z_scale(r[chosen]), int(chosen.sum()))
-            )
+        speed, command = (kind[0] if kind else "" for kind in (s, V))
+        chosen = np.logical_and.reduce([kind[1] for kind in (s, V) if kind])
+        if chosen.sum() >= _MIN_SAMPLES:
+            text = " and ".join(filter(None, (speed, command)))
+            out.append(Regime(text, speed, command, z_scale(r[chosen]), int(chosen.sum())))
     return out
 
 

@@ -16,14 +16,12 @@ from ..identification.search import z_scale
 from ..physics.drive import DRIVES
 from ..view.style import BLUE, GREY, INK, PALE, VERMILION, zero_lines
 from .names import name_of
-from .predictions import SHOWN, shown
+from .patterns import ResidualPattern
+from .predictions import SHOWN, RunPrediction, shown
+from .result import Comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from .comparison import Comparison
-    from .patterns import ResidualPattern
-    from .predictions import RunPrediction
 
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ..core.text import scale
-from ..data.channels import Labels as ChannelsLabels
+from ..data.channels import Labels
 from ..data.decimate import between
 from ..data.left_out import MISSING, SETTLING
 from ..identification.building_sites import StructureRun
@@ -20,10 +20,9 @@ from ..identification.error import ForceError, error_of, errors_by_run
 from ..identification.problem import LOST, Model, Problem, Run, over_noise
 from ..physics.drive import DRIVES, VOLTAGE
 
-# The coordinates along which a residual may be organised, and the bins of each.
-
 Array = NDArray[np.float64]
-Labels = NDArray[np.int64]
+
+# The coordinates along which a residual may be organised, and the bins of each.
 
 RECENT = 0.05
 """Time over which a change of the voltage counts as its rate [s]."""
@@ -132,8 +131,6 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
     The change since its own first-order lag: a step shows for some `over` seconds, where a
     difference from sample to sample shows it once.
     """
-    from scipy.signal import lfilter
-
     keep = float(np.exp(-dt / over))
     rest, _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
     lagged = np.concatenate([V[:1], np.asarray(rest, dtype=float)])
@@ -144,7 +141,7 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
 class Bins:
     """A coordinate cut into bins: `label` (n,) of each sample, `centre`, `low`, `high` (b,)."""
 
-    label: Labels
+    label: NDArray[np.int64]
     centre: Array
     low: Array
     high: Array
@@ -242,7 +239,7 @@ class RunPrediction:
     site: str = ""
     index: NDArray[np.int64] | None = None
     drive: str = VOLTAGE.name
-    labels: ChannelsLabels = field(default_factory=dict)
+    labels: Labels = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     held: ForceError | None = None
     noise_known: bool = True
@@ -373,9 +370,6 @@ def halved(run: Run) -> Run:
         },
         left_out={},
     )
-
-
-# The size of an error in units of the noise, by a scale that a few large errors do not carry.
 
 
 def rms(values: Array) -> float:

@@ -5,15 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..identification.search import z_scale
-
-if TYPE_CHECKING:
-    from .predictions import RunPrediction
+from .predictions import RunPrediction
 
 Array = NDArray[np.float64]
 

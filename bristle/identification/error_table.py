@@ -23,6 +23,7 @@ from ..physics.laws import base_and_variant, law_names
 from .error import ForceError, force_error
 from .problem import Model, Problem, Run, steady, without
 from .search import descend, in_threads
+from .start_grid import Search
 from .starts import start_models
 from .watch import LAW, series, watched
 
@@ -260,10 +261,8 @@ def _fit_filtered(
     cutoff : Hz
     shown : what whoever watches is shown, where `problem` has a part of its samples alone
     """
-    from .fit import Scaled
-
     none = [(np.zeros(1), np.ones(1), np.zeros((1, 1))) for _ in problem.runs]
-    scaled = Scaled(problem, model, none)
+    scaled = Search(problem, model, none, model.free(), logarithms=False)
     unit = _QUADRATIC * force_rms(problem.runs, cutoff)
 
     def residuals(theta: Array) -> Array:

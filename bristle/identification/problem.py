@@ -264,9 +264,6 @@ def following(effects: Iterable[str]) -> dict[str, str]:
     }
 
 
-# Longer than 300 lines: what a model is, and what it predicts of a run, stand together.
-
-
 _AROUND = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 
 _STEADY = 1e-2  # of its level: what a voltage varies by without telling anything
@@ -405,7 +402,7 @@ class Model:
     def free(self) -> list[str]:
         """Return the names of the parameters that a fit moves."""
         fixed_of_law = self.law_class.fixed()
-        names = [name for name in law_parameters(self.law) if name not in fixed_of_law]
+        names = [name for name in self.law_class.parameters if name not in fixed_of_law]
         for effect in self.effects:
             joined = EFFECTS[effect]
             idle = () if self.law_class.has("bristle") else joined.bristles
@@ -435,12 +432,7 @@ def parameter(law: str, name: str) -> Parameter:
     if "." in name:
         effect, own = name.split(".", 1)
         return EFFECTS[effect].parameters[own]
-    return law_parameters(law)[name]
-
-
-def law_parameters(law: str) -> dict[str, Parameter]:
-    """Return the declarations of a law's own parameters by name."""
-    return LAWS[law].parameters
+    return LAWS[law].parameters[name]
 
 
 class Problem:
@@ -743,14 +735,25 @@ def errors(problem: Problem, model: Model, expected: Expected) -> list[Array]:
     Where the force's zero is fitted along, less that zero as well; a model with an effect that has
     a constant force of its own has none besides.
     """
-    found = [
-        (run.force - problem.predict(model, run) - bias)[run.skip :]
-        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
-    ]
+    found = _with_zero(problem, model, expected)
     if not problem.free_zero or has_offset(model):
         return found
     zero = _constant(problem, found, expected)
     return [error - zero for error in found]
+
+
+def _with_zero(problem: Problem, model: Model, expected: Expected) -> list[Array]:
+    """Return per run the error (n - skip,) [N], the zero of the force still in it."""
+    return [
+        (run.force - problem.predict(model, run) - bias)[run.skip :]
+        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
+    ]
+
+
+def _noise(problem: Problem, expected: Expected) -> Array:
+    """Return the noise (n,) expected of a true model's residual, one run after the other."""
+    pairs = zip(problem.runs, expected, strict=True)
+    return np.concatenate([sigma[run.skip :] for run, (_, sigma, _) in pairs])
 
 
 def has_offset(model: Model) -> bool:
@@ -767,13 +770,9 @@ def zero_of(problem: Problem, model: Model) -> tuple[float, float]:
     It is that of Huber's loss over all runs; the deviation is from the scatter of blocks.
     """
     expected = problem.expectation(model)
-    found = [
-        (run.force - problem.predict(model, run) - bias)[run.skip :]
-        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
-    ]
+    found = _with_zero(problem, model, expected)
     zero = _constant(problem, found, expected)
-    sigma = [e[1][run.skip :] for run, e in zip(problem.runs, expected, strict=True)]
-    weight = np.concatenate(sigma) ** -2.0
+    weight = _noise(problem, expected) ** -2.0
     left = (np.concatenate(found) - zero) * weight
     edges = np.arange(0, len(left), min(BLOCK, max(1, len(left) // 20)))
     return zero, float(np.sqrt(np.sum(np.add.reduceat(left, edges) ** 2)) / weight.sum())
@@ -781,10 +780,7 @@ def zero_of(problem: Problem, model: Model) -> tuple[float, float]:
 
 def _constant(problem: Problem, found: list[Array], expected: Expected) -> float:
     """Return the constant of errors per run (n - skip,) [N] by weighted Huber means."""
-    error = np.concatenate(found)
-    sigma = np.concatenate(
-        [e[1][run.skip :] for run, e in zip(problem.runs, expected, strict=True)]
-    )
+    error, sigma = np.concatenate(found), _noise(problem, expected)
     finite = np.isfinite(error)
     error, base = error[finite], sigma[finite] ** -2.0
     if not len(error):
@@ -815,7 +811,10 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
 
 def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:
     """Return z, the robust RMS of residual over expected noise: 1 for a true model."""
-    expected = problem.expectation(model, draws)
+    return _robust_z(problem, model, problem.expectation(model, draws))
+
+
+def _robust_z(problem: Problem, model: Model, expected: Expected) -> float:
     return z_scale(in_noises(problem, residuals(problem, model, expected), expected))
 
 
@@ -836,8 +835,7 @@ def in_noises(problem: Problem, r: Array, expected: Expected) -> Array:
     """
     if not problem.excess:
         return r
-    pairs = zip(problem.runs, expected, strict=True)
-    sigma = np.concatenate([e[1][run.skip :] for run, e in pairs])
+    sigma = _noise(problem, expected)
     return np.asarray(r * sigma / np.sqrt(sigma**2 - problem.excess))
 
 
@@ -850,7 +848,7 @@ def excess_of(problem: Problem, model: Model) -> float:
     0 with z.
     """
     expected = problem.expectation(model)
-    z = z_scale(in_noises(problem, residuals(problem, model, expected), expected))
+    z = _robust_z(problem, model, expected)
     if not z > EXPLAINS:
         return 0.0
     pairs = zip(errors(problem, model, expected), problem.runs, strict=True)

@@ -16,15 +16,10 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from ..physics.law import Shape
-from .problem import Array, Model, Problem, Run
+from .problem import Array, Model, Problem
 
 _NEAR_REST = 3.0  # errors of the velocity within which a sign law tells nothing
 _AT_LEAST = 1e-3  # of the typical size: what a start gives a parameter that came out as zero
-
-
-def start_model(runs: list[Run], law: str, exponent: float = 1.0) -> Model:
-    """Return the best start for a rig of any size."""
-    return start_models(Problem(runs), Model(law, (), {"exponent": exponent}), 1)[0]
 
 
 def start_models(problem: Problem, model: Model, count: int) -> list[Model]:

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.comparison import Comparison
 from ..comparison.names import name_of, site_name
 from ..comparison.patterns import ResidualPattern
 from ..comparison.predictions import RunPrediction, shown
+from ..comparison.result import Comparison
 from ..errors import StudyError
 from ..study.steps import compare_study
 from ..study.study import Study
