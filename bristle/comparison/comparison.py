@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..core.arrays import Array
 from ..errors import RecordError
 from ..identification.fit import Fit
 from ..identification.problem import Model, Problem
@@ -30,8 +28,6 @@ from .predictions import RunPrediction, run_predictions
 from .result import Comparison
 from .spectrum import spectrum
 from .words import sentences
-
-Array = NDArray[np.float64]
 
 FEWER_FLIPS = 299
 """Patterns of signs at a site that is not compared at length: enough for a chance of 1 %."""

@@ -8,8 +8,8 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain, quantity, short_z
 from ..data.channels import Label, Labels, label_text, varying
 from ..identification.search import z_scale
@@ -17,8 +17,6 @@ from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .misfit import CLOSE
 from .names import joined, name_of
 from .predictions import RunPrediction
-
-Array = NDArray[np.float64]
 
 STEADY = 1e-3
 """Share of its largest value by which a command varies in a run that keeps to one level."""
@@ -188,7 +186,6 @@ def _split(own: Sequence[LabelError]) -> float:
 
 # In which regimes of speed and command a model is right within its noise.
 
-Mask = NDArray[np.bool_]
 
 RIGHT = 1.1
 """z up to which a model is right within its noise, when so many samples are asked."""
@@ -244,7 +241,7 @@ def regimes(
     return out
 
 
-def speed_classes(speed: Array | None) -> list[tuple[str, Mask]]:
+def speed_classes(speed: Array | None) -> list[tuple[str, Flags]]:
     """Return low, middle and high speed, cut at a quarter and 60 % of its high values."""
     if speed is None or not np.ptp(speed) > 0.0:
         return []
@@ -258,7 +255,7 @@ def speed_classes(speed: Array | None) -> list[tuple[str, Mask]]:
     ]
 
 
-def level_classes(V: Array | None, drive: Drive = VOLTAGE) -> list[tuple[str, Mask]]:
+def level_classes(V: Array | None, drive: Drive = VOLTAGE) -> list[tuple[str, Flags]]:
     """Return a command (n,) off, low and high; nothing where it does not vary."""
     if V is None or not np.ptp(V) > 1e-3 * max(float(np.max(np.abs(V))), 1e-12):
         return []

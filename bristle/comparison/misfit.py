@@ -8,15 +8,13 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..errors import RecordError
 from ..identification.error import ForceError, pooled
 from ..identification.search import HUBER_AT_ONE, losses, mean_loss, z_scale
 from .patterns import LEVEL, Finder, ResidualPattern
 from .predictions import RunPrediction, rms
-
-Array = NDArray[np.float64]
 
 CLOSE = 1.1
 """z up to which an error is what noise explains."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import PolyCollection
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import log_ticks, percent, plain, quantity, short_z
 from ..data.channels import label_text
 from ..data.cycles import by_level, cycles, steady
@@ -23,8 +23,6 @@ from .result import Comparison
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-
-Array = NDArray[np.float64]
 
 MEASURED, PREDICTED, ERROR = INK, BLUE, VERMILION
 _DOTS = 3000

@@ -16,13 +16,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.search import z_scale
 from ..physics.drive import DRIVES
 from .predictions import BINS, FINE, SLOW, Bins, cut, rms
-
-Array = NDArray[np.float64]
 
 FLIPS = 1999
 LEVEL = 0.01

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from ..core.arrays import Array, Flags, Indices
 from ..core.text import scale
 from ..data.channels import Labels
 from ..data.decimate import between
@@ -19,8 +19,6 @@ from ..identification.building_sites import StructureRun
 from ..identification.error import ForceError, error_of, errors_by_run
 from ..identification.problem import LOST, Model, Problem, Run, over_noise
 from ..physics.drive import DRIVES, VOLTAGE
-
-Array = NDArray[np.float64]
 
 # The coordinates along which a residual may be organised, and the bins of each.
 
@@ -141,7 +139,7 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
 class Bins:
     """A coordinate cut into bins: `label` (n,) of each sample, `centre`, `low`, `high` (b,)."""
 
-    label: NDArray[np.int64]
+    label: Indices
     centre: Array
     low: Array
     high: Array
@@ -184,7 +182,7 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
     )
 
 
-def _begins(counts: NDArray[np.int64], share: float) -> NDArray[np.int64]:
+def _begins(counts: Indices, share: float) -> Indices:
     """Return at which of the levels, by how often they occur (n,), a bin begins (b,).
 
     A level that holds a `share` of the samples by itself is a bin; of the others a bin takes so
@@ -235,9 +233,9 @@ class RunPrediction:
     quantity: str = "force"
     unit: str = "N"
     skip: int = 25
-    known: NDArray[np.bool_] | None = None
+    known: Flags | None = None
     site: str = ""
-    index: NDArray[np.int64] | None = None
+    index: Indices | None = None
     drive: str = VOLTAGE.name
     labels: Labels = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
@@ -266,7 +264,7 @@ class RunPrediction:
         return (error if self.known is None else np.where(self.known, error, 0.0))[self.skip :]
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Flags:
         """Which of the samples after the skipped ones count (n - skip,)."""
         known = np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
         return known[self.skip :]

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.search import z_scale
 from .predictions import RunPrediction
-
-Array = NDArray[np.float64]
 
 _CYCLES = 3  # of the lowest band's frequency in a run, so that it holds enough lines
 _MOST = 9

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain, quantity, short_z
 from ..data.channels import UNITS
 from ..physics.drive import DRIVES
@@ -15,8 +15,6 @@ from .names import joined, name_of, site_name, site_names
 from .patterns import Finder, ResidualPattern
 from .predictions import SHOWN, RunPrediction, shown
 from .result import Comparison
-
-Array = NDArray[np.float64]
 
 FAINT = 0.02
 """Share of an error's power below which its pattern is not worth a sentence."""
@@ -331,7 +329,7 @@ def _at_levels(pattern: ResidualPattern, comparison: Comparison, finder: Finder)
 
 
 def size_of(
-    pattern: ResidualPattern, finder: Finder, chosen: Sequence[bool] | NDArray[np.bool_]
+    pattern: ResidualPattern, finder: Finder, chosen: Sequence[bool] | Flags
 ) -> tuple[float, float]:
     """Return the size of a pattern among some samples, 1 for that of all, and its uncertainty."""
     mean, std = finder.mean_along(pattern, finder.raw, np.asarray(chosen, dtype=float))

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags, Indices
 from ..core.text import quantity
 from .channels import DRIVE, channel_unit
 from .left_out import merged
@@ -25,13 +25,12 @@ from .measurement import Measurement
 # together,
 # coarse steps included.
 
-Array = NDArray[np.float64]
 
 LONG = 5
 """Equal samples in a row at an extreme that a moving force does not show."""
 
 
-def stretches(flat: NDArray[np.bool_]) -> NDArray[np.int64]:
+def stretches(flat: Flags) -> Indices:
     """Return the first sample and the one after the last (k, 2) of each stretch that is true."""
     padded = np.concatenate([[0], flat.astype(np.int8), [0]])
     return np.asarray(np.flatnonzero(np.diff(padded)).reshape(-1, 2), dtype=np.int64)
@@ -127,7 +126,7 @@ def ends_of(
 
 def beyond_range(
     values: Array, noise: float, level: float, longest: int = LONGEST, crowded: float = CROWDED
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Return which samples (n,) of a signal may have been cut off.
 
     What is cut may get its noise behind the cut: then it stands a little inside of it, too.

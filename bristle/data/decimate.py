@@ -15,13 +15,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain
 from ..errors import RecordError
 from .channels import DRIVE, is_smooth
 from .corrections import TIMING, Correction, jumps
 from .noise import SHORTEST, Noise, estimate_noise, is_switched
 from .sampling import Even
-from .table import Array
 
 # Between the samples of a decimated run: where a model is evaluated, and the filter behind it.
 #
@@ -125,7 +125,6 @@ class Finer:
 # smoother. That lowers white noise, by a share that is known, so that noise is estimated before.
 # Where a force bends so much between two samples that no line follows it, its value is not judged.
 
-Flags = NDArray[np.bool_]
 
 _ALONE = np.ones(1)
 _BINS = 20  # of the distances from a sample, where a clock goes through all of them

@@ -12,15 +12,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain
 from ..errors import RecordError, UnitError
 from ..units import conversion, parse, si_unit
 from .channels import UNITS, ChannelSpec, is_channel
 from .columns import Column
 from .raw_signals import raw_signals
-from .table import Array, Table
+from .table import Table
 
 FEWEST = 20
 """Values of such a channel in a run, at least."""
@@ -240,9 +240,7 @@ def read_extra(table: Table, time: Array, wanted: Mapping[str, ChannelSpec]) -> 
     return Read(found, tuple(notes))
 
 
-def _in_order(
-    time: Array, values: Array, there: NDArray[np.bool_], unit: str
-) -> tuple[Array, Array, str]:
+def _in_order(time: Array, values: Array, there: Flags, unit: str) -> tuple[Array, Array, str]:
     """Return the times and values that are there, in the order of time, and their unit."""
     order = np.argsort(time[there], kind="stable")
     return time[there][order], values[there][order], unit
@@ -269,7 +267,7 @@ def _same_unit(first: str, second: str) -> bool:
         return first == second
 
 
-def _refuse_holes(time: Array, there: NDArray[np.bool_]) -> None:
+def _refuse_holes(time: Array, there: Flags) -> None:
     """Refuse a channel that has too few values in a run to be interpolated."""
     count = int(there.sum())
     if count < FEWEST:

@@ -16,13 +16,12 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import plain, quantity
 from ..errors import RecordError
 from .channels import DRIVE, channel_unit, device_channel
 
-Array = NDArray[np.float64]
 Kernel = tuple[int, int]
 
 SHORTEST = 60

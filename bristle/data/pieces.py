@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Indices
 from ..errors import RecordError
 from ..units import conversion
 from .channels import ChannelSpec
 from .noise import SHORTEST
-from .table import Array, Table
+from .table import Table
 
 RIGHT = 'expected "restart", "rests" or "column TITLE".'
 
@@ -103,7 +103,7 @@ def _seconds(table: Table, spec: ChannelSpec | None) -> float:
     return conversion(unit or "s", "s")[0]
 
 
-def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int64]:
+def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> Indices:
     """Return the middles of rests between two motions."""
     motion = "velocity" if "velocity" in channels else "displacement"
     y, spec = _values(table, motion, channels), channels.get("time")
@@ -133,7 +133,7 @@ def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int6
     return np.array(found, dtype=np.int64)
 
 
-def _rows(table: Table, part: NDArray[np.int64], number: int) -> Table:
+def _rows(table: Table, part: Indices, number: int) -> Table:
     return replace(
         table,
         source=f"{table.source}, run {number}",

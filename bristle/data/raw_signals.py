@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.arrays import Array
 from ..units import same_dimension
 from .channels import DRIVE, PLAIN, meaning, of_a_sensor
 from .columns import Column
-from .table import Array, Table
+from .table import Table
 
 _FEWEST = 20  # values
 _LOOKED = 2000  # values of a column that are compared with those of another

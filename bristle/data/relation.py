@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .table import Array
+from ..core.arrays import Array
 
 CUT_OFF = 18.0
 """Low-pass at which channels are compared [Hz], where their own band is not wider."""

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.arrays import Array
 from ..core.text import quantity
 from .channels import Labels, label_text
 from .measurement import Measurement
 from .relation import band, differentiated
-from .table import Array
 
 _TURNED = 0.3  # of half the range that a motion must pass on either side of its middle
 _EVEN = 0.1  # share by which a period may differ from the middle one

@@ -14,15 +14,12 @@ from math import inf, isfinite, nan, sqrt
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import percent, quantity
 from ..data.left_out import LOADED, NO_VALUE, SETTLING, WAYS_OUT, any_of
 from ..errors import RecordError
 from .problem import Model, Problem, Run, has_offset, zero_of
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MENTIONED = 0.02
 """Share of samples left out above which the error over all samples is told as well."""

@@ -15,8 +15,8 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Count
 from ..errors import RecordError
 from ..physics.laws import base_and_variant, law_names
@@ -26,8 +26,6 @@ from .search import descend, in_threads
 from .start_grid import Search
 from .starts import start_models
 from .watch import LAW, series, watched
-
-Array = NDArray[np.float64]
 
 CUTOFF = 18.0
 """Hz, of the paper's low-pass (section III-C)."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Count, tell
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
@@ -30,8 +30,6 @@ from .problem import (
 from .search import HUBER_AT_ONE, in_threads, loss, mean_loss
 from .start_grid import Search
 from .starts import start_models
-
-Array = NDArray[np.float64]
 
 # How well data determine a model's parameters: covariance, and what they do not identify.
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import tell
 from ..data.corrections import JUMP
 from ..physics import damper, structure
@@ -80,8 +81,6 @@ def begun(name: str, digest: str) -> Ahead | None:
     except OSError:
         return None
 
-
-Array = NDArray[np.float64]
 
 _INLINE = (
     "damper.step", "series.advance_series", "series.balanced_speed", "series.by_secants",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.corrections import LEFT_OUT
 from ..data.cut_off import derived_velocity
 from ..data.measurement import Measurement
@@ -15,8 +15,6 @@ from ..physics.drive import VOLTAGE
 from .problem import Run
 from .run_start import begin_of
 from .smoothing import posterior_draws, smooth, smooth_drive
-
-Array = NDArray[np.float64]
 
 SHORTEST = 200
 """Fewest samples of a run that a fit makes sense of."""

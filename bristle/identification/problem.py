@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..data.channels import Label, Labels
 from ..data.corrections import jumps
 from ..data.decimate import Finer, between
@@ -32,7 +32,6 @@ from .search import HUBER, z_scale
 # instrument's reading is what was measured, so its effect is taken back: the motion that the damper
 # felt is the one that the instrument would have shown like that.
 
-Array = NDArray[np.float64]
 
 LEAST = 0.03
 """Least response, by the largest, that is taken back in full; below, noise would be blown up."""
@@ -205,9 +204,7 @@ def values_of_labels(effects: Iterable[str], labels: Labels) -> dict[str, float]
     return {name: value for name, value in known.items() if not isinstance(value, str)}
 
 
-def tracks_of(
-    effects: Iterable[str], extra: Mapping[str, Extra], run: str
-) -> dict[str, NDArray[np.float64]]:
+def tracks_of(effects: Iterable[str], extra: Mapping[str, Extra], run: str) -> dict[str, Array]:
     """Return the values (n,) over a run of parameters that follow its channels, by name.
 
     Parameters
@@ -322,7 +319,7 @@ class Run:
     noise: float
     draws: Array
     skip: int = 25
-    left_out: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    left_out: Mapping[str, Flags] = field(default_factory=dict)
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
     rest: int = 0
@@ -352,13 +349,13 @@ class Run:
         return force if self.finer is None else self.finer.filtered(force)
 
     @cached_property
-    def measured(self) -> NDArray[np.bool_] | None:
+    def measured(self) -> Flags | None:
         """Which samples (n,) say something, None where all do."""
         out = any_of(self.left_out)
         return None if out is None else ~out
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Flags:
         """Which of the samples after `skip` were measured (n - skip,)."""
         if self.measured is None:
             return np.ones(max(0, len(self.force) - self.skip), dtype=bool)

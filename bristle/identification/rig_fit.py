@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from ..core.arrays import Array
 from ..core.text import plain
 from ..errors import RecordError
 from ..physics.effect import EFFECTS
@@ -26,7 +26,6 @@ from .watch import MODEL, series
 
 # The linear law of a layer or storey fitted to its runs, in closed form.
 
-Array = NDArray[np.float64]
 
 DAMPING = "c"
 """The parameter of the linear laws that adds to the building's own damping."""

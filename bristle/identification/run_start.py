@@ -11,13 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import quantity
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
-
-Array = NDArray[np.float64]
 
 SETTLING = 25
 """Samples at the begin of a run that are not judged."""

@@ -8,8 +8,8 @@ from itertools import product
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..physics.effect import EFFECTS, Sizes
 from ..physics.laws import LAWS
 from .problem import Expected, Model, Problem, parameter, residuals
@@ -18,7 +18,6 @@ from .watch import watched
 
 # A model's parameters as a search sees them: numbers of order one, and the residuals over them.
 
-Array = NDArray[np.float64]
 
 MOST_TURNS = 5
 """How often a rough search begins again at most."""

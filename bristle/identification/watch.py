@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.progress import Watcher, watcher
 from ..data.cycles import by_level, cycles
 from ..physics.drive import DRIVES
@@ -24,8 +24,6 @@ from .building_sites import StructureRun
 from .error import force_error
 from .problem import Expected, Model, Problem, Run, in_noises, parameter
 from .search import Accepted, z_of, z_scale
-
-Array = NDArray[np.float64]
 
 MODEL, LAW = "model", "law"
 """Kinds of series: the fits of the model, one after the other; one law of several side by side."""
@@ -98,7 +96,7 @@ def watched(
     search.end()
 
 
-def _measured(run: Run) -> NDArray[np.bool_]:
+def _measured(run: Run) -> Flags:
     return np.ones(len(run.force), dtype=bool) if run.measured is None else run.measured
 
 

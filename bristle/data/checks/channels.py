@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain, quantity
 from ..channels import DRIVE, device_channel
 from ..cut_off import clipped_ends
 from ..measurement import Measurement
 from ..noise import Noise, estimate_noise, is_switched, spikes_text
-from ..table import Array
 from .finding import Finding, Level
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"

@@ -8,6 +8,7 @@ from math import log10
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain
 from ..cut_off import numerical_derivative
 from ..measurement import Measurement
@@ -20,7 +21,6 @@ from ..relation import (
     power_factor,
     tells_sign,
 )
-from ..table import Array
 from .finding import Finding
 
 ACROSS = "across_device"

@@ -9,11 +9,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.text import listed, plain
 from ...errors import RecordError
 from ..noise import SHORTEST, is_switched
 from ..sampling import between, covered
-from ..table import Array
 
 AnyArray: TypeAlias = NDArray[Any]
 

@@ -7,12 +7,12 @@ from itertools import permutations
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...units import parse
 from ..channels import DRIVE
 from ..columns import Column
 from ..noise import is_switched
 from ..relation import Relation, derivative_relation, power_factor, tells_sign
-from ..table import Array
 from .by_name import Candidate, Search, joined, usable, velocity_of
 
 _SHOWN = 3  # columns of many that are told
