@@ -186,9 +186,6 @@ def _split(own: Sequence[LabelError]) -> float:
 
 # In which regimes of speed and command a model is right within its noise.
 
-
-RIGHT = 1.1
-"""z up to which a model is right within its noise, when so many samples are asked."""
 _MIN_SAMPLES = 200  # of a regime that says something
 
 
@@ -205,7 +202,7 @@ class Regime:
     @property
     def right(self) -> bool:
         """Whether the model is right within its noise there."""
-        return self.z <= RIGHT
+        return self.z <= CLOSE
 
     def as_dict(self) -> dict[str, Any]:
         """Return the regime as JSON has it."""

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.arrays import Array, Flags, Indices
+from ..core.arrays import Array, Flags
 from ..core.text import quantity
 from .channels import DRIVE, channel_unit
 from .left_out import merged
 from .measurement import Measurement
+from .noise import stretches
 
 # Whether a channel was cut off at the end of its range, by three measures for three questions.
 #
@@ -28,12 +29,6 @@ from .measurement import Measurement
 
 LONG = 5
 """Equal samples in a row at an extreme that a moving force does not show."""
-
-
-def stretches(flat: Flags) -> Indices:
-    """Return the first sample and the one after the last (k, 2) of each stretch that is true."""
-    padded = np.concatenate([[0], flat.astype(np.int8), [0]])
-    return np.asarray(np.flatnonzero(np.diff(padded)).reshape(-1, 2), dtype=np.int64)
 
 
 def saturated_share(values: Array) -> float:

@@ -11,7 +11,7 @@ from ..core.arrays import Array, Indices
 from ..errors import RecordError
 from ..units import conversion
 from .channels import ChannelSpec
-from .noise import SHORTEST
+from .noise import SHORTEST, stretches
 from .table import Table
 
 RIGHT = 'expected "restart", "rests" or "column TITLE".'
@@ -124,10 +124,9 @@ def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> Indices:
     speed[: 2 * window], speed[-2 * window :] = speed[2 * window], speed[-2 * window - 1]
     still = speed < STANDS * float(np.quantile(speed, 0.98))
     # Turning points are no rests: they are short.
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     found = [
         (a + b) // 2
-        for a, b in edges.reshape(-1, 2).tolist()
+        for a, b in stretches(still).tolist()
         if a > 0 and b < len(y) and (b - a) * step >= RESTS
     ]
     return np.array(found, dtype=np.int64)

@@ -13,7 +13,7 @@ import numpy as np
 from ..core.arrays import Array, Flags, Indices
 from ..errors import RecordError
 from ..physics.motion_file import GAP
-from .noise import SHORTEST, is_switched
+from .noise import SHORTEST, is_switched, stretches
 
 # The even grid that times lie on, which were written with few digits or with some jitter.
 
@@ -386,9 +386,8 @@ def _pieces(
 ) -> list[tuple[Array, dict[str, Array], Flags]]:
     """Cut a stretch where more than `MAX_FILLED` values in a row are missing, and at its ends."""
     size = len(one.even)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~one.known).astype(np.int8), [0]])))
     bounds, gaps = [0], []
-    for start, stop in edges.reshape(-1, 2).tolist():
+    for start, stop in stretches(~one.known).tolist():
         if stop - start > MAX_FILLED or start == 0 or stop == size:
             bounds += [start, stop]
             gaps.append((start, stop))

@@ -207,8 +207,7 @@ def _thinned(problem: Problem, cutoff: float) -> Problem:
     for run in problem.runs:
         every = int(1.0 / (THINNED * cutoff * run.dt)) if cutoff else 1
         every = max(1, min(every, samples // ENOUGH))
-        part = run.of(slice(None, None, every))
-        runs.append(replace(part, dt=run.dt * every, skip=-(-run.skip // every)))
+        runs.append(run.every(every))
     fewer = any(len(a.force) < len(b.force) for a, b in zip(runs, problem.runs, strict=True))
     return problem.of(runs) if fewer else problem
 

@@ -377,6 +377,11 @@ class Run:
             finer=self.finer.of(part) if self.finer and dense else None,
         )  # fmt: skip
 
+    def every(self, count: int) -> Self:
+        """Return the run with one of so many samples, for what has no memory."""
+        part = self.of(slice(None, None, count))
+        return replace(part, dt=self.dt * count, skip=-(-self.skip // count))
+
     def entire(self) -> Run:
         """Return the run with all its samples, whatever a fit takes of them."""
         return self

@@ -261,9 +261,8 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
         return problem, expected
     runs, thinned = [], []
     for run, (bias, sigma, draws) in zip(problem.runs, expected, strict=True):
-        every = slice(None, None, THIN)
-        runs.append(replace(run.of(every), dt=run.dt * THIN, skip=-(-run.skip // THIN)))
-        thinned.append((bias[every], sigma[every], draws[:, every]))
+        runs.append(run.every(THIN))
+        thinned.append((bias[::THIN], sigma[::THIN], draws[:, ::THIN]))
     return problem.of(runs), thinned
 
 

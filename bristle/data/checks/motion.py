@@ -21,7 +21,7 @@ from ..relation import (
     power_factor,
     tells_sign,
 )
-from .finding import Finding
+from .finding import Finding, Level
 
 ACROSS = "across_device"
 """What stands before displacement and velocity across a device, as a level's name elsewhere."""
@@ -66,16 +66,15 @@ def check_motion(run: Measurement, level: str = "") -> Iterator[Finding]:
     if run.has(x, v):
         own = numerical_derivative(run[x], run[v], run.step)
         if own:
-            yield Finding(
-                "derived",
-                "note",
+            text = (
                 f"{v} is the numerical derivative of {x} ({own}): it adds no information, and "
-                "its noise is that of the displacement.",
-                f"Leave it out with bristle study channels MY_RIG --without {v} , or record it "
-                "with an instrument of its own.",
-                run.name,
-                v,
+                "its noise is that of the displacement."
             )
+            do = (
+                f"Leave it out with bristle study channels MY_RIG --without {v} , or record it "
+                "with an instrument of its own."
+            )
+            yield Finding("derived", "note", text, do, run.name, v)
         else:
             yield from _related(run, x, v, derivative_relation(run[x], run[v], run.step))
     yield from _acceleration(run, before, x, v)
@@ -134,15 +133,13 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
     if found is None:
         return  # one of the two stands still, which is said elsewhere
     if abs(found.correlation) < 0.9 and found.residual > 0.4:
-        yield Finding(
-            "derivative",
-            "error",
+        text = (
             f"{upper} is not the derivative of {lower}: their correlation is "
-            f"{found.correlation:.2f}.",
-            "Check the columns: are two exchanged, or is one instrument not connected?",
-            value=1.0 - abs(found.correlation),
-            run=run.name,
-            channel=upper,
+            f"{found.correlation:.2f}."
+        )
+        do = "Check the columns: are two exchanged, or is one instrument not connected?"
+        yield Finding(
+            "derivative", "error", text, do, run.name, upper, 1.0 - abs(found.correlation)
         )
         return
     gain = (
@@ -154,36 +151,21 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
     if found.gain < 0.0 or off > 0.25:
         size = abs(found.gain)
         doubts = ["sign"] * (found.gain < 0.0) + ["unit"] * (not 0.75 < size < 1.25)
-        yield Finding(
-            "gain",
-            "error",
-            f"{gain}{after}.",
-            f"Check the {' and the '.join(doubts)} of both in study.toml.",
-            value=abs(log10(size)),
-            run=run.name,
-            channel=upper,
-        )
+        text = f"{gain}{after}."
+        do = f"Check the {' and the '.join(doubts)} of both in study.toml."
+        yield Finding("gain", "error", text, do, run.name, upper, abs(log10(size)))
     else:
         certain = off > max(_GAIN, 4.0 * found.gain_std)
-        yield Finding(
-            "gain",
-            "warning" if certain else "note",
-            f"{gain}{after}.",
-            "One of the two instruments is out of calibration." if certain else "",
-            value=off,
-            run=run.name,
-            channel=upper,
-        )
+        text = f"{gain}{after}."
+        do = "One of the two instruments is out of calibration." if certain else ""
+        level: Level = "warning" if certain else "note"
+        yield Finding("gain", level, text, do, run.name, upper, off)
     if abs(found.delay) > max(_DELAY * run.step, 4.0 * found.delay_std):
         late = "later" if found.delay > 0.0 else "earlier"
-        yield Finding(
-            "delay",
-            "warning",
+        text = (
             f"{upper} comes {plain(1e3 * abs(found.delay))} ms "
             f"(+-{plain(2e3 * found.delay_std, 1)}) {late} "
-            f"than {lower}.",
-            "Filters of two instruments differ: use the same on both, or one of the channels.",
-            value=abs(found.delay),
-            run=run.name,
-            channel=upper,
+            f"than {lower}."
         )
+        do = "Filters of two instruments differ: use the same on both, or one of the channels."
+        yield Finding("delay", "warning", text, do, run.name, upper, abs(found.delay))

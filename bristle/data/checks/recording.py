@@ -14,6 +14,7 @@ from ..channels import DRIVE
 from ..corrections import BETA, Correction, amplitude_of, drifting_amplitude, without_slow
 from ..measurement import Measurement
 from ..noise import is_switched
+from ..relation import power_spectrum
 from .finding import Finding
 
 # A channel that was interpolated to a faster rate before it was stored: it is straight in pieces.
@@ -22,7 +23,7 @@ from .finding import Finding
 # that
 # was written. No measured signal does so again and again at ever new slopes.
 
-FEWEST = 200
+MIN_PATTERN_SAMPLES = 200
 """Samples from which on a pattern is no accident."""
 
 STRAIGHT = 0.25
@@ -50,7 +51,7 @@ def interpolated(y: Array) -> float:
     y : (n,) as stored, evenly spaced and finite
     """
     size = float(np.ptp(y))
-    if len(y) < FEWEST or size == 0.0:
+    if len(y) < MIN_PATTERN_SAMPLES or size == 0.0:
         return 0.0
     digit = _last_digit(y, size)
     slope = np.diff(y)
@@ -97,7 +98,7 @@ _BETA = 14.0  # of the Kaiser window: 100 dB, deeper than a null
 _BINS = 15  # whose lower third is one point of the spectrum: a periodic test has lines between
 _QUANTILE = 0.3
 _POINTS = 8  # between two nulls at the least
-_BEGIN = 2.0  # times the band of a channel's own power from which on its spectrum is looked at
+_START = 2.0  # times the band of a channel's own power from which on its spectrum is looked at
 _BAND = 0.995  # share of that power
 _DEGREE = 5  # of the polynomial that the rest of the spectrum is taken for, in log power
 _FLOORS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)  # of what came on top behind the average, over a lobe
@@ -158,7 +159,7 @@ def _fewest_nulls(length: int) -> int:
 
 def _is_comb(y: Array, length: int) -> bool:
     """Return whether nulls lie where a periodic channel has gaps between its harmonics."""
-    power = np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(len(y)))) ** 2
+    power = power_spectrum(y)
     k = int(np.argmax(power))
     periodic = float(np.sum(power[max(k - 2, 0) : k + 3])) > _PERIODIC * float(np.sum(power))
     if not periodic or k == 0:
@@ -180,9 +181,9 @@ def _points(y: Array) -> tuple[Array, Array]:
 
 def _begin(y: Array) -> float:
     """Return the frequency [1/sample] from which on a spectrum has a simple shape."""
-    power = np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(len(y)))) ** 2
+    power = power_spectrum(y)
     total = np.cumsum(power)
-    return _BEGIN * float(np.searchsorted(total, _BAND * total[-1])) / len(y)
+    return _START * float(np.searchsorted(total, _BAND * total[-1])) / len(y)
 
 
 def _scaled(frequency: Array) -> Array:
@@ -363,7 +364,7 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
     Returns
     -------
     list of SpectralLine
-        By channel, the largest first; none of runs of fewer than `FEWEST` samples.
+        By channel, the largest first; none of runs of fewer than `MIN_PATTERN_SAMPLES` samples.
     """
     able = {name: y for name, y in channels.items() if _is_able(name, y)}
     spectra = {name: _spectrum(_cut_down(y, step), step) for name, y in able.items()}
@@ -457,7 +458,7 @@ def _spectrum(y: Array, step: float) -> _Spectrum:
 
 def _band_top(y: Array, step: float) -> float:
     """Return the frequency [Hz] below which 99.5 % of the power of a motion's rate lies."""
-    power = np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(len(y)))) ** 2
+    power = power_spectrum(y)
     total = np.cumsum(power)
     return float(np.fft.rfftfreq(len(y), step)[int(np.searchsorted(total, 0.995 * total[-1]))])
 
@@ -604,17 +605,15 @@ def _of_run(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Iter
     for channel, values in run.channels.items():
         found = None if channel in DRIVE else moving_average(values, run.step)
         if found is not None:
-            yield Finding(
-                "averaged",
-                "warning",
+            text = (
                 f"{channel} is a moving average of {found.length} samples "
                 f"({plain(1e3 * found.length * run.step)} ms): its spectrum has {found.nulls} "
                 "nulls at equal distances. Jumps are rounded that long, and a delay or lag of "
-                "that size may be the average's.",
-                "Store the channel as it was sampled, and measure again if you can.",
-                run.name,
-                channel,
-                found.length * run.step,
+                "that size may be the average's."
+            )
+            do = "Store the channel as it was sampled, and measure again if you can."
+            yield Finding(
+                "averaged", "warning", text, do, run.name, channel, found.length * run.step
             )
 
 
@@ -624,17 +623,13 @@ def _interpolated(run: Measurement) -> Iterator[Finding]:
         of_one = 0.0 if channel in DRIVE else interpolated(values)
         if of_one:
             rate = plain(run.sampling.rate / of_one, 3)
-            yield Finding(
-                "interpolated",
-                "warning",
+            text = (
                 f"{channel} is interpolated: {rate} samples per second were measured, those "
                 "between lie on straight lines. Their noise is no measured one, and what is "
-                f"faster than {plain(0.5 * run.sampling.rate / of_one, 3)} Hz is not in them.",
-                f"Store what was measured, or set rate = {rate} in study.toml.",
-                run.name,
-                channel,
-                of_one,
+                f"faster than {plain(0.5 * run.sampling.rate / of_one, 3)} Hz is not in them."
             )
+            do = f"Store what was measured, or set rate = {rate} in study.toml."
+            yield Finding("interpolated", "warning", text, do, run.name, channel, of_one)
 
 
 def _of_lines(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Finding:
@@ -648,13 +643,19 @@ def _of_lines(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Fi
         for one in ordered
     ]
     what = "a line at" if len(told) == 1 else "lines at"
+    text = (
+        f"{channel} has {what} {', '.join(told)}; the largest is "
+        f"{plain(100.0 * ordered[0].amplitude / rms, 2)} % of its RMS, and no motion drives it."
+    )
+    do = (
+        "`bristle study check FOLDER --correct` takes it off. Look for a loop of the ground, or a "
+        "shield that is open."
+    )
     return Finding(
         "lines",
         "warning",
-        f"{channel} has {what} {', '.join(told)}; the largest is "
-        f"{plain(100.0 * ordered[0].amplitude / rms, 2)} % of its RMS, and no motion drives it.",
-        "`bristle study check FOLDER --correct` takes it off. Look for a loop of the ground, or a "
-        "shield that is open.",
+        text,
+        do,
         run.name,
         channel,
         ordered[0].amplitude,

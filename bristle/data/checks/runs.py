@@ -231,17 +231,13 @@ def _beyond(train: list[Excitation], holdout: list[Excitation], parts: bool) -> 
         known = max(map(value, train))
         for run in holdout:
             if known > 0.0 and value(run) > BEYOND * known:
-                yield Finding(
-                    "beyond",
-                    "warning",
+                text = (
                     f"{name} reaches {plain(factor * value(run))} {unit}, and "
                     f"{plain(factor * known)} in "
-                    "the runs for training: the model is tested outside the range of the fit.",
-                    _exchange(run, train, holdout, checks) if not parts else _ANOTHER,
-                    run.run,
-                    name,
-                    value(run) / known,
+                    "the runs for training: the model is tested outside the range of the fit."
                 )
+                do = _exchange(run, train, holdout, checks) if not parts else _ANOTHER
+                yield Finding("beyond", "warning", text, do, run.run, name, value(run) / known)
 
 
 def _exchange(
@@ -290,17 +286,13 @@ def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
         own = float(run.resisting or 0.0)
         ratio = own / usual
         if not 0.4 < ratio < 2.5:
-            yield Finding(
-                "two rigs",
-                "warning",
+            text = (
                 f"force resists with {quantity(own, 'N', 4, usual)} on average, and with "
                 f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like "
-                f"{known[0].drive or 'command'} and speed.",
-                "Is it of another damper, or in another unit? Then use a separate study.",
-                run.run,
-                "force",
-                abs(np.log(ratio)),
+                f"{known[0].drive or 'command'} and speed."
             )
+            do = "Is it of another damper, or in another unit? Then use a separate study."
+            yield Finding("two rigs", "warning", text, do, run.run, "force", abs(np.log(ratio)))
 
 
 def _mean_level(run: Excitation) -> float:

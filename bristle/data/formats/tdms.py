@@ -19,7 +19,7 @@ from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
 from ..table import Table, from_arrays
 from ..titles import unit_or_none
-from ._extra import library
+from . import library
 from ._one_time import AnyArray, Series, by_length, on_one_time, overlap, unset_step
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")

@@ -46,12 +46,8 @@ def _best(fitting: list[Candidate]) -> Candidate:
 
 def _listed(texts: list[str]) -> str:
     """Return titles in quotation marks, the first few of many."""
-    shown = ", ".join(map(_quoted, texts[:_SHOWN]))
+    shown = ", ".join(f'"{text}"' for text in texts[:_SHOWN])
     return shown if len(texts) <= _SHOWN else f"{shown} and {len(texts) - _SHOWN} more"
-
-
-def _quoted(text: str) -> str:
-    return f'"{text}"'
 
 
 def _best_force(search: Search, forces: list[Candidate], chosen: dict[str, Candidate]) -> Candidate:
