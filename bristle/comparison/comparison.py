@@ -282,17 +282,7 @@ class RigComparer:
             return next(iter(sites))
         worst = site_errors(self._everywhere(present))[0]
         if not worst.fails and present.effects:
-            worst = site_errors(self._everywhere(without_effects(present)))[0]
+            worst = site_errors(self._everywhere(present.only(())))[0]
         if not worst.fails and DAMPER in sites:
             return DAMPER  # nothing fails anywhere: it is what a study is about
         return worst.site
-
-
-def without_effects(model: Model) -> Model:
-    """Return the law of a model alone."""
-
-    return replace(
-        model, effects=(), values={n: v for n, v in model.values.items() if "." not in n},
-        fixed=tuple(n for n in model.fixed if "." not in n),
-        limits={n: v for n, v in model.limits.items() if "." not in n},
-    )  # fmt: skip

@@ -340,10 +340,6 @@ def preferred(found: list[ResidualPattern]) -> list[ResidualPattern]:
     same = [one for one in ordered if one.share >= _ALIKE * top and one.significant]
     if not same:
         return ordered
-    same.sort(key=lambda one: _rank(one.coordinate))
+    same.sort(key=lambda one: [*PREFERENCE, one.coordinate].index(one.coordinate))
     first = replace(same[0], alike=tuple(one.coordinate for one in same[1:]))
     return [first, *(one for one in ordered if one.coordinate != first.coordinate)]
-
-
-def _rank(name: str) -> int:
-    return PREFERENCE.index(name) if name in PREFERENCE else len(PREFERENCE)

@@ -248,8 +248,7 @@ class RunPrediction:
         if self.held is not None:
             return self.held
         early = np.arange(len(self.measured)) < self.skip
-        known = np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
-        return error_of(self.measured, self.predicted, {SETTLING: early, MISSING: ~known})
+        return error_of(self.measured, self.predicted, {SETTLING: early, MISSING: ~self._there})
 
     @property
     def time(self) -> Array:
@@ -266,8 +265,11 @@ class RunPrediction:
     @property
     def judged(self) -> Flags:
         """Which of the samples after the skipped ones count (n - skip,)."""
-        known = np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
-        return known[self.skip :]
+        return self._there[self.skip :]
+
+    @property
+    def _there(self) -> Flags:
+        return np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
 
     @property
     def normalised(self) -> Array:

@@ -342,9 +342,7 @@ def _less_and_less(model: Model) -> Iterator[tuple[str, Model]]:
     """Yield what is taken from a model, and what is left of it then."""
     left = model
     for name in reversed(model.effects):
-        kept = tuple(one for one in left.effects if one != name)
-        values = {key: y for key, y in left.values.items() if not key.startswith(f"{name}.")}
-        left = replace(left, effects=kept, values=values)
+        left = left.only(tuple(one for one in left.effects if one != name))
         yield name, left
     law, taken = model.law_class, set[str]()
     for name, hooks in PARTS:

@@ -418,6 +418,18 @@ class Model:
         """The law's class."""
         return LAWS[self.law]
 
+    def only(self, effects: tuple[str, ...]) -> Model:
+        """Return the model with these of its effects alone, and what is given of them."""
+
+        def of(name: str) -> bool:
+            return "." not in name or name.partition(".")[0] in effects
+
+        return replace(
+            self, effects=effects, values={n: v for n, v in self.values.items() if of(n)},
+            fixed=tuple(filter(of, self.fixed)),
+            limits={n: v for n, v in self.limits.items() if of(n)},
+        )  # fmt: skip
+
     def value(self, name: str) -> float:
         """Return a parameter's value, its default where none is given."""
         return float(self.values.get(name, parameter(self.law, name).value))

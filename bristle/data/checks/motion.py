@@ -147,16 +147,15 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
         f"derivative of {lower}"
     )
     after = f"; the remainder is {plain(100 * found.residual, 2)} % of it"
+    text = f"{gain}{after}."
     off = abs(found.gain - 1.0)
     if found.gain < 0.0 or off > 0.25:
         size = abs(found.gain)
         doubts = ["sign"] * (found.gain < 0.0) + ["unit"] * (not 0.75 < size < 1.25)
-        text = f"{gain}{after}."
         do = f"Check the {' and the '.join(doubts)} of both in study.toml."
         yield Finding("gain", "error", text, do, run.name, upper, abs(log10(size)))
     else:
         certain = off > max(_GAIN, 4.0 * found.gain_std)
-        text = f"{gain}{after}."
         do = "One of the two instruments is out of calibration." if certain else ""
         level: Level = "warning" if certain else "note"
         yield Finding("gain", level, text, do, run.name, upper, off)

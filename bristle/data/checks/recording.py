@@ -366,7 +366,7 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
     list of SpectralLine
         By channel, the largest first; none of runs of fewer than `MIN_PATTERN_SAMPLES` samples.
     """
-    able = {name: y for name, y in channels.items() if _is_able(name, y)}
+    able = {name: y for name, y in channels.items() if _is_able(y)}
     spectra = {name: _spectrum(_cut_down(y, step), step) for name, y in able.items()}
     drivers = [name for name, y in able.items() if _moves(name) or _commands(name, y)]
     top = max((_band_top(able[name], step) for name in able if _moves(name)), default=0.0)
@@ -380,7 +380,7 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
         ]
         rms = float(np.sqrt(np.mean(able[name] ** 2)))
         out += [one for one in found if one.amplitude < _MOST_OF_SIGNAL * rms]
-    return [line for line in out if not _is_driven(line, out, spectra, able, step)]
+    return [line for line in out if not _is_driven(line, spectra, able, step)]
 
 
 def of_one_mains(
@@ -419,7 +419,7 @@ def of_one_mains(
     return out
 
 
-def _is_able(name: str, y: Array) -> bool:
+def _is_able(y: Array) -> bool:
     return len(y) >= MIN_LINE_SAMPLES and float(np.ptp(y)) > 0.0 and not is_switched(y)
 
 
@@ -546,11 +546,7 @@ def _is_steady(y: Array, frequency: float, step: float) -> bool:
 
 
 def _is_driven(
-    line: SpectralLine,
-    found: Sequence[SpectralLine],
-    spectra: Mapping[str, _Spectrum],
-    channels: Mapping[str, Array],
-    step: float,
+    line: SpectralLine, spectra: Mapping[str, _Spectrum], channels: Mapping[str, Array], step: float
 ) -> bool:
     """Return whether a line is motion or command, or no fault of its channel alone.
 
@@ -651,16 +647,9 @@ def _of_lines(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Fi
         "`bristle study check FOLDER --correct` takes it off. Look for a loop of the ground, or a "
         "shield that is open."
     )
-    return Finding(
-        "lines",
-        "warning",
-        text,
-        do,
-        run.name,
-        channel,
-        ordered[0].amplitude,
-        tuple(Correction(channel, "line", round(one.frequency, 4)) for one in ordered),
-    )
+    lines_off = tuple(Correction(channel, "line", round(one.frequency, 4)) for one in ordered)
+    size = ordered[0].amplitude
+    return Finding("lines", "warning", text, do, run.name, channel, size, lines_off)
 
 
 def _origin(line: SpectralLine, run: Measurement, mains: str) -> str:
