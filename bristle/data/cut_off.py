@@ -19,12 +19,9 @@ from .noise import stretches
 # All look at stretches of equal samples at an extreme, and none can stand for another. Before any
 # model a channel of any sampling is asked, and a peak in coarse steps must not be taken for a cut:
 # `clipped_ends`, which knows the step. A diagnosis leaves out what may have been cut, so chance
-# must
-# not cut it short: `stands_at_top`, on one side, its limits those of a decision rule. A fit refuses
-# a
-# force that carries nothing but its ends, whatever did that: `saturated_share`, both sides
-# together,
-# coarse steps included.
+# must not cut it short: `stands_at_top`, on one side, its limits those of a decision rule. A fit
+# refuses a force that carries nothing but its ends, whatever did that: `saturated_share`, both
+# sides together, coarse steps included.
 
 
 LONG = 5

@@ -27,8 +27,7 @@ from .sampling import Even
 #
 # A force jumps where the motion turns or the command switches, and the measured one went through a
 # short filter before samples were left out. So does a model's: it is evaluated at several moments
-# per
-# sample, on the motion between them, and what the same filter leaves is held against the
+# per sample, on the motion between them, and what the same filter leaves is held against the
 # measurement.
 
 MOST = 10

@@ -166,7 +166,7 @@ def title_rows(rows: Sequence[Sequence[str]]) -> tuple[int, int | None]:
         *_, names, units = max(pairs)
         return names, units
     last = len(rows) - 1
-    told = [_told(row) for row in rows]
+    told = [_score(row) for row in rows]
     able = [k for k, row in enumerate(rows) if told[k] >= told[last] and any(map(_is_time, row))]
     return max(able, key=lambda k: told[k], default=last), None
 
@@ -183,7 +183,7 @@ def _fit(names: Sequence[str], units: Sequence[str]) -> int:
     )
 
 
-def _told(names: Sequence[str]) -> int:
+def _score(names: Sequence[str]) -> int:
     """Return how much titles tell: a quantity counts, and so does a unit."""
     columns = [title(0, name) for name in names]
     known = [meaning(one.name, one.unit.name if one.unit else None) for one in columns]

@@ -274,11 +274,10 @@ def corrected(
 #
 # Between the ground and a level it is that level's motion. Between two levels it is a small
 # difference, and what the levels' sensors share cancels in it: the noise of the ground's
-# acceleration
-# is in the relative acceleration of every level. So channels are subtracted first and their
-# difference is smoothed, by its own jerk and the noise of the two sensors. Where the two levels do
-# not have the same sensors the smoothed motions are subtracted, and their errors add up as if they
-# were independent: a little too wide.
+# acceleration is in the relative acceleration of every level. So channels are subtracted first and
+# their difference is smoothed, by its own jerk and the noise of the two sensors. Where the two
+# levels do not have the same sensors the smoothed motions are subtracted, and their errors add up
+# as if they were independent: a little too wide.
 
 _NAME = "relative"
 

@@ -29,8 +29,7 @@ from ..physics.tuples import Inputs, Setup
 # Compiles what fits and diagnoses need in processes of their own, while the data are read.
 #
 # numba compiles under one lock, so threads would not help. What a process keeps on disk is read
-# here
-# once it is there.
+# here once it is there.
 
 _CODE = "import sys; from bristle.identification.histories import keep; keep(*sys.argv[1:])"
 

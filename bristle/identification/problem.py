@@ -188,11 +188,6 @@ def corrected(
 # Parameters of effects that are known of each run: its temperature, a pressure at each sample.
 
 
-def told_by(effect: type[Effect], parameter: str) -> str:
-    """Return the label of runs that a parameter of an effect is, or the mean of; else ""."""
-    return effect.labels.get(parameter) or effect.label_means.get(parameter, "")
-
-
 def values_of_labels(effects: Iterable[str], labels: Labels) -> dict[str, float]:
     """Return the values of effects that are labels of a run, by the names of a model."""
     known = {
@@ -552,11 +547,14 @@ class Problem:
     def scaled(self, law: str, name: str) -> float:
         """Return a parameter's default brought to the size of this rig, within its bounds."""
         declared = parameter(law, name)
-        effect, _, own = name.partition(".") if "." in name else ("", "", "")
-        if effect and EFFECTS[effect].of_this_rig():
-            return declared.value
-        if effect and (numbers := self._numbers(told_by(EFFECTS[effect], own))):
-            return float(np.clip(np.mean(numbers), *declared.bounds))
+        key, dot, own = name.partition(".")
+        if dot:
+            effect = EFFECTS[key]
+            if effect.of_this_rig():
+                return declared.value
+            label = effect.labels.get(own) or effect.label_means.get(own, "")
+            if numbers := self._numbers(label):
+                return float(np.clip(np.mean(numbers), *declared.bounds))
         reference = REFERENCE.get(declared.unit)
         value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)
         return min(max(value, declared.bounds[0]), declared.bounds[1])
@@ -832,7 +830,7 @@ def _robust_z(problem: Problem, model: Model, expected: Expected) -> float:
     return z_scale(in_noises(problem, residuals(problem, model, expected), expected))
 
 
-def told_z(problem: Problem, model: Model) -> float:
+def z_if_known(problem: Problem, model: Model) -> float:
     """Return z of a model, NaN where the noise is not known and z says nothing."""
     return robust_z(problem, model) if problem.noise_known else float("nan")
 

@@ -19,7 +19,7 @@ from .building_sites import StructureProblem, StructureRun, thinned
 from .error import ForceError, errors_by_run, pooled
 from .error_table import error_rms, force_rms
 from .fit import Fit, fit, identify
-from .problem import Model, Problem, Run, excess_of, told_z
+from .problem import Model, Problem, Run, excess_of, z_if_known
 from .rig import DAMPER, ROLES, Rig, Site, at_site
 from .start_grid import initial_guesses, refine
 from .watch import MODEL, series
@@ -476,7 +476,7 @@ def errors_of(models: SiteModels, cutoff: float) -> RigErrors:
     force = {role: pooled(found.values()) for role, found in at.items()}
     for role, error in force.items():
         pairs = [pair for _, pair in _pairs(models, role)]
-        out[f"z_{role}"] = max(told_z(*pair) for pair in pairs)
+        out[f"z_{role}"] = max(z_if_known(*pair) for pair in pairs)
         out[f"error_{role}"], out[f"error_share_{role}"] = error.headline
         squares = [error_rms(*pair, cutoff) ** 2 for pair in pairs]
         forces = [force_rms(problem.runs, cutoff) ** 2 for problem, _ in pairs]

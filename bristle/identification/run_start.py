@@ -48,7 +48,7 @@ NUDGE = 1e-3
 """The first step of that search, over the stroke for a state in m, else as it is."""
 
 
-class Begin(NamedTuple):
+class RunStart(NamedTuple):
     """How a run begins.
 
     `first` is the first sample that is judged; `rest` the number of samples before it in which the
@@ -59,7 +59,7 @@ class Begin(NamedTuple):
     rest: int = 0
 
 
-def begin_of(x: Array, force: Array, dt: float) -> Begin:
+def start_of(x: Array, force: Array, dt: float) -> RunStart:
     """Return how a run begins.
 
     Parameters
@@ -73,12 +73,12 @@ def begin_of(x: Array, force: Array, dt: float) -> Begin:
     rests = float(np.ptp(x[:stands])) <= RESTS * span
     loaded = abs(float(np.mean(force[:SETTLING]))) > LOADED * rms
     if rests and not loaded:
-        return Begin(SETTLING)
+        return RunStart(SETTLING)
     every = max(1, round(COARSE / dt))
     passed = np.cumsum(np.abs(np.diff(x[::every]))) > FORGOTTEN * span
     first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
     first = min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
-    return Begin(first, min(stands, first) if rests else 0)
+    return RunStart(first, min(stands, first) if rests else 0)
 
 
 def carrying_state(law: str, effects: Sequence[str]) -> tuple[str, str]:

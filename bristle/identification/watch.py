@@ -120,7 +120,7 @@ class _Series:
         self._told: _Told | None = None
         self._best: _Told | None = None
 
-    def begin(self) -> tuple[int, list[float]]:
+    def start(self) -> tuple[int, list[float]]:
         """Return the number of a new search, and where it notes its errors."""
         errors: list[float] = []
         self._errors = [*self._errors[1 - SEARCHES :], errors]
@@ -169,11 +169,11 @@ class _Search:
 
     def __init__(
         self, series: _Series, problem: Problem, at: Callable[[Array], Model],
-        told_by: tuple[Callable[[Array], float] | None, Expected | None], last: bool,
+        judged_by: tuple[Callable[[Array], float] | None, Expected | None], last: bool,
     ) -> None:  # fmt: skip
         self._series, self._problem, self._at = series, problem, at
-        (self._share, self._expected), self._is_last = told_by, last
-        self._number, self._errors = series.begin()
+        (self._share, self._expected), self._is_last = judged_by, last
+        self._number, self._errors = series.start()
         self._left: tuple[Array, float | None] | None = None  # what was not told yet
 
     def __call__(self, theta: Array, r: Array, cost: float) -> None:

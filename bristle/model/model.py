@@ -254,15 +254,15 @@ class StudyModel:
             return self
         old = DRIVES[self.drive].unit
 
-        def said(value: Value) -> Value:
+        def in_unit(value: Value) -> Value:
             return replace(value, unit=unit_for(value.unit, DRIVES[drive], old))
 
         return replace(
             self,
             drive=drive,
-            parameters={name: said(value) for name, value in self.parameters.items()},
+            parameters={name: in_unit(value) for name, value in self.parameters.items()},
             effects={
-                effect: {name: said(value) for name, value in values.items()}
+                effect: {name: in_unit(value) for name, value in values.items()}
                 for effect, values in self.effects.items()
             },
         )

@@ -20,8 +20,7 @@ from .finding import Finding
 # A channel that was interpolated to a faster rate before it was stored: it is straight in pieces.
 #
 # Between two measured samples an interpolated channel lies on a straight line, to the last digit
-# that
-# was written. No measured signal does so again and again at ever new slopes.
+# that was written. No measured signal does so again and again at ever new slopes.
 
 MIN_PATTERN_SAMPLES = 200
 """Samples from which on a pattern is no accident."""
@@ -84,9 +83,8 @@ def _last_digit(y: Array, size: float) -> float:
 # A channel that was averaged over some samples before it was stored, told from its spectrum.
 #
 # The mean of L samples has the gain |sin(pi L f dt) / (L sin(pi f dt))|: it is zero at every
-# multiple
-# of 1/(L dt), whatever was averaged, motion, jumps or noise. No other filter has nulls at equal
-# distances up to half the sampling rate.
+# multiple of 1/(L dt), whatever was averaged, motion, jumps or noise. No other filter has nulls at
+# equal distances up to half the sampling rate.
 
 MIN_AVERAGED = 1000
 """Samples from which on a spectrum is fine enough."""
@@ -128,7 +126,7 @@ def moving_average(y: Array, step: float) -> MovingAverage | None:
     if len(y) < MIN_AVERAGED or float(np.ptp(y)) == 0.0 or is_switched(y):
         return None
     frequency, level = _points(y)  # in samples^-1
-    inside = frequency > _begin(y)
+    inside = frequency > _start_of(y)
     if np.count_nonzero(inside) < 2 * _POINTS:
         return None
     frequency, level = frequency[inside], level[inside]
@@ -179,7 +177,7 @@ def _points(y: Array) -> tuple[Array, Array]:
     return at, np.quantile(groups, _QUANTILE, axis=1)
 
 
-def _begin(y: Array) -> float:
+def _start_of(y: Array) -> float:
     """Return the frequency [1/sample] from which on a spectrum has a simple shape."""
     power = power_spectrum(y)
     total = np.cumsum(power)
