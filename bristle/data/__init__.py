@@ -1,24 +1,10 @@
-"""What was measured: ground motions, measurements, the checks of both, and a study's model file.
+"""What was measured: ground motions, measurements, and the checks of both.
 
 Ground motions are built in, come from an extra package, or from the user's AT2 and CSV files.
 """
 
 from __future__ import annotations
 
-from .ground_motion import (
-    GroundMotion,
-    baked_in,
-    ground_motion_file,
-    list_ground_motions,
-    read_ground_motion,
-)
-from .listing import Listing
+from .ground_motion import ground_motion_file, list_ground_motions, read_ground_motion
 
-__all__ = [
-    "GroundMotion",
-    "Listing",
-    "baked_in",
-    "ground_motion_file",
-    "list_ground_motions",
-    "read_ground_motion",
-]
+__all__ = ["ground_motion_file", "list_ground_motions", "read_ground_motion"]

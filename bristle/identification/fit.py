@@ -121,7 +121,6 @@ class Fit:
     std: dict[str, float]
     cost: float
     unidentified: tuple[str, ...] = ()
-    evaluations: int = 0
     starts: int = 1
     agreed: int = 1
     covariance: Array | None = None
@@ -157,9 +156,8 @@ def fit(
         cost = mean_loss(loss(scaled.residuals(np.zeros(0))))
         return Fit(model, {}, cost)
     best, found = scaled.run(max_evaluations, tolerance=1e-5)
-    if not with_std:
-        return Fit(best, {}, found.cost, (), found.sweeps)
-    return _with_intervals(Fit(best, {}, found.cost, evaluations=found.sweeps), scaled, found.theta)
+    fitted = Fit(best, {}, found.cost)
+    return _with_intervals(fitted, scaled, found.theta) if with_std else fitted
 
 
 def _with_intervals(found: Fit, scaled: Search, theta: Array) -> Fit:

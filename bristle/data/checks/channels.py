@@ -167,17 +167,14 @@ def _coloured(
         yield Finding("noise", "note", f"{text}.", "", run.name, channel, share)
         return
     doubtful = facts.colour in ("slow", "hidden", "rough", "blue")
-    yield Finding(
-        "noise",
-        "warning" if doubtful else "note",
-        f"{text}; {_COLOURS[facts.colour]}.",
+    text = f"{text}; {_COLOURS[facts.colour]}."
+    do = (
         f"Give its standard deviation as noise in [channels.{channel}], from a record at rest."
         if doubtful
-        else "",
-        run.name,
-        channel,
-        share,
+        else ""
     )
+    level: Level = "warning" if doubtful else "note"
+    yield Finding("noise", level, text, do, run.name, channel, share)
 
 
 def _drift(run: Measurement, x: Array, velocity: Array | None) -> Iterator[Finding]:

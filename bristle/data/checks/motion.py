@@ -104,29 +104,21 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
     if np.ptp(force) == 0.0 or np.ptp(velocity) == 0.0:
         return
     share, agree = power_factor(force, velocity)
-    text = f"share of the power that it could dissipate: {share:+.2f}"
+    shown = f"share of the power that it could dissipate: {share:+.2f}"
     known = tells_sign(share, agree, len(force))
     if known and share < 0.0:
-        yield Finding(
-            "sign",
-            "error",
-            f"force drives the motion, because it is positive along it ({text}).",
+        text = f"force drives the motion, because it is positive along it ({shown})."
+        do = (
             "Turn its sign with bristle study channels MY_RIG --channel force=-COLUMN : a force is "
-            "positive when it resists motion along +x.",
-            run.name,
-            "force",
-            -share,
+            "positive when it resists motion along +x."
         )
+        yield Finding("sign", "error", text, do, run.name, "force", -share)
     elif not known:
-        yield Finding(
-            "sign",
-            "warning",
-            f"force neither resists nor drives the motion ({text}): its sign cannot be determined.",
-            "Check that force and motion were recorded together.",
-            run.name,
-            "force",
-            -abs(share),
+        text = (
+            f"force neither resists nor drives the motion ({shown}): its sign cannot be determined."
         )
+        do = "Check that force and motion were recorded together."
+        yield Finding("sign", "warning", text, do, run.name, "force", -abs(share))
 
 
 def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -> Iterator[Finding]:

@@ -139,14 +139,13 @@ def _too_short(runs: list[Excitation]) -> Iterator[Finding]:
     total = sum(run.cycles for run in runs)
     if total < 3.0 and any(run.speed > 0.0 for run in runs):
         seconds = sum(run.duration for run in runs)
-        yield Finding(
-            "short",
-            "error",
+        text = (
             f"all runs together hold {plain(total, 2)} cycles of motion in {plain(seconds)} s: "
             f"too few for "
-            "a model to be fitted and tested.",
-            "Record ten cycles or more at several speeds.",
+            "a model to be fitted and tested."
         )
+        do = "Record ten cycles or more at several speeds."
+        yield Finding("short", "error", text, do)
         return
     for run in runs:
         if run.speed > 0.0 and run.cycles < 2.0:
@@ -159,13 +158,12 @@ def _too_short(runs: list[Excitation]) -> Iterator[Finding]:
 def _drive(runs: list[Excitation]) -> Iterator[Finding]:
     driven = [run for run in runs if run.drive]
     if not driven:
-        yield Finding(
-            "drive",
-            "warning",
+        text = (
             "no command was recorded: if there is one, it is taken as constant at an unknown "
-            "level, and no effect of it can be tested.",
-            "Record the command, if there is one.",
+            "level, and no effect of it can be tested."
         )
+        do = "Record the command, if there is one."
+        yield Finding("drive", "warning", text, do)
         return
     name = driven[0].drive
     unit = DRIVES[name].unit
@@ -195,14 +193,13 @@ def _moving_drive(runs: list[Excitation], name: str, unit: str) -> Iterator[Find
     yield Finding("drive", "note", text)
     levels = _distinct(sorted(level for run in runs for level, _ in run.levels))
     if all(run.levels for run in runs) and len(levels) == 2:
-        yield Finding(
-            "drive levels",
-            "warning",
+        text = (
             f"{name} has two levels, {plain(levels[0], 4)} and {plain(levels[1], 4)} {unit}: "
             f"saturation cannot "
-            "be distinguished from a force that is linear in it.",
-            "Use three levels or more.",
+            "be distinguished from a force that is linear in it."
         )
+        do = "Use three levels or more."
+        yield Finding("drive levels", "warning", text, do)
 
 
 def _distinct(levels: list[float]) -> list[float]:
