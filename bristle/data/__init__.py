@@ -5,6 +5,11 @@ Ground motions are built in, come from an extra package, or from the user's AT2 
 
 from __future__ import annotations
 
-from .ground_motion import ground_motion_file, list_ground_motions, read_ground_motion
+from .ground_motion import (
+    baked_in,
+    ground_motion_file,
+    list_ground_motions,
+    read_ground_motion,
+)
 
-__all__ = ["ground_motion_file", "list_ground_motions", "read_ground_motion"]
+__all__ = ["baked_in", "ground_motion_file", "list_ground_motions", "read_ground_motion"]
