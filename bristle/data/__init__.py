@@ -11,5 +11,6 @@ from .ground_motion import (
     list_ground_motions,
     read_ground_motion,
 )
+from .listing import Listing
 
-__all__ = ["baked_in", "ground_motion_file", "list_ground_motions", "read_ground_motion"]
+__all__ = ["Listing", "baked_in", "ground_motion_file", "list_ground_motions", "read_ground_motion"]
