@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.identification.fit import Scaled
 from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.start_grid import Search
 
 Array = NDArray[np.float64]
 
@@ -225,7 +225,7 @@ def least_squares(begin: Model, train: Problem, held: Problem) -> float:
 
     size = float(np.sqrt(np.mean(np.concatenate([run.force for run in train.runs]) ** 2)))
     none = [(np.zeros(1), np.ones(1), np.zeros((1, 1))) for _ in train.runs]
-    scaled = Scaled(train, begin, none)
+    scaled = Search(train, begin, none, begin.free(), logarithms=False)
 
     def residuals(theta: Array) -> Array:
         return np.concatenate(errors_of(scaled.at(theta), train)) / size

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bristle.data.measurement import read_measurements
-from bristle.identification.fit import Scaled
 from bristle.identification.problem import Model, Problem, steady, without
 from bristle.identification.rig import DAMPER, ROLES, Site, bench_rig
 from bristle.identification.rig_fit import fit_site
+from bristle.identification.start_grid import Search
 from bristle.identification.starts import start_models
 from bristle.physics.laws import base_and_variant, law_names
 
@@ -114,7 +114,7 @@ def least_squares_fit(problem: Problem, model: Model) -> Model:
     none = [(np.zeros(1), np.ones(1), np.zeros((1, 1))) for _ in problem.runs]
     ends = []
     for start in start_models(problem, model, STARTS):
-        scaled = Scaled(problem, start, none)
+        scaled = Search(problem, start, none, start.free(), logarithms=False)
         found = least_squares(
             lambda theta, s=scaled: errors_of(problem, s.at(theta)), scaled.start,
             bounds=(scaled.low - 1e-12, scaled.high + 1e-12), x_scale="jac", max_nfev=MOST,

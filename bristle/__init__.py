@@ -22,7 +22,7 @@ from .version import __version__
 if TYPE_CHECKING:
     from .campaign.ensemble import Ensemble as Ensemble
     from .campaign.ensemble import ensemble as ensemble
-    from .comparison.comparison import Comparison as Comparison
+    from .comparison.result import Comparison as Comparison
     from .controller_comparison.compare import compare_controllers as compare_controllers
     from .data.measurement import Measurement as Measurement
     from .diagnosis.verdict import Diagnosis as Diagnosis
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 _LAZY = {
     "BristleError": "errors",
-    "Comparison": "comparison.comparison",
+    "Comparison": "comparison.result",
     "DesignResult": "synthesis.result",
     "Diagnosis": "diagnosis.verdict",
     "Effect": "physics.effect",

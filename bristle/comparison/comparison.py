@@ -3,169 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..core.arrays import Array
 from ..errors import RecordError
-from ..identification.error import ForceError
 from ..identification.fit import Fit
 from ..identification.problem import Model, Problem
 from ..identification.rig import DAMPER, Rig
 from ..identification.rig_fit import SiteModel, SiteModels, site_models
-from ..physics.drive import DRIVES, Drive
-from ..view import Viewable
-from .conditions import LabelError, Regime, label_errors, regimes
+from ..physics.drive import DRIVES
+from .conditions import label_errors, regimes
 from .misfit import (
-    CLOSE,
-    FEWEST,
-    RunError,
-    SiteError,
+    MIN_SAMPLES,
+    SiteMisfit,
     interval_of_z,
-    pattern_dict,
     refuse,
-    run_dict,
     run_error,
     total_error,
     with_failures,
     without_z,
 )
-from .patterns import FLIPS as FLIPS_PATTERNS
-from .patterns import Finder, ResidualPattern
+from .patterns import FLIPS, Finder
 from .predictions import RunPrediction, run_predictions
-from .spectrum import Spectrum, spectrum
+from .result import Comparison
+from .spectrum import spectrum
 from .words import sentences
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Viewable):
-    """A prediction held against measured runs; `bristle.compare` returns it, a notebook shows it.
-
-    Attributes
-    ----------
-    quantity, unit : str
-        What is compared: "force", "N".
-    runs : tuple of RunError
-        The error of each run; `total` over all.
-    z_interval : tuple of float
-        The 95 % interval of the total z, which is error / noise.
-    patterns : tuple of ResidualPattern
-        On which coordinate the residual depends, the most telling first; `second` is that of what
-        is left after the first, None where chance explains the rest.
-    spectrum : Spectrum
-        The residual's against the noise's.
-    regimes : tuple of Regime
-        z in classes of speed and command.
-    predictions : tuple of RunPrediction
-        The runs themselves, measured and predicted.
-    sentences : tuple of str
-        What an engineer would say.
-    seen : bool or None
-        Whether the runs were those of the fit, None where nobody knows.
-    role : str
-        "test" where the runs are those that neither a fit nor a verdict has seen.
-    sites : tuple of SiteError
-        The errors of a building's sites, the worst first, of which this is the comparison of one,
-        `site`.
-    labels : tuple of LabelError
-        The error by what is known of whole runs, where that differs between them.
-
-    Examples
-    --------
-    >>> import bristle, numpy as np
-    >>> t = np.arange(0.0, 8.0, 0.004)  # s
-    >>> v = 72e-3 * np.cos(9.0 * t)  # m/s
-    >>> noise = np.random.default_rng(1).normal(0.0, 0.05, t.size)
-    >>> run = {"time": t, "velocity": v, "force": 5.0 * np.sign(v) + 90.0 * v + noise}  # s, m/s, N
-    >>> comparison = bristle.compare(run, "bingham_standard")  # at its defaults
-    >>> comparison.right, comparison.z > 2.0
-    (False, True)
-    """
-
-    quantity: str
-    unit: str
-    runs: tuple[RunError, ...]
-    total: RunError
-    z_interval: tuple[float, float]
-    patterns: tuple[ResidualPattern, ...]
-    second: ResidualPattern | None
-    spectrum: Spectrum
-    regimes: tuple[Regime, ...]
-    predictions: tuple[RunPrediction, ...]
-    sentences: tuple[str, ...] = ()
-    seen: bool | None = False
-    sites: tuple[SiteError, ...] = ()
-    role: str = ""
-    labels: tuple[LabelError, ...] = ()
-
-    @property
-    def site(self) -> str:
-        """The site of a building that is compared, "" on a bench."""
-        return self.predictions[0].site
-
-    @property
-    def drive(self) -> Drive:
-        """What commands the damper in these runs."""
-        return DRIVES[self.predictions[0].drive]
-
-    @property
-    def z(self) -> float:
-        """RMS(residual)/noise expected of a true model, over all runs."""
-        return self.total.z
-
-    @property
-    def error(self) -> ForceError:
-        """The error over all runs."""
-        return self.total.error
-
-    @property
-    def noise_known(self) -> bool:
-        """Whether z says something: else it is NaN."""
-        return self.z == self.z
-
-    @property
-    def right(self) -> bool:
-        """Whether noise explains the error; of a building's site, with all sites looked at."""
-        if not self.noise_known:
-            return False
-        if self.sites:
-            return not next(one.fails for one in self.sites if one.site == self.site)
-        return self.z <= CLOSE
-
-    @property
-    def first(self) -> ResidualPattern | None:
-        """The coordinate that organises the residual most, None where chance explains all."""
-        return self.patterns[0] if self.patterns and self.patterns[0].significant else None
-
-    @property
-    def worst(self) -> RunPrediction:
-        """The run with the largest z."""
-        name = max(self.runs, key=lambda run: run.z).name
-        return next(one for one in self.predictions if one.name == name)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the comparison as JSON has it, without the samples."""
-        of_building = {"site": self.site, "sites": [one.as_dict() for one in self.sites]}
-        return {
-            **(of_building if self.sites else {}),
-            "quantity": self.quantity,
-            "unit": self.unit,
-            "held_out": None if self.seen is None else not self.seen,
-            "sentences": list(self.sentences),
-            "z": self.z,
-            "z_interval": list(self.z_interval),
-            "total": run_dict(self.total),
-            "runs": [run_dict(run) for run in self.runs],
-            "places": [pattern_dict(one) for one in self.patterns],
-            "second": pattern_dict(self.second) if self.second else None,
-            "bands": [asdict(band) for band in self.spectrum.bands],
-            "regimes": [one.as_dict() for one in self.regimes],
-            **({"labels": [one.as_dict() for one in self.labels]} if self.labels else {}),
-        }
+FEWER_FLIPS = 299
+"""Patterns of signs at a site that is not compared at length: enough for a chance of 1 %."""
 
 
 def compare(
@@ -204,8 +69,8 @@ def compare_predictions(
     *,
     seen: bool | None = False,
     seed: int = 0,
-    flips: int = FLIPS_PATTERNS,
-    others: Sequence[SiteError] = (),
+    flips: int = FLIPS,
+    others: Sequence[SiteMisfit] = (),
     role: str = "",
     every: Sequence[RunPrediction] = (),
 ) -> Comparison:
@@ -226,12 +91,8 @@ def compare_predictions(
     RecordError
         If there is no run, or one is too short, not finite or without noise.
     """
-    refuse(predictions)
-    normalised = [one.only_judged(one.normalised) for one in predictions]
-    residuals = [one.only_judged(one.residual) for one in predictions]
-    along = [one.judged_along() for one in predictions]
+    finder, normalised, along = _searched(predictions, flips, seed)
     runs = tuple(run_error(one.name, [one]) for one in predictions)
-    finder = Finder(normalised, residuals, along, flips, seed)
     found = finder.ranked(finder.normalised)
     second = None
     if found and found[0].significant:
@@ -249,8 +110,26 @@ def compare_predictions(
     if not predictions[0].noise_known:
         comparison = _without_z(comparison)
     if others:
-        comparison = replace(comparison, sites=with_failures([site_of(comparison), *others]))
+        here = SiteMisfit(
+            comparison.site, comparison.quantity, comparison.unit, comparison.runs,
+            comparison.total, comparison.z_interval, comparison.first,
+        )  # fmt: skip
+        comparison = replace(comparison, sites=with_failures([here, *others]))
     return replace(comparison, sentences=sentences(comparison, finder))
+
+
+def _searched(
+    predictions: Sequence[RunPrediction], flips: int, seed: int
+) -> tuple[Finder, list[Array], list[dict[str, Array]]]:
+    """Return the search for patterns, the normalised residuals (n,) of runs, their coordinates.
+
+    Of the samples that count.
+    """
+    refuse(predictions)
+    normalised = [one.only_judged(one.normalised) for one in predictions]
+    residuals = [one.only_judged(one.residual) for one in predictions]
+    along = [one.judged_along() for one in predictions]
+    return Finder(normalised, residuals, along, flips, seed), normalised, along
 
 
 def _without_z(comparison: Comparison) -> Comparison:
@@ -267,18 +146,7 @@ def _without_z(comparison: Comparison) -> Comparison:
     )  # fmt: skip
 
 
-def site_of(comparison: Comparison) -> SiteError:
-    """Return the site that is compared at length as one among the others."""
-    return SiteError(
-        comparison.site, comparison.quantity, comparison.unit, comparison.runs, comparison.total,
-        comparison.z_interval, comparison.first,
-    )  # fmt: skip
-
-
 # A building's model held against its runs at every site: the damper, the layer, each storey.
-
-FLIPS = 299
-"""Patterns of signs at a site that is not compared at length: enough for a chance of 1 %."""
 
 
 def compare_sites(
@@ -308,43 +176,39 @@ def compare_sites(
     errors = site_errors(predictions, seed)
     site = site or errors[0].site
     others = [one for one in errors if one.site != site]
-    able = usable(predictions[site])
     return compare_predictions(
-        able, seen=seen, seed=seed, others=others, role=role, every=predictions[site]
-    )
+        usable(predictions[site]), seen=seen, seed=seed, others=others, role=role,
+        every=predictions[site],
+    )  # fmt: skip
 
 
 def site_errors(
     predictions: Mapping[str, Sequence[RunPrediction]], seed: int = 0
-) -> tuple[SiteError, ...]:
+) -> tuple[SiteMisfit, ...]:
     """Return how wrong a model is at every site, the worst one first."""
     return with_failures([site_error(runs, seed) for runs in predictions.values()])
 
 
 def usable(predictions: Sequence[RunPrediction]) -> list[RunPrediction]:
     """Return the runs that are long enough; of a base that hardly slides little is left."""
-    return [one for one in predictions if len(one.measured) > one.skip + FEWEST]
+    return [one for one in predictions if len(one.measured) > one.skip + MIN_SAMPLES]
 
 
-def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteError:
+def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteMisfit:
     """Return how wrong a model is at a site, and along what, without the rest of a comparison."""
     first, every, predictions = predictions[0], predictions, usable(predictions)
     total, nothing = total_error(predictions, every), float("nan")
     if not predictions:
-        return SiteError(first.site, first.quantity, first.unit, (), total, (nothing,) * 2, None)
-    refuse(predictions)
+        return SiteMisfit(first.site, first.quantity, first.unit, (), total, (nothing,) * 2, None)
+    finder, normalised, _ = _searched(predictions, FEWER_FLIPS, seed)
     runs = tuple(run_error(one.name, [one]) for one in predictions)
-    normalised = [one.only_judged(one.normalised) for one in predictions]
-    residuals = [one.only_judged(one.residual) for one in predictions]
-    along = [one.judged_along() for one in predictions]
-    finder = Finder(normalised, residuals, along, FLIPS, seed)
     found = finder.ranked(finder.normalised)
     pattern = found[0] if found and found[0].significant else None
     interval = interval_of_z(normalised, finder)
     if not first.noise_known:
         total, runs, interval = without_z(total), tuple(map(without_z, runs)), (nothing, nothing)
         pattern = replace(pattern, of_excess=nothing) if pattern else None
-    return SiteError(first.site, first.quantity, first.unit, runs, total, interval, pattern)
+    return SiteMisfit(first.site, first.quantity, first.unit, runs, total, interval, pattern)
 
 
 # A model compared with the runs of a rig: at one site at length, at all others in short.
@@ -418,22 +282,7 @@ class RigComparer:
             return next(iter(sites))
         worst = site_errors(self._everywhere(present))[0]
         if not worst.fails and present.effects:
-            worst = site_errors(self._everywhere(without_effects(present)))[0]
+            worst = site_errors(self._everywhere(present.only(())))[0]
         if not worst.fails and DAMPER in sites:
             return DAMPER  # nothing fails anywhere: it is what a study is about
         return worst.site
-
-
-def without_effects(model: Model) -> Model:
-    """Return the law of a model alone."""
-
-    def own(name: str) -> bool:
-        return "." not in name
-
-    return replace(
-        model,
-        effects=(),
-        values={name: value for name, value in model.values.items() if own(name)},
-        fixed=tuple(name for name in model.fixed if own(name)),
-        limits={name: bounds for name, bounds in model.limits.items() if own(name)},
-    )

@@ -8,8 +8,8 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain, quantity, short_z
 from ..data.channels import Label, Labels, label_text, varying
 from ..identification.search import z_scale
@@ -17,8 +17,6 @@ from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .misfit import CLOSE
 from .names import joined, name_of
 from .predictions import RunPrediction
-
-Array = NDArray[np.float64]
 
 STEADY = 1e-3
 """Share of its largest value by which a command varies in a run that keeps to one level."""
@@ -188,11 +186,7 @@ def _split(own: Sequence[LabelError]) -> float:
 
 # In which regimes of speed and command a model is right within its noise.
 
-Mask = NDArray[np.bool_]
-
-RIGHT = 1.1
-"""z up to which a model is right within its noise, when so many samples are asked."""
-_FEWEST = 200  # samples of a regime that says something
+_MIN_SAMPLES = 200  # of a regime that says something
 
 
 @dataclass(frozen=True)
@@ -208,7 +202,7 @@ class Regime:
     @property
     def right(self) -> bool:
         """Whether the model is right within its noise there."""
-        return self.z <= RIGHT
+        return self.z <= CLOSE
 
     def as_dict(self) -> dict[str, Any]:
         """Return the regime as JSON has it."""
@@ -236,21 +230,15 @@ def regimes(
     cells += [(s, V) for s in speeds for V in levels]
     out = []
     for s, V in cells:
-        chosen = np.ones(len(r), dtype=bool)
-        names = []
-        for kind in (s, V):
-            if kind is not None:
-                chosen &= kind[1]
-                names.append(kind[0])
-        if chosen.sum() >= _FEWEST:
-            name = [kind[0] if kind else "" for kind in (s, V)]
-            out.append(
-                Regime(" and ".join(names), name[0], name[1], z_scale(r[chosen]), int(chosen.sum()))
-            )
+        speed, command = (kind[0] if kind else "" for kind in (s, V))
+        chosen = np.logical_and.reduce([kind[1] for kind in (s, V) if kind])
+        if chosen.sum() >= _MIN_SAMPLES:
+            text = " and ".join(filter(None, (speed, command)))
+            out.append(Regime(text, speed, command, z_scale(r[chosen]), int(chosen.sum())))
     return out
 
 
-def speed_classes(speed: Array | None) -> list[tuple[str, Mask]]:
+def speed_classes(speed: Array | None) -> list[tuple[str, Flags]]:
     """Return low, middle and high speed, cut at a quarter and 60 % of its high values."""
     if speed is None or not np.ptp(speed) > 0.0:
         return []
@@ -264,7 +252,7 @@ def speed_classes(speed: Array | None) -> list[tuple[str, Mask]]:
     ]
 
 
-def level_classes(V: Array | None, drive: Drive = VOLTAGE) -> list[tuple[str, Mask]]:
+def level_classes(V: Array | None, drive: Drive = VOLTAGE) -> list[tuple[str, Flags]]:
     """Return a command (n,) off, low and high; nothing where it does not vary."""
     if V is None or not np.ptp(V) > 1e-3 * max(float(np.max(np.abs(V))), 1e-12):
         return []

@@ -8,24 +8,22 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..errors import RecordError
 from ..identification.error import ForceError, pooled
 from ..identification.search import HUBER_AT_ONE, losses, mean_loss, z_scale
 from .patterns import LEVEL, Finder, ResidualPattern
 from .predictions import RunPrediction, rms
 
-Array = NDArray[np.float64]
-
 CLOSE = 1.1
 """z up to which an error is what noise explains."""
-FEWEST = 100
+MIN_SAMPLES = 100
 """Samples that a run of a comparison has at the least, beside those that are skipped."""
 
 
 @dataclass(frozen=True)
-class RunError:
+class RunMisfit:
     """The error on one run.
 
     `error` is the one that every command tells. `z` RMS(residual)/noise expected of a true model,
@@ -72,9 +70,16 @@ class RunError:
         """The error over the RMS of the measured output [1]."""
         return self.error.headline[1]
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the error as JSON has it."""
+        return {
+            **asdict(self), "error": self.error.as_dict(), "fit": self.fit,
+            "accounted": self.accounted,
+        }  # fmt: skip
+
 
 @dataclass(frozen=True)
-class SiteError:
+class SiteMisfit:
     """How wrong a model is at one site of a building.
 
     `site` is "damper", "layer", "storey1" ...; `quantity`, `unit` what is compared there; `runs`
@@ -86,8 +91,8 @@ class SiteError:
     site: str
     quantity: str
     unit: str
-    runs: tuple[RunError, ...]
-    total: RunError
+    runs: tuple[RunMisfit, ...]
+    total: RunMisfit
     z_interval: tuple[float, float]
     pattern: ResidualPattern | None
     fails: bool = False
@@ -118,9 +123,9 @@ class SiteError:
             "z": self.z,
             "z_interval": list(self.z_interval),
             "fails": self.fails,
-            "total": run_dict(self.total),
-            "runs": [run_dict(run) for run in self.runs],
-            "place": pattern_dict(self.pattern) if self.pattern else None,
+            "total": self.total.as_dict(),
+            "runs": [run.as_dict() for run in self.runs],
+            "place": self.pattern.as_dict() if self.pattern else None,
         }
 
 
@@ -129,9 +134,10 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
     if not predictions:
         raise RecordError("there is no run to compare with.")
     for one in predictions:
-        if len(one.measured) <= one.skip + FEWEST:
+        if len(one.measured) <= one.skip + MIN_SAMPLES:
             raise RecordError(
-                f"{one.name}: {len(one.measured)} samples; a comparison needs {one.skip + FEWEST}."
+                f"{one.name}: {len(one.measured)} samples; a comparison needs "
+                f"{one.skip + MIN_SAMPLES}."
             )
         for what, values in (("predicted", one.predicted), ("measured", one.measured)):
             bad = np.flatnonzero(~np.isfinite(values))
@@ -147,19 +153,19 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
             )
 
 
-def without_z(run: RunError) -> RunError:
+def without_z(run: RunMisfit) -> RunMisfit:
     """Return an error whose noise is not known: nothing says how much of it is noise."""
     none = float("nan")
     return replace(run, z=none, numerical_z=none, noise=none, noise_own=none)
 
 
-def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
+def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunMisfit:
     """Return the error over some runs; over those without a sample for z as well."""
     error = pooled(one.error for one in predictions)
     predictions = [one for one in predictions if one.judged.any()]
     if not predictions:
         nothing = float("nan")
-        return RunError(name, error, 0, *[nothing] * 8)
+        return RunMisfit(name, error, 0, *[nothing] * 8)
     residual = np.concatenate([one.residual[one.judged] for one in predictions])
     sigma = np.concatenate([one.sigma[one.skip :][one.judged] for one in predictions])
     own = np.concatenate([np.full(one.judged.sum(), one.noise) for one in predictions])
@@ -168,14 +174,14 @@ def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
     ]
     moved = np.concatenate(tried) if len(tried) == len(predictions) else np.full(1, np.nan)
     measured = np.concatenate([one.measured[one.skip :][one.judged] for one in predictions])
-    return RunError(
+    return RunMisfit(
         name, error, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
         rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
         float(np.std(residual)), float(np.std(measured)),
     )  # fmt: skip
 
 
-def total_error(able: Sequence[RunPrediction], every: Sequence[RunPrediction]) -> RunError:
+def total_error(able: Sequence[RunPrediction], every: Sequence[RunPrediction]) -> RunMisfit:
     """Return the error over all runs: z of those that are long enough, the error of every one."""
     return replace(run_error("all runs", able), error=pooled(one.error for one in every))
 
@@ -194,23 +200,7 @@ def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, f
     return float(np.sqrt(low / HUBER_AT_ONE)), float(np.sqrt(high / HUBER_AT_ONE))
 
 
-def run_dict(run: RunError) -> dict[str, Any]:
-    """Return an error as JSON has it."""
-    return {
-        **asdict(run), "error": run.error.as_dict(), "fit": run.fit, "accounted": run.accounted,
-    }  # fmt: skip
-
-
-def pattern_dict(pattern: ResidualPattern) -> dict[str, Any]:
-    """Return a pattern as JSON has it."""
-    found = asdict(pattern)
-    for key in ("centre", "low", "high", "mean", "std"):
-        found[key] = [float(value) for value in found[key]]
-    del found["raw"], found["chance"]
-    return {**found, "alike": list(pattern.alike), "significant": pattern.significant}
-
-
-def with_failures(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
+def with_failures(sites: Iterable[SiteMisfit]) -> tuple[SiteMisfit, ...]:
     """Return sites of which it is known which ones fail, those first, then by z.
 
     Of twenty storeys one has a large z by chance: a site fails if the chance of its z is small for
@@ -219,7 +209,7 @@ def with_failures(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
     sites = list(sites)
     far = NormalDist().inv_cdf(1.0 - LEVEL / max(len(sites), 1)) / 1.96
 
-    def fails(one: SiteError) -> bool:
+    def fails(one: SiteMisfit) -> bool:
         high = one.z_interval[1]
         return one.z > CLOSE and one.z**2 - far * (high**2 - one.z**2) > 1.0
 

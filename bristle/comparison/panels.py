@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import PolyCollection
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import log_ticks, percent, plain, quantity, short_z
 from ..data.channels import label_text
 from ..data.cycles import by_level, cycles, steady
@@ -16,17 +16,14 @@ from ..identification.search import z_scale
 from ..physics.drive import DRIVES
 from ..view.style import BLUE, GREY, INK, PALE, VERMILION, zero_lines
 from .names import name_of
-from .predictions import SHOWN, shown
+from .patterns import ResidualPattern
+from .predictions import SHOWN, RunPrediction, shown
+from .result import Comparison
+from .words import capitalised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .comparison import Comparison
-    from .patterns import ResidualPattern
-    from .predictions import RunPrediction
-
-
-Array = NDArray[np.float64]
 
 MEASURED, PREDICTED, ERROR = INK, BLUE, VERMILION
 _DOTS = 3000
@@ -193,8 +190,8 @@ def _as_text(text: Callable[[float], str]) -> Callable[[float, float], str]:
 def draw_regimes(axes: Axes, comparison: Comparison) -> None:
     """Draw z in classes of speed and command, 1 being what noise explains."""
     cells = [one for one in comparison.regimes if one.speed or one.command]
-    speeds = _ordered(one.speed for one in cells if one.speed)
-    levels = _ordered(one.command for one in cells if one.command)
+    speeds = list(dict.fromkeys(one.speed for one in cells if one.speed))
+    levels = list(dict.fromkeys(one.command for one in cells if one.command))
     pairs = {(one.speed, one.command): one.z for one in cells}
     columns, rows = (levels or [""]), (speeds or [""])
     values = np.array([[pairs.get((s, V), np.nan) for V in columns] for s in rows])
@@ -270,12 +267,7 @@ def _axis(coordinate: str, site: str) -> str:
 
 
 def _named(prediction: RunPrediction) -> str:
-    name = prediction.quantity.replace("_", " ")
-    return name[:1].upper() + name[1:]
-
-
-def _ordered(names: Any) -> list[str]:
-    return list(dict.fromkeys(names))
+    return capitalised(prediction.quantity.replace("_", " "))
 
 
 def _short(text: str) -> str:
@@ -327,9 +319,8 @@ def chosen_cycles(predictions: Sequence[RunPrediction], most: int = MOST) -> lis
     skip = max(one.skip for one in predictions)
     found = [one for one in cycles(motions, skip) if _whole(predictions[one.run], one.part)]
     if name == "speed":  # the median of a cycle is no measure of how fast it is
-        found = [
-            one._replace(level=_peak(motions[one.run][1][one.part]), spread=0.0) for one in found
-        ]
+        peaks = [float(np.max(np.abs(motions[one.run][1][one.part]))) for one in found]
+        found = [one._replace(level=v, spread=0.0) for one, v in zip(found, peaks, strict=True)]
     out = []
     for one in by_level(found, most):
         of = predictions[one.run]
@@ -359,10 +350,6 @@ def z_of(of: RunPrediction, part: slice) -> float:
     if not of.noise_known:
         return float("nan")
     return z_scale((of.measured - of.predicted)[part] / of.sigma[part])
-
-
-def _peak(v: Array) -> float:
-    return float(np.max(np.abs(v)))
 
 
 def _whole(of: RunPrediction, part: slice) -> bool:
@@ -399,7 +386,6 @@ def draw_cycle(
     over: str,
     *,
     force: tuple[float, str] = (1.0, "N"),
-    band: bool = True,
 ) -> None:
     """Draw a cycle, measured and predicted, in the band of 95 % of a true model's samples.
 
@@ -450,7 +436,7 @@ def draw_loops(
     """
     for number, (over, panels) in enumerate(rows.items()):
         site = shown[0].prediction.site
-        axis = name_of(over, site).removeprefix("the ")
+        axis = _axis(over, site)
         for panel, one in zip(panels, shown, strict=False):
             draw_cycle(panel, one, over, force=force)
             panel.set_xlabel(f"{axis} [{SHOWN.get(over, (1.0, ''))[1]}]", fontsize=8)

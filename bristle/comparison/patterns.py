@@ -12,16 +12,15 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.search import z_scale
 from ..physics.drive import DRIVES
 from .predictions import BINS, FINE, SLOW, Bins, cut, rms
-
-Array = NDArray[np.float64]
 
 FLIPS = 1999
 LEVEL = 0.01
@@ -29,7 +28,7 @@ LEVEL = 0.01
 CUT_OFF = 8.0
 """Normalised residuals are cut there, times z where that is above 1: spikes are no pattern."""
 _SHORTEST = 40  # samples of a block at the least
-_FEWEST = 30  # blocks at the least, as long as that leaves each `_SHORTEST` samples
+_MIN_BLOCKS = 30  # blocks at the least, as long as that leaves each `_SHORTEST` samples
 _ALIKE = 0.95  # share of the best coordinate's from which another tells the same
 _PER_BIN = 8  # blocks per bin of a coordinate that only grows
 
@@ -82,6 +81,14 @@ class ResidualPattern:
         """Whether chance is not a fair explanation."""
         return self.p <= LEVEL
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the pattern as JSON has it."""
+        found = asdict(self)
+        for key in ("centre", "low", "high", "mean", "std"):
+            found[key] = [float(value) for value in found[key]]
+        del found["raw"], found["chance"]
+        return {**found, "alike": list(self.alike), "significant": self.significant}
+
 
 class Blocks:
     """Samples in blocks longer than the residual's correlation, none across two runs.
@@ -133,7 +140,7 @@ def block_length(residuals: Sequence[Array]) -> int:
     total = sum(len(r) for r in residuals)
     times = [correlation_time(r) for r in residuals if len(r) > _SHORTEST]
     wanted = 8.0 * max(times, default=1.0)
-    return int(max(_SHORTEST, min(wanted, total / _FEWEST)))
+    return int(max(_SHORTEST, min(wanted, total / _MIN_BLOCKS)))
 
 
 def correlation_time(r: Array) -> float:
@@ -333,31 +340,6 @@ def preferred(found: list[ResidualPattern]) -> list[ResidualPattern]:
     same = [one for one in ordered if one.share >= _ALIKE * top and one.significant]
     if not same:
         return ordered
-    same.sort(key=lambda one: _rank(one.coordinate))
+    same.sort(key=lambda one: [*PREFERENCE, one.coordinate].index(one.coordinate))
     first = replace(same[0], alike=tuple(one.coordinate for one in same[1:]))
     return [first, *(one for one in ordered if one.coordinate != first.coordinate)]
-
-
-def _rank(name: str) -> int:
-    return PREFERENCE.index(name) if name in PREFERENCE else len(PREFERENCE)
-
-
-def dependence(
-    residual: Array, coordinate: Array, flips: int = 299, seed: int = 0
-) -> tuple[float, float]:
-    """Return how much of a residual a coordinate organises, and the most by chance.
-
-    Both are roots of shares of the residual's power, as a correlation is; chance is the 99 %
-    quantile under random signs of blocks.
-
-    Parameters
-    ----------
-    residual : (n,) over the noise expected of a true model, or in any unit
-    coordinate : (n,) in any unit
-    flips, seed : how many random patterns of signs are drawn, and their seed
-    """
-    finder = Finder([residual], [residual], [{"it": coordinate}], flips, seed)
-    if "it" not in finder.bins:
-        return 0.0, 0.0
-    pattern, _ = finder._pattern("it", finder.bins["it"], finder.normalised, residual, False)
-    return float(np.sqrt(pattern.raw)), float(np.sqrt(pattern.chance))

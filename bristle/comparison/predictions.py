@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from ..core.arrays import Array, Flags, Indices
 from ..core.text import scale
-from ..data.channels import Labels as ChannelsLabels
+from ..data.channels import Labels
 from ..data.decimate import between
 from ..data.left_out import MISSING, SETTLING
 from ..identification.building_sites import StructureRun
@@ -21,9 +21,6 @@ from ..identification.problem import LOST, Model, Problem, Run, over_noise
 from ..physics.drive import DRIVES, VOLTAGE
 
 # The coordinates along which a residual may be organised, and the bins of each.
-
-Array = NDArray[np.float64]
-Labels = NDArray[np.int64]
 
 RECENT = 0.05
 """Time over which a change of the voltage counts as its rate [s]."""
@@ -132,8 +129,6 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
     The change since its own first-order lag: a step shows for some `over` seconds, where a
     difference from sample to sample shows it once.
     """
-    from scipy.signal import lfilter
-
     keep = float(np.exp(-dt / over))
     rest, _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
     lagged = np.concatenate([V[:1], np.asarray(rest, dtype=float)])
@@ -144,7 +139,7 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
 class Bins:
     """A coordinate cut into bins: `label` (n,) of each sample, `centre`, `low`, `high` (b,)."""
 
-    label: Labels
+    label: Indices
     centre: Array
     low: Array
     high: Array
@@ -187,7 +182,7 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
     )
 
 
-def _begins(counts: NDArray[np.int64], share: float) -> NDArray[np.int64]:
+def _begins(counts: Indices, share: float) -> Indices:
     """Return at which of the levels, by how often they occur (n,), a bin begins (b,).
 
     A level that holds a `share` of the samples by itself is a bin; of the others a bin takes so
@@ -238,11 +233,11 @@ class RunPrediction:
     quantity: str = "force"
     unit: str = "N"
     skip: int = 25
-    known: NDArray[np.bool_] | None = None
+    known: Flags | None = None
     site: str = ""
-    index: NDArray[np.int64] | None = None
+    index: Indices | None = None
     drive: str = VOLTAGE.name
-    labels: ChannelsLabels = field(default_factory=dict)
+    labels: Labels = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     held: ForceError | None = None
     noise_known: bool = True
@@ -253,8 +248,7 @@ class RunPrediction:
         if self.held is not None:
             return self.held
         early = np.arange(len(self.measured)) < self.skip
-        known = np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
-        return error_of(self.measured, self.predicted, {SETTLING: early, MISSING: ~known})
+        return error_of(self.measured, self.predicted, {SETTLING: early, MISSING: ~self._there})
 
     @property
     def time(self) -> Array:
@@ -269,10 +263,13 @@ class RunPrediction:
         return (error if self.known is None else np.where(self.known, error, 0.0))[self.skip :]
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Flags:
         """Which of the samples after the skipped ones count (n - skip,)."""
-        known = np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
-        return known[self.skip :]
+        return self._there[self.skip :]
+
+    @property
+    def _there(self) -> Flags:
+        return np.ones(len(self.measured), dtype=bool) if self.known is None else self.known
 
     @property
     def normalised(self) -> Array:
@@ -373,9 +370,6 @@ def halved(run: Run) -> Run:
         },
         left_out={},
     )
-
-
-# The size of an error in units of the noise, by a scale that a few large errors do not carry.
 
 
 def rms(values: Array) -> float:

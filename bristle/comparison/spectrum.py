@@ -5,17 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.search import z_scale
-
-if TYPE_CHECKING:
-    from .predictions import RunPrediction
-
-Array = NDArray[np.float64]
+from .predictions import RunPrediction
 
 _CYCLES = 3  # of the lowest band's frequency in a run, so that it holds enough lines
 _MOST = 9

@@ -10,9 +10,8 @@ from ..data.channels import Label, label_text, varying
 from ..physics.drive import DRIVES
 from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import BLUE, FLOOR, GREY, INK, VERMILION, Page, look
-from .comparison import Comparison
 from .conditions import known_of
-from .misfit import CLOSE, RunError, SiteError
+from .misfit import CLOSE, RunMisfit, SiteMisfit
 from .names import name_of, site_name
 from .panels import (
     OVERS,
@@ -28,7 +27,8 @@ from .panels import (
     worst_window,
 )
 from .patterns import ResidualPattern
-from .words import FAINT, begin
+from .result import Comparison
+from .words import FAINT, capitalised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +64,7 @@ def site_table(comparison: Comparison) -> Table:
     return Table(header, [_site(one, factor) for one in comparison.sites], range(1, 6), title)
 
 
-def _site(one: SiteError, factor: float) -> list[str]:
+def _site(one: SiteMisfit, factor: float) -> list[str]:
     name = site_name(one.site).removeprefix("the ")
     if not one.total.samples:
         return [name, "-", one.why_not, "-", "-", "-", "-"]
@@ -91,7 +91,7 @@ def run_table(comparison: Comparison) -> Table:
         rows.append([*_run(comparison.total, factor), *["" for _ in names]])
     title = "Error / noise (z), RMS at all frequencies, and the sensitivity to halving the step"
     if comparison.sites:
-        title = f"{begin(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
+        title = f"{capitalised(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
     return Table(header, rows, range(1, len(header)), title)
 
 
@@ -108,7 +108,7 @@ def label_table(comparison: Comparison) -> Table:
     return Table(["label", "value", "z", "runs"], rows, (1, 2, 3), title)
 
 
-def _run(run: RunError, factor: float) -> list[str]:
+def _run(run: RunMisfit, factor: float) -> list[str]:
     numerical = plain(run.numerical_z, 2) if run.numerical_z == run.numerical_z else "not tried"
     if run.z != run.z:
         numerical = short_z(None)
@@ -289,7 +289,7 @@ def sites_height(count: int) -> float:
     return 0.95 + 0.25 * count
 
 
-def draw_sites(axes: Axes, sites: Sequence[SiteError], before: Sequence[SiteError] = ()) -> None:
+def draw_sites(axes: Axes, sites: Sequence[SiteMisfit], before: Sequence[SiteMisfit] = ()) -> None:
     """Draw z at every site of a building, the top storey above, over the band of noise.
 
     Small dots are runs, the large one all of them with the 95 % interval; `before` are the sites of

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain, quantity, short_z
 from ..data.channels import UNITS
 from ..physics.drive import DRIVES
 from .conditions import Regime, label_sentence
 from .names import joined, name_of, site_name, site_names
 from .patterns import Finder, ResidualPattern
-from .predictions import SHOWN, shown
-
-if TYPE_CHECKING:
-    from .comparison import Comparison
-    from .predictions import RunPrediction
-
-Array = NDArray[np.float64]
+from .predictions import SHOWN, RunPrediction, shown
+from .result import Comparison
 
 FAINT = 0.02
 """Share of an error's power below which its pattern is not worth a sentence."""
@@ -140,13 +134,13 @@ def _where_right(comparison: Comparison) -> str:
     if right:
         best = max(right, key=lambda one: (not (one.speed and one.command), one.samples))
         others = [one for one in right if _beside(one, best)]
-        text = f"{begin(best.text)} it is right within its noise (z = {best.z:.2f})"
+        text = f"{capitalised(best.text)} it is right within its noise (z = {best.z:.2f})"
         if others:
             text += f", and so it is {max(others, key=lambda one: one.samples).text}"
         return text + "."
     loud = _loudest(comparison)
     if not every:
-        return f"{begin(loud)}." if loud else "Without a speed, no regimes can be compared."
+        return f"{capitalised(loud)}." if loud else "Without a speed, no regimes can be compared."
     best = min(every, key=lambda one: one.z)
     if comparison.right:
         return f"The model is best {best.text} (z = {best.z:.2f})."
@@ -335,7 +329,7 @@ def _at_levels(pattern: ResidualPattern, comparison: Comparison, finder: Finder)
 
 
 def size_of(
-    pattern: ResidualPattern, finder: Finder, chosen: Sequence[bool] | NDArray[np.bool_]
+    pattern: ResidualPattern, finder: Finder, chosen: Sequence[bool] | Flags
 ) -> tuple[float, float]:
     """Return the size of a pattern among some samples, 1 for that of all, and its uncertainty."""
     mean, std = finder.mean_along(pattern, finder.raw, np.asarray(chosen, dtype=float))
@@ -351,6 +345,6 @@ def _percent(share: float) -> str:
     return f"{plain(100.0 * share, 2 if share < 0.995 else 3)} %"
 
 
-def begin(text: str) -> str:
-    """Return a text with a capital at its begin."""
+def capitalised(text: str) -> str:
+    """Return a text that starts with a capital."""
     return text[:1].upper() + text[1:]

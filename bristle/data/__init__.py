@@ -1,4 +1,4 @@
-"""What was measured: ground motions, measurements, the checks of both, and a study's model file.
+"""What was measured: ground motions, measurements, and the checks of both.
 
 Ground motions are built in, come from an extra package, or from the user's AT2 and CSV files.
 """
@@ -6,7 +6,6 @@ Ground motions are built in, come from an extra package, or from the user's AT2 
 from __future__ import annotations
 
 from .ground_motion import (
-    GroundMotion,
     baked_in,
     ground_motion_file,
     list_ground_motions,
@@ -14,11 +13,4 @@ from .ground_motion import (
 )
 from .listing import Listing
 
-__all__ = [
-    "GroundMotion",
-    "Listing",
-    "baked_in",
-    "ground_motion_file",
-    "list_ground_motions",
-    "read_ground_motion",
-]
+__all__ = ["Listing", "baked_in", "ground_motion_file", "list_ground_motions", "read_ground_motion"]

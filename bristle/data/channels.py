@@ -10,8 +10,8 @@ from difflib import get_close_matches
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import plain
 from ..core.text import quantity as quantity_text
 from ..errors import RecordError
@@ -33,7 +33,7 @@ TEMPERATURE = "temperature"
 """The label that is a channel's mean where a run has one of that name."""
 
 
-def mean_temperature(values: NDArray[np.float64]) -> tuple[float | None, str]:
+def mean_temperature(values: Array) -> tuple[float | None, str]:
     """Return the mean of a temperature (n,) [degC] over a run, None without any, and a note of it.
 
     A slow logger leaves fields empty: they do not count. Tenths of a kelvin are what a sensor

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain, quantity
 from .channels import channel_unit
-from .table import Array
 
 # A command as it reaches the coil: limited in slew or in range behind the point of its record.
 #
@@ -35,11 +35,11 @@ JUMP = 8.0
 """How many times the changes beside it a change of a command exceeds that is a jump."""
 
 
-def jumps(V: Array) -> NDArray[np.bool_]:
+def jumps(V: Array) -> Flags:
     """Return at which samples of a command (n,) it jumps: it was held until then."""
     change = np.abs(np.diff(V, prepend=V[:1]))
     beside = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
-    found: NDArray[np.bool_] = change > JUMP * beside
+    found: Flags = change > JUMP * beside
     return found
 
 

@@ -6,35 +6,26 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import quantity
 from .channels import DRIVE, channel_unit
 from .left_out import merged
 from .measurement import Measurement
+from .noise import stretches
 
 # Whether a channel was cut off at the end of its range, by three measures for three questions.
 #
 # All look at stretches of equal samples at an extreme, and none can stand for another. Before any
 # model a channel of any sampling is asked, and a peak in coarse steps must not be taken for a cut:
 # `clipped_ends`, which knows the step. A diagnosis leaves out what may have been cut, so chance
-# must
-# not cut it short: `stands_at_top`, on one side, its limits those of a decision rule. A fit refuses
-# a
-# force that carries nothing but its ends, whatever did that: `saturated_share`, both sides
-# together,
-# coarse steps included.
+# must not cut it short: `stands_at_top`, on one side, its limits those of a decision rule. A fit
+# refuses a force that carries nothing but its ends, whatever did that: `saturated_share`, both
+# sides together, coarse steps included.
 
-Array = NDArray[np.float64]
 
 LONG = 5
 """Equal samples in a row at an extreme that a moving force does not show."""
-
-
-def stretches(flat: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the first sample and the one after the last (k, 2) of each stretch that is true."""
-    padded = np.concatenate([[0], flat.astype(np.int8), [0]])
-    return np.asarray(np.flatnonzero(np.diff(padded)).reshape(-1, 2), dtype=np.int64)
 
 
 def saturated_share(values: Array) -> float:
@@ -127,7 +118,7 @@ def ends_of(
 
 def beyond_range(
     values: Array, noise: float, level: float, longest: int = LONGEST, crowded: float = CROWDED
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Return which samples (n,) of a signal may have been cut off.
 
     What is cut may get its noise behind the cut: then it stands a little inside of it, too.

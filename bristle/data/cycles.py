@@ -7,9 +7,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..core.arrays import Array, Indices
 
 DEAD = 0.05
 """Speed over its RMS below which a motion keeps its direction: noise about rest is no reversal."""
@@ -104,7 +103,7 @@ def _range(found: Sequence[Cycle]) -> tuple[float, float]:
     return min(levels), max(levels) - min(levels)
 
 
-def _turns(v: Array) -> NDArray[np.int64]:
+def _turns(v: Array) -> Indices:
     """Return the samples (k,) from which on a velocity (n,) is positive again."""
     size = float(np.sqrt(np.mean(v**2)))
     side = np.where(v > DEAD * size, 1, np.where(v < -DEAD * size, -1, 0))

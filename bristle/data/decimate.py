@@ -15,20 +15,19 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain
 from ..errors import RecordError
 from .channels import DRIVE, is_smooth
 from .corrections import TIMING, Correction, jumps
 from .noise import SHORTEST, Noise, estimate_noise, is_switched
 from .sampling import Even
-from .table import Array
 
 # Between the samples of a decimated run: where a model is evaluated, and the filter behind it.
 #
 # A force jumps where the motion turns or the command switches, and the measured one went through a
 # short filter before samples were left out. So does a model's: it is evaluated at several moments
-# per
-# sample, on the motion between them, and what the same filter leaves is held against the
+# per sample, on the motion between them, and what the same filter leaves is held against the
 # measurement.
 
 MOST = 10
@@ -125,7 +124,6 @@ class Finer:
 # smoother. That lowers white noise, by a share that is known, so that noise is estimated before.
 # Where a force bends so much between two samples that no line follows it, its value is not judged.
 
-Flags = NDArray[np.bool_]
 
 _ALONE = np.ones(1)
 _BINS = 20  # of the distances from a sample, where a clock goes through all of them

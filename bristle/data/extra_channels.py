@@ -12,17 +12,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain
 from ..errors import RecordError, UnitError
-from ..units import conversion, parse, si_unit
-from .channels import UNITS, ChannelSpec, is_channel
+from ..units import conversion, parse, same_dimension, si_unit
+from .channels import DRIVE, PLAIN, UNITS, ChannelSpec, is_channel, meaning, of_a_sensor
 from .columns import Column
-from .raw_signals import raw_signals
-from .table import Array, Table
+from .table import Table
 
-FEWEST = 20
+MIN_VALUES = 20
 """Values of such a channel in a run, at least."""
 
 HOLE = 0.25
@@ -31,14 +30,18 @@ HOLE = 0.25
 ABSURD = 1e30
 """What some recorders write where a value is missing; so do larger numbers."""
 
-MOST = 40
+MAX_CHANNELS = 40
 """Columns of a file that are taken for such channels, at the most."""
 
-LOOKED = 2000
+COMPARED = 2000
 """Values of a column that are compared with those of another."""
 
-SAME = 1e-6
-"""Share of its spread by which a column may leave a line in another one and hold the same."""
+SAME = 1e-6, 1e-12
+"""Share of its spread by which a column may leave a line in another one and hold the same, and
+share of its largest value below which that spread is none."""
+
+RAW = 0.02, 1e-9
+"""The same of a raw signal, by its rounding."""
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _TITLE_UNIT = re.compile(r".*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]\s*")
@@ -135,18 +138,60 @@ def found_in(table: Table, used: Iterable[str], names: Iterable[str]) -> dict[st
         if column.text in raw:
             continue
         unit = unit_as_written(column)
-        if len(out) == MOST:
+        if len(out) == MAX_CHANNELS:
             break
         if column.text in used or column.text in table.not_numeric or not unit:
             continue
         values = _known_values(table.values[column.text])
-        if np.isfinite(values).sum() < FEWEST:
+        if np.isfinite(values).sum() < MIN_VALUES:
             continue
-        if any(_on_a_line(values, one) for one in (counted, *seen)):
+        if any(_on_a_line(values, one, *SAME) for one in (counted, *seen)):
             continue
         seen.append(values)
         out[name_of(column, (*names, *out))] = ChannelSpec(column.text, unit)
     return out
+
+
+# Columns of raw volts or milliamperes that stand beside the same signal in its own unit.
+
+
+def _is_electric(column: Column) -> bool:
+    """Return whether a column is in volts or amperes, or in mV/V as of a bridge."""
+    unit = column.unit.name if column.unit else ""
+    return unit.endswith("V/V") or any(
+        same_dimension(unit, PLAIN[name]) for name in ("voltage", "current")
+    )
+
+
+def raw_signals(table: Table) -> dict[str, str]:
+    """Return the columns that hold raw signals, each with that of the same signal in its unit.
+
+    They have the name of the other column, where it is one of a sensor, or lie on a line with it.
+    """
+    there = [one for one in table.columns if one.text not in table.not_numeric and one.unit]
+    raw = [one for one in there if _is_electric(one)]
+    others = [one for one in there if not _is_electric(one) and not _is_command_or_time(one)]
+    out: dict[str, str] = {}
+    for one in raw:
+        for other in others:
+            same = one.name.strip().lower() == other.name.strip().lower()
+            values, beside = table.values[one.text], table.values[other.text]
+            if (same and _is_sensed(one)) or _on_a_line(values, beside, *RAW):
+                out[one.text] = other.text
+                break
+    return out
+
+
+def _is_command_or_time(column: Column) -> bool:
+    unit = column.unit.name if column.unit else ""
+    return any(same_dimension(unit, PLAIN[name]) for name in (*DRIVE, "time"))
+
+
+def _is_sensed(column: Column) -> bool:
+    meant = meaning(column.name, None)
+    return of_a_sensor(column.name) or (
+        meant is not None and meant.quantity not in (*DRIVE, "time")
+    )
 
 
 def _known_values(values: Array) -> Array:
@@ -154,17 +199,23 @@ def _known_values(values: Array) -> Array:
     return np.where(np.abs(values) < ABSURD, values, np.nan)
 
 
-def _on_a_line(values: Array, other: Array) -> bool:
-    """Return whether a column is another one in other units; a constant one is not."""
+def _on_a_line(values: Array, other: Array, off: float, still: float) -> bool:
+    """Return whether a column is another one in other units; a constant one is not.
+
+    Parameters
+    ----------
+    values, other : (n,) of the columns
+    off, still : as `SAME` and `RAW` have them
+    """
     both = np.flatnonzero(np.isfinite(values) & np.isfinite(other))
-    if len(both) < FEWEST:
+    if len(both) < MIN_VALUES:
         return False
-    both = both[:: -(-len(both) // LOOKED)]
+    both = both[:: -(-len(both) // COMPARED)]
     y, x = (one[both] - one[both].mean() for one in (values, other))
     spread, power = float(np.std(y)), float(x @ x)
-    if not spread > 1e-12 * float(np.max(np.abs(values[both]))) or not power > 0.0:
+    if not spread > still * float(np.max(np.abs(values[both]))) or not power > 0.0:
         return False
-    return float(np.std(y - x * (x @ y) / power)) <= SAME * spread
+    return float(np.std(y - x * (x @ y) / power)) <= off * spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,9 +291,7 @@ def read_extra(table: Table, time: Array, wanted: Mapping[str, ChannelSpec]) -> 
     return Read(found, tuple(notes))
 
 
-def _in_order(
-    time: Array, values: Array, there: NDArray[np.bool_], unit: str
-) -> tuple[Array, Array, str]:
+def _in_order(time: Array, values: Array, there: Flags, unit: str) -> tuple[Array, Array, str]:
     """Return the times and values that are there, in the order of time, and their unit."""
     order = np.argsort(time[there], kind="stable")
     return time[there][order], values[there][order], unit
@@ -269,11 +318,11 @@ def _same_unit(first: str, second: str) -> bool:
         return first == second
 
 
-def _refuse_holes(time: Array, there: NDArray[np.bool_]) -> None:
+def _refuse_holes(time: Array, there: Flags) -> None:
     """Refuse a channel that has too few values in a run to be interpolated."""
     count = int(there.sum())
-    if count < FEWEST:
-        raise RecordError(f"it has {count} values; {FEWEST} or more are needed")
+    if count < MIN_VALUES:
+        raise RecordError(f"it has {count} values; {MIN_VALUES} or more are needed")
     begin, end = float(np.nanmin(time)), float(np.nanmax(time))
     edges = np.concatenate([[begin], np.sort(time[there]), [end]])
     widest = int(np.argmax(np.diff(edges)))

@@ -13,8 +13,8 @@ from math import cos, radians
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..errors import RecordError
 from ..units import STANDARD_GRAVITY
 from .listing import Listing
@@ -102,7 +102,7 @@ def listings() -> list[Listing]:
     ]
 
 
-def read(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+def read(name: str) -> tuple[Array, Array, str]:
     """Return times (n,) s, accelerations (n,) m/s2, and the source in words.
 
     Raises

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.arrays import Array
 from .measurement import Measurement
-from .table import Array
 
 _SAMPLES = 1500  # of a run, at most
 _WIDTHS = (0.05, 0.3)  # of a yield force's turn, in standard deviations of the velocity

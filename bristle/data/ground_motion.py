@@ -12,8 +12,8 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import listed
 from ..errors import PhysicsError, RecordError
 from ..physics.motion_file import HEADER, LARGEST, is_two_column, parse_two_column, read_text
@@ -37,8 +37,8 @@ class GroundMotion:
     `source` says in words where the numbers come from.
     """
 
-    time: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
+    time: Array
+    acceleration: Array
     name: str
     source: str
 

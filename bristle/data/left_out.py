@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-Flags = NDArray[np.bool_]
+from ..core.arrays import Flags
 
 MISSING = "missing"
 SATURATED = "saturated"

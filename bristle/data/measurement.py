@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import shown
 from ..errors import RecordError, UnitError
 from ..units import conversion
@@ -36,7 +36,7 @@ from .left_out import MASKED, MISSING, SATURATED, any_of, occurring
 from .noise import KNOWN, Noise, Spike, estimate_noise, quietest, spikes_of, spikes_text
 from .read import read_table
 from .sampling import Even, Sampling, evenly
-from .table import Array, Table, table_from_frame
+from .table import Table, table_from_frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,20 +116,20 @@ class Measurement:
     time: Array
     channels: dict[str, Array]
     units: dict[str, str]
-    measured: NDArray[np.bool_]
+    measured: Flags
     noise: dict[str, float]
     noise_facts: dict[str, Noise | None]
     sampling: Sampling
     source: str
     notes: tuple[str, ...] = field(default=())
-    lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    lost: Mapping[str, Flags] = field(default_factory=dict)
     parts: int = 1
     since: Mapping[str, Array] = field(default_factory=dict)
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
     extra: Mapping[str, Extra] = field(default_factory=dict)
-    saturated: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
-    masked: NDArray[np.bool_] | None = None
+    saturated: Mapping[str, Flags] = field(default_factory=dict)
+    masked: Flags | None = None
 
     def __repr__(self) -> str:
         rows = (
@@ -149,7 +149,7 @@ class Measurement:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def valid(self, *channels: str, but_for: str = "") -> NDArray[np.bool_]:
+    def valid(self, *channels: str, but_for: str = "") -> Flags:
         """Return at which samples (n,) all of these channels say something.
 
         Parameters
@@ -163,11 +163,11 @@ class Measurement:
         out = any_of(found)
         return np.ones(len(self.time), dtype=np.bool_) if out is None else ~out
 
-    def left_out(self, *channels: str) -> dict[str, NDArray[np.bool_]]:
+    def left_out(self, *channels: str) -> dict[str, Flags]:
         """Return why these channels say nothing at samples (n,): True by reason, if one holds."""
         nowhere = np.zeros(len(self.time), dtype=np.bool_)
 
-        def of(flags: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        def of(flags: Mapping[str, Flags]) -> Flags:
             own = [flags[channel] for channel in channels if channel in flags]
             return np.asarray(np.any([nowhere, *own], axis=0), dtype=np.bool_)
 
@@ -391,7 +391,7 @@ def _set_right(even: Even, corrections: tuple[Correction, ...]) -> tuple[Even, l
     return replace(even, pieces=pieces), moved
 
 
-def _beside(time: Array, masked: Array, step: float) -> NDArray[np.bool_]:
+def _beside(time: Array, masked: Array, step: float) -> Flags:
     """Return which times (n,) [s] lie within a step of one of those that were masked (m,)."""
     ordered = np.sort(masked)
     after = np.searchsorted(ordered, time)

@@ -16,13 +16,12 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags, Indices
 from ..core.text import plain, quantity
 from ..errors import RecordError
 from .channels import DRIVE, channel_unit, device_channel
 
-Array = NDArray[np.float64]
 Kernel = tuple[int, int]
 
 SHORTEST = 60
@@ -175,6 +174,12 @@ def is_switched(values: Array) -> bool:
     return bool(changes <= max(1, _CHANGES * len(finite) // 100))
 
 
+def stretches(flat: Flags) -> Indices:
+    """Return the first sample and the one after the last (k, 2) of each stretch that is true."""
+    padded = np.concatenate([[0], flat.astype(np.int8), [0]])
+    return np.asarray(np.flatnonzero(np.diff(padded)).reshape(-1, 2), dtype=np.int64)
+
+
 def _in_bands(y: Array, std: float) -> tuple[float, str]:
     """Return the standard deviation and the colour that the bands tell.
 
@@ -289,7 +294,6 @@ def find_spikes(y: Array) -> list[tuple[int, int]]:
         _ABOVE_NOISE * 1.4826 * float(np.median(size)),
         _OF_RANGE * float(high - low),
     )
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (size > least).astype(np.int8), [0]])))
     margin = _OF_RANGE * float(high - low)
 
     def stands_out(a: int, b: int) -> bool:
@@ -304,7 +308,7 @@ def find_spikes(y: Array) -> list[tuple[int, int]]:
 
     return [
         (int(good[a]), int(good[b - 1]) + 1)
-        for a, b in edges.reshape(-1, 2).tolist()
+        for a, b in stretches(size > least).tolist()
         if b - a <= LONGEST and 0 < a < b < len(there) and stands_out(a, b)
     ]
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Indices
 from ..errors import RecordError
 from ..units import conversion
 from .channels import ChannelSpec
-from .noise import SHORTEST
-from .table import Array, Table
+from .noise import SHORTEST, stretches
+from .table import Table
 
 RIGHT = 'expected "restart", "rests" or "column TITLE".'
 
@@ -103,7 +103,7 @@ def _seconds(table: Table, spec: ChannelSpec | None) -> float:
     return conversion(unit or "s", "s")[0]
 
 
-def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int64]:
+def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> Indices:
     """Return the middles of rests between two motions."""
     motion = "velocity" if "velocity" in channels else "displacement"
     y, spec = _values(table, motion, channels), channels.get("time")
@@ -124,16 +124,15 @@ def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int6
     speed[: 2 * window], speed[-2 * window :] = speed[2 * window], speed[-2 * window - 1]
     still = speed < STANDS * float(np.quantile(speed, 0.98))
     # Turning points are no rests: they are short.
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     found = [
         (a + b) // 2
-        for a, b in edges.reshape(-1, 2).tolist()
+        for a, b in stretches(still).tolist()
         if a > 0 and b < len(y) and (b - a) * step >= RESTS
     ]
     return np.array(found, dtype=np.int64)
 
 
-def _rows(table: Table, part: NDArray[np.int64], number: int) -> Table:
+def _rows(table: Table, part: Indices, number: int) -> Table:
     return replace(
         table,
         source=f"{table.source}, run {number}",

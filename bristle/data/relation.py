@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .table import Array
+from ..core.arrays import Array
 
 CUT_OFF = 18.0
 """Low-pass at which channels are compared [Hz], where their own band is not wider."""
@@ -54,27 +54,19 @@ def derivative_relation(x: Array, y: Array, step: float) -> Relation | None:
     return _related(derivative[edge:-edge], other[edge:-edge], float(np.mean(y)), step, cut_off)
 
 
-def same_relation(x: Array, y: Array, step: float) -> Relation | None:
-    """Return how y follows x itself, gain and delay; None where one of them stands still."""
-    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0 or len(x) < 40:
-        return None
-    cut_off = band(y, step)
-    one = low_passed(x - np.mean(x), step, cut_off)
-    other = low_passed(y - np.mean(y), step, cut_off)
-    edge = min(len(x) // 10, int(1.0 / (cut_off * step)) + 2)
-    offset = float(np.mean(y) - np.mean(x))
-    return _related(one[edge:-edge], other[edge:-edge], offset, step, cut_off)
-
-
 def band(y: Array, step: float) -> float:
     """Return the cut-off [Hz] that keeps what moves: 99 % of a channel's power, 18 Hz at least."""
-    centred = y - np.mean(y)
-    power = np.abs(np.fft.rfft(centred * np.hanning(len(y)))) ** 2
-    total = np.cumsum(power)
+    total = np.cumsum(power_spectrum(y))
     if total[-1] <= 0.0:
         return CUT_OFF
     top = np.fft.rfftfreq(len(y), step)[int(np.searchsorted(total, 0.99 * total[-1]))]
     return float(min(max(CUT_OFF, 1.5 * top), 0.4 / step))
+
+
+def power_spectrum(y: Array) -> Array:
+    """Return the power (n // 2 + 1,) of a channel (n,) about its mean, under Hann's window."""
+    power: Array = np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(len(y)))) ** 2
+    return power
 
 
 def low_passed(y: Array, step: float, cut_off: float) -> Array:

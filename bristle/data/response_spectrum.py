@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..errors import RecordError
 
 DAMPING = 0.05
@@ -13,8 +13,6 @@ LEAST, MOST, COUNT = 0.05, 5.0, 80
 """The periods [s] of `usual_periods`, and how many there are."""
 SAMPLES = 10
 """Samples in the shortest period: between them a peak is at most 5 % higher."""
-
-Array = NDArray[np.float64]
 
 
 def usual_periods(step: float) -> Array:

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags, Indices
 from ..errors import RecordError
 from ..physics.motion_file import GAP
-from .noise import SHORTEST, is_switched
-from .table import Array
+from .noise import SHORTEST, is_switched, stretches
 
 # The even grid that times lie on, which were written with few digits or with some jitter.
 
@@ -25,9 +24,7 @@ MOSTLY = 0.9
 """Share of times on a grid from which on the others are off it, and not all of them rounded."""
 
 
-def even_grid(
-    time: Array, step: float, tolerated: float
-) -> tuple[Array, NDArray[np.int64], float, float]:
+def even_grid(time: Array, step: float, tolerated: float) -> tuple[Array, Indices, float, float]:
     """Return an even grid, the place of each sample on it, and how far the times are from it.
 
     Parameters
@@ -147,14 +144,12 @@ class Sampling:
 class Even:
     """Evenly spaced pieces: per piece, times (n,), channels (n,) and which samples are measured."""
 
-    pieces: list[tuple[Array, dict[str, Array], NDArray[np.bool_]]]
+    pieces: list[tuple[Array, dict[str, Array], Flags]]
     sampling: Sampling
     notes: list[str]
 
 
-def evenly(
-    time: Array, channels: dict[str, Array], lines: NDArray[np.int64], name: str, place: str
-) -> Even:
+def evenly(time: Array, channels: dict[str, Array], lines: Indices, name: str, place: str) -> Even:
     """Return channels at evenly spaced times.
 
     Parameters
@@ -223,7 +218,7 @@ class _Stretch:
 
     even: Array
     channels: dict[str, Array]
-    known: NDArray[np.bool_]
+    known: Flags
     jitter: float
     digits: float
     resampled: bool
@@ -276,11 +271,11 @@ def _ms(step: float) -> str:
 def _in_order(
     time: Array,
     channels: dict[str, Array],
-    lines: NDArray[np.int64],
+    lines: Indices,
     name: str,
     place: str,
     notes: list[str],
-) -> tuple[Array, dict[str, Array], NDArray[np.int64]]:
+) -> tuple[Array, dict[str, Array], Indices]:
     """Return the samples with times that increase; refuse times that go back."""
     there = np.isfinite(time)
     if not there.all():
@@ -332,7 +327,7 @@ def _resampled_note(time: Array, step: float) -> str:
 
 def _on_grid(
     even: Array, at: Array, channels: dict[str, Array], step: float
-) -> tuple[dict[str, Array], NDArray[np.bool_], tuple[str, ...]]:
+) -> tuple[dict[str, Array], Flags, tuple[str, ...]]:
     """Return channels on the grid, which of its samples lie next to measured ones, and which
     channels are written less often than the rest."""
     out: dict[str, Array] = {}
@@ -370,7 +365,7 @@ def between(even: Array, x: Array, y: Array) -> Array:
     return np.asarray(PchipInterpolator(x, y)(np.clip(even, x[0], x[-1])), dtype=float)
 
 
-def covered(even: Array, x: Array, step: float) -> NDArray[np.bool_]:
+def covered(even: Array, x: Array, step: float) -> Flags:
     """Return which times of a grid are samples, or lie between samples that are no gap apart.
 
     Parameters
@@ -388,12 +383,11 @@ def covered(even: Array, x: Array, step: float) -> NDArray[np.bool_]:
 
 def _pieces(
     one: _Stretch, name: str, notes: list[str]
-) -> list[tuple[Array, dict[str, Array], NDArray[np.bool_]]]:
+) -> list[tuple[Array, dict[str, Array], Flags]]:
     """Cut a stretch where more than `MAX_FILLED` values in a row are missing, and at its ends."""
     size = len(one.even)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~one.known).astype(np.int8), [0]])))
     bounds, gaps = [0], []
-    for start, stop in edges.reshape(-1, 2).tolist():
+    for start, stop in stretches(~one.known).tolist():
         if stop - start > MAX_FILLED or start == 0 or stop == size:
             bounds += [start, stop]
             gaps.append((start, stop))

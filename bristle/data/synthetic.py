@@ -11,11 +11,9 @@ from math import pi
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from .listing import Listing
-
-Array = NDArray[np.float64]
 
 PEAK = 3.0
 """Largest acceleration of each [m/s2]."""

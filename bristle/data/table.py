@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array, Indices
 from ..core.text import listed
 from ..errors import RecordError
 from .columns import Column
@@ -17,7 +18,6 @@ from .titles import titles
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 _CODES = (-9999.0, 9999.0, -99999.0, 99999.0, -999999.0, 999999.0, -7999.0)
 """Numbers that loggers write where nothing was measured."""
@@ -36,7 +36,7 @@ class Table:
     source: str
     columns: tuple[Column, ...]
     values: dict[str, Array]
-    lines: NDArray[np.int64]
+    lines: Indices
     place: str = "line"
     not_numeric: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()

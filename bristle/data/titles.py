@@ -166,7 +166,7 @@ def title_rows(rows: Sequence[Sequence[str]]) -> tuple[int, int | None]:
         *_, names, units = max(pairs)
         return names, units
     last = len(rows) - 1
-    told = [_told(row) for row in rows]
+    told = [_score(row) for row in rows]
     able = [k for k, row in enumerate(rows) if told[k] >= told[last] and any(map(_is_time, row))]
     return max(able, key=lambda k: told[k], default=last), None
 
@@ -183,7 +183,7 @@ def _fit(names: Sequence[str], units: Sequence[str]) -> int:
     )
 
 
-def _told(names: Sequence[str]) -> int:
+def _score(names: Sequence[str]) -> int:
     """Return how much titles tell: a quantity counts, and so does a unit."""
     columns = [title(0, name) for name in names]
     known = [meaning(one.name, one.unit.name if one.unit else None) for one in columns]
@@ -241,63 +241,28 @@ def unit_or_none(text: str) -> Unit | None:
     return None
 
 
-# What instruments print and no standard knows.
-_RENAMED = {
-    "volt": "V",
-    "volts": "V",
-    "amp": "A",
-    "amps": "A",
-    "ampere": "A",
-    "amperes": "A",
-    "milliamp": "mA",
-    "milliamps": "mA",
-    "percent": "%",
-    "per cent": "%",
-    "pct": "%",
-    "tesla": "T",
-    "kilonewton": "kN",
-    "millimeter": "mm",
-    "millimetre": "mm",
-    "millimeters": "mm",
-    "mm/sec": "mm/s",
-    "m/sec": "m/s",
-    "in/sec": "in/s",
-    "hour": "h",
-    "newton": "N",
-    "newtons": "N",
-    "sec": "s",
-    "secs": "s",
-    "second": "s",
-    "seconds": "s",
-    "msec": "ms",
-    "msecs": "ms",
-    "millisecond": "ms",
-    "milliseconds": "ms",
-    "millisekunden": "ms",
-    "microseconds": "us",
-    "usec": "us",
-    "minute": "min",
-    "minutes": "min",
-    "mins": "min",
-    "meter": "m",
-    "metre": "m",
-    "kip": "kip",
-    "lbs": "lbf",
-    "lb": "lbf",
-    "kips": "kip",
-    "klbf": "kip",
-    "klbs": "kip",
-    "inch": "in",
-    "g's": "g",
-    "sekunden": "s",
-    # In capitals, as some programs write all their titles.
-    "s": "s",
-    "ms": "ms",
-    "kn": "kN",
-    "lbf": "lbf",
-    "mm": "mm",
-    "mm/s": "mm/s",
-    "m/s": "m/s",
-    "in": "in",
-    "in/s": "in/s",
+# What instruments print and no standard knows, some in capitals.
+_SPELLINGS = {
+    "V": "volt, volts",
+    "A": "amp, amps, ampere, amperes",
+    "mA": "milliamp, milliamps",
+    "%": "percent, per cent, pct",
+    "T": "tesla",
+    "kN": "kilonewton, kn",
+    "mm": "millimeter, millimetre, millimeters, mm",
+    "mm/s": "mm/sec, mm/s",
+    "m/s": "m/sec, m/s",
+    "in/s": "in/sec, in/s",
+    "h": "hour",
+    "N": "newton, newtons",
+    "s": "sec, secs, second, seconds, sekunden, s",
+    "ms": "msec, msecs, millisecond, milliseconds, millisekunden, ms",
+    "us": "microseconds, usec",
+    "min": "minute, minutes, mins",
+    "m": "meter, metre",
+    "kip": "kip, kips, klbf, klbs",
+    "lbf": "lbs, lb, lbf",
+    "in": "inch, in",
+    "g": "g's",
 }
+_RENAMED = {text: unit for unit, texts in _SPELLINGS.items() for text in texts.split(", ")}

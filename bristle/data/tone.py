@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.arrays import Array
 from ..core.text import quantity
 from .channels import Labels, label_text
 from .measurement import Measurement
 from .relation import band, differentiated
-from .table import Array
 
 _TURNED = 0.3  # of half the range that a motion must pass on either side of its middle
 _EVEN = 0.1  # share by which a period may differ from the middle one
 _MOST = 0.8  # share of the periods that must not
-_FEWEST = 40  # samples
+_MIN_SAMPLES = 40  # samples
 
 SAME = 1.2
 """Ratio within which a frequency that is stated and a measured one are the same."""
@@ -58,7 +58,7 @@ def tone(y: Array, step: float) -> Tone | None:
     """Return the tone of a signal (n,) that is sampled every `step` [s]; None where it rests."""
     low, high = (float(one) for one in np.quantile(y, [0.005, 0.995]))
     half = 0.5 * (high - low)
-    if not half > 0.0 or len(y) < _FEWEST:
+    if not half > 0.0 or len(y) < _MIN_SAMPLES:
         return None
     away = (y - 0.5 * (high + low)) / half
     sides = np.where(away > _TURNED, 1, np.where(away < -_TURNED, -1, 0))

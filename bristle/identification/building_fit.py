@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import plain
 from ..data.measurement import Measurement
 from ..errors import RecordError
@@ -35,8 +35,6 @@ from .equilibrium import (
     stiffness_matrix,
 )
 from .search import z_scale
-
-Array = NDArray[np.float64]
 
 ROUNDS = 4
 """Rounds of instruments after the first, plain one."""
@@ -145,7 +143,7 @@ class _Ended(NamedTuple):
 
 
 def _rounds(
-    runs: list[Response], building: Building, unknown: Device | None, free: NDArray[np.bool_]
+    runs: list[Response], building: Building, unknown: Device | None, free: Flags
 ) -> _Ended:
     """Return the stiffnesses and the ratios of the modes in `free`; the others stay as given."""
     stiffness, given = np.array(building.stiffnesses), ratios_of(building)
@@ -163,7 +161,7 @@ def _rounds(
     return _Ended(stiffness, zeta, covariance, std, system, positive, round_)
 
 
-def _untold(ended: _Ended, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _untold(ended: _Ended, free: Flags) -> Flags:
     """Return which of the free ratios the data do not tell, (n,).
 
     Free, they would take whatever the others leave, and the instruments would follow them.
@@ -174,7 +172,7 @@ def _untold(ended: _Ended, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _finish(
     runs: list[Response], building: Building, ended: _Ended, unknown: Device | None,
-    free: NDArray[np.bool_],
+    free: Flags,
 ) -> StructureFit:  # fmt: skip
     """Return the fit with what is not identified put back and named."""
     stiffness, zeta, system = ended.stiffness.copy(), ended.zeta.copy(), ended.system
@@ -261,9 +259,7 @@ def _unknown(runs: list[Response], damper: bool | None) -> Device | None:
     return device if damper and not all(run.force is not None for run in runs) else None
 
 
-def _modes_of_springs(
-    building: Building, stiffness: Array, told: Sequence[int]
-) -> NDArray[np.bool_]:
+def _modes_of_springs(building: Building, stiffness: Array, told: Sequence[int]) -> Flags:
     """Return the modes (n,) that springs which are not told hold most of, one for each spring.
 
     Their damping is as much that of the storeys there, which equilibrium does not show.

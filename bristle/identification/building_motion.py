@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
+from ..core.arrays import Array, Flags
 from ..data.channels import Labels, device_channel, no_device
 from ..data.decimate import Finer
 from ..data.extra_channels import Extra
@@ -33,7 +33,6 @@ from .smoothing import EDGE, Motion, posterior_draws, random_motion, smooth_step
 # therefore taken from the nearest level that has a displacement, and the storeys between by their
 # equilibrium: far below the first mode they hardly deflect.
 
-Array = NDArray[np.float64]
 
 SLOW = 0.3
 """Share of the first natural frequency below which a displacement that was not measured is taken
@@ -159,9 +158,7 @@ def smoothed_level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
     return {"state": out.state, "std": std, "jerk": jerk, "r": r, "have": have}
 
 
-def _samples(
-    y: Array, r: Array, have: NDArray[np.bool_], dt: float, seen: NDArray[np.bool_] | None = None
-) -> Samples:
+def _samples(y: Array, r: Array, have: Flags, dt: float, seen: Flags | None = None) -> Samples:
     """Return a level's channels (n, 3) of variances r (3,), with a wide guess of the beginning.
 
     `seen` (n, 3) says which values were measured, None that all were.
@@ -190,7 +187,7 @@ def jumps(a: Array, dt: float) -> Array:
 
 
 def _likeliest(
-    y: Array, seen: NDArray[np.bool_], r: Array, have: NDArray[np.bool_], dt: float, added: Array,
+    y: Array, seen: Flags, r: Array, have: Flags, dt: float, added: Array,
     most: int = 4000,
 ) -> float:  # fmt: skip
     """Return the intensity of the white jerk that makes the strongest stretch likeliest."""
@@ -277,11 +274,10 @@ def corrected(
 #
 # Between the ground and a level it is that level's motion. Between two levels it is a small
 # difference, and what the levels' sensors share cancels in it: the noise of the ground's
-# acceleration
-# is in the relative acceleration of every level. So channels are subtracted first and their
-# difference is smoothed, by its own jerk and the noise of the two sensors. Where the two levels do
-# not have the same sensors the smoothed motions are subtracted, and their errors add up as if they
-# were independent: a little too wide.
+# acceleration is in the relative acceleration of every level. So channels are subtracted first and
+# their difference is smoothed, by its own jerk and the noise of the two sensors. Where the two
+# levels do not have the same sensors the smoothed motions are subtracted, and their errors add up
+# as if they were independent: a little too wide.
 
 _NAME = "relative"
 
@@ -365,8 +361,6 @@ def _difference(run: Measurement, lower: str, upper: str) -> Measurement | None:
 # Longer than 300 lines: a docstring says of every field and argument which shape and unit it has.
 
 
-Flags = NDArray[np.bool_]
-
 FIRST_LEVEL = Device("", GROUND, 0)
 """Where the damper of a building without devices of its own sits."""
 
@@ -418,7 +412,7 @@ class Response:
     noise_a: Array
     noise_force: float
     noise_ground: float
-    accelerometer: NDArray[np.bool_]
+    accelerometer: Flags
     std: Array
     draws: Array
     V_left: float

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from ..core.arrays import Array, Flags, Indices
 from ..data.left_out import occurring
 from ..data.measurement import Measurement
 from ..errors import RecordError
@@ -31,9 +31,6 @@ from .building_motion import Response, responses, shear
 from .equilibrium import reconstructed
 from .histories import Along
 from .problem import Model, Problem, Run, absorbed, of_one_site
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 SLIDING = 3.0
 """Where dry friction may act, slower samples than so many standard deviations are left out: the
@@ -58,7 +55,7 @@ class StructureRun(Run):
     """
 
     whole: Run | None = field(default=None, repr=False)
-    keep: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    keep: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def of(self, part: slice) -> Self:
         """Return the run with these of the samples that count; `whole` stays, for its history."""
@@ -180,7 +177,7 @@ class StructureProblem(Problem):
 
 def structure_run(
     name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
-    draws: Array, keep: NDArray[np.bool_] | None = None, drawn: Array | None = None,
+    draws: Array, keep: Flags | None = None, drawn: Array | None = None,
     left_out: Mapping[str, Flags] | None = None, untold: tuple[str, ...] = (),
 ) -> StructureRun:  # fmt: skip
     """Return a run of the samples that count; the first ones are the smoother's and skipped.
@@ -303,12 +300,12 @@ def layer_run(response: Response, building: Building) -> StructureRun:
     return _of(response, made)
 
 
-def sliding(response: Response) -> NDArray[np.bool_]:
+def sliding(response: Response) -> Flags:
     """Return where the first level surely moves, and so do the samples beside, (n,)."""
     return moving(response.v[0], float(response.std[0, 1]))
 
 
-def moving(v: Array, std: float) -> NDArray[np.bool_]:
+def moving(v: Array, std: float) -> Flags:
     """Return where a velocity (n,) surely is none, and so are the samples beside, (n,).
 
     Beside a stop or a start the velocity is smoothed over a bend, and less certain than elsewhere.

@@ -13,17 +13,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
+from ..core.arrays import Array, Flags
 from ..errors import RecordError
 from ..physics.building import GROUND, Building, Device
 from .building_motion import Response
 
 # The response that a building shows to a measured excitation, mode by mode.
-
-Array = NDArray[np.float64]
 
 
 def stiffness_matrix(building: Building, stiffness: Array) -> Array:
@@ -258,7 +256,7 @@ class EquilibriumSystem:
         rows = self.regressors(i)
         return np.hstack([rows[:, : 2 * n], rows[:, 4 * n :]])
 
-    def solve(self, sums: Array, given: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def solve(self, sums: Array, given: Array, free: Flags) -> tuple[Array, Array]:
         """Return the unknowns (p,) and their covariance, from blocks taken as independent.
 
         The damping ratios that are not `free` (n,) stay as `given`, with a variance of zero.
@@ -295,7 +293,7 @@ class EquilibriumSystem:
         return found, theta[m : m + self.n]
 
 
-def judged(run: Response, unknown: Device | None) -> NDArray[np.bool_]:
+def judged(run: Response, unknown: Device | None) -> Flags:
     """Return where all was measured that the equations of a run take (n,).
 
     Parameters

@@ -14,15 +14,12 @@ from math import inf, isfinite, nan, sqrt
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.text import percent, quantity
 from ..data.left_out import LOADED, NO_VALUE, SETTLING, WAYS_OUT, any_of
 from ..errors import RecordError
 from .problem import Model, Problem, Run, has_offset, zero_of
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MENTIONED = 0.02
 """Share of samples left out above which the error over all samples is told as well."""
@@ -30,7 +27,7 @@ MENTIONED = 0.02
 TOO_MANY = 0.2
 """The same above which that one is the error."""
 
-FEWEST = 100
+MIN_SAMPLES = 100
 """Samples of all runs together that a fit, or a judgement, needs at the least."""
 
 
@@ -160,14 +157,14 @@ def refuse_empty(runs: Sequence[Run]) -> None:
     every = [run.entire() for run in runs]
     counts = [error_of(run.force, run.force, reasons_of(run)) for run in every]
     whole = pooled(counts)
-    if whole.samples >= FEWEST:
+    if whole.samples >= MIN_SAMPLES:
         return
     told = [f"{run.name}: {one.counted()}" for run, one in zip(runs, counts, strict=True)]
     more = [f"and {len(told) - 3} more runs"] if len(told) > 3 else []
     ways = "; ".join(dict.fromkeys(WAYS_OUT[why] for one in counts for why in one.left_out))
     raise RecordError(
-        f"{'; '.join([*told[:3], *more])}. {whole.samples:,} samples are left, and {FEWEST} are "
-        f"needed. To change it: {ways}."
+        f"{'; '.join([*told[:3], *more])}. {whole.samples:,} samples are left, and {MIN_SAMPLES} "
+        f"are needed. To change it: {ways}."
     )
 
 

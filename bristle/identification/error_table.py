@@ -15,18 +15,17 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Count
 from ..errors import RecordError
 from ..physics.laws import base_and_variant, law_names
 from .error import ForceError, force_error
 from .problem import Model, Problem, Run, steady, without
 from .search import descend, in_threads
+from .start_grid import Search
 from .starts import start_models
 from .watch import LAW, series, watched
-
-Array = NDArray[np.float64]
 
 CUTOFF = 18.0
 """Hz, of the paper's low-pass (section III-C)."""
@@ -208,8 +207,7 @@ def _thinned(problem: Problem, cutoff: float) -> Problem:
     for run in problem.runs:
         every = int(1.0 / (THINNED * cutoff * run.dt)) if cutoff else 1
         every = max(1, min(every, samples // ENOUGH))
-        part = run.of(slice(None, None, every))
-        runs.append(replace(part, dt=run.dt * every, skip=-(-run.skip // every)))
+        runs.append(run.every(every))
     fewer = any(len(a.force) < len(b.force) for a, b in zip(runs, problem.runs, strict=True))
     return problem.of(runs) if fewer else problem
 
@@ -260,10 +258,8 @@ def _fit_filtered(
     cutoff : Hz
     shown : what whoever watches is shown, where `problem` has a part of its samples alone
     """
-    from .fit import Scaled
-
     none = [(np.zeros(1), np.ones(1), np.zeros((1, 1))) for _ in problem.runs]
-    scaled = Scaled(problem, model, none)
+    scaled = Search(problem, model, none, model.free(), logarithms=False)
     unit = _QUADRATIC * force_rms(problem.runs, cutoff)
 
     def residuals(theta: Array) -> Array:
@@ -346,9 +342,7 @@ def _less_and_less(model: Model) -> Iterator[tuple[str, Model]]:
     """Yield what is taken from a model, and what is left of it then."""
     left = model
     for name in reversed(model.effects):
-        kept = tuple(one for one in left.effects if one != name)
-        values = {key: y for key, y in left.values.items() if not key.startswith(f"{name}.")}
-        left = replace(left, effects=kept, values=values)
+        left = left.only(tuple(one for one in left.effects if one != name))
         yield name, left
     law, taken = model.law_class, set[str]()
     for name, hooks in PARTS:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Count, tell
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
@@ -22,70 +22,14 @@ from .problem import (
     Expected,
     Model,
     Problem,
-    Run,
     drawn_noise,
-    law_parameters,
     parameter,
-    residuals,
-    sizes,
     steady,
     without,
 )
-from .search import HUBER_AT_ONE, descend, in_threads, jacobian, loss, mean_loss
-from .starts import start_model, start_models
-from .watch import watched
-
-__all__ = [
-    "Expected",
-    "Fit",
-    "Model",
-    "Problem",
-    "Run",
-    "Scaled",
-    "fit",
-    "identify",
-    "intervals_of",
-    "law_parameters",
-    "multistart_refit",
-    "parameter",
-    "sizes",
-    "start_model",
-]
-
-
-# A model's free parameters as a search sees them: numbers of order one, and their residuals.
-
-Array = NDArray[np.float64]
-
-
-class Scaled:
-    """A model's free parameters as numbers of order one, and the residuals over them."""
-
-    def __init__(self, problem: Problem, model: Model, expected: Expected) -> None:
-        self.problem, self.model, self.expected = problem, model, expected
-        self.names = model.free()
-        # An impact's spike would tell a gap far more sharply than its fit can find it.
-        self.rough = any(EFFECTS[name].joint for name in model.effects)
-        start = np.array([model.value(name) for name in self.names])
-        units = [parameter(model.law, name).unit for name in self.names]
-        self.scale = np.maximum(np.abs(start), 1e-2 * np.array([problem.size(u) for u in units]))
-        bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
-        self.low, self.high = bounds[:, 0] / self.scale, bounds[:, 1] / self.scale
-        self.start = np.clip(start / self.scale, self.low, self.high)
-
-    def at(self, theta: Array) -> Model:
-        """Return the model with these values."""
-        own = dict(zip(self.names, (theta * self.scale).tolist(), strict=True))
-        return replace(self.model, values={**self.model.values, **own})
-
-    def residuals(self, theta: Array) -> Array:
-        """Return the normalised residuals of all runs, finite."""
-        return residuals(self.problem, self.at(theta), self.expected)
-
-    def jacobian(self, theta: Array, r: Array) -> Array:
-        """Return the derivatives (n, p) of the residuals at theta."""
-        return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
-
+from .search import HUBER_AT_ONE, in_threads, loss, mean_loss
+from .start_grid import Search
+from .starts import start_models
 
 # How well data determine a model's parameters: covariance, and what they do not identify.
 
@@ -93,7 +37,7 @@ _WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the 
 _MISFIT = 1.15  # z above which a residual is more than noise
 
 
-def covariance_of(scaled: Scaled, theta: Array) -> tuple[Array, tuple[str, ...]]:
+def covariance_of(scaled: Search, theta: Array) -> tuple[Array, tuple[str, ...]]:
     """Return the covariance (p, p) [SI], and the names that the data do not identify.
 
     Covariance A^-1 B A^-1 of an M-estimator (Huber 1981, Robust Statistics, ch. 7): A = J'J over
@@ -143,7 +87,7 @@ def _scores_of_blocks(J: Array, r: Array) -> Array:
 
 
 def _lost(
-    scaled: Scaled, value: Array, std: Array, norms: Array, directions: Array
+    scaled: Search, value: Array, std: Array, norms: Array, directions: Array
 ) -> tuple[str, ...]:
     """Name what does not move the force, is mixed up with others, or is wider than its size."""
     lost = []
@@ -177,7 +121,6 @@ class Fit:
     std: dict[str, float]
     cost: float
     unidentified: tuple[str, ...] = ()
-    evaluations: int = 0
     starts: int = 1
     agreed: int = 1
     covariance: Array | None = None
@@ -208,28 +151,16 @@ def fit(
         sandwich formula with the drawn noise.
     """
     expected = expectation or problem.expectation(model)
-    scaled = Scaled(problem, model, expected)
+    scaled = Search(problem, model, expected, model.free(), logarithms=False)
     if not scaled.names:
         cost = mean_loss(loss(scaled.residuals(np.zeros(0))))
         return Fit(model, {}, cost)
-    with watched(problem, scaled.at, expected=expected) as accepted:
-        found = descend(
-            scaled.residuals,
-            scaled.start,
-            scaled.low,
-            scaled.high,
-            max_evaluations,
-            tolerance=1e-5,
-            rough=scaled.rough,
-            accepted=accepted,
-        )
-    best = scaled.at(found.theta)
-    if not with_std:
-        return Fit(best, {}, found.cost, (), found.sweeps)
-    return _with_intervals(Fit(best, {}, found.cost, evaluations=found.sweeps), scaled, found.theta)
+    best, found = scaled.run(max_evaluations, tolerance=1e-5)
+    fitted = Fit(best, {}, found.cost)
+    return _with_intervals(fitted, scaled, found.theta) if with_std else fitted
 
 
-def _with_intervals(found: Fit, scaled: Scaled, theta: Array) -> Fit:
+def _with_intervals(found: Fit, scaled: Search, theta: Array) -> Fit:
     covariance, lost = covariance_of(scaled, theta)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
     by_name = dict(zip(scaled.names, std, strict=True))
@@ -284,7 +215,8 @@ def intervals_of(problem: Problem, model: Model) -> Fit:
     problem : the runs that the model was fitted to
     model : with its values
     """
-    scaled = Scaled(problem, model, problem.expectation(model))
+    expected = problem.expectation(model)
+    scaled = Search(problem, model, expected, model.free(), logarithms=False)
     cost = mean_loss(loss(scaled.residuals(scaled.start)))
     found = Fit(model, {}, cost)
     return _with_intervals(found, scaled, scaled.start) if scaled.names else found
@@ -324,7 +256,7 @@ def identify(
     given = {
         f"{effect}.{own}": problem.scaled(law, f"{effect}.{own}")
         for effect in effects
-        for own in _parameters(effect)
+        for own in EFFECTS[effect].parameters
     } | dict(values or {})
     model = Model(law, effects, given, fixed, dict(limits or {}))
     driven = LAWS[law].driven() if steady(problem) else ()
@@ -348,7 +280,3 @@ def identify(
     return replace(
         best, unidentified=(*silent, *best.unidentified), starts=len(trials), agreed=agreed
     )
-
-
-def _parameters(effect: str) -> list[str]:
-    return list(EFFECTS[effect].parameters)

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import tell
 from ..data.corrections import JUMP
 from ..physics import damper, structure
@@ -28,8 +29,7 @@ from ..physics.tuples import Inputs, Setup
 # Compiles what fits and diagnoses need in processes of their own, while the data are read.
 #
 # numba compiles under one lock, so threads would not help. What a process keeps on disk is read
-# here
-# once it is there.
+# here once it is there.
 
 _CODE = "import sys; from bristle.identification.histories import keep; keep(*sys.argv[1:])"
 
@@ -80,8 +80,6 @@ def begun(name: str, digest: str) -> Ahead | None:
     except OSError:
         return None
 
-
-Array = NDArray[np.float64]
 
 _INLINE = (
     "damper.step", "series.advance_series", "series.balanced_speed", "series.by_secants",

@@ -11,9 +11,8 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..core.arrays import Array, Flags
 
 _SETTLED = 1e-12
 """Relative change of a covariance in a sample below which it stays."""
@@ -34,7 +33,7 @@ class Samples(NamedTuple):
 
     y: Array
     r: Array
-    have: NDArray[np.bool_]
+    have: Flags
     dt: float
     mean: Array
     cov: Array

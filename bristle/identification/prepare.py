@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.corrections import LEFT_OUT
 from ..data.cut_off import derived_velocity
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.drive import VOLTAGE
 from .problem import Run
-from .run_start import begin_of
+from .run_start import start_of
 from .smoothing import posterior_draws, smooth, smooth_drive
-
-Array = NDArray[np.float64]
 
 SHORTEST = 200
 """Fewest samples of a run that a fit makes sense of."""
@@ -47,7 +45,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     _refuse(measurement)
     n, dt = len(measurement.time), measurement.step
     noise = (_noise_of(measurement, "displacement"), _noise_of(measurement, "velocity"))
-    x, v = _seen(measurement, "displacement"), _seen(measurement, "velocity")
+    x, v = _as_measured(measurement, "displacement"), _as_measured(measurement, "velocity")
     if derived_velocity(measurement):
         v = None  # it holds nothing that the displacement does not, and may be half a sample late
     have = (x is not None, v is not None)
@@ -64,16 +62,16 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     alone = tuple(c for c in ("displacement", "velocity") if measurement.has(c))
     needed = ("force", drive, *(alone if len(alone) == 1 else ()))
     force = measurement["force"]
-    begin = begin_of(motion.x, force, dt)
+    start = start_of(motion.x, force, dt)
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
-        _noise_of_force(measurement), error, begin.first, measurement.left_out(*needed),
-        drive or VOLTAGE.name, measurement.labels, begin.rest, measurement.extra,
+        _noise_of_force(measurement), error, start.first, measurement.left_out(*needed),
+        drive or VOLTAGE.name, measurement.labels, start.rest, measurement.extra,
         finer=measurement.finer, untold=untold(measurement, ("force",)),
     )  # fmt: skip
 
 
-def _seen(measurement: Measurement, channel: str) -> Array | None:
+def _as_measured(measurement: Measurement, channel: str) -> Array | None:
     """Return a channel with NaN where a sample was filled in or lost, None if it is not there."""
     if not measurement.has(channel):
         return None

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..data.channels import Label, Labels
 from ..data.corrections import jumps
 from ..data.decimate import Finer, between
@@ -32,7 +32,6 @@ from .search import HUBER, z_scale
 # instrument's reading is what was measured, so its effect is taken back: the motion that the damper
 # felt is the one that the instrument would have shown like that.
 
-Array = NDArray[np.float64]
 
 LEAST = 0.03
 """Least response, by the largest, that is taken back in full; below, noise would be blown up."""
@@ -189,11 +188,6 @@ def corrected(
 # Parameters of effects that are known of each run: its temperature, a pressure at each sample.
 
 
-def told_by(effect: type[Effect], parameter: str) -> str:
-    """Return the label of runs that a parameter of an effect is, or the mean of; else ""."""
-    return effect.labels.get(parameter) or effect.label_means.get(parameter, "")
-
-
 def values_of_labels(effects: Iterable[str], labels: Labels) -> dict[str, float]:
     """Return the values of effects that are labels of a run, by the names of a model."""
     known = {
@@ -205,9 +199,7 @@ def values_of_labels(effects: Iterable[str], labels: Labels) -> dict[str, float]
     return {name: value for name, value in known.items() if not isinstance(value, str)}
 
 
-def tracks_of(
-    effects: Iterable[str], extra: Mapping[str, Extra], run: str
-) -> dict[str, NDArray[np.float64]]:
+def tracks_of(effects: Iterable[str], extra: Mapping[str, Extra], run: str) -> dict[str, Array]:
     """Return the values (n,) over a run of parameters that follow its channels, by name.
 
     Parameters
@@ -262,9 +254,6 @@ def following(effects: Iterable[str]) -> dict[str, str]:
         for name in effects
         for own, channel in EFFECTS[name].channels.items()
     }
-
-
-# Longer than 300 lines: what a model is, and what it predicts of a run, stand together.
 
 
 _AROUND = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
@@ -325,7 +314,7 @@ class Run:
     noise: float
     draws: Array
     skip: int = 25
-    left_out: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    left_out: Mapping[str, Flags] = field(default_factory=dict)
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
     rest: int = 0
@@ -355,13 +344,13 @@ class Run:
         return force if self.finer is None else self.finer.filtered(force)
 
     @cached_property
-    def measured(self) -> NDArray[np.bool_] | None:
+    def measured(self) -> Flags | None:
         """Which samples (n,) say something, None where all do."""
         out = any_of(self.left_out)
         return None if out is None else ~out
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Flags:
         """Which of the samples after `skip` were measured (n - skip,)."""
         if self.measured is None:
             return np.ones(max(0, len(self.force) - self.skip), dtype=bool)
@@ -382,6 +371,11 @@ class Run:
             extra={name: one.of(part) for name, one in self.extra.items()},
             finer=self.finer.of(part) if self.finer and dense else None,
         )  # fmt: skip
+
+    def every(self, count: int) -> Self:
+        """Return the run with one of so many samples, for what has no memory."""
+        part = self.of(slice(None, None, count))
+        return replace(part, dt=self.dt * count, skip=-(-self.skip // count))
 
     def entire(self) -> Run:
         """Return the run with all its samples, whatever a fit takes of them."""
@@ -405,7 +399,7 @@ class Model:
     def free(self) -> list[str]:
         """Return the names of the parameters that a fit moves."""
         fixed_of_law = self.law_class.fixed()
-        names = [name for name in law_parameters(self.law) if name not in fixed_of_law]
+        names = [name for name in self.law_class.parameters if name not in fixed_of_law]
         for effect in self.effects:
             joined = EFFECTS[effect]
             idle = () if self.law_class.has("bristle") else joined.bristles
@@ -418,6 +412,18 @@ class Model:
     def law_class(self) -> type[Law]:
         """The law's class."""
         return LAWS[self.law]
+
+    def only(self, effects: tuple[str, ...]) -> Model:
+        """Return the model with these of its effects alone, and what is given of them."""
+
+        def of(name: str) -> bool:
+            return "." not in name or name.partition(".")[0] in effects
+
+        return replace(
+            self, effects=effects, values={n: v for n, v in self.values.items() if of(n)},
+            fixed=tuple(filter(of, self.fixed)),
+            limits={n: v for n, v in self.limits.items() if of(n)},
+        )  # fmt: skip
 
     def value(self, name: str) -> float:
         """Return a parameter's value, its default where none is given."""
@@ -435,12 +441,7 @@ def parameter(law: str, name: str) -> Parameter:
     if "." in name:
         effect, own = name.split(".", 1)
         return EFFECTS[effect].parameters[own]
-    return law_parameters(law)[name]
-
-
-def law_parameters(law: str) -> dict[str, Parameter]:
-    """Return the declarations of a law's own parameters by name."""
-    return LAWS[law].parameters
+    return LAWS[law].parameters[name]
 
 
 class Problem:
@@ -546,11 +547,14 @@ class Problem:
     def scaled(self, law: str, name: str) -> float:
         """Return a parameter's default brought to the size of this rig, within its bounds."""
         declared = parameter(law, name)
-        effect, _, own = name.partition(".") if "." in name else ("", "", "")
-        if effect and EFFECTS[effect].of_this_rig():
-            return declared.value
-        if effect and (numbers := self._numbers(told_by(EFFECTS[effect], own))):
-            return float(np.clip(np.mean(numbers), *declared.bounds))
+        key, dot, own = name.partition(".")
+        if dot:
+            effect = EFFECTS[key]
+            if effect.of_this_rig():
+                return declared.value
+            label = effect.labels.get(own) or effect.label_means.get(own, "")
+            if numbers := self._numbers(label):
+                return float(np.clip(np.mean(numbers), *declared.bounds))
         reference = REFERENCE.get(declared.unit)
         value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)
         return min(max(value, declared.bounds[0]), declared.bounds[1])
@@ -743,14 +747,25 @@ def errors(problem: Problem, model: Model, expected: Expected) -> list[Array]:
     Where the force's zero is fitted along, less that zero as well; a model with an effect that has
     a constant force of its own has none besides.
     """
-    found = [
-        (run.force - problem.predict(model, run) - bias)[run.skip :]
-        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
-    ]
+    found = _with_zero(problem, model, expected)
     if not problem.free_zero or has_offset(model):
         return found
     zero = _constant(problem, found, expected)
     return [error - zero for error in found]
+
+
+def _with_zero(problem: Problem, model: Model, expected: Expected) -> list[Array]:
+    """Return per run the error (n - skip,) [N], the zero of the force still in it."""
+    return [
+        (run.force - problem.predict(model, run) - bias)[run.skip :]
+        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
+    ]
+
+
+def _noise(problem: Problem, expected: Expected) -> Array:
+    """Return the noise (n,) expected of a true model's residual, one run after the other."""
+    pairs = zip(problem.runs, expected, strict=True)
+    return np.concatenate([sigma[run.skip :] for run, (_, sigma, _) in pairs])
 
 
 def has_offset(model: Model) -> bool:
@@ -767,13 +782,9 @@ def zero_of(problem: Problem, model: Model) -> tuple[float, float]:
     It is that of Huber's loss over all runs; the deviation is from the scatter of blocks.
     """
     expected = problem.expectation(model)
-    found = [
-        (run.force - problem.predict(model, run) - bias)[run.skip :]
-        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
-    ]
+    found = _with_zero(problem, model, expected)
     zero = _constant(problem, found, expected)
-    sigma = [e[1][run.skip :] for run, e in zip(problem.runs, expected, strict=True)]
-    weight = np.concatenate(sigma) ** -2.0
+    weight = _noise(problem, expected) ** -2.0
     left = (np.concatenate(found) - zero) * weight
     edges = np.arange(0, len(left), min(BLOCK, max(1, len(left) // 20)))
     return zero, float(np.sqrt(np.sum(np.add.reduceat(left, edges) ** 2)) / weight.sum())
@@ -781,10 +792,7 @@ def zero_of(problem: Problem, model: Model) -> tuple[float, float]:
 
 def _constant(problem: Problem, found: list[Array], expected: Expected) -> float:
     """Return the constant of errors per run (n - skip,) [N] by weighted Huber means."""
-    error = np.concatenate(found)
-    sigma = np.concatenate(
-        [e[1][run.skip :] for run, e in zip(problem.runs, expected, strict=True)]
-    )
+    error, sigma = np.concatenate(found), _noise(problem, expected)
     finite = np.isfinite(error)
     error, base = error[finite], sigma[finite] ** -2.0
     if not len(error):
@@ -815,11 +823,14 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
 
 def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:
     """Return z, the robust RMS of residual over expected noise: 1 for a true model."""
-    expected = problem.expectation(model, draws)
+    return _robust_z(problem, model, problem.expectation(model, draws))
+
+
+def _robust_z(problem: Problem, model: Model, expected: Expected) -> float:
     return z_scale(in_noises(problem, residuals(problem, model, expected), expected))
 
 
-def told_z(problem: Problem, model: Model) -> float:
+def z_if_known(problem: Problem, model: Model) -> float:
     """Return z of a model, NaN where the noise is not known and z says nothing."""
     return robust_z(problem, model) if problem.noise_known else float("nan")
 
@@ -836,8 +847,7 @@ def in_noises(problem: Problem, r: Array, expected: Expected) -> Array:
     """
     if not problem.excess:
         return r
-    pairs = zip(problem.runs, expected, strict=True)
-    sigma = np.concatenate([e[1][run.skip :] for run, e in pairs])
+    sigma = _noise(problem, expected)
     return np.asarray(r * sigma / np.sqrt(sigma**2 - problem.excess))
 
 
@@ -850,7 +860,7 @@ def excess_of(problem: Problem, model: Model) -> float:
     0 with z.
     """
     expected = problem.expectation(model)
-    z = z_scale(in_noises(problem, residuals(problem, model, expected), expected))
+    z = _robust_z(problem, model, expected)
     if not z > EXPLAINS:
         return 0.0
     pairs = zip(errors(problem, model, expected), problem.runs, strict=True)

@@ -101,11 +101,7 @@ def corrected_for_delay(found: list[Response], model: Model) -> tuple[list[Respo
     late = late_effects(model.effects)
     if not late or any(one.force is None for one in found):
         return found, model
-    rest = replace(
-        model,
-        effects=tuple(name for name in model.effects if name not in late),
-        values={n: v for n, v in model.values.items() if n.partition(".")[0] not in late},
-    )
+    rest = model.only(tuple(name for name in model.effects if name not in late))
     return [corrected(one, lateness(model), 1.0) for one in found], rest
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from ..core.arrays import Array
 from ..core.text import plain
 from ..errors import RecordError
 from ..physics.effect import EFFECTS
@@ -19,14 +19,13 @@ from .building_sites import StructureProblem, StructureRun, thinned
 from .error import ForceError, errors_by_run, pooled
 from .error_table import error_rms, force_rms
 from .fit import Fit, fit, identify
-from .problem import Model, Problem, Run, excess_of, told_z
+from .problem import Model, Problem, Run, excess_of, z_if_known
 from .rig import DAMPER, ROLES, Rig, Site, at_site
 from .start_grid import initial_guesses, refine
 from .watch import MODEL, series
 
 # The linear law of a layer or storey fitted to its runs, in closed form.
 
-Array = NDArray[np.float64]
 
 DAMPING = "c"
 """The parameter of the linear laws that adds to the building's own damping."""
@@ -477,7 +476,7 @@ def errors_of(models: SiteModels, cutoff: float) -> RigErrors:
     force = {role: pooled(found.values()) for role, found in at.items()}
     for role, error in force.items():
         pairs = [pair for _, pair in _pairs(models, role)]
-        out[f"z_{role}"] = max(told_z(*pair) for pair in pairs)
+        out[f"z_{role}"] = max(z_if_known(*pair) for pair in pairs)
         out[f"error_{role}"], out[f"error_share_{role}"] = error.headline
         squares = [error_rms(*pair, cutoff) ** 2 for pair in pairs]
         forces = [force_rms(problem.runs, cutoff) ** 2 for problem, _ in pairs]

@@ -11,13 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import quantity
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
-
-Array = NDArray[np.float64]
 
 SETTLING = 25
 """Samples at the begin of a run that are not judged."""
@@ -50,7 +48,7 @@ NUDGE = 1e-3
 """The first step of that search, over the stroke for a state in m, else as it is."""
 
 
-class Begin(NamedTuple):
+class RunStart(NamedTuple):
     """How a run begins.
 
     `first` is the first sample that is judged; `rest` the number of samples before it in which the
@@ -61,7 +59,7 @@ class Begin(NamedTuple):
     rest: int = 0
 
 
-def begin_of(x: Array, force: Array, dt: float) -> Begin:
+def start_of(x: Array, force: Array, dt: float) -> RunStart:
     """Return how a run begins.
 
     Parameters
@@ -75,12 +73,12 @@ def begin_of(x: Array, force: Array, dt: float) -> Begin:
     rests = float(np.ptp(x[:stands])) <= RESTS * span
     loaded = abs(float(np.mean(force[:SETTLING]))) > LOADED * rms
     if rests and not loaded:
-        return Begin(SETTLING)
+        return RunStart(SETTLING)
     every = max(1, round(COARSE / dt))
     passed = np.cumsum(np.abs(np.diff(x[::every]))) > FORGOTTEN * span
     first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
     first = min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
-    return Begin(first, min(stands, first) if rests else 0)
+    return RunStart(first, min(stands, first) if rests else 0)
 
 
 def carrying_state(law: str, effects: Sequence[str]) -> tuple[str, str]:

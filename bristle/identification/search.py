@@ -14,9 +14,9 @@ from os import cpu_count
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..core.arrays import Array
+
 Accepted = Callable[[Array, Array, float], None]
 """Is told of a step that a search keeps: theta (p,), residuals (n,), cost; it may change none."""
 

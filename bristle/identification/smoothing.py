@@ -18,9 +18,8 @@ from scipy.ndimage import uniform_filter, uniform_filter1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import istft, stft
 
+from ..core.arrays import Array
 from .kalman import Samples, Smoothed, kalman_smooth, room
-
-Array = NDArray[np.float64]
 
 GROUP = 12
 """Draws whose mean is zero together: any multiple of them may be used for an expectation."""

@@ -8,19 +8,16 @@ from itertools import product
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..physics.effect import EFFECTS, Sizes
 from ..physics.laws import LAWS
-from .problem import Expected as Expected
-from .problem import Model, Problem, parameter
-from .problem import residuals as residuals
+from .problem import Expected, Model, Problem, parameter, residuals
 from .search import HUBER, Descent, descend, jacobian, loss, mean_loss
 from .watch import watched
 
-# The search for a model's free parameters on runs.
+# A model's parameters as a search sees them: numbers of order one, and the residuals over them.
 
-Array = NDArray[np.float64]
 
 MOST_TURNS = 5
 """How often a rough search begins again at most."""
@@ -35,16 +32,28 @@ def is_rough(model: Model) -> bool:
 
 
 class Search:
-    """The search for a model's parameters on runs: logarithms where a bound is above zero."""
+    """The search for a model's parameters on runs, as numbers of order one.
 
-    def __init__(self, problem: Problem, model: Model, expected: Expected, names: Sequence[str]):
+    Parameters
+    ----------
+    problem, model : the runs; the model, where the search begins
+    expected : what a true model would show on each run
+    names : of the parameters that it moves
+    logarithms : whether it moves the logarithm of a parameter whose lower bound is above zero
+    """
+
+    def __init__(
+        self, problem: Problem, model: Model, expected: Expected, names: Sequence[str],
+        *, logarithms: bool = True,
+    ) -> None:  # fmt: skip
         self.problem, self.model, self.expected = problem, model, expected
         self.names = list(names)
+        # An impact's spike would tell a gap far more sharply than its fit can find it.
         self.rough = is_rough(model)
         declared = [parameter(model.law, name) for name in self.names]
         value = np.array([model.value(name) for name in self.names])
         bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
-        self.log = (bounds[:, 0] > 0.0) & (bounds[:, 1] > 50.0 * bounds[:, 0])
+        self.log = logarithms & (bounds[:, 0] > 0.0) & (bounds[:, 1] > 50.0 * bounds[:, 0])
         sizes = np.array([problem.size(d.unit) for d in declared])
         self.scale = np.where(self.log, 1.0, np.maximum(np.abs(value), 1e-2 * sizes))
         self.low, self.high = self._to(bounds[:, 0]), self._to(bounds[:, 1])
@@ -66,17 +75,20 @@ class Search:
         """Return the normalised residuals of all runs (n,)."""
         return residuals(self.problem, self.at(theta), self.expected)
 
-    def sensitivities(self) -> Array:
-        """Return how the normalised residuals change with the parameters (n, p), there."""
-        here = self.residuals(self.start)
-        return jacobian(self.residuals, self.start, here, self.low, self.high, self.rough)
+    def jacobian(self, theta: Array, r: Array) -> Array:
+        """Return the derivatives (n, p) of the residuals at theta (p,), where they are `r`."""
+        return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
 
-    def run(self, sweeps: int) -> tuple[Model, Descent]:
+    def sensitivities(self) -> Array:
+        """Return how the normalised residuals change with the parameters (n, p), at the start."""
+        return self.jacobian(self.start, self.residuals(self.start))
+
+    def run(self, sweeps: int, tolerance: float = 1e-4) -> tuple[Model, Descent]:
         """Search from the model's own values."""
         with watched(self.problem, self.at, expected=self.expected) as accepted:
             found = descend(
-                self.residuals, self.start, self.low, self.high, sweeps, rough=self.rough,
-                accepted=accepted,
+                self.residuals, self.start, self.low, self.high, sweeps, tolerance, self.rough,
+                accepted,
             )  # fmt: skip
         return self.at(found.theta), found
 
@@ -249,9 +261,8 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
         return problem, expected
     runs, thinned = [], []
     for run, (bias, sigma, draws) in zip(problem.runs, expected, strict=True):
-        every = slice(None, None, THIN)
-        runs.append(replace(run.of(every), dt=run.dt * THIN, skip=-(-run.skip // THIN)))
-        thinned.append((bias[every], sigma[every], draws[:, every]))
+        runs.append(run.every(THIN))
+        thinned.append((bias[::THIN], sigma[::THIN], draws[:, ::THIN]))
     return problem.of(runs), thinned
 
 

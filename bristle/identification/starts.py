@@ -12,19 +12,14 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from ..core.arrays import Array
 from ..physics.law import Shape
-from .problem import Array, Model, Problem, Run
+from .problem import Model, Problem
 
 _NEAR_REST = 3.0  # errors of the velocity within which a sign law tells nothing
 _AT_LEAST = 1e-3  # of the typical size: what a start gives a parameter that came out as zero
-
-
-def start_model(runs: list[Run], law: str, exponent: float = 1.0) -> Model:
-    """Return the best start for a rig of any size."""
-    return start_models(Problem(runs), Model(law, (), {"exponent": exponent}), 1)[0]
 
 
 def start_models(problem: Problem, model: Model, count: int) -> list[Model]:
@@ -107,7 +102,7 @@ class _Net:
         alone = Model(self.model_0.law, (), values)
         return np.concatenate([self.problem.predict(alone, run) for run in self.problem.runs])
 
-    def _weight(self) -> NDArray[np.float64]:
+    def _weight(self) -> Array:
         """Return the weight of each sample: none near rest for a law with a sign, or not measured.
 
         Runs of stronger noise weigh less.

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Flags
 from ..core.progress import Watcher, watcher
 from ..data.cycles import by_level, cycles
 from ..physics.drive import DRIVES
@@ -24,8 +24,6 @@ from .building_sites import StructureRun
 from .error import force_error
 from .problem import Expected, Model, Problem, Run, in_noises, parameter
 from .search import Accepted, z_of, z_scale
-
-Array = NDArray[np.float64]
 
 MODEL, LAW = "model", "law"
 """Kinds of series: the fits of the model, one after the other; one law of several side by side."""
@@ -98,7 +96,7 @@ def watched(
     search.end()
 
 
-def _measured(run: Run) -> NDArray[np.bool_]:
+def _measured(run: Run) -> Flags:
     return np.ones(len(run.force), dtype=bool) if run.measured is None else run.measured
 
 
@@ -122,7 +120,7 @@ class _Series:
         self._told: _Told | None = None
         self._best: _Told | None = None
 
-    def begin(self) -> tuple[int, list[float]]:
+    def start(self) -> tuple[int, list[float]]:
         """Return the number of a new search, and where it notes its errors."""
         errors: list[float] = []
         self._errors = [*self._errors[1 - SEARCHES :], errors]
@@ -171,11 +169,11 @@ class _Search:
 
     def __init__(
         self, series: _Series, problem: Problem, at: Callable[[Array], Model],
-        told_by: tuple[Callable[[Array], float] | None, Expected | None], last: bool,
+        judged_by: tuple[Callable[[Array], float] | None, Expected | None], last: bool,
     ) -> None:  # fmt: skip
         self._series, self._problem, self._at = series, problem, at
-        (self._share, self._expected), self._is_last = told_by, last
-        self._number, self._errors = series.begin()
+        (self._share, self._expected), self._is_last = judged_by, last
+        self._number, self._errors = series.start()
         self._left: tuple[Array, float | None] | None = None  # what was not told yet
 
     def __call__(self, theta: Array, r: Array, cost: float) -> None:

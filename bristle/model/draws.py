@@ -15,16 +15,14 @@ from statistics import NormalDist
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import command
 from ..errors import StudyError
 from ..physics.effect import EFFECTS, exclude
 from ..physics.forms import joined_form
 from ..units import convert
 from .model import StudyModel
-
-Array = NDArray[np.float64]
 
 POINT = 1.96
 """Standard deviations of a normal size at its limit: 95 % are smaller, whatever their sign."""

@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ..core.arrays import Array
 from ..core.config import Document, Key, Spec
 from ..core.text import shown
 from ..core.toml_lines import KeyPath
@@ -18,7 +19,7 @@ from ..physics.laws import DEFAULT, base_and_variant
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..units import canonical, convert
 from ..user_code.load import waiting
-from .uncertainty import Array, Correlation, correlation_of_covariance, covariance_of
+from .uncertainty import Correlation, correlation_of_covariance, covariance_of
 
 # A value of a model.toml, and what can be read of a law or effect without its code.
 
@@ -253,15 +254,15 @@ class StudyModel:
             return self
         old = DRIVES[self.drive].unit
 
-        def said(value: Value) -> Value:
+        def in_unit(value: Value) -> Value:
             return replace(value, unit=unit_for(value.unit, DRIVES[drive], old))
 
         return replace(
             self,
             drive=drive,
-            parameters={name: said(value) for name, value in self.parameters.items()},
+            parameters={name: in_unit(value) for name, value in self.parameters.items()},
             effects={
-                effect: {name: said(value) for name, value in values.items()}
+                effect: {name: in_unit(value) for name, value in values.items()}
                 for effect, values in self.effects.items()
             },
         )

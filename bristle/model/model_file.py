@@ -41,13 +41,16 @@ from ..physics.laws import LAWS, base_and_variant, law_names
 from ..physics.parameter import Parameter
 from ..units import convert
 from ..user_code.load import waiting, why_left_out
-from .model import ORIGINS as ORIGINS
-from .model import VALUE as VALUE
-from .model import StudyModel as StudyModel
-from .model import Value as Value
-from .model import as_written, declared_of, defaults_of, waiting_law
-from .model import new_model as new_model
-from .model import table_names as table_names
+from .model import (
+    VALUE,
+    StudyModel,
+    Value,
+    as_written,
+    declared_of,
+    defaults_of,
+    table_names,
+    waiting_law,
+)
 from .uncertainty import CORRELATION, read_correlation, set_correlation
 
 # The form of the command in a model.toml: the keys `command` and `command_knots`.

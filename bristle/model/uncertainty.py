@@ -15,13 +15,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.config import ANY, Document, Key, Spec
 from ..core.text import unknown, written
 from ..errors import StudyError
-
-Array = NDArray[np.float64]
 
 _DIGITS = 9
 _SLACK = 1e-7

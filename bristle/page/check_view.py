@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.checks.finding import grouped, sentence
-from ..data.cut_off import LONG, stretches
+from ..data.cut_off import LONG
+from ..data.noise import stretches
 from ..study.data_check import check_data
 from ..study.study import Study
 from .data_view import Array, spans

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..core.text import scale
 from ..data.checks.motion import velocity_of_run
-from ..data.cut_off import stretches
 from ..data.measurement import Measurement
+from ..data.noise import stretches
 from ..study.rig import Place, place_of_damper
 from ..study.runs import place_of_run
 from ..study.study import Study

@@ -6,7 +6,7 @@ import base64
 import re
 from pathlib import Path
 
-from ..comparison.comparison import Comparison
+from ..comparison.result import Comparison
 from ..view import html
 from ..view.page_data import pack
 from .errors_view import linked

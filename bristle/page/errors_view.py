@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.comparison import Comparison
 from ..comparison.misfit import run_error
 from ..comparison.names import name_of, site_name
 from ..comparison.patterns import ResidualPattern
 from ..comparison.predictions import RunPrediction, shown
+from ..comparison.result import Comparison
 from ..errors import StudyError
 from ..study.steps import before_after, compare_study, predictions
 from ..study.study import Study

@@ -13,8 +13,9 @@ from ..core.config import Document
 from ..diagnosis.effect_size import Known as Fitted
 from ..errors import StudyError
 from ..identification.fit import identify
-from ..identification.problem import REFERENCE, Model, Problem, Run, law_parameters
+from ..identification.problem import REFERENCE, Model, Problem, Run
 from ..identification.smoothing import posterior_draws
+from ..physics.laws import LAWS
 from .bench import planned
 from .information import DRAWS, Question
 from .limits import RigLimits, Test, limits_given, read_sheet, with_given
@@ -203,7 +204,7 @@ def _stand_in(rig: NewRig) -> Run:
 
 def _scaled(rig: NewRig, problem: Problem) -> Model:
     """Return the law at the rig's size: its largest force is that of the data sheet."""
-    declared = law_parameters(rig.law)
+    declared = LAWS[rig.law].parameters
     values = {}
     for name, one in declared.items():
         per_command = one.unit.replace("(m.V)", "m").replace("/V", "")

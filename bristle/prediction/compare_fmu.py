@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison.comparison import Comparison, compare_predictions
+from ..comparison.comparison import compare_predictions
 from ..comparison.predictions import RunPrediction, coordinates_of, rms
+from ..comparison.result import Comparison
 from ..data.channels import DRIVE, MOTION, PLAIN, ChannelSpec, channel_unit, is_channel
 from ..data.decimate import between
 from ..data.guess import guess_channels, specs

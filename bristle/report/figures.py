@@ -33,7 +33,7 @@ from ..view.style import Page, look
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from ..comparison.comparison import Comparison
+    from ..comparison.result import Comparison
     from ..data.measurement import Measurement
     from ..model.model import StudyModel, Value
     from ..study.study import Study

@@ -33,7 +33,8 @@ from .figures import curves_section, data_table, data_words, parameter_table
 from .reproduce import commands
 
 if TYPE_CHECKING:
-    from ..comparison.comparison import Comparison, RigComparer
+    from ..comparison.comparison import RigComparer
+    from ..comparison.result import Comparison
     from ..identification.rig_fit import SiteModel
     from ..model.model import StudyModel
     from ..study.history import Step

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..comparison.comparison import Comparison, RigComparer
+from ..comparison.comparison import RigComparer
+from ..comparison.result import Comparison
 from ..core.text import written
 from ..diagnosis import Diagnosis, diagnose_rig
 from ..diagnosis.joint_search import diagnose_laws

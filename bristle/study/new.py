@@ -22,11 +22,10 @@ from ..data.channels import (
     no_device,
 )
 from ..data.decimate import FAST, RATE
-from ..data.extra_channels import found_in
+from ..data.extra_channels import found_in, raw_signals
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
 from ..data.measurement import measurements_of
 from ..data.pieces import pieces_of
-from ..data.raw_signals import raw_signals
 from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of

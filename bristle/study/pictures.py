@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.arrays import Array
 from ..core.text import quantity, short_z
 from ..data.channels import DRIVE
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
-from ..data.table import Array
 from ..view.style import BLUE, FLOOR, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look
 
 if TYPE_CHECKING:

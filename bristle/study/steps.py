@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.comparison import Comparison, RigComparer
+from ..comparison.comparison import RigComparer
 from ..comparison.misfit import run_error
 from ..comparison.predictions import RunPrediction
+from ..comparison.result import Comparison
 from ..core.config import other_schema
 from ..core.files import read_json, write_json, write_whole
 from ..core.interrupt import keeps

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 from predictions_made import DT, motion, predictions_with
 
-from bristle.comparison import compare, compare_predictions
+from bristle.comparison.comparison import compare, compare_predictions
 from bristle.comparison.conditions import Regime
 from bristle.comparison.panels import draw_pattern, residual_map, worst_window
 from bristle.comparison.predictions import halved, run_predictions

@@ -13,7 +13,6 @@ from bristle.comparison.patterns import (
     Finder,
     block_length,
     correlation_time,
-    dependence,
     residual_patterns,
 )
 from bristle.comparison.predictions import coordinates_of
@@ -146,17 +145,6 @@ def test_blocks_are_longer_than_the_correlation():
         assert correlation_time(r[0]) == pytest.approx(truth, rel=0.5)
         assert block_length(r) >= min(6.0 * truth, 600)
     assert block_length([np.ones(500)]) == 40
-
-
-def test_share_of_one_coordinate_and_of_chance():
-    random = np.random.default_rng(2)
-    x = random.standard_normal(5000)
-    share, chance = dependence(0.5 * x + random.standard_normal(5000), x)
-    assert share == pytest.approx(np.sqrt(0.2), abs=0.03)
-    assert chance < 0.15
-    share, chance = dependence(random.standard_normal(5000), x)
-    assert share < 1.3 * chance
-    assert dependence(random.standard_normal(500), np.zeros(500)) == (0.0, 0.0)
 
 
 def test_a_comparison_of_18_000_samples_takes_less_than_a_second():

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from predictions_made import predictions_with
 
-from bristle.comparison import compare_sites
-from bristle.comparison.comparison import site_errors
+from bristle.comparison.comparison import compare_sites, site_errors
 from bristle.comparison.names import site_names
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.checks.channels import check_channels
-from bristle.data.extra_channels import MOST, found_in, refused_name, unit_of
+from bristle.data.extra_channels import MAX_CHANNELS, found_in, refused_name, unit_of
 from bristle.data.guess import guess_channels
 from bristle.data.measurement import Known, Measurement, measurements_of
 from bristle.data.table import Table, from_arrays
@@ -70,8 +70,8 @@ def test_a_second_time_an_index_and_a_copy_in_other_units_are_no_channels():
 
 def test_of_very_many_columns_the_first_are_kept():
     random = np.random.default_rng(3)
-    made = table(**{f"gauge{k}__rad": random.standard_normal(N) for k in range(MOST + 5)})
-    assert list(extra_of(made)) == [f"gauge{k}" for k in range(MOST)]
+    made = table(**{f"gauge{k}__rad": random.standard_normal(N) for k in range(MAX_CHANNELS + 5)})
+    assert list(extra_of(made)) == [f"gauge{k}" for k in range(MAX_CHANNELS)]
 
 
 def test_two_of_one_name_are_told_apart_and_no_name_is_one_that_means_something():

@@ -9,7 +9,7 @@ import pytest
 from known_runs import bench_run, truth_of
 from scipy.optimize import least_squares
 
-from bristle.identification.fit import Scaled, identify
+from bristle.identification.fit import identify
 from bristle.identification.problem import (
     EXPLAINS,
     Model,
@@ -22,6 +22,7 @@ from bristle.identification.problem import (
 )
 from bristle.identification.rig import DAMPER, ROLES, Site
 from bristle.identification.rig_fit import fit_site
+from bristle.identification.start_grid import Search
 
 LAW = "bingham"
 
@@ -63,7 +64,7 @@ def test_a_fit_that_misses_something_is_nearly_least_squares(runs):
     assert robust_z(problem, found) > 3.0
 
     none = [(np.zeros(len(r.x)), np.ones(len(r.x)), np.zeros((1, len(r.x)))) for r in problem.runs]
-    scaled = Scaled(problem, found, none)
+    scaled = Search(problem, found, none, found.free(), logarithms=False)
     best = least_squares(
         lambda theta: np.concatenate(errors(problem, scaled.at(theta), none)), scaled.start,
         bounds=(scaled.low - 1e-12, scaled.high + 1e-12), x_scale="jac",

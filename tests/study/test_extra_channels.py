@@ -11,7 +11,7 @@ import pytest
 from made import bench_run, write
 
 from bristle.cli import main
-from bristle.comparison import compare
+from bristle.comparison.comparison import compare
 from bristle.errors import RecordError, StudyError
 from bristle.fmu.description import read_description
 from bristle.identification.prepare import prepare

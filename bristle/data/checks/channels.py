@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain, quantity
 from ..channels import DRIVE, device_channel
 from ..cut_off import clipped_ends
 from ..measurement import Measurement
 from ..noise import Noise, estimate_noise, is_switched, spikes_text
-from ..table import Array
 from .finding import Finding, Level
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
@@ -74,16 +74,12 @@ def _extra(run: Measurement) -> Iterator[Finding]:
 def _spikes(run: Measurement) -> Iterator[Finding]:
     for channel in dict.fromkeys(spike.channel for spike in run.spikes):
         own = tuple(spike for spike in run.spikes if spike.channel == channel)
-        yield Finding(
-            "spikes",
-            "warning",
-            f"{spikes_text(own)}.",
+        text = f"{spikes_text(own)}."
+        do = (
             "`bristle study check FOLDER --mask` takes them for not measured. Look for a loose "
-            "cable.",
-            run.name,
-            channel,
-            float(len(own)),
+            "cable."
         )
+        yield Finding("spikes", "warning", text, do, run.name, channel, float(len(own)))
 
 
 def _still(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
@@ -110,16 +106,12 @@ def _clipped(
         return
     friction = channel.endswith("force") and _is_at_ends(ends)
     other = ", or a friction without noise that nothing changes" if friction else ""
-    yield Finding(
-        "clipping",
-        "warning",
+    text = (
         f"{channel} stays at exactly {_ends_text(ends, run.units[channel])}: it is cut off by its "
-        f"instrument or amplifier{other}.",
-        "Repeat the run with a larger range, or leave it out: saturated samples are lost.",
-        run.name,
-        channel,
-        sum(end[0] for end in ends),
+        f"instrument or amplifier{other}."
     )
+    do = "Repeat the run with a larger range, or leave it out: saturated samples are lost."
+    yield Finding("clipping", "warning", text, do, run.name, channel, sum(end[0] for end in ends))
 
 
 def _keeps_levels(channel: str) -> bool:
@@ -175,17 +167,14 @@ def _coloured(
         yield Finding("noise", "note", f"{text}.", "", run.name, channel, share)
         return
     doubtful = facts.colour in ("slow", "hidden", "rough", "blue")
-    yield Finding(
-        "noise",
-        "warning" if doubtful else "note",
-        f"{text}; {_COLOURS[facts.colour]}.",
+    text = f"{text}; {_COLOURS[facts.colour]}."
+    do = (
         f"Give its standard deviation as noise in [channels.{channel}], from a record at rest."
         if doubtful
-        else "",
-        run.name,
-        channel,
-        share,
+        else ""
     )
+    level: Level = "warning" if doubtful else "note"
+    yield Finding("noise", level, text, do, run.name, channel, share)
 
 
 def _drift(run: Measurement, x: Array, velocity: Array | None) -> Iterator[Finding]:
@@ -193,28 +182,20 @@ def _drift(run: Measurement, x: Array, velocity: Array | None) -> Iterator[Findi
     slope, spread = middle_drift(x, velocity) if velocity is not None else (0.0, 0.0)
     span, middle = float(np.ptp(x)), 0.5 * float(x.max() + x.min())
     if abs(slope) > max(0.2 * span, 4.0 * spread):
-        yield Finding(
-            "drift",
-            "warning",
+        text = (
             f"the middle of the displacement drifts by {plain(1e3 * slope)} mm over the run, of "
-            f"{plain(1e3 * span)} mm in all.",
-            "Let the instrument warm up, or say in notes that the motion itself is so.",
-            run.name,
-            "displacement",
-            abs(slope) / span,
+            f"{plain(1e3 * span)} mm in all."
         )
+        do = "Let the instrument warm up, or say in notes that the motion itself is so."
+        yield Finding("drift", "warning", text, do, run.name, "displacement", abs(slope) / span)
     if abs(middle) > 0.25 * span:
-        yield Finding(
-            "zero",
-            "note",
+        text = (
             f"displacement runs from {plain(1e3 * float(x.min()), 4)} to "
             f"{plain(1e3 * float(x.max()), 4)} mm: "
-            "its zero is not the middle of the motion.",
-            "Such data show effects of position only up to that zero.",
-            run.name,
-            "displacement",
-            abs(middle) / span,
+            "its zero is not the middle of the motion."
         )
+        do = "Such data show effects of position only up to that zero."
+        yield Finding("zero", "note", text, do, run.name, "displacement", abs(middle) / span)
 
 
 def _force_offset(run: Measurement, force: Array, velocity: Array) -> Iterator[Finding]:
@@ -224,17 +205,14 @@ def _force_offset(run: Measurement, force: Array, velocity: Array) -> Iterator[F
     rms = float(np.std(force))
     if rms == 0.0 or abs(offset) < max(0.03 * rms, 4.0 * spread):
         return
-    yield Finding(
-        "offset",
-        "warning" if abs(offset) > 0.1 * rms else "note",
+    text = (
         f"force at equal speeds to both sides has a mean of {plain(offset, 4)} N "
         f"({plain(100 * offset / rms)} % of its RMS about the mean): the zero of the load cell, "
-        "a preload, or an asymmetric damper.",
-        "Note the load cell's reading without a damper; asymmetry shows only with it.",
-        run.name,
-        "force",
-        abs(offset) / rms,
+        "a preload, or an asymmetric damper."
     )
+    do = "Note the load cell's reading without a damper; asymmetry shows only with it."
+    level: Level = "warning" if abs(offset) > 0.1 * rms else "note"
+    yield Finding("offset", level, text, do, run.name, "force", abs(offset) / rms)
 
 
 def middle_drift(x: Array, velocity: Array) -> tuple[float, float]:
@@ -327,10 +305,9 @@ def _turned(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
     """Report a command that is below zero and never above: laws take more of it for more force."""
     low = float(values.min())
     if low < 0.0 and float(values.max()) <= -NEVER * low and float(np.mean(values)) < MOSTLY * low:
-        yield Finding(
-            "command sign", "warning",
+        text = (
             f"{channel} goes down to {quantity(low, run.units[channel], 3)} and never above zero: "
-            "is its sign turned?",
-            f"Turn it with bristle study channels MY_RIG --channel {channel}=-COLUMN",
-            run.name, channel,
-        )  # fmt: skip
+            "is its sign turned?"
+        )
+        do = f"Turn it with bristle study channels MY_RIG --channel {channel}=-COLUMN"
+        yield Finding("command sign", "warning", text, do, run.name, channel)

@@ -14,16 +14,16 @@ from math import log
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain, quantity
 from ..corrections import LEFT_OUT, Correction
 from ..force_shapes import RunForces, fitted_forces, force_parts
 from ..measurement import Measurement
 from ..relation import derivative_relation
-from ..table import Array
 from .finding import Finding
 from .motion import velocity_of_run
 
-FEWEST = 4
+MIN_RUNS = 4
 """Runs from which on one can differ from the others."""
 
 GAIN = 0.12
@@ -60,7 +60,7 @@ def check_differing_runs(runs: Sequence[Measurement]) -> Iterator[Finding]:
     yield from motion
     off = {finding.run for finding in motion}
     able = [run for run in runs if run.name not in off and _has_force(run)]
-    if len(able) >= FEWEST:
+    if len(able) >= MIN_RUNS:
         yield from _forces(able)
 
 
@@ -76,7 +76,7 @@ def _motion(runs: Sequence[Measurement]) -> Iterator[Finding]:
         for run, one in zip(pairs, found, strict=True)
         if one is not None and abs(one.correlation) > 0.9
     ]
-    if len(known) < FEWEST:
+    if len(known) < MIN_RUNS:
         return
     usual = float(np.median([one.gain for _, one in known]))
     logs = np.array([log(abs(one.gain / usual)) for _, one in known])
@@ -190,7 +190,7 @@ def _forces(runs: Sequence[Measurement]) -> Iterator[Finding]:
     gains, zeros = _apart(found, rms)
     off = (np.abs(gains) > 0.5 * GAIN) | (found.gain < 0.0) | (np.abs(zeros) > 0.5 * ZERO)
     sound = np.flatnonzero(~off).tolist()
-    if len(sound) < FEWEST - 1 or len(sound) == len(runs):
+    if len(sound) < MIN_RUNS - 1 or len(sound) == len(runs):
         return
     found = fitted_forces(parts, sound)
     gains, zeros = _apart(found, rms, sound)

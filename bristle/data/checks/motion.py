@@ -8,6 +8,7 @@ from math import log10
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain
 from ..cut_off import numerical_derivative
 from ..measurement import Measurement
@@ -20,8 +21,7 @@ from ..relation import (
     power_factor,
     tells_sign,
 )
-from ..table import Array
-from .finding import Finding
+from .finding import Finding, Level
 
 ACROSS = "across_device"
 """What stands before displacement and velocity across a device, as a level's name elsewhere."""
@@ -66,16 +66,15 @@ def check_motion(run: Measurement, level: str = "") -> Iterator[Finding]:
     if run.has(x, v):
         own = numerical_derivative(run[x], run[v], run.step)
         if own:
-            yield Finding(
-                "derived",
-                "note",
+            text = (
                 f"{v} is the numerical derivative of {x} ({own}): it adds no information, and "
-                "its noise is that of the displacement.",
-                f"Leave it out with bristle study channels MY_RIG --without {v} , or record it "
-                "with an instrument of its own.",
-                run.name,
-                v,
+                "its noise is that of the displacement."
             )
+            do = (
+                f"Leave it out with bristle study channels MY_RIG --without {v} , or record it "
+                "with an instrument of its own."
+            )
+            yield Finding("derived", "note", text, do, run.name, v)
         else:
             yield from _related(run, x, v, derivative_relation(run[x], run[v], run.step))
     yield from _acceleration(run, before, x, v)
@@ -105,44 +104,34 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
     if np.ptp(force) == 0.0 or np.ptp(velocity) == 0.0:
         return
     share, agree = power_factor(force, velocity)
-    text = f"share of the power that it could dissipate: {share:+.2f}"
+    shown = f"share of the power that it could dissipate: {share:+.2f}"
     known = tells_sign(share, agree, len(force))
     if known and share < 0.0:
-        yield Finding(
-            "sign",
-            "error",
-            f"force drives the motion, because it is positive along it ({text}).",
+        text = f"force drives the motion, because it is positive along it ({shown})."
+        do = (
             "Turn its sign with bristle study channels MY_RIG --channel force=-COLUMN : a force is "
-            "positive when it resists motion along +x.",
-            run.name,
-            "force",
-            -share,
+            "positive when it resists motion along +x."
         )
+        yield Finding("sign", "error", text, do, run.name, "force", -share)
     elif not known:
-        yield Finding(
-            "sign",
-            "warning",
-            f"force neither resists nor drives the motion ({text}): its sign cannot be determined.",
-            "Check that force and motion were recorded together.",
-            run.name,
-            "force",
-            -abs(share),
+        text = (
+            f"force neither resists nor drives the motion ({shown}): its sign cannot be determined."
         )
+        do = "Check that force and motion were recorded together."
+        yield Finding("sign", "warning", text, do, run.name, "force", -abs(share))
 
 
 def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -> Iterator[Finding]:
     if found is None:
         return  # one of the two stands still, which is said elsewhere
     if abs(found.correlation) < 0.9 and found.residual > 0.4:
-        yield Finding(
-            "derivative",
-            "error",
+        text = (
             f"{upper} is not the derivative of {lower}: their correlation is "
-            f"{found.correlation:.2f}.",
-            "Check the columns: are two exchanged, or is one instrument not connected?",
-            value=1.0 - abs(found.correlation),
-            run=run.name,
-            channel=upper,
+            f"{found.correlation:.2f}."
+        )
+        do = "Check the columns: are two exchanged, or is one instrument not connected?"
+        yield Finding(
+            "derivative", "error", text, do, run.name, upper, 1.0 - abs(found.correlation)
         )
         return
     gain = (
@@ -150,40 +139,24 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
         f"derivative of {lower}"
     )
     after = f"; the remainder is {plain(100 * found.residual, 2)} % of it"
+    text = f"{gain}{after}."
     off = abs(found.gain - 1.0)
     if found.gain < 0.0 or off > 0.25:
         size = abs(found.gain)
         doubts = ["sign"] * (found.gain < 0.0) + ["unit"] * (not 0.75 < size < 1.25)
-        yield Finding(
-            "gain",
-            "error",
-            f"{gain}{after}.",
-            f"Check the {' and the '.join(doubts)} of both in study.toml.",
-            value=abs(log10(size)),
-            run=run.name,
-            channel=upper,
-        )
+        do = f"Check the {' and the '.join(doubts)} of both in study.toml."
+        yield Finding("gain", "error", text, do, run.name, upper, abs(log10(size)))
     else:
         certain = off > max(_GAIN, 4.0 * found.gain_std)
-        yield Finding(
-            "gain",
-            "warning" if certain else "note",
-            f"{gain}{after}.",
-            "One of the two instruments is out of calibration." if certain else "",
-            value=off,
-            run=run.name,
-            channel=upper,
-        )
+        do = "One of the two instruments is out of calibration." if certain else ""
+        level: Level = "warning" if certain else "note"
+        yield Finding("gain", level, text, do, run.name, upper, off)
     if abs(found.delay) > max(_DELAY * run.step, 4.0 * found.delay_std):
         late = "later" if found.delay > 0.0 else "earlier"
-        yield Finding(
-            "delay",
-            "warning",
+        text = (
             f"{upper} comes {plain(1e3 * abs(found.delay))} ms "
             f"(+-{plain(2e3 * found.delay_std, 1)}) {late} "
-            f"than {lower}.",
-            "Filters of two instruments differ: use the same on both, or one of the channels.",
-            value=abs(found.delay),
-            run=run.name,
-            channel=upper,
+            f"than {lower}."
         )
+        do = "Filters of two instruments differ: use the same on both, or one of the channels."
+        yield Finding("delay", "warning", text, do, run.name, upper, abs(found.delay))

@@ -8,21 +8,21 @@ from itertools import chain
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain, quantity
 from ..channels import DRIVE
 from ..corrections import BETA, Correction, amplitude_of, drifting_amplitude, without_slow
 from ..measurement import Measurement
 from ..noise import is_switched
-from ..table import Array
+from ..relation import power_spectrum
 from .finding import Finding
 
 # A channel that was interpolated to a faster rate before it was stored: it is straight in pieces.
 #
 # Between two measured samples an interpolated channel lies on a straight line, to the last digit
-# that
-# was written. No measured signal does so again and again at ever new slopes.
+# that was written. No measured signal does so again and again at ever new slopes.
 
-FEWEST = 200
+MIN_PATTERN_SAMPLES = 200
 """Samples from which on a pattern is no accident."""
 
 STRAIGHT = 0.25
@@ -50,7 +50,7 @@ def interpolated(y: Array) -> float:
     y : (n,) as stored, evenly spaced and finite
     """
     size = float(np.ptp(y))
-    if len(y) < FEWEST or size == 0.0:
+    if len(y) < MIN_PATTERN_SAMPLES or size == 0.0:
         return 0.0
     digit = _last_digit(y, size)
     slope = np.diff(y)
@@ -83,9 +83,8 @@ def _last_digit(y: Array, size: float) -> float:
 # A channel that was averaged over some samples before it was stored, told from its spectrum.
 #
 # The mean of L samples has the gain |sin(pi L f dt) / (L sin(pi f dt))|: it is zero at every
-# multiple
-# of 1/(L dt), whatever was averaged, motion, jumps or noise. No other filter has nulls at equal
-# distances up to half the sampling rate.
+# multiple of 1/(L dt), whatever was averaged, motion, jumps or noise. No other filter has nulls at
+# equal distances up to half the sampling rate.
 
 MIN_AVERAGED = 1000
 """Samples from which on a spectrum is fine enough."""
@@ -97,7 +96,7 @@ _BETA = 14.0  # of the Kaiser window: 100 dB, deeper than a null
 _BINS = 15  # whose lower third is one point of the spectrum: a periodic test has lines between
 _QUANTILE = 0.3
 _POINTS = 8  # between two nulls at the least
-_BEGIN = 2.0  # times the band of a channel's own power from which on its spectrum is looked at
+_START = 2.0  # times the band of a channel's own power from which on its spectrum is looked at
 _BAND = 0.995  # share of that power
 _DEGREE = 5  # of the polynomial that the rest of the spectrum is taken for, in log power
 _FLOORS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)  # of what came on top behind the average, over a lobe
@@ -127,7 +126,7 @@ def moving_average(y: Array, step: float) -> MovingAverage | None:
     if len(y) < MIN_AVERAGED or float(np.ptp(y)) == 0.0 or is_switched(y):
         return None
     frequency, level = _points(y)  # in samples^-1
-    inside = frequency > _begin(y)
+    inside = frequency > _start_of(y)
     if np.count_nonzero(inside) < 2 * _POINTS:
         return None
     frequency, level = frequency[inside], level[inside]
@@ -158,7 +157,7 @@ def _fewest_nulls(length: int) -> int:
 
 def _is_comb(y: Array, length: int) -> bool:
     """Return whether nulls lie where a periodic channel has gaps between its harmonics."""
-    power = np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(len(y)))) ** 2
+    power = power_spectrum(y)
     k = int(np.argmax(power))
     periodic = float(np.sum(power[max(k - 2, 0) : k + 3])) > _PERIODIC * float(np.sum(power))
     if not periodic or k == 0:
@@ -178,11 +177,11 @@ def _points(y: Array) -> tuple[Array, Array]:
     return at, np.quantile(groups, _QUANTILE, axis=1)
 
 
-def _begin(y: Array) -> float:
+def _start_of(y: Array) -> float:
     """Return the frequency [1/sample] from which on a spectrum has a simple shape."""
-    power = np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(len(y)))) ** 2
+    power = power_spectrum(y)
     total = np.cumsum(power)
-    return _BEGIN * float(np.searchsorted(total, _BAND * total[-1])) / len(y)
+    return _START * float(np.searchsorted(total, _BAND * total[-1])) / len(y)
 
 
 def _scaled(frequency: Array) -> Array:
@@ -363,9 +362,9 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
     Returns
     -------
     list of SpectralLine
-        By channel, the largest first; none of runs of fewer than `FEWEST` samples.
+        By channel, the largest first; none of runs of fewer than `MIN_PATTERN_SAMPLES` samples.
     """
-    able = {name: y for name, y in channels.items() if _is_able(name, y)}
+    able = {name: y for name, y in channels.items() if _is_able(y)}
     spectra = {name: _spectrum(_cut_down(y, step), step) for name, y in able.items()}
     drivers = [name for name, y in able.items() if _moves(name) or _commands(name, y)]
     top = max((_band_top(able[name], step) for name in able if _moves(name)), default=0.0)
@@ -379,7 +378,7 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
         ]
         rms = float(np.sqrt(np.mean(able[name] ** 2)))
         out += [one for one in found if one.amplitude < _MOST_OF_SIGNAL * rms]
-    return [line for line in out if not _is_driven(line, out, spectra, able, step)]
+    return [line for line in out if not _is_driven(line, spectra, able, step)]
 
 
 def of_one_mains(
@@ -418,7 +417,7 @@ def of_one_mains(
     return out
 
 
-def _is_able(name: str, y: Array) -> bool:
+def _is_able(y: Array) -> bool:
     return len(y) >= MIN_LINE_SAMPLES and float(np.ptp(y)) > 0.0 and not is_switched(y)
 
 
@@ -457,7 +456,7 @@ def _spectrum(y: Array, step: float) -> _Spectrum:
 
 def _band_top(y: Array, step: float) -> float:
     """Return the frequency [Hz] below which 99.5 % of the power of a motion's rate lies."""
-    power = np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(len(y)))) ** 2
+    power = power_spectrum(y)
     total = np.cumsum(power)
     return float(np.fft.rfftfreq(len(y), step)[int(np.searchsorted(total, 0.995 * total[-1]))])
 
@@ -545,11 +544,7 @@ def _is_steady(y: Array, frequency: float, step: float) -> bool:
 
 
 def _is_driven(
-    line: SpectralLine,
-    found: Sequence[SpectralLine],
-    spectra: Mapping[str, _Spectrum],
-    channels: Mapping[str, Array],
-    step: float,
+    line: SpectralLine, spectra: Mapping[str, _Spectrum], channels: Mapping[str, Array], step: float
 ) -> bool:
     """Return whether a line is motion or command, or no fault of its channel alone.
 
@@ -604,17 +599,15 @@ def _of_run(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Iter
     for channel, values in run.channels.items():
         found = None if channel in DRIVE else moving_average(values, run.step)
         if found is not None:
-            yield Finding(
-                "averaged",
-                "warning",
+            text = (
                 f"{channel} is a moving average of {found.length} samples "
                 f"({plain(1e3 * found.length * run.step)} ms): its spectrum has {found.nulls} "
                 "nulls at equal distances. Jumps are rounded that long, and a delay or lag of "
-                "that size may be the average's.",
-                "Store the channel as it was sampled, and measure again if you can.",
-                run.name,
-                channel,
-                found.length * run.step,
+                "that size may be the average's."
+            )
+            do = "Store the channel as it was sampled, and measure again if you can."
+            yield Finding(
+                "averaged", "warning", text, do, run.name, channel, found.length * run.step
             )
 
 
@@ -624,17 +617,13 @@ def _interpolated(run: Measurement) -> Iterator[Finding]:
         of_one = 0.0 if channel in DRIVE else interpolated(values)
         if of_one:
             rate = plain(run.sampling.rate / of_one, 3)
-            yield Finding(
-                "interpolated",
-                "warning",
+            text = (
                 f"{channel} is interpolated: {rate} samples per second were measured, those "
                 "between lie on straight lines. Their noise is no measured one, and what is "
-                f"faster than {plain(0.5 * run.sampling.rate / of_one, 3)} Hz is not in them.",
-                f"Store what was measured, or set rate = {rate} in study.toml.",
-                run.name,
-                channel,
-                of_one,
+                f"faster than {plain(0.5 * run.sampling.rate / of_one, 3)} Hz is not in them."
             )
+            do = f"Store what was measured, or set rate = {rate} in study.toml."
+            yield Finding("interpolated", "warning", text, do, run.name, channel, of_one)
 
 
 def _of_lines(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Finding:
@@ -648,18 +637,17 @@ def _of_lines(run: Measurement, lines: Sequence[SpectralLine], mains: str) -> Fi
         for one in ordered
     ]
     what = "a line at" if len(told) == 1 else "lines at"
-    return Finding(
-        "lines",
-        "warning",
+    text = (
         f"{channel} has {what} {', '.join(told)}; the largest is "
-        f"{plain(100.0 * ordered[0].amplitude / rms, 2)} % of its RMS, and no motion drives it.",
-        "`bristle study check FOLDER --correct` takes it off. Look for a loop of the ground, or a "
-        "shield that is open.",
-        run.name,
-        channel,
-        ordered[0].amplitude,
-        tuple(Correction(channel, "line", round(one.frequency, 4)) for one in ordered),
+        f"{plain(100.0 * ordered[0].amplitude / rms, 2)} % of its RMS, and no motion drives it."
     )
+    do = (
+        "`bristle study check FOLDER --correct` takes it off. Look for a loop of the ground, or a "
+        "shield that is open."
+    )
+    lines_off = tuple(Correction(channel, "line", round(one.frequency, 4)) for one in ordered)
+    size = ordered[0].amplitude
+    return Finding("lines", "warning", text, do, run.name, channel, size, lines_off)
 
 
 def _origin(line: SpectralLine, run: Measurement, mains: str) -> str:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain, quantity
 from ...physics.drive import DRIVES
 from ..measurement import Measurement
 from ..noise import is_switched
-from ..table import Array
 from ..tone import label_doubt, tone_of
 from .finding import Finding
 from .motion import velocity_of_run
@@ -139,14 +139,13 @@ def _too_short(runs: list[Excitation]) -> Iterator[Finding]:
     total = sum(run.cycles for run in runs)
     if total < 3.0 and any(run.speed > 0.0 for run in runs):
         seconds = sum(run.duration for run in runs)
-        yield Finding(
-            "short",
-            "error",
+        text = (
             f"all runs together hold {plain(total, 2)} cycles of motion in {plain(seconds)} s: "
             f"too few for "
-            "a model to be fitted and tested.",
-            "Record ten cycles or more at several speeds.",
+            "a model to be fitted and tested."
         )
+        do = "Record ten cycles or more at several speeds."
+        yield Finding("short", "error", text, do)
         return
     for run in runs:
         if run.speed > 0.0 and run.cycles < 2.0:
@@ -159,13 +158,12 @@ def _too_short(runs: list[Excitation]) -> Iterator[Finding]:
 def _drive(runs: list[Excitation]) -> Iterator[Finding]:
     driven = [run for run in runs if run.drive]
     if not driven:
-        yield Finding(
-            "drive",
-            "warning",
+        text = (
             "no command was recorded: if there is one, it is taken as constant at an unknown "
-            "level, and no effect of it can be tested.",
-            "Record the command, if there is one.",
+            "level, and no effect of it can be tested."
         )
+        do = "Record the command, if there is one."
+        yield Finding("drive", "warning", text, do)
         return
     name = driven[0].drive
     unit = DRIVES[name].unit
@@ -195,14 +193,13 @@ def _moving_drive(runs: list[Excitation], name: str, unit: str) -> Iterator[Find
     yield Finding("drive", "note", text)
     levels = _distinct(sorted(level for run in runs for level, _ in run.levels))
     if all(run.levels for run in runs) and len(levels) == 2:
-        yield Finding(
-            "drive levels",
-            "warning",
+        text = (
             f"{name} has two levels, {plain(levels[0], 4)} and {plain(levels[1], 4)} {unit}: "
             f"saturation cannot "
-            "be distinguished from a force that is linear in it.",
-            "Use three levels or more.",
+            "be distinguished from a force that is linear in it."
         )
+        do = "Use three levels or more."
+        yield Finding("drive levels", "warning", text, do)
 
 
 def _distinct(levels: list[float]) -> list[float]:
@@ -231,17 +228,13 @@ def _beyond(train: list[Excitation], holdout: list[Excitation], parts: bool) -> 
         known = max(map(value, train))
         for run in holdout:
             if known > 0.0 and value(run) > BEYOND * known:
-                yield Finding(
-                    "beyond",
-                    "warning",
+                text = (
                     f"{name} reaches {plain(factor * value(run))} {unit}, and "
                     f"{plain(factor * known)} in "
-                    "the runs for training: the model is tested outside the range of the fit.",
-                    _exchange(run, train, holdout, checks) if not parts else _ANOTHER,
-                    run.run,
-                    name,
-                    value(run) / known,
+                    "the runs for training: the model is tested outside the range of the fit."
                 )
+                do = _exchange(run, train, holdout, checks) if not parts else _ANOTHER
+                yield Finding("beyond", "warning", text, do, run.run, name, value(run) / known)
 
 
 def _exchange(
@@ -290,17 +283,13 @@ def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
         own = float(run.resisting or 0.0)
         ratio = own / usual
         if not 0.4 < ratio < 2.5:
-            yield Finding(
-                "two rigs",
-                "warning",
+            text = (
                 f"force resists with {quantity(own, 'N', 4, usual)} on average, and with "
                 f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like "
-                f"{known[0].drive or 'command'} and speed.",
-                "Is it of another damper, or in another unit? Then use a separate study.",
-                run.run,
-                "force",
-                abs(np.log(ratio)),
+                f"{known[0].drive or 'command'} and speed."
             )
+            do = "Is it of another damper, or in another unit? Then use a separate study."
+            yield Finding("two rigs", "warning", text, do, run.run, "force", abs(np.log(ratio)))
 
 
 def _mean_level(run: Excitation) -> float:

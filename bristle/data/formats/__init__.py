@@ -14,8 +14,12 @@ import pkgutil
 from functools import cache
 from importlib import import_module
 from types import ModuleType
+from typing import Any
 
+from ...errors import RecordError
 from ..table import Table, without_codes
+
+INSTALL = "pip install 'bristle[formats]'"
 
 
 @cache
@@ -43,3 +47,23 @@ def read(content: bytes, suffix: str, name: str) -> Table:
     module = next(one for one in formats() if one.recognises(content, suffix))
     table: Table = module.read(content, name)
     return without_codes(table)
+
+
+def library(module: str, name: str, what: str) -> Any:
+    """Return a module that reads a format.
+
+    Parameters
+    ----------
+    module : what to import
+    name : the file, for the message
+    what : the format, as in "an Excel workbook"
+
+    Raises
+    ------
+    RecordError
+        If it is not installed, with the command that installs it.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        raise RecordError(f"{name}: this is {what}; to read it:  {INSTALL}") from None

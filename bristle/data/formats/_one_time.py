@@ -9,11 +9,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.text import listed, plain
 from ...errors import RecordError
 from ..noise import SHORTEST, is_switched
 from ..sampling import between, covered
-from ..table import Array
 
 AnyArray: TypeAlias = NDArray[Any]
 
@@ -95,7 +95,7 @@ def on_one_time(series: Sequence[Series], name: str) -> Joined:
     for one in series:
         found, interpolated = _at(one, time) if one is not chosen else (_rows(one, kept), False)
         data |= found
-        remarks += _told(one, chosen, interpolated)
+        remarks += _notes_on(one, chosen, interpolated)
     slowest = max(one.step for one in series)
     spans = [one.span for one in series]
     if max(max(begin - first, last - end) for first, last in spans) > 1.5 * slowest:
@@ -139,7 +139,7 @@ def _interpolated(one: Series, array: AnyArray, time: Array) -> Array:
     return out
 
 
-def _told(one: Series, chosen: Series, interpolated: bool) -> list[str]:
+def _notes_on(one: Series, chosen: Series, interpolated: bool) -> list[str]:
     """Return what is to be known of a series beside that on whose times it is."""
     names, others = listed(f'"{key}"' for key in one.data), _others(chosen)
     several = len(one.data) > 1

@@ -10,11 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Indices
 from ...errors import RecordError
 from ...physics.motion_file import shortened
-from ..table import Array
 
 _MISSING = frozenset(
     ("", "-", "--", "nan", "-nan", "nan(ind)", "na", "n/a", "#n/a", "null", "none", "1.#qnan")
@@ -67,7 +66,7 @@ class Body:
     """
 
     values: list[Array]
-    lines: NDArray[np.int64]
+    lines: Indices
     not_numeric: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     grouped: dict[int, str] = field(default_factory=dict)

@@ -13,11 +13,10 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Flags
 from ...core.text import plain
 from ..columns import Column
-from ..table import Array
 from ._rows import Body, Layout, is_grouped, plain_number, without_groups
 
 _EVEN = 0.9  # by what factor a column is more even with groups than with decimals
@@ -37,7 +36,7 @@ def read_groups(
     """
     mark = "," if layout.comma else "."
 
-    def texts(index: int, of: NDArray[np.bool_] | None = None) -> list[str]:
+    def texts(index: int, of: Flags | None = None) -> list[str]:
         places = body.lines if of is None else body.lines[of]
         rows = (layout.split(lines[at - 1].strip(" \r\n")) for at in places)
         return [row[index].strip().strip('"').strip() for row in rows]
@@ -91,7 +90,7 @@ def _refused(k: int, body: Body, texts: list[str], layout: Layout) -> str:
     return ""
 
 
-def _kind(values: Array, texts: Callable[[NDArray[np.bool_]], list[str]], mark: str) -> str:
+def _kind(values: Array, texts: Callable[[Flags], list[str]], mark: str) -> str:
     """Return what the marks in a column are: "decimal", "groups", or "open" where nothing tells.
 
     "whole" where no value has decimals, so that it may have no marks at all.
@@ -125,7 +124,7 @@ def _kind(values: Array, texts: Callable[[NDArray[np.bool_]], list[str]], mark: 
     return "groups" if with_groups < _EVEN * with_decimals else "decimal"
 
 
-def _whole(values: Array) -> NDArray[np.bool_]:
+def _whole(values: Array) -> Flags:
     return np.asarray(np.abs(values - np.round(values)) <= 1e-6)
 
 

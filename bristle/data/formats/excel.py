@@ -22,8 +22,7 @@ from ..channels import meaning, quantity_of_unit
 from ..noise import SHORTEST
 from ..table import Table
 from ..titles import title_rows
-from . import delimited
-from ._extra import library
+from . import delimited, library
 
 ENTRY = "xl/workbook.xml"
 LARGEST = 512 * 1024**2

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import RecordError
 from ..table import Table
-from ._extra import library
+from . import library
 from ._tree import TELL_TIME, Bare, Leaf, Node, Unread, table_of
 
 _MARK = b"\x89HDF\r\n\x1a\n"

@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import listed, plain
 from ...errors import RecordError
 from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
-from ..table import Array, Table, from_arrays
+from ..table import Table, from_arrays
 from ..titles import unit_or_none
-from ._extra import library
+from . import library
 from ._one_time import AnyArray, Series, by_length, on_one_time, overlap, unset_step
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")

@@ -16,8 +16,7 @@ from ...core.text import plain
 from ...units import parse as parse_unit
 from ..channels import TEMPERATURE, ChannelSpec, device_channel, meaning, quantity_of_unit
 from ..columns import Column
-from ..extra_channels import unit_as_written
-from ..raw_signals import raw_signals
+from ..extra_channels import raw_signals, unit_as_written
 from ..table import Table
 from .by_data import bench_guesses, fit_signs, fit_units
 from .by_name import Search, candidate_of, joined, structure_guesses
@@ -31,7 +30,7 @@ _SAME_TIME = 0.02  # of a step, by which times that are the same may differ
 _IN_DAYS = 2e-6
 """Spacing below which a time from 30,000 on is in days: in s, it would be above 500 kHz."""
 
-FEWEST = 10
+MIN_TIME_ROWS = 10
 """Rows of numbers below which no column is taken for the time."""
 
 
@@ -142,10 +141,12 @@ def specs(table: Table, guesses: list[Guess]) -> dict[str, ChannelSpec]:
 
 def too_few_rows(table: Table) -> str:
     """Return that no column is taken for the time in so few rows, "" where there are enough."""
-    if table.rows >= FEWEST:
+    if table.rows >= MIN_TIME_ROWS:
         return ""
     rows = "one row" if table.rows == 1 else f"{table.rows} rows"
-    return f"{rows} of numbers: no column can be recognised as the time in fewer than {FEWEST}"
+    return (
+        f"{rows} of numbers: no column can be recognised as the time in fewer than {MIN_TIME_ROWS}"
+    )
 
 
 def _find_time(table: Table) -> tuple[Guess | None, float]:
@@ -154,7 +155,7 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
     for column in table.columns:
         values = table.values[column.text]
         good = values[np.isfinite(values)]
-        if len(good) < max(FEWEST, 0.5 * table.rows):
+        if len(good) < max(MIN_TIME_ROWS, 0.5 * table.rows):
             continue
         spacing = np.diff(good)
         rising = float(np.mean(spacing > 0.0)) > 0.98

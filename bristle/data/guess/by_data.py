@@ -7,12 +7,12 @@ from itertools import permutations
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...units import parse
 from ..channels import DRIVE
 from ..columns import Column
 from ..noise import is_switched
 from ..relation import Relation, derivative_relation, power_factor, tells_sign
-from ..table import Array
 from .by_name import Candidate, Search, joined, usable, velocity_of
 
 _SHOWN = 3  # columns of many that are told
@@ -46,12 +46,8 @@ def _best(fitting: list[Candidate]) -> Candidate:
 
 def _listed(texts: list[str]) -> str:
     """Return titles in quotation marks, the first few of many."""
-    shown = ", ".join(map(_quoted, texts[:_SHOWN]))
+    shown = ", ".join(f'"{text}"' for text in texts[:_SHOWN])
     return shown if len(texts) <= _SHOWN else f"{shown} and {len(texts) - _SHOWN} more"
-
-
-def _quoted(text: str) -> str:
-    return f'"{text}"'
 
 
 def _best_force(search: Search, forces: list[Candidate], chosen: dict[str, Candidate]) -> Candidate:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Flags
 from ..channels import (
     DRIVE,
     Meaning,
@@ -19,7 +19,7 @@ from ..channels import (
 )
 from ..columns import Column
 from ..relation import differentiated
-from ..table import Array, Table
+from ..table import Table
 
 
 @dataclass
@@ -107,7 +107,7 @@ def _by_name(column: Column, meant: Meaning, unit: str, by_unit: str | None) -> 
     )
 
 
-def usable(values: Array) -> NDArray[np.bool_]:
+def usable(values: Array) -> Flags:
     """Return which values can be of a measurement; reading the column refuses the others."""
     return np.isfinite(values) & (np.abs(values) < 1e100)
 
