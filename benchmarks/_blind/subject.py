@@ -34,7 +34,7 @@ def digest() -> str:
     folders = ("diagnosis", "identification", "comparison", "user_code", "data", "physics")
     package = ROOT / "bristle"
     files = [path for folder in folders for path in (package / folder).rglob("*.py")]
-    return digest_of([*files, package / "jit.py"])
+    return digest_of([*files, package / "core" / "jit.py"])
 
 
 def unit_of(channel: str) -> str:

@@ -97,17 +97,23 @@ def _in_building(
         first = try_laws(*runs.damper, present, bends=bends)
         runs.suppose(simplest(first, rule).trial.model)
     runs.correct(findings)
-    problem, held_out = runs.damper
-    say("trying every law")
-    rows = try_laws(problem, held_out, present, bends=bends, kept=kept)
-    looks = Looks(runs.opened_with, say)
-    sought = _sought(rows, looks, runs.damper, say, rule)
-    runs.suppose(sought.chosen.row.trial.model)
+
+    def searched(kept: KeptFits | None) -> _Sought:
+        assert runs.damper is not None
+        say("trying every law")
+        rows = try_laws(*runs.damper, present, bends=bends, kept=kept)
+        sought = _sought(rows, Looks(runs.opened_with, say), runs.damper, say, rule)
+        runs.suppose(sought.chosen.row.trial.model)
+        return sought
+
+    sought = searched(kept)
+    if runs.suited_to(sought.chosen.finding):
+        sought = searched(None)  # what was kept was fitted to the force of the file's numbers
     found = sought.chosen.finding
     excused = runs.excused(found, findings)
     settled = excused if excused is not found else contradicted(found, sought.opened)
     findings[DAMPER] = detailed(settled, sought.opened, profile=profile)
-    laws = sought.verdict(named, problem, present, rule)
+    laws = sought.verdict(named, runs.damper[0], present, rule)
     return replace(conclude(findings, runs.about()), laws=laws)
 
 

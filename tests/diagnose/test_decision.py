@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.diagnosis.decision import decide, missing
-from bristle.diagnosis.rule import BENCH
+from bristle.diagnosis.rule import BENCH, INSIDE, RECONSTRUCTED
 from bristle.diagnosis.trials import Trial
 from bristle.identification.problem import Model
 
@@ -91,6 +91,14 @@ def test_rivals_that_the_data_cannot_distinguish_are_ambiguous():
     found = decide(trial(3.0), trials, refuse)
     assert found.kind == "ambiguous"
     assert found.effects == ("asymmetry", "gas_spring")
+
+
+def test_a_wrong_form_must_stand_out_more_where_equilibrium_gives_the_force():
+    before = trial(4.25)
+    tried = [trial(1.97, "base_friction"), trial(2.28, "stribeck"), trial(2.83, "flattening")]
+    assert decide(before, tried, no_more, rule=INSIDE).effects == ("base_friction",)
+    found = decide(before, tried, no_more, rule=RECONSTRUCTED)
+    assert (found.kind, found.effects) == ("ambiguous", ("base_friction", "stribeck"))
 
 
 def test_three_alternatives_are_named_at_most():

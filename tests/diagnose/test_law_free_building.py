@@ -7,6 +7,7 @@ import pytest
 from shaken import building, measured, shake
 
 from bristle.diagnosis import law_trials
+from bristle.diagnosis.building_numbers import moved
 from bristle.diagnosis.joint_search import diagnose_laws
 from bristle.diagnosis.prepared import silent
 from bristle.diagnosis.rig_runs import BuildingRuns
@@ -23,8 +24,8 @@ def damper(x, v):
     return 1.2 * np.tanh(v / 0.02) + 8.0 * v
 
 
-def runs(**given):
-    made = [shake(HOUSE, seed, damper, samples=1500) for seed in (1, 2, 3)]
+def runs(more=None, **given):
+    made = [shake(HOUSE, seed, damper, samples=1500) | (more or {}) for seed in (1, 2, 3)]
     found = [measured(one, k, name=f"run{k}", **given) for k, one in enumerate(made)]
     return found[:2], found[2:]
 
@@ -53,6 +54,15 @@ def test_all_laws_are_held_against_the_samples_that_every_law_tells():
     )
     assert len(sought.force) < len(known.force)
     assert np.min(np.abs(sought.v)) > np.min(np.abs(known.v))
+
+
+@pytest.mark.slow
+def test_a_stiffness_that_the_file_has_wrong_is_no_effect_of_the_law_that_is_found(few):
+    file = moved(HOUSE, np.array([1.0, 0.0, 0.0, 0.0]))
+    hidden = runs({"voltage": np.full(1500, 2.0)}, without=("force",))
+    found = diagnose_laws(*hidden, Model("lugre"), file, named="lugre")
+    assert (found.kind, found.law) == ("none", "tanh")
+    assert "stiffness of isolation -2.7%" in found.words
 
 
 def test_without_a_damper_no_law_is_sought():
