@@ -22,7 +22,7 @@ from ..model.model_file import read_model
 from ..study.changes import behind_data
 from ..study.history import history_steps
 from ..study.rig import building_of
-from ..study.steps import count_test_set_use, opened_text, runs_for_test, test_set_uses
+from ..study.steps import count_test_set_use, opened_text, runs_for_test, uses_of_test_set
 from ..study.study import Study
 from ..study.study_file import TEST
 from .closed_loop_result import ClosedLoop, Predicted
@@ -79,7 +79,7 @@ def closed_loop(
         )
     if role == TEST:
         count_test_set_use(study)
-        notes.append(opened_text(len(test_set_uses(study))))
+        notes.append(opened_text(len(uses_of_test_set(study))))
     return replace(found, role=role, notes=(*found.notes, *notes))
 
 

@@ -285,7 +285,7 @@ def runs_for_test(study: Study, runs: Runs) -> Runs:
     return Runs(runs.train, found, idle)
 
 
-def test_set_uses(study: Study) -> tuple[TestSetUse, ...]:
+def uses_of_test_set(study: Study) -> tuple[TestSetUse, ...]:
     """Return when the test runs were opened, the first time first.
 
     Raises
@@ -319,7 +319,7 @@ def count_test_set_use(study: Study) -> None:
     with study.writing():
         numbers = study.history.numbers()
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        counted = (*test_set_uses(study), TestSetUse(now, numbers[-1] if numbers else 0))
+        counted = (*uses_of_test_set(study), TestSetUse(now, numbers[-1] if numbers else 0))
         write_json(study.folder / FILE, {"schema": 1, "openings": [asdict(one) for one in counted]})
 
 
@@ -376,7 +376,7 @@ def compare_study(
     found = comparer(study, role).compare(as_model(model or study.model()))
     if role != TEST:
         return found
-    said = opened_text(len(test_set_uses(study)))
+    said = opened_text(len(uses_of_test_set(study)))
     return replace(found, sentences=(*found.sentences, said))
 
 

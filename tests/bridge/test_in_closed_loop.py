@@ -31,7 +31,7 @@ from bristle.prediction.excitation import PredictedRun, house_of, trials_in
 from bristle.prediction.model_system import BuildingWithFile, Excitation
 from bristle.prediction.monte_carlo import Figures, Simulator
 from bristle.study import Study, create_study
-from bristle.study.steps import test_set_uses
+from bristle.study.steps import uses_of_test_set
 
 DRAG = 8.0  # N s/m
 
@@ -154,7 +154,7 @@ def test_test_runs_are_counted_here_too(tmp_path: Path) -> None:
     found = closed_loop(study, role="test", draws=0)
     assert {one.run for one in found.rows} == {"train_0"}
     assert found.notes[-1].endswith("opened for the first time.")
-    assert len(test_set_uses(study)) == 1
+    assert len(uses_of_test_set(study)) == 1
     assert not found.step  # step 0 is nobody's guess
 
 

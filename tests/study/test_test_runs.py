@@ -16,7 +16,7 @@ from bristle.report.study_page import study_report
 from bristle.study import Study, create_study
 from bristle.study.data_check import check_data
 from bristle.study.run_facts import RunChoices
-from bristle.study.steps import FILE, test_set_uses
+from bristle.study.steps import FILE, uses_of_test_set
 
 SECONDS = 2.0
 
@@ -134,12 +134,12 @@ def test_fits_and_verdicts_do_not_read_a_test_run(
     assert sorted(seen) == ["run_1", "run_2", "run_3"]
     assert bristle.compare(study).z > 0.0
     assert study.plot() is not None
-    assert test_set_uses(study) == ()
+    assert uses_of_test_set(study) == ()
     with pytest.raises(RecordError, match=r"final\.csv"):
         check_data(study)
     with pytest.raises(RecordError, match=r"final\.csv"):
         bristle.compare(study, role="test")
-    assert test_set_uses(study) == ()  # nobody saw an error
+    assert uses_of_test_set(study) == ()  # nobody saw an error
 
 
 def test_openings_are_counted_and_told(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
@@ -158,9 +158,9 @@ def test_openings_are_counted_and_told(study: Study, capsys: pytest.CaptureFixtu
     assert [one["step"] for one in answer["test_openings"]] == [0, 1, 1]
     assert all(one["date"].startswith("20") for one in answer["test_openings"])
     study.undo()
-    assert len(test_set_uses(study)) == 3  # what was seen stays seen
+    assert len(uses_of_test_set(study)) == 3  # what was seen stays seen
     bristle.compare(study)
-    assert len(test_set_uses(study)) == 3
+    assert len(uses_of_test_set(study)) == 3
 
 
 def test_the_report_opens_them_unless_they_are_to_stay_closed(
@@ -169,12 +169,12 @@ def test_the_report_opens_them_unless_they_are_to_stay_closed(
     page = tmp_path / "page.html"
     assert main(["report", str(study.folder), "--keep-test-closed", "--out", str(page)]) == 0
     assert "They stay closed." in page.read_text()
-    assert test_set_uses(study) == ()
+    assert uses_of_test_set(study) == ()
     text = study_report(study)
     assert "Error on the test runs" in text
     assert "opened for the first time" in text
     assert "1 test run" in text
-    assert len(test_set_uses(study)) == 1
+    assert len(uses_of_test_set(study)) == 1
     capsys.readouterr()
 
 
