@@ -156,7 +156,7 @@ def test_a_bad_effect_leaves_the_good_ones_in(tmp_path: Path) -> None:
     written(tmp_path, "leaking", **{FORCE: "return p.f_s / q.v"})
     (tmp_path / "no_text.py").write_bytes(b"\xff\xfe\x00")
     loaded = {one.name: one for one in load.load(tmp_path)}
-    assert loaded["seal"].effect is EFFECTS["seal"]
+    assert loaded["seal"].made is EFFECTS["seal"]
     assert "cannot be read" in loaded["no_text"].error
     assert "leaking" not in EFFECTS
 
@@ -166,7 +166,7 @@ def test_what_numba_refuses_is_left_out_too(tmp_path: Path) -> None:
     loaded = load.load(tmp_path)
     assert loaded[0].made is not None  # Python runs it
     (checked,) = usable(loaded)
-    assert checked.effect is None
+    assert checked.made is None
     assert "force cannot be compiled" in checked.error
     assert "seal" not in EFFECTS
 

@@ -221,7 +221,7 @@ def test_the_command_starts_checks_and_lists(
     assert "bristle check my_damper.py" in capsys.readouterr().out
     assert main(["new", "law", "my_damper"]) == 2
     assert main(["new", "law", "lugre"]) == 2
-    assert "is the name of a law of the library" in capsys.readouterr().err
+    assert "is taken in the library" in capsys.readouterr().err
     assert main(["check", "my_damper.py"]) == 0
     said = capsys.readouterr().out
     assert "my_damper conforms" in said
