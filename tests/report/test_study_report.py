@@ -231,7 +231,7 @@ def test_the_comparison_of_a_study_by_the_command(folder, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert answer["held_out"] is True
     assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
-    assert main(["compare", str(folder), "--runs", "train"]) == 0
+    assert main(["compare", str(folder), "--role", "train"]) == 0
     assert "On the training runs" in capsys.readouterr().out
 
 

@@ -49,7 +49,7 @@ def test_it_is_the_run_of_the_exported_fmu(study: Study, tmp_path: Path) -> None
 def test_the_report_has_sliders_for_the_numbers_of_the_model(
     study: Study, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(web_module, "module", lambda: b"\0asm")
+    monkeypatch.setattr(web_module, "module", lambda _system=None: b"\0asm")
     assert main(["report", str(study.folder), "--what-if"]) == 0
     page = (study.folder / "reports" / "report.html").read_text()
     assert "What if: the model in run_2, with other numbers" in page

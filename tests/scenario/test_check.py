@@ -66,7 +66,7 @@ def test_overrides_are_checked_with_the_file(write, capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["check"], "wants a FILE"),
+        (["check"], "expected a FILE"),
         (["check", "no_damper", "--set", "damper.f_c"], "NAME=VALUE is right"),
         (["check", "no_damper", "--set", "a.b=1", "--set", "a.b=1"], "given twice"),
     ],

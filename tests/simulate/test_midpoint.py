@@ -213,8 +213,8 @@ def test_an_output_that_a_scenario_calls_sampled_is_passed_on_as_it_stands(
     ("line", "words"),
     [
         ('over_step = { w = "held" }', 'there is no port "w"'),
-        ('over_step = { u = "late" }', "one of held, linear, sampled is right"),
-        ("over_step = { u = 1 }", "one of held, linear, sampled is right"),
+        ('over_step = { u = "late" }', "There are: held, linear, sampled"),
+        ("over_step = { u = 1 }", 'expected "held" or "linear" or "sampled"'),
         ('over_step = { y_last = "held" }', '"sampled" is right'),
         ('over_step = "held"', "a table"),
     ],

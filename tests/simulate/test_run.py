@@ -80,7 +80,7 @@ def test_folder_holds_results_figure_and_log_and_nothing_else(fine: Path, tmp_pa
     assert (done.returncode, done.stderr) == (0, "")
     folder = tmp_path / "results" / "toys"
     assert sorted(p.name for p in folder.iterdir()) == ["figure.png", "log", "results.csv"]
-    assert "RMS over 0 to 1 s" in done.stdout
+    assert "from 0 to 1 s" in done.stdout
     for name in ("results.csv", "figure.png", "log"):
         assert f"results/toys/{name}" in done.stdout
     frame = load_results(folder)

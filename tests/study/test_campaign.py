@@ -303,7 +303,7 @@ def test_a_level_and_a_channel_exclude_each_other(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "what"),
     [
-        ("current = 0.5", 'current = "much"', "a finite number is right"),
+        ("current = 0.5", 'current = "much"', "expected a number [A]"),
         ("current = 0.5", "", "no current, which other runs have"),
         ("frequency = 0.5", "oil = 3", 'key "oil"'),
         ("frequency = 0.5", "labels = { current = 2 }", "stands beside file and role"),
