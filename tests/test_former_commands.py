@@ -25,4 +25,4 @@ def test_it_names_what_took_its_place(
     with pytest.raises(SystemExit) as ended:
         main(line.split())
     assert ended.value.code == 2
-    assert f"is now bristle {new}" in capsys.readouterr().err
+    assert new in capsys.readouterr().err

@@ -157,16 +157,6 @@ def test_a_file_that_is_no_component_is_one_message(
     assert "there is no such file" in capsys.readouterr().err
 
 
-def test_components_and_scenarios_are_listed_without_a_further_word(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for command in ("components", "scenarios"):
-        assert main(["list", command]) == 0
-        listed = capsys.readouterr().out
-        assert main([command]) == 0
-        assert capsys.readouterr().out == listed
-
-
 def test_list_scenarios_prints_paths(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "scenarios", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)

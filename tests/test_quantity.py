@@ -105,7 +105,7 @@ def test_a_number_to_type_has_its_zeros_until_they_must_be_counted() -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["list ports LuGreDamper", "list ports Structure", "effects", "laws"]
+    "line", ["list ports LuGreDamper", "list ports Structure", "list effects", "list laws"]
 )
 def test_no_list_shows_a_power_of_ten(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(line.split()) == 0

@@ -16,9 +16,9 @@ RESULTS = (
     "Study",
 )  # fmt: skip
 OTHERS = (
-    ("controllers.result", "ControllerComparison"), ("limit.result", "Limit"),
-    ("study.curves", "LearnedEffect"), ("study.data_check", "DataCheck"),
-    ("data.study_model", "StudyModel"),
+    ("controller_comparison.result", "ControllerComparison"), ("optimal_control.limit", "Limit"),
+    ("learning.result", "LearnedEffect"), ("study.data_check", "DataCheck"),
+    ("model.model", "StudyModel"),
 )  # fmt: skip
 
 

@@ -73,7 +73,7 @@ def scenario(tmp_path: Path, mailed: Path) -> Path:
 
 RUNNING = (
     "identify", "identify --dry-run", "compare", "diagnose", "diagnose --json", "add {} stribeck",
-    "export", "study auto", "effects seal --study",
+    "export", "study auto", "list effects seal --study",
 )  # fmt: skip
 READING = ("undo", "report", "study check", "list effects --study")
 
@@ -122,7 +122,7 @@ def law_mailed(tmp_path: Path, marker: Path) -> Path:
     return study.folder
 
 
-@pytest.mark.parametrize("line", [*RUNNING[:-1], "identify --law oil", "laws oil --study"])
+@pytest.mark.parametrize("line", [*RUNNING[:-1], "identify --law oil", "list laws oil --study"])
 def test_a_law_in_the_model_that_waits_for_consent_is_named(
     line: str, law_mailed: Path, marker: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -395,7 +395,7 @@ def test_on_a_terminal_the_text_is_shown_and_asked_about(
 
     ours, theirs = pty.openpty()
     child = subprocess.Popen(
-        [sys.executable, "-m", "bristle.cli", "effects", "seal", "--study", str(mailed)],
+        [sys.executable, "-m", "bristle.cli", "list", "effects", "seal", "--study", str(mailed)],
         stdin=theirs, stdout=subprocess.PIPE, stderr=theirs,
     )  # fmt: skip
     os.close(theirs)

@@ -194,7 +194,13 @@ def print_table(
     heads: Sequence[str], rows: Iterable[Sequence[str | Text]], title: str | None = None, *,
     lines: bool = False,
 ) -> None:  # fmt: skip
-    """Print a table with rules, for a terminal."""
+    """Print a table with rules, for a terminal.
+
+    Parameters
+    ----------
+    heads, rows, title : what stands in it
+    lines : whether lines stand between the rows
+    """
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

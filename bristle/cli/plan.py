@@ -119,7 +119,14 @@ def _free(folder: Path) -> Path:
 
 
 def text(found: Plan, study: Path | None, folder: Path | None, *, details: bool = False) -> str:
-    """Return a plan as text, with the next command."""
+    """Return a plan as text, with the next command.
+
+    Parameters
+    ----------
+    found : the plan
+    study, folder : where its study and its files are, if it has them
+    details : whether to print what stands behind the answer
+    """
     from ..view import terminal
 
     view = found.view()

@@ -109,12 +109,18 @@ def choices_of(given: Given, where: str) -> list[Choice]:
 
 
 def number(value: object, name: str, where: str, right: str = "a number") -> float:
-    """Return a setting as a number; `right` says which.
+    """Return a setting as a number.
+
+    Parameters
+    ----------
+    value : what was set
+    name, where : of the setting, and what was chosen
+    right : what is expected
 
     Raises
     ------
     ScenarioError
-        If it is none; `where` says what was chosen, `name` the setting.
+        If it is none.
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
         raise ScenarioError(f"{where}: {name} = {written(value)}; {right} is right.")
@@ -234,7 +240,14 @@ def plain_name(text: str) -> str:
 def scenario_text(
     title: str, stop: float, step: float, parts: Mapping[str, Part], wires: Mapping[str, Any]
 ) -> str:
-    """Return the text of a scenario, stop and step in s; the rest as `joined_text` takes it."""
+    """Return the text of a scenario.
+
+    Parameters
+    ----------
+    title : of the run
+    stop, step : of the run [s]
+    parts, wires : components and connections by name, as `joined_text` takes them
+    """
     run = {"stop": stop, "step": step, "algorithm": "midpoint"}
     tables = (
         component_text(

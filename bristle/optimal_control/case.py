@@ -339,7 +339,14 @@ def write_scenario(case: Case, time: Array, voltage: Array, folder: Path) -> Sce
 def history_text(
     times: Iterable[float], values: Iterable[float], name: str = "voltage", unit: str = "V"
 ) -> str:
-    """Return a command's history as a two-column CSV; times in s."""
+    """Return a command's history as a CSV of two columns.
+
+    Parameters
+    ----------
+    times : of the samples [s]
+    values : of the command
+    name, unit : of the column
+    """
     rows = (f"{t:.9g},{V:.9g}" for t, V in zip(times, values, strict=True))
     return "\n".join([f"time [s],{name} [{unit}]", *rows]) + "\n"
 
