@@ -6,7 +6,7 @@ import re
 import textwrap
 
 from bristle.model.equations import formulas
-from bristle.view.formula import formula_html
+from bristle.view.formula import formula as formula_html
 
 
 def table(titles: list[str], rows: list[list[str]]) -> str:
