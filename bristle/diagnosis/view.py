@@ -66,13 +66,13 @@ def verdict_view(verdict: Verdict) -> View:
         (
             *(Text(text, "say") for text in named if kind == "effect"),
             *(Text(text) for text in named if kind != "effect"),
-            Text(f"{_error(verdict)} {_gain(verdict)}".strip()),
+            Text(" ".join([_error(verdict), *_errors_beside(verdict), _gain(verdict)]).strip()),
             *map(Text, shown),
             Text(f"To distinguish them: {separate}" if separate else ""),
             *(Text(f"{note.rstrip('.')}.", "note") for note in notes),
         ),
         (
-            *map(Text, apart), *map(Text, _errors_beside(verdict)), *_tables(verdict),
+            *map(Text, apart), *_tables(verdict),
         ),
         TONES[kind],
     )  # fmt: skip

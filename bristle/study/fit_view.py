@@ -56,13 +56,13 @@ def identified_view(found: Identified) -> View:
         (
             parameter_table(found), *(Formula(one.numbers, one.intervals) for one in told),
             Text(symbols(found.model, told) if told else "", "soft"), error_table(found),
+            *(Text(f"{_NAMES[role].capitalize()}: {' '.join(beside)}") for role in _roles(found)
+              if (beside := found.errors.force[role].beside())),
             *map(Text, said), *laws, *([_forms(found)] if found.forms else ()),
             *(Text(note, "note") for note in found.notes),
         ),
         (
             Text(starts), errors_beside(found),
-            *(Text(f"{_NAMES[role].capitalize()}: {text}") for role in _roles(found)
-              for text in found.errors.force[role].beside()),
             # Where all laws were asked for, they are told as they do with effects.
             *([law_errors(found)] if found.table and not found.laws else ()),
             Figure(lambda: draw_identified(found), f"{title}: force measured and predicted"),
