@@ -45,12 +45,12 @@ def main(arguments: argparse.Namespace) -> int:
 
 def text(added: Added, folder: Path) -> str:
     """Return what adding did, as text."""
-    from ..study.fit_view import error_table, parameter_table, z_text
+    from ..study.fit_view import error_table, left_out, parameter_table, z_text
     from ..study.forms import law_command
     from ..view import terminal
 
     found, then = added.identified, [Next(command("diagnose", folder))]
-    said = [Text(z_text(found))]
+    said = [*left_out(found), Text(z_text(found))]
     if added.other_law:
         told = f"The verdict is about the law {added.other_law}; this model has {found.model.law}."
         said.append(Text(told))

@@ -56,8 +56,7 @@ def identified_view(found: Identified) -> View:
         (
             parameter_table(found), *(Formula(one.numbers, one.intervals) for one in told),
             Text(symbols(found.model, told) if told else "", "soft"), error_table(found),
-            *(Text(f"{_NAMES[role].capitalize()}: {' '.join(beside)}") for role in _roles(found)
-              if (beside := found.errors.force[role].beside())),
+            *left_out(found),
             *map(Text, said), *laws, *([_forms(found)] if found.forms else ()),
             *(Text(note, "note") for note in found.notes),
         ),
@@ -109,6 +108,16 @@ def error_table(found: Identified) -> Table:
     ]
     header = ("error of the force: RMS, share", *(name for name, _ in columns))
     return Table(header, rows, range(1, len(header)))
+
+
+def left_out(found: Identified) -> list[Text]:
+    """Return what the error of each role leaves out, with count, share and reason."""
+    force = found.errors.force
+    return [
+        Text(f"{_NAMES[role].capitalize()}: {' '.join(beside)}")
+        for role in _roles(found)
+        if (beside := force[role].beside())
+    ]
 
 
 def z_text(found: Identified) -> str:
