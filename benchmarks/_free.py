@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
+from bristle.core.finding import Finding
 from bristle.data.checks.runs import tells_a_bend
 from bristle.data.measurement import Measurement
 from bristle.diagnosis.joint_search import Looks
@@ -26,9 +27,8 @@ from bristle.diagnosis.prepared import (
     opening,
     silent,
 )
-from bristle.diagnosis.sensor_faults import SensorFault
 from bristle.diagnosis.site import look_at_damper
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import judge
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Model, Problem, has_offset, zero_of
@@ -57,7 +57,7 @@ class Found:
     model: Model
     curves: tuple[Curve, ...]
     z: float
-    faults: tuple[SensorFault, ...]
+    faults: tuple[Finding, ...]
     free_zero: bool
 
     @property
@@ -118,7 +118,7 @@ def _laws(
     return split, data, try_laws(data.problem, data.held_out, Model(DEFAULT), bends=bends)
 
 
-def _with_effects(split: Runs, finding: Finding, opened: Opening, say: Progress) -> Opening:
+def _with_effects(split: Runs, finding: SiteDiagnosis, opened: Opening, say: Progress) -> Opening:
     """Add effects as long as one is named, or lowers the error beyond chance; see `study auto`."""
     while len(opened.before.model.effects) < MOST_EFFECTS:
         if finding.kind == "effect" and finding.model is not None:

@@ -114,7 +114,7 @@ def verdict_of(found: Diagnosis) -> str:
         sure = bool(found.patterns) and found.patterns[0].significant
         text += f", along {found.coordinate}" + ("" if sure else " (not significant)")
     for fault in found.sensors:
-        text += f"; {fault.channel}: {fault.fault}"
+        text += f"; {fault.channel}: {fault.kind}"
     return text
 
 

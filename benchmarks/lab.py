@@ -36,14 +36,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bristle.core.finding import Finding
 from bristle.core.text import plain
 from bristle.data.checks.differing_runs import check_differing_runs
-from bristle.data.checks.finding import Finding
 from bristle.data.checks.recording import check_recording
 from bristle.data.measurement import Measurement
 from bristle.diagnosis.load_cell import low_pass_text
 from bristle.diagnosis.prepared import opening
-from bristle.diagnosis.sensor_faults import SensorFault
 from bristle.diagnosis.site import look_at_damper
 from bristle.identification.problem import Model
 from tests.independent.generate import Case
@@ -140,7 +139,7 @@ def _answered(fault: str, number: int) -> Answer:
         if fault == CLEAN:
             found = _found(runs)
             told = _told_by_model(runs, number)
-            words = [*(one.text for one in found), *(one.words for one in told)]
+            words = [*(one.text for one in found), *(one.text for one in told)]
             return {"right": not words, "said": words}
         if fault in BY_MODEL:
             return _clocks(fault, number, runs, rng)
@@ -167,8 +166,8 @@ def _clocks(fault: str, number: int, runs: list[Measurement], rng: np.random.Gen
     told = _told_by_model(changed, number)
     kind, name = ("clock", "") if place is None else ("delay", runs[place].name)
     near = [abs(one.value - size) <= NEAR[kind] * abs(size) for one in told]
-    right = len(told) == 1 and (told[0].fault, told[0].run) == (kind, name) and near[0]
-    said = [[one.run, one.channel, one.words] for one in told]
+    right = len(told) == 1 and (told[0].kind, told[0].run) == (kind, name) and near[0]
+    said = [[one.run, one.channel, one.text] for one in told]
     return {"right": right, "planted": [name, "force", kind, size], "said": said}
 
 
@@ -186,8 +185,8 @@ def _limits(fault: str, number: int, rng: np.random.Generator) -> Answer:
         runs.append({**made, "voltage": made["voltage"] + run.command() - felt.command()})
     told = _told_by_model(measurements(runs, case.channels), number)
     near = [abs(one.value - size) <= NEAR[fault] * size for one in told]
-    right = len(told) == 1 and (told[0].channel, told[0].fault) == ("voltage", fault) and near[0]
-    said = [[one.run, one.channel, one.words] for one in told]
+    right = len(told) == 1 and (told[0].channel, told[0].kind) == ("voltage", fault) and near[0]
+    said = [[one.run, one.channel, one.text] for one in told]
     return {"right": right, "planted": ["", "voltage", fault, size], "said": said}
 
 
@@ -282,7 +281,7 @@ def _late(run: Measurement, size: float, fault: str, rng: np.random.Generator) -
     return replace(run, channels={**run.channels, **moved})
 
 
-def _told_by_model(runs: list[Measurement], number: int) -> list[SensorFault]:
+def _told_by_model(runs: list[Measurement], number: int) -> list[Finding]:
     """Return the faults that a diagnosis of the runs begins with."""
     law = _task(number).law
     train, held = ([run for run in runs if run.name.startswith(r)] for r in ("train", "holdout"))
@@ -317,7 +316,7 @@ def _names(found: Finding, run: str, wanted: tuple[str, str, float]) -> bool:
     if fault == "folded" and "aliased" not in found.text:
         return False
     fault = "line" if fault == "folded" else fault
-    told = [one for one in found.corrections if one.fault == fault]
+    told = [one for one in found.fixes if one.fault == fault]
     return any(abs(one.value - value) <= NEAR[fault] * abs(value) for one in told)
 
 

@@ -108,7 +108,7 @@ def _named(hidden: Hidden) -> Answer:
         return {"right": False, "kind": found.kind, "seconds": took}
     # A sensor's effect is told as a fault of its channel: its lag may be short enough for a delay.
     told = list(instruments_of(found.sensors))
-    if any((one.channel, one.fault) == ("velocity", "delay") for one in found.sensors):
+    if any((one.channel, one.kind) == ("velocity", "delay") for one in found.sensors):
         told.append("velocity_sensor")
     said = laws.name, tuple(dict.fromkeys((*found.effects, *told)))
     others = [(law, other) for law, other, _ in laws.equivalents]

@@ -19,7 +19,7 @@ from ..core.text import cut_short
 from ._options import add_json, add_overrides, add_trust, print_json
 
 if TYPE_CHECKING:
-    from ..system.scenario import Finding
+    from ..core.finding import Finding
 
 HELP = "check scenario files, or your own effects and laws: every mistake, with its line"
 
@@ -73,7 +73,7 @@ def _print_json(found: dict[str, list[Finding]]) -> None:
         {
             "file": file,
             "ok": all(finding.level != "error" for finding in findings),
-            "findings": [finding._asdict() for finding in findings],
+            "findings": [finding.as_dict("line", "level", "text") for finding in findings],
         }
         for file, findings in found.items()
     ]
@@ -108,9 +108,10 @@ def print_findings(file: str, findings: list[Finding], around: Sequence[str] = (
 
 
 def _line(file: str, finding: Finding, *, colour: bool) -> str:
-    line, level, text = finding
+    level = finding.level
     word = f"\033[{_COLOURS[level]}m{level}\033[0m" if colour else level
-    return f"{file}:{line}: {word}: {text}" if line else f"{file}: {word}: {text}"
+    place = f"{file}:{finding.line}" if finding.line else file
+    return f"{place}: {word}: {finding.text}"
 
 
 def _own(file: Path, as_json: bool) -> int:

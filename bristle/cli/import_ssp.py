@@ -39,7 +39,7 @@ def main(arguments: argparse.Namespace) -> int:
             "scenario": str(made.scenario.absolute()),
             "fmus": [str(file.absolute()) for file in made.fmus],
             "notes": [note.text for note in made.notes],
-            "findings": [finding._asdict() for finding in findings],
+            "findings": [finding.as_dict("line", "level", "text") for finding in findings],
         }
         print_json(answer)
         return 2 if wrong else 0

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 from ..errors import BristleError
 from ..version import __version__
-from .text import Finding, Level, number, unknown, worded, written
+from .finding import Finding, Level, worded
+from .text import number, unknown, written
 from .toml_lines import KeyPath, key_lines, repeated_keys
 
 SCHEMA = 1
@@ -277,7 +278,7 @@ class Document:
             while keys and keys not in self.lines:
                 keys = keys[:-1]
             line = self.lines.get(keys, 0)
-        if (finding := Finding(line, level, text)) not in self.found:
+        if (finding := Finding("file", level, text, line=line)) not in self.found:
             self.found.append(finding)
 
     def error(self, keys: KeyPath, text: str) -> None:
@@ -405,7 +406,7 @@ def raised(raises: type[BristleError], path: str | Path, found: Sequence[Finding
 
 
 def _error(raises: type[BristleError], path: str | Path, line: int, text: str) -> BristleError:
-    return raised(raises, path, (Finding(line, "error", text),))
+    return raised(raises, path, (Finding("file", "error", text, line=line),))
 
 
 def _syntax(text: str, message: str) -> tuple[int, str]:

@@ -1,4 +1,4 @@
-"""Numbers as people write them, names that were misspelt, findings in words."""
+"""Numbers as people write them, names that were misspelt."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from math import floor, isfinite, log10
-from typing import Literal, NamedTuple
 
 _LONGEST = 9  # digits after the point beyond which a number is told as a power of ten
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -161,27 +160,12 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
     return f"{shown_value}{power_of_zero}", f"± {shown_width}{tail}"
 
 
-Level = Literal["error", "warning", "note"]
 LIST_AT_MOST = 12
 """Longer lists of names are cut down to the nearest few."""
 LINES, CHARACTERS = 10, 1000
 """Size of a message at most."""
 LIST_LONGEST = 300
 """Characters of a list of names at most."""
-
-
-class Finding(NamedTuple):
-    """One finding of a check. `line` 0 stands for the whole file, or for an override."""
-
-    line: int
-    level: Level
-    text: str
-
-
-def worded(file: object, finding: Finding) -> str:
-    """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
-    place = f"{file}:{finding.line}" if finding.line else str(file)
-    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
 
 
 def nearest(name: str, names: Iterable[str], count: int = 1) -> list[str]:

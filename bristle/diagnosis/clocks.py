@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.finding import Finding
 from ..core.text import plain
 from ..data.corrections import LEFT_OUT
 from ..data.left_out import MISSING, merged
 from ..identification.problem import Model, Problem, Run, robust_z
 from ..identification.start_grid import refine
 from .rule import SENSOR, DecisionRule
-from .sensor_faults import SensorFault
 from .trials import Trial, judge
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ HUBER = 6.0
 class ClockFaults:
     """Faults of clocks, the runs set right, and how the model does on them."""
 
-    faults: tuple[SensorFault, ...]
+    faults: tuple[Finding, ...]
     train: Problem
     held_out: Problem
     trial: Trial
@@ -245,22 +245,23 @@ def _differ(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> bool:
     return _rate_matters(clocks, runs, rule) or bool(_apart(clocks, runs, rule)[1])
 
 
-def _told(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[SensorFault, ...]:
+def _told(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[Finding, ...]:
     """Return the faults that clocks are; what all runs share is one, each run apart another."""
-    out: list[SensorFault] = []
+    out: list[Finding] = []
     rated = _rate_matters(clocks, runs, rule)
     usual, off = _apart(clocks, runs, rule)
     if rated:
         length = max(run.dt * len(run.force) for run in runs)
         way = "fast" if clocks.rate > 0.0 else "slow"
         out.append(
-            SensorFault(
-                "force", "clock", clocks.rate, clocks.rate_std,
+            Finding(
+                "clock", "warning",
                 f"The clock of the force's logger runs {plain(1e6 * abs(clocks.rate), 2)} ppm "
                 f"(+-{plain(1.96e6 * clocks.rate_std, 1)}) {way} relative to that of the motion: "
                 f"{plain(1e3 * abs(clocks.rate) * length, 2)} ms in {plain(length, 3)} s. Record "
                 "both on one logger, or set it right in study.toml: correct = "
                 f'[{{channel = "force", fault = "clock", value = {clocks.rate:.3g}}}].',
+                channel="force", value=clocks.rate, std=clocks.rate_std,
             )
         )  # fmt: skip
     coarsest = max(run.dt for run in runs)
@@ -275,7 +276,7 @@ def _told(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[SensorFa
     return tuple(out)
 
 
-def _late(late: float, std: float, where: str, run: str) -> SensorFault:
+def _late(late: float, std: float, where: str, run: str) -> Finding:
     """Return the fault of a force that is late throughout a run."""
     way = "late" if late > 0.0 else "early"
     than = " than in the other runs" if run else ""
@@ -287,4 +288,4 @@ def _late(late: float, std: float, where: str, run: str) -> SensorFault:
         if run
         else f"{where} the force is {plain(1e3 * abs(late), 3)} ms {way} relative to the motion."
     )
-    return SensorFault("force", "delay", late, std, words, run=run)
+    return Finding("delay", "warning", words, channel="force", value=late, std=std, run=run)

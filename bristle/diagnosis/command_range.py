@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.finding import Finding
 from ..core.text import plain, quantity
 from ..data.corrections import LIMITS, limited
 from ..identification.problem import Expected, Model, Problem, Run, residuals
@@ -21,7 +22,6 @@ from ..identification.start_grid import Search, refine
 from ..physics.drive import DRIVES
 from .model_faults import ModelBasedFault, explains, has_rival, promise
 from .rule import LIMITED, DecisionRule
-from .sensor_faults import SensorFault
 from .trials import Trial, judge
 
 Array = NDArray[np.float64]
@@ -174,7 +174,7 @@ def _fitted(limit: _Limit, train: Problem, expected: Expected) -> _Limit:
     )
 
 
-def _told(limit: _Limit, train: Problem, held_out: Problem, drive: str) -> SensorFault:
+def _told(limit: _Limit, train: Problem, held_out: Problem, drive: str) -> Finding:
     """Return the fault that a limit is, with what it does to the runs."""
     runs, most = [*train.runs, *held_out.runs], max(_largest(train), _largest(held_out))
     felt = [limited(run.V, run.dt, limit.fault, limit.value) for run in runs]
@@ -191,9 +191,10 @@ def _told(limit: _Limit, train: Problem, held_out: Problem, drive: str) -> Senso
         "slew": f"{name} reaches the coil no faster than {size}: in {where} it is late there, by "
         f"up to {late} ms, and differs from the record in {samples}.",
     }[limit.fault]
-    return SensorFault(
-        drive, limit.fault, limit.value, limit.std,
+    return Finding(
+        limit.fault, "warning",
         f"{words} A supply or an amplifier limits it: record it behind that, or set it right in "
         f'study.toml: correct = [{{channel = "{drive}", fault = "{limit.fault}", value = '
         f"{limit.value:.4g}}}] in each [[runs]].",
+        channel=drive, value=limit.value, std=limit.std,
     )  # fmt: skip

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..core.finding import Finding
 from ..data.corrections import TIMING, Correction
 from ..identification.rig import DAMPER
 from ..physics.effect import EFFECTS, Effect, effects_of, plain_name
@@ -13,8 +14,8 @@ from . import words
 from .decision import Z
 from .load_cell import FORCE_GAIN, low_pass_text
 from .rule import BENCH, SITE, DecisionRule
-from .sensor_faults import SensorFault, instruments_of
-from .site_diagnosis import Finding
+from .sensor_faults import instruments_of
+from .site_diagnosis import SiteDiagnosis
 from .verdict import Diagnosis
 from .words import effect_words
 
@@ -37,14 +38,14 @@ class About:
     """
 
     force: str = "measured"
-    sensors: tuple[SensorFault, ...] = ()
+    sensors: tuple[Finding, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     driven: bool = True
     beside_layer: bool = True
 
 
-def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
+def conclude(findings: Mapping[str, SiteDiagnosis], about: About) -> Diagnosis:
     """Return one verdict from what the sites of a rig show.
 
     Parameters
@@ -91,7 +92,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     )  # fmt: skip
 
 
-def _without_command(found: Finding) -> Finding:
+def _without_command(found: SiteDiagnosis) -> SiteDiagnosis:
     """Return a finding that does not speak of effects of a command, where none was recorded."""
     of_it = {effect.name for effect in EFFECTS.values() if "V" in effect.needs}
     return replace(
@@ -101,15 +102,15 @@ def _without_command(found: Finding) -> Finding:
     )
 
 
-def _sensors(findings: Mapping[str, Finding], about: About) -> tuple[SensorFault, ...]:
+def _sensors(findings: Mapping[str, SiteDiagnosis], about: About) -> tuple[Finding, ...]:
     """Return the faults of all sensors; what a site tells anew takes the place of the first."""
     renewed = [fault for found in findings.values() for fault in found.sensors]
-    again = {(one.channel, one.fault) for one in renewed}
-    first = [one for one in about.sensors if (one.channel, one.fault) not in again]
+    again = {(one.channel, one.kind) for one in renewed}
+    first = [one for one in about.sensors if (one.channel, one.kind) not in again]
     return (*first, *_of_load_cell(findings), *renewed)
 
 
-def _told(parts: Sequence[Finding], kind: str, about: About) -> list[str]:
+def _told(parts: Sequence[SiteDiagnosis], kind: str, about: About) -> list[str]:
     """Return why the verdict is what it is, and what else is to be said of sites and runs."""
     return [
         *_reasons(parts, kind),
@@ -119,7 +120,7 @@ def _told(parts: Sequence[Finding], kind: str, about: About) -> list[str]:
     ]
 
 
-def _after_the_force(found: Finding, damper: Finding | None) -> Finding:
+def _after_the_force(found: SiteDiagnosis, damper: SiteDiagnosis | None) -> SiteDiagnosis:
     """Return what the layer shows, no verdict where the damper's runs contradict each other.
 
     The measured force is in its equilibrium, and so is what is wrong with it.
@@ -134,7 +135,9 @@ def _after_the_force(found: Finding, damper: Finding | None) -> Finding:
     return replace(found, kind="insufficient", reasons=(why,))
 
 
-def _beside_what_is_found(parts: Sequence[Finding], rule: DecisionRule = SITE) -> list[Finding]:
+def _beside_what_is_found(
+    parts: Sequence[SiteDiagnosis], rule: DecisionRule = SITE
+) -> list[SiteDiagnosis]:
     """Return what sites show, a little beside a clear finding as told in words alone.
 
     Where an effect is found, another site may show a trace of it, of the instruments, or of what
@@ -165,7 +168,7 @@ def _kind_of(kinds: Sequence[str], named: Sequence[str], rivals: Sequence[str]) 
     return "insufficient" if "insufficient" in kinds else "none"
 
 
-def _reasons(parts: Sequence[Finding], kind: str) -> list[str]:
+def _reasons(parts: Sequence[SiteDiagnosis], kind: str) -> list[str]:
     """Return why the verdict is what it is, each reason with its site where there are several."""
     if len(parts) == 1:
         return list(parts[0].reasons)
@@ -185,7 +188,7 @@ def _without_load_cell(reason: str) -> str:
 
 
 def _untestable(
-    findings: Mapping[str, Finding], effects: tuple[str, ...], reconstructed: bool
+    findings: Mapping[str, SiteDiagnosis], effects: tuple[str, ...], reconstructed: bool
 ) -> tuple[str, ...]:
     """Return the effects, not those named, that some site's runs do not show.
 
@@ -221,11 +224,11 @@ def _has_twin(effect: type[Effect], site: str) -> bool:
     return bool(effect.absorbed_by) or any(site in other.sites for other in others)
 
 
-def _is_gain(finding: Finding) -> bool:
+def _is_gain(finding: SiteDiagnosis) -> bool:
     return FORCE_GAIN in finding.effects
 
 
-def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
+def _of_load_cell(findings: Mapping[str, SiteDiagnosis]) -> list[Finding]:
     """Return the faults of the load cell that equilibrium shows and that are no effects."""
     out = []
     for finding in findings.values():
@@ -236,7 +239,9 @@ def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
                 before, after = finding.z_before, finding.z_after
                 text += f" ({Z} {before:.3g} before, {after:.3g} with that corrected)"
             text += "."
-            out.append(SensorFault("force", "gain", gain, float("nan"), text))
+            out.append(
+                Finding("gain", "warning", text, channel="force", value=gain, std=float("nan"))
+            )
     return out
 
 

@@ -26,7 +26,7 @@ from .remaining import patterns_of, remaining_residual
 from .rig_runs import BenchRuns, BuildingRuns
 from .rule import SITE
 from .site import joinable_at, look_at, look_at_damper
-from .site_diagnosis import Finding
+from .site_diagnosis import SiteDiagnosis
 from .trials import SHOWN, joinable, judge
 from .verdict import Diagnosis
 
@@ -36,7 +36,7 @@ from .verdict import Diagnosis
 # organised, how well parameters are known, and which run would distinguish alternatives.
 
 
-def detailed(found: Finding, opened: Opening, *, profile: bool = False) -> Finding:
+def detailed(found: SiteDiagnosis, opened: Opening, *, profile: bool = False) -> SiteDiagnosis:
     """Return a site's finding with limits, patterns, intervals and, where asked for, a next run.
 
     Parameters
@@ -50,7 +50,7 @@ def detailed(found: Finding, opened: Opening, *, profile: bool = False) -> Findi
     return _with_labels(found, opened)
 
 
-def _with_labels(found: Finding, opened: Opening) -> Finding:
+def _with_labels(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
     """Return a finding that says on which runs the present model errs, where a label tells it."""
     runs = [*opened.problem.runs, *opened.held_out.runs]
     if found.kind == "none" or not found.noise_known or not varying(_known(runs)):
@@ -67,7 +67,7 @@ def _known(runs: Sequence[Run]) -> list[Labels]:
     return with_levels(runs[0].drive, [run.V for run in runs], [run.labels for run in runs])
 
 
-def _with_limits(found: Finding, opened: Opening, profile: bool) -> Finding:
+def _with_limits(found: SiteDiagnosis, opened: Opening, profile: bool) -> SiteDiagnosis:
     """Return a finding with what the data could not show, and what would tell more."""
     problem, model, rule = opened.searched, opened.before.model, opened.rule
     expected = problem.expectation(model)
@@ -82,7 +82,7 @@ def _with_limits(found: Finding, opened: Opening, profile: bool) -> Finding:
     return replace(found, limits=_limits(found, opened, profile))
 
 
-def _limits(found: Finding, opened: Opening, profile: bool) -> tuple[EffectLimit, ...]:
+def _limits(found: SiteDiagnosis, opened: Opening, profile: bool) -> tuple[EffectLimit, ...]:
     """Return how large each further effect may be beside the model that a finding names."""
     if found.kind == "insufficient" or found.after is None or not found.noise_known:
         return ()
@@ -97,7 +97,7 @@ def _limits(found: Finding, opened: Opening, profile: bool) -> tuple[EffectLimit
     return profiled(known, limits) if profile else limits
 
 
-def _able(found: Finding, opened: Opening) -> list[str]:
+def _able(found: SiteDiagnosis, opened: Opening) -> list[str]:
     """Return the effects that can join the model at a site."""
     model = opened.before.model
     if model.law_class.site == "structure":
@@ -106,7 +106,7 @@ def _able(found: Finding, opened: Opening) -> list[str]:
     return [*joinable(model, shown), *of_layer(model, opened.problem)]
 
 
-def _with_patterns(found: Finding, opened: Opening) -> Finding:
+def _with_patterns(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
     """Return a finding with the coordinates that its residual depends on, where it has any."""
     if found.kind == "none" and not found.patterns:
         return found
@@ -119,7 +119,7 @@ def _with_patterns(found: Finding, opened: Opening) -> Finding:
     return replace(found, coordinate=coordinate, patterns=tuple(patterns), beside=beside)
 
 
-def _with_intervals(found: Finding, opened: Opening) -> Finding:
+def _with_intervals(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
     """Return a finding with standard deviations; its model refitted where `Scope.sweeps` asks so.
 
     Parameters that the data cannot identify have none.
@@ -233,9 +233,9 @@ def _insufficient(why: Insufficient) -> Diagnosis:
 
 def look_at_lines(
     runs: BenchRuns | BuildingRuns, say: Progress = silent, *, profile: bool = False
-) -> dict[str, Finding]:
+) -> dict[str, SiteDiagnosis]:
     """Return what the isolation layer and the storeys show, by site; nothing on a bench."""
-    findings: dict[str, Finding] = {}
+    findings: dict[str, SiteDiagnosis] = {}
     for name, pair in runs.lines().items():
         say(f"{name}: effects of the structure")
         findings[name] = _line(name, pair, runs.part(name), profile)
@@ -244,7 +244,7 @@ def look_at_lines(
 
 def _line(
     name: str, pair: tuple[StructureProblem, StructureProblem], present: Model, profile: bool
-) -> Finding:
+) -> SiteDiagnosis:
     """Return what a layer or storey shows, on its runs for training and held out."""
     found = look_at(name, *pair, present)
     assert found.before is not None

@@ -20,7 +20,7 @@ from .clocks import clock_faults
 from .decision import OTHER_FORM, Z, force_in
 from .prepared import Opening
 from .rule import BENCH, DecisionRule
-from .site_diagnosis import Finding
+from .site_diagnosis import SiteDiagnosis
 from .trials import Trial
 
 # The one run whose force was recorded with another zero or gain than in all others.
@@ -144,7 +144,7 @@ HELD_OUT_DIFFER = (
 )
 
 
-def contradicted(found: Finding, opened: Opening) -> Finding:
+def contradicted(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
     """Return a finding, insufficient where the runs contradict each other, with the reason.
 
     Parameters
@@ -177,7 +177,7 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
     return replace(found, kind=kind, reasons=(told,))
 
 
-def _but_for_a_run(found: Finding, opened: Opening) -> Finding:
+def _but_for_a_run(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
     """Return a finding that names the run whose zero or gain is another one, if there is one.
 
     Where a model explains all other runs, what they leave together is no other form of an effect,
@@ -196,7 +196,7 @@ def _but_for_a_run(found: Finding, opened: Opening) -> Finding:
     return found
 
 
-def _but_for_clocks(found: Finding, opened: Opening) -> Finding:
+def _but_for_clocks(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
     """Return a finding that names the runs whose loggers began apart, if that explains the rest.
 
     Beside a missing effect it shows only in what the effect leaves: clocks are looked at for the
@@ -209,13 +209,13 @@ def _but_for_clocks(found: Finding, opened: Opening) -> Finding:
     for trial, added in _to_be_explained(found, opened):
         clocks = clock_faults(trial, opened.problem, opened.held_out) if added else None
         if clocks is not None:
-            told = " ".join(fault.words for fault in clocks.faults)
+            told = " ".join(fault.text for fault in clocks.faults)
             seen = f"Told from {force_in(opened.problem)}."
             return _with_reason(found, trial, f"With {' and '.join(added)}: {told} {seen}")
     return found
 
 
-def _to_be_explained(found: Finding, opened: Opening) -> list[tuple[Trial, list[str]]]:
+def _to_be_explained(found: SiteDiagnosis, opened: Opening) -> list[tuple[Trial, list[str]]]:
     """Return trials that leave more than noise, with the effects that they add, simplest first.
 
     None where the force is no measured one.
@@ -230,7 +230,7 @@ def _to_be_explained(found: Finding, opened: Opening) -> list[tuple[Trial, list[
     return [(one, [name for name in one.effects if name not in own]) for one in trials.values()]
 
 
-def _with_reason(found: Finding, trial: Trial, told: str) -> Finding:
+def _with_reason(found: SiteDiagnosis, trial: Trial, told: str) -> SiteDiagnosis:
     """Return a finding with what is wrong in a run, which is to be set right first.
 
     Where the trial has the effects of the finding, they stand: what remains is no other form.

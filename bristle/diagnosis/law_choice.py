@@ -16,7 +16,7 @@ from .decision import missing
 from .law_trials import LawTrial
 from .prepared import Opening
 from .rule import BENCH, DecisionRule
-from .site_diagnosis import Finding
+from .site_diagnosis import SiteDiagnosis
 from .trials import Difference, Trial, joinable, paired
 
 EXPLAINING = ("none", "effect", "ambiguous")
@@ -28,7 +28,7 @@ class Pair:
     """A law with what it lacks: the law's row, what the search found, and what it began with."""
 
     row: LawTrial
-    finding: Finding
+    finding: SiteDiagnosis
     opened: Opening | None = None
 
     @property

@@ -18,7 +18,7 @@ from ..physics.effect import EFFECTS, instrument_of
 from ..physics.laws import law_of_part
 from .effect_limits import detectable
 from .rule import SITE, DecisionRule
-from .site_diagnosis import Finding
+from .site_diagnosis import SiteDiagnosis
 from .trials import judge
 
 FORCE_GAIN = "force_gain"
@@ -26,13 +26,13 @@ FORCE_GAIN = "force_gain"
 
 
 def load_cell(
-    layer: Finding,
+    layer: SiteDiagnosis,
     train: list[Response],
     holdout: list[Response],
     building: Building,
     rule: DecisionRule = SITE,
     level: int = 0,
-) -> tuple[Finding, tuple[list[Response], list[Response]]] | None:
+) -> tuple[SiteDiagnosis, tuple[list[Response], list[Response]]] | None:
     """Return the finding that the load cell is late or wrongly scaled, with the forces set right.
 
     Equilibrium knows when and how large the force is.
@@ -52,7 +52,7 @@ def load_cell(
         The finding, then the training and held-out responses with the force corrected. None where
         no delay and no gain explains the layer better than its own effects do.
     """
-    best: tuple[float, float, float, Finding] | None = None
+    best: tuple[float, float, float, SiteDiagnosis] | None = None
     for what in ("delay", "gain"):
         found = _search_cell(what, train, holdout, building, level)
         if best is None or found[0] < best[0]:
@@ -78,7 +78,7 @@ def load_cell(
 
 def _search_cell(
     what: str, train: list[Response], holdout: list[Response], building: Building, level: int
-) -> tuple[float, float, float, Finding]:
+) -> tuple[float, float, float, SiteDiagnosis]:
     """Return z on held-out runs, delay [s], gain and finding of the best delay or gain."""
 
     def problem(value: float, part: list[Response]) -> StructureProblem:
@@ -106,7 +106,7 @@ def _search_cell(
     base = fit_line(own, law)
     after = judge(base.model, own, other)
     seen = detectable(other, other.expectation(base.model), SITE)
-    finding = Finding("force", "none", (), 0.0, after.z, 0.0, seen, "", base.model)
+    finding = SiteDiagnosis("force", "none", (), 0.0, after.z, 0.0, seen, "", base.model)
     delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
     return after.z, delay, gain, finding
 
@@ -117,7 +117,7 @@ MOSTLY = 0.6
 """Share of the lateness that a filter takes from which on the load cell is said to low-pass."""
 
 
-def low_pass_text(found: Finding) -> str:
+def low_pass_text(found: SiteDiagnosis) -> str:
     """Return what filter makes the force late, "" where the force is not late or only delayed.
 
     The filter is of second order; its corner is where half the power is left.

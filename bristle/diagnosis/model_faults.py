@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.finding import Finding
 from ..core.text import quantity
 from ..data.left_out import MISSING, merged
 from ..identification.problem import Model, Problem, Run, residuals, steady
@@ -20,7 +21,6 @@ from ..identification.search import HUBER_AT_ONE, in_threads, losses, mean_loss
 from ..identification.start_grid import SearchContext, ranked_guesses, refine
 from ..physics.effect import EFFECTS, Effect, effects_of
 from .rule import DRIVE, DecisionRule
-from .sensor_faults import SensorFault
 from .trials import Trial, joinable, judge, short_search
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ BLOCK = 250
 class ModelBasedFault:
     """A fault, the runs set right, and how the model does on them."""
 
-    fault: SensorFault
+    fault: Finding
     train: Problem
     held_out: Problem
     trial: Trial
@@ -139,11 +139,12 @@ def _zero_of_force(
     plain = {k: v for k, v in fitted.values.items() if k not in (own, *others)}
     right = [_shifted(problem, offset) for problem in (train, held_out)]
     trial = judge(replace(base, values=plain), right[0], right[1])
-    fault = SensorFault(
-        "force", "bias", offset, _deviation(_left(trial.model, right[0])),
+    fault = Finding(
+        "bias", "warning",
         f"Force shows {quantity(offset, 'N')} whatever the motion and the "
         f"{train.runs[0].drive}, without the "
         "stiffness of a spring: the zero of the load cell is off, or a preload acts on the rod.",
+        channel="force", value=offset, std=_deviation(_left(trial.model, right[0])),
     )  # fmt: skip
     return ModelBasedFault(fault, right[0], right[1], trial)
 
@@ -197,10 +198,11 @@ def _late_drive(
     bend = cost(late + dt) + cost(late - dt) - 2.0 * cost(late)
     std = dt * float(np.sqrt(2.0 / max(bend, 1e-12)))
     right = [_moved(problem, late) for problem in (train, held_out)]
-    fault = SensorFault(
-        drive, "delay", late, std,
+    fault = Finding(
+        "delay", "warning",
         f"The force follows the {drive} {1e3 * late:.2f} ms before the {drive} was recorded: its "
         "record is late.",
+        channel=drive, value=late, std=std,
     )  # fmt: skip
     return ModelBasedFault(
         fault, right[0], right[1], judge(refine(model, right[0]), right[0], right[1])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..core.finding import Finding
 from ..core.text import plain
 from ..data.corrections import LIMITS, TIMING, Correction, set_right
 from ..data.cut_off import beyond_range, derived_velocity, ends_of
@@ -26,7 +27,7 @@ from .decision import TOLD, in_runs
 from .effect_size import Known
 from .model_faults import model_based_fault
 from .rule import BENCH, DecisionRule
-from .sensor_faults import SensorFault, sensor_faults, words_of
+from .sensor_faults import sensor_faults
 from .trials import Trial, judge
 
 # Measurements as they would be without the faults of their sensors.
@@ -35,7 +36,7 @@ ORDER = {"bias": 1, "sign": 2, "gain": 3}
 """In which order faults are taken back: an offset is on what the instrument shows."""
 
 
-def corrected(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list[Measurement]:
+def corrected(runs: Sequence[Measurement], faults: Sequence[Finding]) -> list[Measurement]:
     """Return the measurements as they would be without the faults, so that physics can be judged.
 
     Displacement is the reference of velocity. Clipped samples of a channel are lost, those of the
@@ -44,28 +45,28 @@ def corrected(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> lis
     return [_corrected(run, faults) for run in runs]
 
 
-def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
+def _corrected(run: Measurement, faults: Sequence[Finding]) -> Measurement:
     channels, cut, noise = dict(run.channels), dict(run.saturated), dict(run.noise)
     timing: list[Correction] = []
-    for fault in sorted(faults, key=lambda one: ORDER.get(one.fault, 0)):
+    for fault in sorted(faults, key=lambda one: ORDER.get(one.kind, 0)):
         if fault.channel not in channels or fault.run not in ("", run.name):
             continue
         values = channels[fault.channel]
-        if fault.fault in TIMING:
-            timing.append(Correction(fault.channel, fault.fault, fault.value))
-        elif fault.fault == "sign":
+        if fault.kind in TIMING:
+            timing.append(Correction(fault.channel, fault.kind, fault.value))
+        elif fault.kind == "sign":
             channels[fault.channel] = -values
-        elif fault.fault == "gain":
+        elif fault.kind == "gain":
             channels[fault.channel] = values / fault.value
             noise[fault.channel] = noise.get(fault.channel, 0.0) / abs(fault.value)
-        elif fault.fault == "bias":
+        elif fault.kind == "bias":
             channels[fault.channel] = values - fault.value
-        elif fault.fault in LIMITS:
-            limit = [Correction(fault.channel, fault.fault, fault.value)]
+        elif fault.kind in LIMITS:
+            limit = [Correction(fault.channel, fault.kind, fault.value)]
             channels |= set_right({fault.channel: values}, run.step, limit)
-        elif fault.fault in ("lag", "high-pass", "derived"):
+        elif fault.kind in ("lag", "high-pass", "derived"):
             del channels[fault.channel]  # displacement says the same, without it
-        elif fault.fault == "clipping":
+        elif fault.kind == "clipping":
             cut[fault.channel] = beyond_range(values, noise.get(fault.channel, 0.0), fault.value)
     known = {name: replace(run, saturated=cut).valid(name) for name in channels}
     moved = in_time(channels, known, run.step, timing)
@@ -97,7 +98,7 @@ class Insufficient:
     """Why data carry no verdict, in sentences, with the faults of the sensors and the noise."""
 
     reasons: tuple[str, ...]
-    faults: tuple[SensorFault, ...]
+    faults: tuple[Finding, ...]
     noise: Mapping[str, float]
 
 
@@ -133,7 +134,7 @@ class Opening:
     before: Trial
     problem: Problem
     held_out: Problem
-    faults: tuple[SensorFault, ...] = ()
+    faults: tuple[Finding, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     shown: tuple[str, ...] = ()
     part: Problem | None = None
@@ -168,7 +169,7 @@ class BenchData:
 
     problem: Problem
     held_out: Problem
-    faults: tuple[SensorFault, ...]
+    faults: tuple[Finding, ...]
     noise: Mapping[str, float]
     shown: tuple[str, ...]
 
@@ -199,7 +200,7 @@ def bench_data(
     if not all(left):
         empty = zip(("for training", "held out"), whole, left, strict=True)
         reasons = [_too_few(role, runs) for role, runs, kept in empty if not kept]
-        return Insufficient((*reasons, *words_of(faults)), tuple(faults), noise)
+        return Insufficient((*reasons, *(fault.text for fault in faults)), tuple(faults), noise)
     problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
     redundant = any(
         run.has("displacement", "velocity") and not derived_velocity(run) for run in train
@@ -247,7 +248,7 @@ def opened_with(before: Trial, data: BenchData) -> Opening:
     if shown is not None:
         faults.append(shown.fault)
         problem, held_out, before = shown.train, shown.held_out, shown.trial
-        if shown.fault.fault == "bias":  # found without the effects that are tried next
+        if shown.fault.kind == "bias":  # found without the effects that are tried next
             problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
             before = judge(before.model, problem, held_out)
     else:
@@ -332,7 +333,7 @@ def _too_few(role: str, runs: Sequence[Measurement]) -> str:
 def lacking_in_building(
     recorded: Sequence[Measurement],
     right: Sequence[Sequence[Measurement]],
-    faults: tuple[SensorFault, ...],
+    faults: tuple[Finding, ...],
     noise: Mapping[str, float],
 ) -> Insufficient | None:
     """Return why a building's runs carry no verdict: too little of the damper's force is left.
@@ -348,7 +349,11 @@ def lacking_in_building(
         force = [replace(r, channels={"force": r["force"]}) for r in runs if r.has("force")]
         if force and not _left(force):
             reasons.append(_too_few(role, force))
-    return Insufficient((*reasons, *words_of(faults)), faults, noise) if reasons else None
+    return (
+        Insufficient((*reasons, *(fault.text for fault in faults)), faults, noise)
+        if reasons
+        else None
+    )
 
 
 def _where(runs: Sequence[Measurement], names: Sequence[str] = ()) -> str:
@@ -367,7 +372,7 @@ def median_noise(runs: Sequence[Measurement]) -> dict[str, float]:
 
 
 def _lacking(
-    runs: Sequence[Measurement], faults: Sequence[SensorFault], rule: DecisionRule = BENCH
+    runs: Sequence[Measurement], faults: Sequence[Finding], rule: DecisionRule = BENCH
 ) -> list[str]:
     """Return what keeps these data from carrying a verdict, in sentences."""
     out = []
@@ -395,19 +400,19 @@ def _lacking(
                 "Look at its column:  bristle study channels ; or measure with motion."
             )
     out += [
-        f"{fault.words} That is so {where}. Look at the two columns:  bristle study channels ; or "
+        f"{fault.text} That is so {where}. Look at the two columns:  bristle study channels ; or "
         "leave one of them out."
         for fault in faults
-        if fault.fault == "unrelated"
+        if fault.kind == "unrelated"
     ]
     return [*out, *_saturated(runs, faults, rule)]
 
 
 def _saturated(
-    runs: Sequence[Measurement], faults: Sequence[SensorFault], rule: DecisionRule = BENCH
+    runs: Sequence[Measurement], faults: Sequence[Finding], rule: DecisionRule = BENCH
 ) -> list[str]:
     """Return that the force is too often at the ends of its range, in a sentence."""
-    cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
+    cut = [fault for fault in faults if fault.channel == "force" and fault.kind == "clipping"]
     there = [run for run in runs if run.has("force")]
     total = sum(len(run.time) for run in there)
     if not cut:

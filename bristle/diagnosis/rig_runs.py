@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from ..core.finding import Finding
 from ..data.channels import DRIVE
 from ..data.checks.runs import tells_a_bend
 from ..data.measurement import Measurement
@@ -45,9 +46,9 @@ from .prepared import (
     opening,
 )
 from .rule import BENCH, INSIDE, RECONSTRUCTED, SITE, DecisionRule
-from .sensor_faults import SensorFault, sensor_faults
+from .sensor_faults import sensor_faults
 from .site import excused_by_sensor, left_by_filter, present_at, shortened
-from .site_diagnosis import Finding
+from .site_diagnosis import SiteDiagnosis
 from .trials import SHOWN, Trial, judge
 from .verdict import late_values
 
@@ -63,7 +64,7 @@ without them, and what is left of a delay would be held against the law at each 
 _MOTION = ("displacement", "velocity")
 
 
-def faults_in_building(runs: Sequence[Measurement], building: Building) -> list[SensorFault]:
+def faults_in_building(runs: Sequence[Measurement], building: Building) -> list[Finding]:
     """Return the faults that the channels at a building's damper show of each other.
 
     Parameters
@@ -73,7 +74,7 @@ def faults_in_building(runs: Sequence[Measurement], building: Building) -> list[
 
     Returns
     -------
-    list of SensorFault
+    list of Finding
         Of the one level of a damper on the ground by the names of a bench, `displacement` and
         `velocity`; of two levels by theirs.
     """
@@ -85,7 +86,7 @@ def faults_in_building(runs: Sequence[Measurement], building: Building) -> list[
             fault,
             channel=f"{end}_{fault.channel}",
             either=fault.either and f"{end}_{fault.either}",
-            words=f"{end}: {fault.words}",
+            text=f"{end}: {fault.text}",
         )
         for end in ends
         for fault in sensor_faults([_as_bench(run, end, force=False) for run in runs])
@@ -95,7 +96,7 @@ def faults_in_building(runs: Sequence[Measurement], building: Building) -> list[
 
 
 def without_faults(
-    runs: Sequence[Measurement], faults: Sequence[SensorFault], building: Building
+    runs: Sequence[Measurement], faults: Sequence[Finding], building: Building
 ) -> list[Measurement]:
     """Return measurements without the faults of the damper's channels.
 
@@ -120,7 +121,7 @@ def without_faults(
     ]
 
 
-def blurred(faults: Sequence[SensorFault]) -> bool:
+def blurred(faults: Sequence[Finding]) -> bool:
     """Return whether a velocity at the damper is left out."""
     return any(map(_blurs, faults))
 
@@ -130,8 +131,8 @@ def moves_measured(runs: Sequence[Measurement], building: Building) -> bool:
     return all(run.has(f"{end}_velocity") for run in runs for end in _ends(building))
 
 
-def _blurs(fault: SensorFault) -> bool:
-    return fault.channel.endswith("velocity") and fault.fault in BLURRED
+def _blurs(fault: Finding) -> bool:
+    return fault.channel.endswith("velocity") and fault.kind in BLURRED
 
 
 def _ends(building: Building) -> list[str]:
@@ -234,7 +235,7 @@ class BuildingRuns:
         """Return the part of the model at a site."""
         return at_site(self._present, site, self._problems)
 
-    def correct(self, findings: dict[str, Finding]) -> None:
+    def correct(self, findings: dict[str, SiteDiagnosis]) -> None:
         """Set right what the lines tell of the load cell, and of the building's numbers."""
         if DAMPER not in self._problems:
             return
@@ -253,7 +254,7 @@ class BuildingRuns:
         storey = level if self._building.isolated else level + 1
         return f"storey{storey}" if storey else "layer"
 
-    def _correct_load_cell(self, site: str, findings: dict[str, Finding]) -> None:
+    def _correct_load_cell(self, site: str, findings: dict[str, SiteDiagnosis]) -> None:
         self._say(f"{site}: the load cell")
         level = self._device.lower + 1
         late = load_cell(findings[site], self._train, self._holdout, self._building, level=level)
@@ -266,7 +267,7 @@ class BuildingRuns:
             self._problems[DAMPER] = shown
             self._present = _late(self._present, findings[site])
 
-    def _correct_building(self, findings: Mapping[str, Finding]) -> None:
+    def _correct_building(self, findings: Mapping[str, SiteDiagnosis]) -> None:
         self._say("damper: what the building's file leaves open")
         storeys = {one: found for one, found in findings.items() if one.startswith("storey")}
         self._straight = self._straight and all(one.kind == "none" for one in storeys.values())
@@ -280,7 +281,7 @@ class BuildingRuns:
         self._problems = self._made(self._building)
         self._suit(self.part(DAMPER))
 
-    def suited_to(self, found: Finding) -> bool:
+    def suited_to(self, found: SiteDiagnosis) -> bool:
         """Adjust the building's numbers beside what was found at the damper; return whether so.
 
         Where the force follows from equilibrium, the file's numbers show in what an effect leaves,
@@ -376,7 +377,9 @@ class BuildingRuns:
             shortened(train, SEARCHED), rule, IN_BUILDING,
         )  # fmt: skip
 
-    def excused(self, finding: Finding, findings: Mapping[str, Finding]) -> Finding:
+    def excused(
+        self, finding: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]
+    ) -> SiteDiagnosis:
         """Return the damper's finding, not unknown where an instrument explains what is left."""
         if blurred(self._sensors) or not self._velocities:
             why = "Without the velocity of the base, its reversals are not located exactly."
@@ -388,7 +391,7 @@ class BuildingRuns:
             finding = excused_by_sensor(finding, most, why)
         return finding
 
-    def beside_other_laws(self, finding: Finding, _opened: Opening) -> Finding:
+    def beside_other_laws(self, finding: SiteDiagnosis, _opened: Opening) -> SiteDiagnosis:
         """Return the damper's finding: the law decides which samples of a building count."""
         return finding
 
@@ -416,7 +419,7 @@ def _suits(suited: Pair, given: Pair, damper: Model, rule: DecisionRule = BENCH)
     return left(suited) <= rule.moved * left(given)
 
 
-def _rounded(layer: Finding, rule: DecisionRule = SITE) -> bool:
+def _rounded(layer: SiteDiagnosis, rule: DecisionRule = SITE) -> bool:
     """Return whether a load cell is late in a way that moving its record ahead does not undo.
 
     A filter rounds the force besides. That cannot be taken back, but it can be put on the model.
@@ -424,7 +427,7 @@ def _rounded(layer: Finding, rule: DecisionRule = SITE) -> bool:
     return bool(late_values(layer)) and layer.z_after > rule.clean
 
 
-def _late(present: Model, layer: Finding) -> Model:
+def _late(present: Model, layer: SiteDiagnosis) -> Model:
     """Return the model whose damper's force is shown as late as equilibrium says."""
     effects = (*present.effects, *layer.effects)
     return replace(present, effects=effects, values={**present.values, **late_values(layer)})
@@ -465,7 +468,7 @@ class BenchRuns:
         """Return the part of the model at a site."""
         return self._present
 
-    def correct(self, _findings: dict[str, Finding]) -> None:
+    def correct(self, _findings: dict[str, SiteDiagnosis]) -> None:
         """Do nothing: on a bench no equilibrium tells of the load cell."""
 
     def sites(self) -> tuple[str, ...]:
@@ -484,11 +487,13 @@ class BenchRuns:
         self._opened = opened if isinstance(opened, Opening) else None
         return opened
 
-    def excused(self, finding: Finding, _findings: Mapping[str, Finding]) -> Finding:
+    def excused(
+        self, finding: SiteDiagnosis, _findings: Mapping[str, SiteDiagnosis]
+    ) -> SiteDiagnosis:
         """Return the damper's finding as it is."""
         return finding
 
-    def beside_other_laws(self, finding: Finding, opened: Opening) -> Finding:
+    def beside_other_laws(self, finding: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
         """Return a finding that leaves an error with how much of it is the form of the law."""
         judged = finding.before if finding.kind == "unknown" else finding.after
         if finding.kind == "insufficient" or judged is None or judged.z <= opened.rule.clean:

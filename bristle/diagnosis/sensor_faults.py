@@ -12,13 +12,13 @@ over pieces, so that an instrument's lag, corner and bias show, and how sure the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ..comparison.names import joined
+from ..core.finding import Finding
 from ..core.text import plain, quantity
 from ..data.channels import channel_unit
 from ..data.cut_off import CHANNELS, LATE, derived_velocity, ends_of, outermost
@@ -35,52 +35,31 @@ UNITS = {
 """Units of faults that do not have their channel's."""
 
 
-@dataclass(frozen=True)
-class SensorFault:
-    """A fault of one channel.
-
-    `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
-    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; "derived" [s,
-    how late] is a velocity that was computed from the displacement, "unrelated" (0) one of another
-    motion. `std` is the uncertainty of `value`; `words` a sentence; `either` the channel that may
-    have it instead, as far as the data tell; `run` the run whose channel it is, "" for all. `runs`
-    are those that "clipping" was seen in, () for all; no model corrects it, so that `run` is "".
-    "clock" [s/s] is what the channel's clock gains on that of the motion. "range" [the channel's
-    unit] and "slew" [that per second] limit a command between its record and the coil.
-    """
-
-    channel: str
-    fault: str
-    value: float
-    std: float
-    words: str
-    either: str = ""
-    run: str = ""
-    runs: tuple[str, ...] = ()
-
-    def as_dict(self) -> dict[str, object]:
-        """Return what verdict.json holds of it."""
-        entry = {
-            "channel": self.channel, "fault": self.fault, "value": self.value, "std": self.std,
-            "words": self.words,
-        }  # fmt: skip
-        more = {"either": self.either, "run": self.run}
-        listed = {"runs": list(self.runs)} if self.runs else {}
-        return {**entry, **{key: text for key, text in more.items() if text}, **listed}
+# A sensor's fault is a finding. Its `kind` is "gain" [1], "sign" (-1), "delay" [s], "bias" or
+# "clipping" [the channel's unit], or what an instrument does: "lag" [s, of first order],
+# "high-pass" [1/s, its corner]; "derived" [s, how late] is a velocity that was computed from the
+# displacement, "unrelated" (0) one of another motion. "clock" [s/s] is what the channel's clock
+# gains on that of the motion; "range" [the channel's unit] and "slew" [that per second] limit a
+# command between its record and the coil. No model corrects "clipping", so that its `run` is "" and
+# `runs` are those that it was seen in.
 
 
-def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:
+def as_json(fault: Finding) -> dict[str, object]:
+    """Return what verdict.json holds of a fault."""
+    whole = {
+        "channel": fault.channel, "fault": fault.kind, "value": fault.value, "std": fault.std,
+        "words": fault.text, "either": fault.either, "run": fault.run, "runs": [*fault.runs],
+    }  # fmt: skip
+    return {key: one for key, one in whole.items() if one not in ("", [])}
+
+
+def instruments_of(sensors: Sequence[Finding]) -> tuple[str, ...]:
     """Return the sensor effects that the faults of channels are.
 
     What one run alone has is no effect of a model, which all runs share: it is corrected there.
     """
-    found = (instrument_of(one.channel, one.fault) for one in sensors if not one.run)
+    found = (instrument_of(one.channel, one.kind) for one in sensors if not one.run)
     return tuple(dict.fromkeys(name for name in found if name))
-
-
-def words_of(faults: Sequence[SensorFault]) -> list[str]:
-    """Return the sentences of faults."""
-    return [fault.words for fault in faults]
 
 
 def size_text(channel: str, fault: str, value: float) -> str:
@@ -88,7 +67,7 @@ def size_text(channel: str, fault: str, value: float) -> str:
 
     Parameters
     ----------
-    channel, fault, value : as `SensorFault` has them
+    channel, fault, value : of the fault
     """
     if fault == "clock":
         return f"{plain(1e6 * value)} ppm"
@@ -103,7 +82,7 @@ NAMED = 3
 """Runs that a sentence names; of more it says how many there are."""
 
 
-def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
+def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
     """Return the channels that repeat an extreme: their range ends before the motion does."""
     found = []
     for channel in CHANNELS:
@@ -115,10 +94,11 @@ def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Se
             at = joined([quantity(end, channel_unit(channel), 4) for end in outermost(every)])
             named = joined([*ends]) if len(ends) <= NAMED else f"{len(ends)} runs"
             found.append(
-                SensorFault(
-                    channel, "clipping", max(map(abs, every)), 0.0,
+                Finding(
+                    "clipping", "warning",
                     f"{channel.capitalize()} repeats the very same extreme in {named}: its range "
                     f"ended at {at}.",
+                    channel=channel, value=max(map(abs, every)), std=0.0,
                     runs=tuple(ends) if len(ends) < len(runs) else (),
                 )
             )  # fmt: skip
@@ -137,7 +117,7 @@ FEWEST = 3
 """Pieces from which on their spread means anything."""
 
 
-def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
+def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
     """Return the faults that the channels show of each other, over all runs."""
     found = clipped(runs, rule)
     cut = {fault.channel for fault in found}
@@ -150,7 +130,7 @@ def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> l
     return found + signs(runs, found, rule)
 
 
-def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[SensorFault]:
+def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[Finding]:
     """Return a velocity that was computed from the displacement, where that made it late."""
     late = [run for run in runs if LATE[how.get(run.name, "central")]]
     if not late:
@@ -158,17 +138,18 @@ def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[Senso
     first = late[0]
     value = LATE[how[first.name]] * first.step
     return [
-        SensorFault(
-            "velocity", "derived", value, 0.0,
+        Finding(
+            "derived", "warning",
             f"Velocity is the {how[first.name]} difference of displacement, half a sample "
             f"({plain(1e3 * abs(value))} ms) {'late' if value > 0.0 else 'early'}: it was "
             f"computed, "
             "not measured, and is left out.",
+            channel="velocity", value=value, std=0.0,
         )
     ]  # fmt: skip
 
 
-def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
+def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
     """Return what is wrong between displacement and velocity.
 
     In pieces of `WINDOW`, by least squares on signals low-passed alike,
@@ -183,11 +164,11 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         return []  # the spread over pieces is what says how sure a fault is
     if _unrelated_share(runs) > rule.unrelated:
         return [
-            SensorFault(
-                "velocity", "unrelated", 0.0, 0.0,
+            Finding(
+                "unrelated", "warning",
                 "Velocity is not the rate of displacement, whatever gain and delay it is given: "
                 "one of the two belongs to another motion, or is not connected.",
-                either="displacement",
+                channel="velocity", value=0.0, std=0.0, either="displacement",
             )
         ]  # fmt: skip
     theta, std = _pooled(runs)
@@ -199,10 +180,11 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         gain = -gain
     if abs(theta[4]) > max(rule.sure * std[4], rule.least_corner):
         found.append(
-            SensorFault(
-                "velocity", "high-pass", theta[4] * gain, std[4] * gain,
+            Finding(
+                "high-pass", "warning",
                 "Velocity lacks the low frequencies of the rate of displacement, like a geophone "
                 f"with a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
+                channel="velocity", value=theta[4] * gain, std=std[4] * gain,
             )
         )  # fmt: skip
         return found
@@ -211,12 +193,12 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     spread = std[0] * gain * gain
     if abs(gain - 1.0) > max(rule.sure * spread, rule.least_gain):
         found.append(
-            SensorFault(
-                "velocity", "gain", gain, spread,
+            Finding(
+                "gain", "warning",
                 f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is "
                 f"off, and neither motion nor force shows which one. If velocity is right, "
                 f"displacement shows {1.0 / gain:.3f} of what it should.",
-                either="displacement",
+                channel="velocity", value=gain, std=spread, either="displacement",
             )
         )  # fmt: skip
     found += _late(theta * gain, std * gain, _mean_step(runs), rule)
@@ -224,31 +206,39 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     rms = float(np.sqrt(np.mean(np.concatenate([run["velocity"] for run in runs]) ** 2)))
     if abs(bias) > max(rule.sure * bias_std, rule.least_bias * rms):
         found.append(
-            SensorFault(
-                "velocity", "bias", bias, bias_std,
+            Finding(
+                "bias", "warning",
                 f"Velocity shows {plain(bias)} m/s too much: its integral drifts away from "
                 "displacement.",
+                channel="velocity", value=bias, std=bias_std,
             )
         )  # fmt: skip
     return found
 
 
-def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> SensorFault:
+def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> Finding:
     """Return which of displacement and velocity is turned: the velocity if the force speeds it."""
     power = _power(runs)
     begin = "Displacement and velocity have opposite signs: "
     if abs(power) < rule.resists:
-        return SensorFault(
-            "velocity", "sign", -1.0, 0.0, begin + "one of the two is reversed.", "displacement"
+        return Finding(
+            "sign",
+            "warning",
+            begin + "one of the two is reversed.",
+            channel="velocity",
+            value=-1.0,
+            std=0.0,
+            either="displacement",
         )
     channel = "velocity" if power < 0.0 else "displacement"
     seen = "speed up" if power < 0.0 else "resist"
-    return SensorFault(
-        channel,
+    return Finding(
         "sign",
-        -1.0,
-        0.0,
+        "warning",
         f"{begin}the force seems to {seen} the velocity, so {channel} is reversed.",
+        channel=channel,
+        value=-1.0,
+        std=0.0,
     )
 
 
@@ -270,7 +260,7 @@ def _mean_step(runs: Sequence[Measurement]) -> float:
     return float(np.average([run.step for run in runs], weights=samples))
 
 
-def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[SensorFault]:
+def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[Finding]:
     """Return a delay of one channel, or a lag of the velocity's instrument."""
     late, late_std = float(theta[1]), float(std[1])
     if abs(late) <= max(rule.sure * late_std, rule.least_delay * step):
@@ -278,17 +268,19 @@ def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[Sen
     order = _order(theta, std, rule) if late > 0.0 else 0
     if order:
         return [
-            SensorFault(
-                "velocity", "lag", late, late_std,
+            Finding(
+                "lag", "warning",
                 f"Velocity lags the rate of displacement by {1e3 * late:.2f} ms and rounds it, "
                 f"as an instrument of {'first' if order == 1 else 'second'} order does.",
+                channel="velocity", value=late, std=late_std,
             )
         ]  # fmt: skip
     channel = "velocity" if late > 0.0 else "displacement"
     return [
-        SensorFault(
-            channel, "delay", abs(late), late_std,
+        Finding(
+            "delay", "warning",
             f"{channel.capitalize()} is {1e3 * abs(late):.2f} ms late relative to the other.",
+            channel=channel, value=abs(late), std=late_std,
         )
     ]  # fmt: skip
 
@@ -367,17 +359,18 @@ def _integral(values: Array, dt: float) -> Array:
 
 
 def signs(
-    runs: Sequence[Measurement], known: Sequence[SensorFault], rule: DecisionRule = SENSOR
-) -> list[SensorFault]:
+    runs: Sequence[Measurement], known: Sequence[Finding], rule: DecisionRule = SENSOR
+) -> list[Finding]:
     """Return force or motion that is turned: a damper that yields energy; a voltage below zero."""
     found = []
-    turned = any(fault.fault == "sign" for fault in known)
+    turned = any(fault.kind == "sign" for fault in known)
     if not turned and _power(runs) < -rule.resists:
         found.append(
-            SensorFault(
-                "force", "sign", -1.0, 0.0,
+            Finding(
+                "sign", "warning",
                 "Force times velocity is negative on average: a damper would feed energy in. "
                 "The sign of the force, or of the motion, is reversed.",
+                channel="force", value=-1.0, std=0.0,
             )
         )  # fmt: skip
     for drive in ("voltage", "duty"):  # a current or a field may well be driven both ways
@@ -388,9 +381,10 @@ def signs(
         low, high = np.quantile(V, [0.02, 0.98])
         if low < 0.0 and -low > rule.turned * max(high, 0.0):
             found.append(
-                SensorFault(
-                    drive, "sign", -1.0, 0.0,
+                Finding(
+                    "sign", "warning",
                     f"The {drive} is negative nearly always: its sign is reversed.",
+                    channel=drive, value=-1.0, std=0.0,
                 )
             )  # fmt: skip
     return found

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..comparison.patterns import ResidualPattern
+from ..core.finding import Finding
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit
 from ..identification.problem import Model, Problem, Run, has_offset, zero_of
@@ -39,8 +40,7 @@ from .decision import (
 from .prepared import Opening, Progress, of_layer, silent
 from .remaining import patterns_of
 from .rule import BENCH, SENSOR, SITE, DecisionRule
-from .sensor_faults import SensorFault
-from .site_diagnosis import Finding, of_decision
+from .site_diagnosis import SiteDiagnosis, of_decision
 from .trials import SECONDS, Trial, judge, missed_by, paired, try_all, try_members
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ def look_at(
     held_out: StructureProblem,
     present: Model | None = None,
     rule: DecisionRule = SITE,
-) -> Finding:
+) -> SiteDiagnosis:
     """Return what a layer's or storey's problem shows.
 
     Parameters
@@ -324,9 +324,7 @@ def free_zero(opened: Opening, decision: Decision, rule: DecisionRule = SENSOR) 
     return None if alone and missing(freed.before, decision.best) else freed
 
 
-def zero_fault(
-    problem: Problem, decision: Decision, rule: DecisionRule = SENSOR
-) -> SensorFault | None:
+def zero_fault(problem: Problem, decision: Decision, rule: DecisionRule = SENSOR) -> Finding | None:
     """Return the zero of the force beside what was decided with the zero free, None without one."""
     model = decision.best.model
     if decision.kind in ("unknown", "insufficient") or has_offset(model):
@@ -336,12 +334,12 @@ def zero_fault(
     return _fault(*zero_of(problem, model), decision, problem.runs[0].drive)
 
 
-def renewed_zero(opened: Opening, decision: Decision) -> tuple[SensorFault, ...]:
+def renewed_zero(opened: Opening, decision: Decision) -> tuple[Finding, ...]:
     """Return the zero that was found before any effect as it is beside what was decided.
 
     Nothing where there was none, or where an effect has a constant force of its own.
     """
-    first = [one for one in opened.faults if (one.channel, one.fault) == ("force", "bias")]
+    first = [one for one in opened.faults if (one.channel, one.kind) == ("force", "bias")]
     model = decision.best.model
     if not first or not opened.problem.free_zero or has_offset(model):
         return ()
@@ -350,12 +348,13 @@ def renewed_zero(opened: Opening, decision: Decision) -> tuple[SensorFault, ...]
     return (_fault(first[0].value + more, std, decision, drive),)
 
 
-def _fault(zero: float, std: float, decision: Decision, drive: str) -> SensorFault:
+def _fault(zero: float, std: float, decision: Decision, drive: str) -> Finding:
     beside = f" beside {' and '.join(decision.effects)}" if decision.kind == "effect" else ""
-    return SensorFault(
-        "force", "bias", zero, std,
+    return Finding(
+        "bias", "warning",
         f"Force shows {zero:.3g} N{beside} whatever the motion and the {drive}: the zero of the "
         "load cell is off. A static preload on the rod would look the same.",
+        channel="force", value=zero, std=std,
     )  # fmt: skip
 
 
@@ -392,7 +391,7 @@ def look_at_damper(
     *,
     pairs: bool = True,
     excess: float | None = None,
-) -> tuple[Finding, Opening]:
+) -> tuple[SiteDiagnosis, Opening]:
     """Return what a damper's law lacks, by `opened.rule`.
 
     Parameters
@@ -476,8 +475,8 @@ def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:
 
 
 def excused_by_sensor(
-    found: Finding, most: float, reason: str, rule: DecisionRule = BENCH
-) -> Finding:
+    found: SiteDiagnosis, most: float, reason: str, rule: DecisionRule = BENCH
+) -> SiteDiagnosis:
     """Return a damper's finding, not unknown where an instrument already known explains it.
 
     What an effect of the library lowers is not excused.

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from ..comparison.patterns import ResidualPattern
+from ..core.finding import Finding
 from ..identification.problem import Model
 from ..identification.rig import DAMPER
 from .decision import Decision
 from .effect_limits import EffectLimit
 from .experiments import Experiment
 from .law_trials import OtherLaw
-from .sensor_faults import SensorFault
 from .trials import Trial
 
 
 @dataclass(frozen=True)
-class Finding:
+class SiteDiagnosis:
     """What one site shows: "damper", "layer", "storey1", ... or "force" for the load cell.
 
     `kind` and `effects` as in verdict.json; `z_before`, `z_after` on held-out runs; `share` what
@@ -56,7 +56,7 @@ class Finding:
     patterns: tuple[ResidualPattern, ...] = ()
     untestable: tuple[str, ...] = ()
     experiment: Experiment | None = None
-    sensors: tuple[SensorFault, ...] = ()
+    sensors: tuple[Finding, ...] = ()
     together: Trial | None = None
     other_law: OtherLaw | None = None
     limits: tuple[EffectLimit, ...] = ()
@@ -115,7 +115,7 @@ def without_z(value: Any) -> Any:
 
 def of_decision(
     decision: Decision, before: Trial, trials: tuple[Trial, ...] = (), site: str = DAMPER
-) -> Finding:
+) -> SiteDiagnosis:
     """Return the finding that a decision is.
 
     Parameters
@@ -126,7 +126,7 @@ def of_decision(
     site : "damper", "layer", "storey1" ...
     """
     best = decision.best
-    return Finding(
+    return SiteDiagnosis(
         site, decision.kind, decision.effects, before.z, best.z, decision.explained,
         float("nan"), model=best.model, trials=trials, before=before, after=best,
         reasons=decision.reasons,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..comparison.patterns import ResidualPattern
+from ..core.finding import Finding
 from ..errors import StudyError
 from ..identification.error import ForceError, pooled
 from ..identification.rig import DAMPER, late_effects
@@ -20,15 +21,15 @@ from .effect_limits import EffectLimit
 from .experiments import Experiment
 from .law_choice import LawVerdict
 from .rule import BENCH, DecisionRule
-from .sensor_faults import SensorFault
-from .site_diagnosis import Finding, without_z
+from .sensor_faults import as_json
+from .site_diagnosis import SiteDiagnosis, without_z
 from .trials import Trial
 from .words import TONES
 
 # What known effects gain where none of them, nor a pair, explains what is missing.
 
 
-def gains_of(found: Finding, rule: DecisionRule = BENCH) -> list[dict[str, Any]]:
+def gains_of(found: SiteDiagnosis, rule: DecisionRule = BENCH) -> list[dict[str, Any]]:
     """Return the effects that lower a site's held-out error by enough, and beyond chance.
 
     Single ones, the best first; last the pair that gains most, if it gains more than the best one.
@@ -102,9 +103,9 @@ class Diagnosis(Viewable):
         The effects that are missing; of "ambiguous" one of them is.
     reasons : tuple of str
         Why, in sentences.
-    findings : mapping of Finding
+    findings : mapping of SiteDiagnosis
         What each site shows, the damper's last.
-    sensors : tuple of SensorFault
+    sensors : tuple of Finding
         Faults that the channels show of each other.
     untestable : tuple of str
         Effects that the runs do not excite, or that the model absorbs.
@@ -135,8 +136,8 @@ class Diagnosis(Viewable):
     kind: str
     effects: tuple[str, ...]
     reasons: tuple[str, ...]
-    findings: Mapping[str, Finding] = field(default_factory=dict)
-    sensors: tuple[SensorFault, ...] = ()
+    findings: Mapping[str, SiteDiagnosis] = field(default_factory=dict)
+    sensors: tuple[Finding, ...] = ()
     untestable: tuple[str, ...] = ()
     coordinate: str = ""
     sites: Mapping[str, str] = field(default_factory=dict)
@@ -157,7 +158,7 @@ class Diagnosis(Viewable):
         return str(self.as_dict()["words"])
 
     @property
-    def worst(self) -> Finding | None:
+    def worst(self) -> SiteDiagnosis | None:
         """What the site shows whose model errs the most on held-out runs, None without a site."""
         return max(self.findings.values(), key=lambda found: found.z_before, default=None)
 
@@ -262,7 +263,7 @@ class Diagnosis(Viewable):
         return {"effects": effects, "values": values} if effects else {}
 
     @property
-    def _damper(self) -> Finding | None:
+    def _damper(self) -> SiteDiagnosis | None:
         return self.findings.get(DAMPER)
 
     def as_dict(self) -> dict[str, Any]:
@@ -271,7 +272,7 @@ class Diagnosis(Viewable):
             "schema": SCHEMA, "kind": self.kind, "effects": list(self.effects),
             "sites": dict(self.sites), "force": self.force, "ranking": self._ranking(),
             "untestable": list(self.untestable),
-            "sensors": [fault.as_dict() for fault in self.sensors],
+            "sensors": [as_json(fault) for fault in self.sensors],
             "noise_floor": {name: float(noise) for name, noise in self.noise.items()},
             "findings": [found.as_dict() for found in self.findings.values()],
             "reasons": list(self.reasons),
@@ -331,7 +332,7 @@ def _in_a_storey(name: str) -> bool:
     return name in EFFECTS and "which" in EFFECTS[name].parameters
 
 
-def late_values(finding: Finding) -> dict[str, float]:
+def late_values(finding: SiteDiagnosis) -> dict[str, float]:
     """Return the parameter and the time [s] of a finding that the load cell is late, if it is."""
     if len(finding.effects) != 1 or not late_effects([n for n in finding.effects if n in EFFECTS]):
         return {}

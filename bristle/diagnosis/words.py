@@ -19,7 +19,7 @@ from ..physics.forms import LINEAR_FORM
 from .decision import Z
 from .rule import BENCH, DecisionRule
 from .sensor_faults import size_text
-from .site_diagnosis import Finding
+from .site_diagnosis import SiteDiagnosis
 
 # What a verdict says of laws, in words and as a table, from the content of verdict.json.
 
@@ -380,7 +380,7 @@ def sited(site: str, reason: str) -> str:
 # What the values of a named effect mean, in sentences for the verdict.
 
 
-def effect_words(found: Finding) -> list[str]:
+def effect_words(found: SiteDiagnosis) -> list[str]:
     """Return what the values of a site's effects mean, of those that say it.
 
     Parameters

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.checks.finding import grouped, sentence
+from ..core.finding import grouped, sentence
 from ..data.cut_off import LONG
 from ..data.noise import stretches
 from ..study.data_check import check_data
@@ -38,7 +38,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
             {
                 "kind": finding.kind, "level": finding.level, "channel": finding.channel,
                 "run": finding.run, "text": sentence(finding, runs), "do": finding.do,
-                "can_correct": bool(finding.corrections),
+                "can_correct": bool(finding.fixes),
             }
             for finding, runs in grouped(found.findings)
         ],

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.finding import Finding, grouped, sentence
 from ..core.text import command, plain, scale
 from ..data.checks.channels import check_channels, check_sizes
 from ..data.checks.differing_runs import check_differing_runs
-from ..data.checks.finding import Finding, grouped, sentence
 from ..data.checks.motion import (
     check_force,
     check_motion,
@@ -59,15 +59,19 @@ class DataCheck(Viewable):
         """Return what can be set right, by the name of the run."""
         out: dict[str, list[Correction]] = {}
         for finding in self.findings:
-            if finding.corrections:
-                out.setdefault(finding.run, []).extend(finding.corrections)
+            if finding.fixes:
+                out.setdefault(finding.run, []).extend(finding.fixes)
         return out
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it as JSON has it."""
         return {
             "ok": self.ok,
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": [
+                finding.as_dict("kind", "level", "text", "do", "run", "channel", "value")
+                | {"corrections": [one._asdict() for one in finding.fixes]}
+                for finding in self.findings
+            ],
             "runs": [
                 {
                     **asdict(excitation),

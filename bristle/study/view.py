@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..core.finding import grouped, sentence
 from ..core.text import plain, short_z
-from ..data.checks.finding import grouped, sentence
 from ..errors import RecordError
 from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import Page

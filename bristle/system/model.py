@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..core.config import Document
-from ..core.text import Finding, command, nearest, worded
+from ..core.finding import Finding, worded
+from ..core.text import command, nearest
 from ..core.toml_lines import KeyPath
 from ..fmu.description import Description, Value, Variable
 

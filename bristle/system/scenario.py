@@ -11,7 +11,8 @@ from pathlib import Path
 
 from ..core import files
 from ..core.config import Document, raised, toml_content
-from ..core.text import Finding, nearest, unknown
+from ..core.finding import Finding
+from ..core.text import nearest, unknown
 from ..errors import ScenarioError
 from ..fmu.description import Value
 from .advice import advise
@@ -27,13 +28,12 @@ from .overrides import (
     parse_overrides,
     plain,
 )
-from .ssp_import import Note, unpacked
+from .ssp_import import unpacked
 from .toml import check_components, check_steps
 
 __all__ = [
     "Component",
     "Connection",
-    "Finding",
     "Scenario",
     "check_scenario",
     "copy_scenario",
@@ -110,20 +110,20 @@ def check_scenario(
     try:
         path = resolve_scenario(file)
     except ScenarioError as error:
-        return [Finding(0, "error", str(error))]
+        return [Finding("file", "error", str(error))]
     return _read(path, overrides or {}, library)[1]
 
 
 def _read(
     path: Path, overrides: Mapping[str, object], library: Library | None
 ) -> tuple[Scenario | None, list[Finding]]:
-    package, notes = None, tuple[Note, ...]()
+    package, notes = None, tuple[Finding, ...]()
     if path.suffix.lower() == ".ssp":
         package = path
         try:
             made = unpacked(package)
         except ScenarioError as error:
-            return None, [Finding(0, "error", str(error))]
+            return None, [Finding("file", "error", str(error))]
         path, notes = made.scenario, made.notes
     try:
         document = Document(path, ScenarioError)
@@ -135,7 +135,7 @@ def _read(
         return None, list(error.findings)
     library = library or installed()
     for note in notes:
-        if ("run", note.key) not in document.overridden:
+        if ("run", note.kind) not in document.overridden:
             document.note((), note.text)
     run, title = Run(**read["run"]), read["title"]
     parts = check_components(document, read["components"], library)

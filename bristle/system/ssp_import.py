@@ -11,9 +11,10 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..core import files
+from ..core.finding import Finding
 from ..core.text import listed
 from ..core.toml_write import toml_value
 from ..errors import FmuError, ScenarioError, UnitError
@@ -340,20 +341,16 @@ _START: dict[str, Value] = {
 }  # fmt: skip
 
 
-class Note(NamedTuple):
-    """What was taken to be or left aside; `key` is that of [run] which it is about, or ""."""
-
-    text: str
-    key: str = ""
-
-
 @dataclass(frozen=True)
 class ImportedPackage:
-    """The scenario, its FMUs, and what was taken to be or left aside."""
+    """The scenario, its FMUs, and what was taken to be or left aside.
+
+    The kind of a note is the key of [run] that it is about, else "import".
+    """
 
     scenario: Path
     fmus: tuple[Path, ...]
-    notes: tuple[Note, ...]
+    notes: tuple[Finding, ...]
 
 
 def import_ssp(package: Path, folder: Path) -> ImportedPackage:
@@ -412,7 +409,9 @@ def unpacked(package: Path) -> ImportedPackage:
                 inner = Path(temporary) / "package"
                 inner.mkdir()
                 made = _unpack(package, inner)
-                (inner / _NOTES).write_text(json.dumps(made.notes), encoding="utf-8")
+                (inner / _NOTES).write_text(
+                    json.dumps([(note.text, note.kind) for note in made.notes]), encoding="utf-8"
+                )
                 if not folder.is_dir():  # another process may have been faster
                     inner.replace(folder)
         except OSError as error:
@@ -422,7 +421,7 @@ def unpacked(package: Path) -> ImportedPackage:
     return ImportedPackage(
         next(folder.glob("*.toml")),
         tuple(folder.glob("*.fmu")),
-        tuple(Note(text, key) for text, key in notes),
+        tuple(Finding(kind, "note", text) for text, kind in notes),
     )
 
 
@@ -431,12 +430,12 @@ def _unpack(path: Path, folder: Path) -> ImportedPackage:
         structure = read_structure(package)
         fmus = _Fmus(package, folder)
         flat = _Flattener(structure, package, fmus.describe).flat()
-        notes = [Note(text) for text in package.notes]
+        notes = [Finding("import", "note", text) for text in package.notes]
     stop, step = _times(structure, fmus.files.values(), notes)
     algorithm = structure.algorithm or ALGORITHMS[0]
     if algorithm not in ALGORITHMS:
         text = f'There is no algorithm "{algorithm}": {ALGORITHMS[0]} is taken.'
-        notes.append(Note(text, "algorithm"))
+        notes.append(Finding("algorithm", "note", text))
         algorithm = ALGORITHMS[0]
     run = {"stop": stop, "step": step, "algorithm": algorithm}
     names = _names(flat)
@@ -485,7 +484,7 @@ def _unique(name: str, taken: Iterable[str], other: Callable[[int], str]) -> str
 
 
 def _components(
-    flat: FlatSystem, fmus: _Fmus, names: Mapping[Names, str], notes: list[Note]
+    flat: FlatSystem, fmus: _Fmus, names: Mapping[Names, str], notes: list[Finding]
 ) -> list[str]:
     """Return the tables of the components."""
     fed = {connection.target for connection in flat.connections}
@@ -505,7 +504,7 @@ def _components(
                     start = next(iter(variable.items.values()), _START[variable.kind])
                     port = ".".join((*path, variable.name))
                     text = f'The input "{port}" has neither source nor start value: '
-                    notes.append(Note(f"{text}{toml_value(start)} is taken."))
+                    notes.append(Finding("import", "note", f"{text}{toml_value(start)} is taken."))
                 values[variable.name] = start
         table = {"fmu": fmus.files[member].name, **({"parameters": values} if values else {})}
         parts.append(component_text(names[path], table))
@@ -556,7 +555,7 @@ def _typed(variable: Variable, value: Value) -> Value:
     return value
 
 
-def _times(structure: Structure, fmus: Iterable[Path], notes: list[Note]) -> tuple[float, float]:
+def _times(structure: Structure, fmus: Iterable[Path], notes: list[Finding]) -> tuple[float, float]:
     """Return stop and step [s]: the package's, else what its FMUs say, else the usual ones."""
     stop, step = structure.stop, structure.step
     if stop is None or step is None:
@@ -567,17 +566,21 @@ def _times(structure: Structure, fmus: Iterable[Path], notes: list[Note]) -> tup
         )
         if stop is None:
             stop = max(filter(None, stops), default=USUAL_STOP)
-            notes.append(Note(f"The package names no stop: {stop:g} s is taken.", "stop"))
+            notes.append(
+                Finding("stop", "note", f"The package names no stop: {stop:g} s is taken.")
+            )
         if step is None:
             step = min(filter(None, steps), default=stop / USUAL_STEPS)
-            notes.append(Note(f"The package names no step: {step:g} s is taken.", "step"))
+            notes.append(
+                Finding("step", "note", f"The package names no step: {step:g} s is taken.")
+            )
     if not 0.0 < step <= stop:
         raise ScenarioError(f"stop = {stop:g} s, step = {step:g} s: 0 < step <= stop is right.")
     count = stop / step
     if abs(count - round(count)) > STEP_TOLERANCE:
         step = stop / math.ceil(count)
         text = f"The stop is no whole number of steps: a step of {step:g} s is taken."
-        notes.append(Note(text, "step"))
+        notes.append(Finding("step", "note", text))
     return stop, step
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bristle.data.checks.finding import Finding, grouped, sentence
+from bristle.core.finding import Finding, grouped, sentence
 
 
 def test_a_warning_in_one_run_and_notes_in_others_are_told_once():

@@ -71,9 +71,9 @@ def test_it_is_told_as_what_it_is():
     x = noisy()
     run = bench(differences(x)["backward"], x)
     faults = sensor_faults([run])
-    assert [(one.channel, one.fault) for one in faults] == [("velocity", "derived")]
+    assert [(one.channel, one.kind) for one in faults] == [("velocity", "derived")]
     assert faults[0].value == pytest.approx(0.5 * DT)
-    assert "backward difference of displacement" in faults[0].words
+    assert "backward difference of displacement" in faults[0].text
     assert not corrected([run], faults)[0].has("velocity")
     # A central difference is not late: nothing is wrong with it.
     assert sensor_faults([bench(differences(x)["central"], x)]) == []

@@ -7,15 +7,17 @@ from dataclasses import replace
 import numpy as np
 from test_starts import LAW, recorded_rig
 
+from bristle.core.finding import Finding
 from bristle.diagnosis import prepared
 from bristle.diagnosis.diagnosis import diagnose
 from bristle.diagnosis.prepared import _left, corrected
-from bristle.diagnosis.sensor_faults import SensorFault
 
 
 def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
     runs = recorded_rig((), {})
-    cut = SensorFault("voltage", "clipping", 3.0, 0.0, "The voltage stands at 3 V.")
+    cut = Finding(
+        "clipping", "warning", "The voltage stands at 3 V.", channel="voltage", value=3.0, std=0.0
+    )
     high = replace(runs[0], channels={**runs[0].channels, "voltage": np.full(3000, 3.0)})
     kept = _left(corrected([high, *runs[1:]], [cut]))
     assert [run.name for run in kept] == [run.name for run in runs[1:]]
@@ -23,7 +25,14 @@ def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
 
 def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
     runs = recorded_rig((), {})
-    cut = SensorFault("voltage", "clipping", 1.0, 0.0, "The voltage stands at its end.")
+    cut = Finding(
+        "clipping",
+        "warning",
+        "The voltage stands at its end.",
+        channel="voltage",
+        value=1.0,
+        std=0.0,
+    )
     monkeypatch.setattr(prepared, "sensor_faults", lambda _runs: [cut])
     every = [replace(run, channels={**run.channels, "voltage": np.ones(3000)}) for run in runs]
     found = diagnose(every[:2], every[2:], law="bingham", values=LAW)

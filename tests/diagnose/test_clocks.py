@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from shaken import measured
 
+from bristle.core.finding import Finding
 from bristle.diagnosis.clocks import clock_faults, clocks_of
 from bristle.diagnosis.prepared import corrected
-from bristle.diagnosis.sensor_faults import SensorFault, instruments_of
+from bristle.diagnosis.sensor_faults import as_json, instruments_of
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit
 from bristle.identification.histories import Bench
@@ -55,13 +56,13 @@ def test_a_clock_that_gains_is_told_with_its_rate_and_set_right():
     before, *pair = opened(*runs(RATE))
     found = clock_faults(before, *pair)
     (fault,) = found.faults
-    assert (fault.channel, fault.fault, fault.run) == ("force", "clock", "")
+    assert (fault.channel, fault.kind, fault.run) == ("force", "clock", "")
     assert fault.value == pytest.approx(RATE, rel=0.03)
     assert abs(fault.value - RATE) < 4.0 * fault.std
     assert before.z > 1.3
     assert found.trial.z == pytest.approx(1.0, abs=0.05)
-    assert "400 ppm" in fault.words
-    assert "fast" in fault.words
+    assert "400 ppm" in fault.text
+    assert "fast" in fault.text
 
 
 @pytest.mark.parametrize("late", [0.008, -0.012])
@@ -69,9 +70,9 @@ def test_a_run_that_began_apart_is_told_with_its_name(late):
     before, *pair = opened(*runs(late=(0.0, late, 0.0, 0.0)))
     found = clock_faults(before, *pair)
     (fault,) = found.faults
-    assert (fault.fault, fault.run) == ("delay", "run1")
+    assert (fault.kind, fault.run) == ("delay", "run1")
     assert fault.value == pytest.approx(late, rel=0.05)
-    assert ("later" if late > 0.0 else "earlier") in fault.words
+    assert ("later" if late > 0.0 else "earlier") in fault.text
     assert found.trial.train == pytest.approx(1.0, abs=0.05)
 
 
@@ -96,17 +97,21 @@ def test_a_fault_of_one_run_corrects_that_run_alone():
     ramp = 10.0 * T
     channels = {"time": T, "displacement": np.sin(T), "force": ramp}
     pair = [measured(channels, 0, noise=0.0, name=name) for name in ("one", "two")]
-    late = SensorFault("force", "delay", 0.1, 0.0, "", run="two")
+    late = Finding("delay", "warning", "", channel="force", value=0.1, std=0.0, run="two")
     one, two = corrected(pair, [late])
     assert one["force"] == pytest.approx(ramp)
     assert two["force"][:4000] == pytest.approx(ramp[:4000] + 1.0)
-    (fast,) = corrected(pair[:1], [SensorFault("force", "clock", 1e-3, 0.0, "")])
+    (fast,) = corrected(
+        pair[:1], [Finding("clock", "warning", "", channel="force", value=1e-3, std=0.0)]
+    )
     assert fast["force"][:4000] == pytest.approx(1.001 * ramp[:4000])
-    assert late.as_dict()["run"] == "two"
-    assert "run" not in SensorFault("force", "clock", 1e-3, 0.0, "").as_dict()
+    assert as_json(late)["run"] == "two"
+    assert "run" not in as_json(
+        Finding("clock", "warning", "", channel="force", value=1e-3, std=0.0)
+    )
 
 
 def test_a_run_that_began_apart_is_no_effect_of_the_model():
-    late = SensorFault("force", "delay", 0.008, 1e-5, "")
+    late = Finding("delay", "warning", "", channel="force", value=0.008, std=1e-5)
     assert instruments_of([late]) == ("delay",)
     assert instruments_of([replace(late, run="run1")]) == ()

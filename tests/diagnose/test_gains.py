@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.verdict import gains_of
 from bristle.diagnosis.words import sentences
@@ -22,7 +22,7 @@ def trial(z, *effects):
 def finding(*trials, kind="unknown", together=None):
     """Return what a damper shows whose model has z = 3."""
     before = trial(3.0)
-    return Finding(
+    return SiteDiagnosis(
         "damper", kind, (), 3.0, 3.0, 0.0, float("nan"), "", None, trials, before, before,
         together=together,
     )  # fmt: skip
@@ -52,4 +52,4 @@ def test_a_pair_that_gains_no_more_than_the_best_effect_is_not_told():
 def test_nothing_is_told_where_no_effect_gains_or_the_verdict_names_it():
     assert gains_of(finding(trial(2.99, "stribeck"))) == []
     assert gains_of(finding(trial(1.0, "stribeck"), kind="effect")) == []
-    assert gains_of(Finding("damper", "unknown", (), 3.0, 3.0, 0.0, float("nan"))) == []
+    assert gains_of(SiteDiagnosis("damper", "unknown", (), 3.0, 3.0, 0.0, float("nan"))) == []

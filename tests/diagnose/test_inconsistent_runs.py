@@ -13,7 +13,7 @@ from bristle.diagnosis.conclusion import About, conclude
 from bristle.diagnosis.decision import OTHER_FORM
 from bristle.diagnosis.inconsistent_runs import contradicted, groups, inconsistent_runs, odd_run
 from bristle.diagnosis.prepared import Opening
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit, identify
 from bristle.identification.rig_fit import joined
@@ -106,7 +106,7 @@ def test_a_run_beyond_all_others_is_not_called_odd():
     assert odd_run(fit(train, truth, with_std=False).model, train, first.of([])) == ""
 
 
-def sprung_finding(place: int, gain: float) -> tuple[Finding, Opening]:
+def sprung_finding(place: int, gain: float) -> tuple[SiteDiagnosis, Opening]:
     """Return what is found on a damper beside a spring, with one run whose force is scaled."""
     first, second, truth = true_case(5, "bingham")
     both = [*first.runs, *second.runs]
@@ -116,7 +116,7 @@ def sprung_finding(place: int, gain: float) -> tuple[Finding, Opening]:
     train, held_out = first.of(runs[:3]), first.of(runs[3:])
     before = judge(fit(train, truth, with_std=False).model, train, held_out)
     single = judge(joined("gas_spring", before.model, train), train, held_out)
-    found = Finding(
+    found = SiteDiagnosis(
         "damper", "effect", ("gas_spring",), before.z, single.z, 0.8, float("nan"),
         trials=(single,), before=before, after=single, reasons=("It gains.", OTHER_FORM),
     )  # fmt: skip
@@ -194,8 +194,8 @@ def test_after_runs_that_allow_no_verdict_comes_another_diagnosis():
 )
 def test_the_layer_waits_for_a_measured_force_that_contradicts_itself(force, damper, kind):
     nan = float("nan")
-    layer = Finding("layer", "unknown", (), 2.2, 2.2, 0.0, nan, reasons=("It errs.",))
-    other = Finding("damper", damper, (), 4.0, 4.0, 0.0, nan, reasons=("One run is odd.",))
+    layer = SiteDiagnosis("layer", "unknown", (), 2.2, 2.2, 0.0, nan, reasons=("It errs.",))
+    other = SiteDiagnosis("damper", damper, (), 4.0, 4.0, 0.0, nan, reasons=("One run is odd.",))
     told = conclude({"layer": layer, "damper": other}, About(force=force))
     assert told.kind == kind
     assert ("set right first" in " ".join(told.reasons)) == (kind == "insufficient")

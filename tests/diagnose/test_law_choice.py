@@ -22,7 +22,7 @@ from bristle.diagnosis.law_choice import (
 )
 from bristle.diagnosis.law_trials import LawTrial
 from bristle.diagnosis.rule import BENCH
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.words import headline, law_sentences, law_table
 from bristle.identification.error import ForceError
@@ -55,7 +55,9 @@ def pair(law, z_alone, kind="none", effects=(), z=None, **choices):
     """Return a law with what it lacks."""
     first = row(law, z_alone)
     after = trial(z if z is not None else z_alone, law, effects, **choices)
-    gone = Finding("damper", kind, tuple(effects), z_alone, after.z, 0.0, float("nan"), after=after)
+    gone = SiteDiagnosis(
+        "damper", kind, tuple(effects), z_alone, after.z, 0.0, float("nan"), after=after
+    )
     return Pair(first, gone)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bristle.core.finding import Finding
 from bristle.data.corrections import Correction, limited, set_right, wrong_value
 from bristle.diagnosis.command_range import limited_drive
 from bristle.diagnosis.prepared import corrected
-from bristle.diagnosis.sensor_faults import SensorFault
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit
 from bristle.identification.histories import Bench
@@ -57,13 +57,13 @@ def found(drive="voltage", **how):
 @pytest.mark.parametrize("limit", [("slew", 12.0), ("range", 4.5)])
 def test_a_limit_is_told_with_its_value_and_set_right(command, limit):
     before, told = found(command=command, limit=limit)
-    assert (told.fault.channel, told.fault.fault) == ("voltage", limit[0])
+    assert (told.fault.channel, told.fault.kind) == ("voltage", limit[0])
     assert told.fault.value == pytest.approx(limit[1], rel=0.02)
     assert abs(told.fault.value - limit[1]) < 5.0 * told.fault.std
     assert before.z > 1.2
     assert told.trial.z == pytest.approx(1.0, abs=0.06)
-    assert "4 of 4 runs" in told.fault.words
-    assert f'fault = "{limit[0]}"' in told.fault.words
+    assert "4 of 4 runs" in told.fault.text
+    assert f'fault = "{limit[0]}"' in told.fault.text
     apart = told.held_out.runs[0].V - limited(made(4, command=command).V, DT, *limit)
     assert float(np.max(np.abs(apart))) < 0.1
 
@@ -86,7 +86,7 @@ def test_effects_are_no_limit(effect):
 def test_a_current_is_told_in_its_own_unit():
     _, told = found(drive="current", limit=("slew", 12.0))
     assert told.fault.channel == "current"
-    assert told.fault.words.startswith("Current reaches the coil no faster than 12 A/s")
+    assert told.fault.text.startswith("Current reaches the coil no faster than 12 A/s")
 
 
 def test_clean_runs_and_commands_that_are_held_show_none():
@@ -118,6 +118,6 @@ def test_a_told_limit_corrects_measurements():
     channels = {"time": T, "displacement": np.sin(T), "voltage": 5.0 + np.sin(T)}
     (right,) = corrected(
         [measured(channels, 0, noise=0.0, name="one")],
-        [SensorFault("voltage", "range", 5.5, 0.0, "")],
+        [Finding("range", "warning", "", channel="voltage", value=5.5, std=0.0)],
     )
     assert right["voltage"].max() == 5.5

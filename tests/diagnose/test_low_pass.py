@@ -11,17 +11,17 @@ import pytest
 from scipy.signal import cont2discrete
 
 from bristle.diagnosis.load_cell import low_pass_text
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
 from bristle.identification.problem import Model
 from bristle.physics.effects.delay import Delay
 
 
-def late(time: float, share: float, kind: str = "effect", damping: float = 1.0) -> Finding:
+def late(time: float, share: float, kind: str = "effect", damping: float = 1.0) -> SiteDiagnosis:
     values = {"delay.time": time, "delay.filtered": share, "delay.damping": damping}
     model = Model("bingham", ("delay",), values)
     trial = Trial(model, 1.0, 1.0, 1.0, np.ones(10), np.ones(10))
-    return Finding(
+    return SiteDiagnosis(
         "damper", kind, ("delay",), 2.0, 1.0, 1.0, 0.01, "", model, (trial,), trial, trial
     )
 

@@ -13,7 +13,7 @@ import pytest
 from bristle.data.guess import guess_channels
 from bristle.data.measurement import Known, measurements_of
 from bristle.data.table import table_from_frame
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import joinable, judge
 from bristle.diagnosis.words import effect_words
 from bristle.errors import PhysicsError
@@ -68,7 +68,7 @@ def test_the_force_follows_the_temperature_of_each_run():
     assert trial.model.value(f"{NAME}.c_yield") == pytest.approx(YIELD, rel=0.1)
     assert trial.model.value("c_0") == pytest.approx(LAW["c_0"], rel=0.03)
     assert trial.model.value(f"{NAME}.T_0") == MIDDLE
-    found = Finding("damper", "effect", (NAME,), 2.0, 1.0, 1.0, 0.0, after=trial)
+    found = SiteDiagnosis("damper", "effect", (NAME,), 2.0, 1.0, 1.0, 0.0, after=trial)
     (text,) = effect_words(found)
     assert text.startswith("With each kelvin above 27 °C the viscous force falls by 1.5 %")
     assert "the yield force falls by 0.4" in text

@@ -47,7 +47,7 @@ def preload(k):
 
 def test_a_force_off_its_zero():
     fault = found(*problems(**preload(0.0))).fault
-    assert (fault.channel, fault.fault) == ("force", "bias")
+    assert (fault.channel, fault.kind) == ("force", "bias")
     assert fault.value == pytest.approx(OFFSET, abs=max(4.0 * fault.std, 0.01))
 
 
@@ -63,7 +63,7 @@ def test_a_damper_stronger_one_way_is_physics():
 def test_a_voltage_recorded_late():
     shift = round(LATE / DT)
     late = found(*problems(spoil=lambda V: np.concatenate([np.full(shift, V[0]), V[:-shift]])))
-    assert (late.fault.channel, late.fault.fault) == ("voltage", "delay")
+    assert (late.fault.channel, late.fault.kind) == ("voltage", "delay")
     assert late.fault.value == pytest.approx(LATE, abs=max(4.0 * late.fault.std, 1e-4))
     assert late.trial.z == pytest.approx(1.0, abs=0.1)
 

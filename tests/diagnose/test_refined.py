@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.diagnosis import Diagnosis
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
 from bristle.identification.problem import Model
 
@@ -22,7 +22,7 @@ SPRING = replace(
 def verdict(kind: str, effects: tuple[str, ...], best: Trial) -> Diagnosis:
     """Return a verdict on a damper, with one trial."""
     model = best.model if effects else BEFORE.model
-    found = Finding(
+    found = SiteDiagnosis(
         "damper", kind, effects, 5.0, best.z, 0.6, float("nan"), model=model, trials=(best,),
         before=BEFORE, after=best,
     )  # fmt: skip

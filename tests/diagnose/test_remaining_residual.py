@@ -13,7 +13,7 @@ from bristle.diagnosis import remaining
 from bristle.diagnosis.conclusion import About, conclude
 from bristle.diagnosis.remaining import most_telling, patterns_of, ringing
 from bristle.diagnosis.rule import BENCH
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.identification.problem import Problem, Run
 
 NONE = np.zeros(0)
@@ -102,6 +102,6 @@ def test_nothing_is_named_where_there_is_no_place(rings):
     [(False, "unknown", True), (False, "none", False), (True, "unknown", False)],
 )
 def test_a_drive_that_nobody_recorded_leaves_a_doubt(driven, kind, doubted):
-    shown = Finding("damper", kind, (), 2.0, 2.0, 0.0, 0.01, reasons=("Something.",))
+    shown = SiteDiagnosis("damper", kind, (), 2.0, 2.0, 0.0, 0.01, reasons=("Something.",))
     found = conclude({"damper": shown}, About(driven=driven))
     assert ("No command was recorded" in found.words) is doubted

@@ -13,7 +13,7 @@ from bristle.core.text import quantity
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of_frame
 from bristle.diagnosis.prepared import corrected
-from bristle.diagnosis.sensor_faults import clipped, sensor_faults
+from bristle.diagnosis.sensor_faults import as_json, clipped, sensor_faults
 from bristle.diagnosis.words import fault_rows
 
 STEP, SECONDS, NOISE = 0.002, 10.0, 0.01
@@ -58,7 +58,7 @@ def measured(seed, late=0.0, spoil=lambda channels: None, after=lambda channels:
 
 def only(faults):
     """Return the one fault there is."""
-    assert len(faults) == 1, [(one.channel, one.fault, one.value) for one in faults]
+    assert len(faults) == 1, [(one.channel, one.kind, one.value) for one in faults]
     return faults[0]
 
 
@@ -74,14 +74,14 @@ def test_clean_channels_show_no_fault(seed):
 @pytest.mark.parametrize("gain", [0.93, 1.05, 1.2])
 def test_a_gain(gain):
     fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=gain * c["velocity"]))))
-    assert (fault.channel, fault.fault) == ("velocity", "gain")
+    assert (fault.channel, fault.kind) == ("velocity", "gain")
     assert fault.value == pytest.approx(gain, abs=max(3.0 * fault.std, 0.003))
 
 
 @pytest.mark.parametrize("late", [0.003, 0.008])
 def test_a_late_velocity(late):
     fault = only(sensor_faults(runs(late=late)))
-    assert (fault.channel, fault.fault) == ("velocity", "delay")
+    assert (fault.channel, fault.kind) == ("velocity", "delay")
     assert fault.value == pytest.approx(late, rel=0.1)
 
 
@@ -95,27 +95,27 @@ def test_a_late_velocity_of_runs_with_different_rates(order):
 
 def test_a_late_displacement():
     fault = only(sensor_faults(runs(late=-0.004)))
-    assert (fault.channel, fault.fault) == ("displacement", "delay")
+    assert (fault.channel, fault.kind) == ("displacement", "delay")
     assert fault.value == pytest.approx(0.004, rel=0.1)
 
 
 @pytest.mark.parametrize("bias", [-0.006, 0.004])
 def test_a_bias_of_the_velocity(bias):
     fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=c["velocity"] + bias))))
-    assert (fault.channel, fault.fault) == ("velocity", "bias")
+    assert (fault.channel, fault.kind) == ("velocity", "bias")
     assert fault.value == pytest.approx(bias, rel=0.1)
 
 
 @pytest.mark.parametrize("channel", ["displacement", "velocity"])
 def test_a_turned_motion(channel):
     found = sensor_faults(runs(spoil=lambda c: c.update({channel: -c[channel]})))
-    assert [one.fault for one in found] == ["sign"]
+    assert [one.kind for one in found] == ["sign"]
 
 
 @pytest.mark.parametrize("channel", ["force", "voltage"])
 def test_a_turned_force_or_voltage(channel):
     fault = only(sensor_faults(runs(spoil=lambda c: c.update({channel: -c[channel]}))))
-    assert (fault.channel, fault.fault, fault.value) == (channel, "sign", -1.0)
+    assert (fault.channel, fault.kind, fault.value) == (channel, "sign", -1.0)
 
 
 @pytest.mark.parametrize("channel", ["force", "displacement", "velocity"])
@@ -127,7 +127,7 @@ def test_a_clipped_channel(channel):
 
     all_runs = runs(after=clip)
     fault = only(sensor_faults(all_runs))
-    assert (fault.channel, fault.fault) == (channel, "clipping")
+    assert (fault.channel, fault.kind) == (channel, "clipping")
     assert fault.value == pytest.approx(max(np.max(np.abs(one[channel])) for one in all_runs))
 
 
@@ -141,8 +141,8 @@ def test_a_force_that_is_clipped_in_one_run_names_it_and_both_ends():
     fault = only(clipped([plain[0], spoilt, *plain[2:]]))
     assert fault.runs == (spoilt.name,)
     ends = f"{quantity(-0.6 * top, 'N', 4)} and {quantity(0.5 * top, 'N', 4)}"
-    assert fault.words.endswith(f"in {spoilt.name}: its range ended at {ends}.")
-    assert fault_rows({"sensors": [fault.as_dict()]})[0][-1] == spoilt.name
+    assert fault.text.endswith(f"in {spoilt.name}: its range ended at {ends}.")
+    assert fault_rows({"sensors": [as_json(fault)]})[0][-1] == spoilt.name
 
 
 @pytest.mark.parametrize("tau", [0.004, 0.01])
@@ -155,14 +155,14 @@ def test_a_velocity_that_lags(tau):
         channels["velocity"] = lfilter(b, a, v, zi=[v[0] * (1.0 - b[0] / a[0])])[0]
 
     fault = only(sensor_faults(runs(spoil=lag)))
-    assert (fault.channel, fault.fault) == ("velocity", "lag")
+    assert (fault.channel, fault.kind) == ("velocity", "lag")
     assert fault.value == pytest.approx(tau, rel=0.15)
 
 
 def test_mended_channels_show_no_fault():
     spoilt = runs(late=0.006, spoil=lambda c: c.update(velocity=1.1 * c["velocity"]))
     found = sensor_faults(spoilt)
-    assert {one.fault for one in found} == {"gain", "delay"}
+    assert {one.kind for one in found} == {"gain", "delay"}
     assert sensor_faults(corrected(spoilt, found)) == []
 
 
@@ -172,7 +172,7 @@ def test_a_channel_that_stands_at_its_ends_nearly_always_is_clipped_too():
         channels["force"] = np.clip(channels["force"], -level, level)
 
     fault = only(sensor_faults(runs(after=clip)))
-    assert (fault.channel, fault.fault) == ("force", "clipping")
+    assert (fault.channel, fault.kind) == ("force", "clipping")
 
 
 def test_a_channel_cut_on_one_side():
@@ -181,7 +181,7 @@ def test_a_channel_cut_on_one_side():
 
     spoilt = runs(after=clip)
     fault = only(sensor_faults(spoilt))
-    assert (fault.channel, fault.fault) == ("force", "clipping")
+    assert (fault.channel, fault.kind) == ("force", "clipping")
     for before, after in zip(spoilt, corrected(spoilt, [fault]), strict=True):
         cut = before["force"] == before["force"].max()
         told, level = after.valid("force"), before["force"].max()
@@ -201,7 +201,7 @@ def test_noise_that_comes_after_the_cut_is_lost_with_it():
         level.append(end)
 
     spoilt = runs(after=clip)
-    fault = only([one for one in sensor_faults(spoilt) if one.fault == "clipping"])
+    fault = only([one for one in sensor_faults(spoilt) if one.kind == "clipping"])
     for after, end in zip(corrected(spoilt, [fault]), level, strict=True):
         beyond = np.abs(after["force"]) > 0.985 * end
         assert beyond.sum() > 100
@@ -214,7 +214,7 @@ def test_a_coarse_instrument_is_not_clipped():
             step = np.max(np.abs(channels[name])) / 40.0
             channels[name] = step * np.round(channels[name] / step)
 
-    assert [one for one in sensor_faults(runs(after=coarse)) if one.fault == "clipping"] == []
+    assert [one for one in sensor_faults(runs(after=coarse)) if one.kind == "clipping"] == []
 
 
 def test_a_rest_at_the_end_of_the_stroke_is_not_clipped():
@@ -222,26 +222,26 @@ def test_a_rest_at_the_end_of_the_stroke_is_not_clipped():
         channels["displacement"] = channels["displacement"] - channels["displacement"].min()
         channels["displacement"][:150] = 0.0  # read without noise: the instrument's steps are wider
 
-    assert [one for one in sensor_faults(runs(after=parked)) if one.fault == "clipping"] == []
+    assert [one for one in sensor_faults(runs(after=parked)) if one.kind == "clipping"] == []
 
 
 def test_a_turned_displacement_is_told_by_the_force():
     fault = only(sensor_faults(runs(spoil=lambda c: c.update(displacement=-c["displacement"]))))
-    assert (fault.channel, fault.fault) == ("displacement", "sign")
+    assert (fault.channel, fault.kind) == ("displacement", "sign")
     fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=-c["velocity"]))))
-    assert (fault.channel, fault.fault) == ("velocity", "sign")
+    assert (fault.channel, fault.kind) == ("velocity", "sign")
 
 
 def test_a_turned_velocity_with_an_offset_is_corrected():
     whole = runs(spoil=lambda c: c.update(velocity=0.005 - c["velocity"]))
     found = sensor_faults(whole)
-    assert {one.fault for one in found} == {"sign", "bias"}
+    assert {one.kind for one in found} == {"sign", "bias"}
     assert sensor_faults(corrected(whole, found)) == []
 
 
 def test_a_gain_names_the_other_channel_too():
     fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=1.1 * c["velocity"]))))
-    assert fault.as_dict()["either"] == "displacement"
+    assert fault.either == "displacement"
 
 
 @pytest.mark.parametrize("damping", [0.6, 0.7, 0.9])
@@ -258,7 +258,7 @@ def test_a_velocity_behind_an_instrument_of_second_order(damping):
         channels["velocity"] = lfilter(b, a, v, zi=lfilter_zi(b, a) * v[0])[0]
 
     fault = only(sensor_faults(runs(spoil=lag)))
-    assert (fault.channel, fault.fault) == ("velocity", "lag")
+    assert (fault.channel, fault.kind) == ("velocity", "lag")
     assert fault.value == pytest.approx(2.0 * damping / corner, rel=0.1)
 
 
@@ -274,4 +274,4 @@ def cut(channels, n):
 
 def test_a_velocity_of_another_motion():
     fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=c["velocity"][::-1].copy()))))
-    assert fault.fault == "unrelated"
+    assert fault.kind == "unrelated"

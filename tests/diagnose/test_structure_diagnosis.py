@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
+from bristle.core.finding import Finding
 from bristle.diagnosis import diagnose_rig, rig_runs
 from bristle.diagnosis import site as of_damper
 from bristle.diagnosis.conclusion import About, conclude, lookalikes
@@ -16,9 +17,8 @@ from bristle.diagnosis.inconsistent_runs import kind_of
 from bristle.diagnosis.load_cell import load_cell
 from bristle.diagnosis.prepared import IN_BUILDING, Opening
 from bristle.diagnosis.rule import BENCH, INSIDE
-from bristle.diagnosis.sensor_faults import SensorFault
 from bristle.diagnosis.site import look_at, shortened
-from bristle.diagnosis.site_diagnosis import Finding, of_decision
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis, of_decision
 from bristle.diagnosis.trials import Trial, judge
 from bristle.errors import RecordError
 from bristle.identification.building_motion import responses
@@ -47,7 +47,7 @@ def soften(x, v):
     return [loss[0] - loss[1], loss[1] - loss[2], loss[2]]
 
 
-NOTHING = Finding("layer", "none", (), 1.0, 1.0, 0.0, 0.0)
+NOTHING = SiteDiagnosis("layer", "none", (), 1.0, 1.0, 0.0, 0.0)
 HIDDEN = {"duffing": duffing, "base_friction": rub, "end_stop": stop, "storey_softening": soften}
 
 
@@ -189,7 +189,7 @@ def test_what_a_reconstructed_force_cannot_tell_is_named():
 
 def test_findings_of_sites_become_one_verdict():
     def at(site, kind, *effects):
-        return Finding(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
+        return SiteDiagnosis(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
 
     both = {"layer": at("layer", "effect", "duffing"), "storey1": at("storey1", "none")}
     assert conclude(both, About()).effects == ("duffing",)
@@ -204,7 +204,7 @@ def test_findings_of_sites_become_one_verdict():
 
 def seen(site, kind, before, *effects):
     """Return what a site shows, with z before."""
-    return Finding(site, kind, effects, before, 1.0, 1.0, 0.01, reasons=("Because.",))
+    return SiteDiagnosis(site, kind, effects, before, 1.0, 1.0, 0.01, reasons=("Because.",))
 
 
 def test_what_is_found_is_named_whatever_a_quiet_site_does():
@@ -272,14 +272,14 @@ def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
         runs.append(measured(clean, i))
     found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
     (fault,) = found.sensors
-    assert (fault.channel, fault.fault) == ("velocity", "delay")
+    assert (fault.channel, fault.kind) == ("velocity", "delay")
     assert fault.value == pytest.approx(4 * 0.002, rel=0.05)
     assert (found.kind, found.effects) == ("none", ())
     assert found.z_before == pytest.approx(1.0, abs=0.1)
 
 
 def test_lag_of_a_velocity_is_its_instrument():
-    lag = SensorFault("velocity", "lag", 0.004, 1e-4, "Velocity lags.")
+    lag = Finding("lag", "warning", "Velocity lags.", channel="velocity", value=0.004, std=1e-4)
     found = conclude({"layer": NOTHING}, About(sensors=(lag,)))
     assert (found.kind, found.effects) == ("effect", ("velocity_sensor",))
     assert found.sites == {"velocity_sensor": "sensor"}
@@ -361,7 +361,7 @@ def test_only_what_an_instrument_accounts_for_is_excused_by_sensor():
 
 def test_a_load_cell_that_rounds_is_put_on_the_model_and_not_taken_back():
     def told(effect, z):
-        return Finding("force", "effect", (effect,), 4.0, z, 0.9, 0.01, coordinate="0.0125 s")
+        return SiteDiagnosis("force", "effect", (effect,), 4.0, z, 0.9, 0.01, coordinate="0.0125 s")
 
     assert rig_runs._rounded(told("delay", 1.9))
     assert not rig_runs._rounded(told("delay", 1.02)), "moved ahead it fits: a plain delay"

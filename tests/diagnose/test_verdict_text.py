@@ -6,9 +6,9 @@ import json
 
 import pytest
 
+from bristle.core.finding import Finding
 from bristle.diagnosis.conclusion import About, conclude
-from bristle.diagnosis.sensor_faults import SensorFault
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.verdict import current
 from bristle.diagnosis.words import TONES, fault_rows, fault_texts, headline, sentences, untestable
 from bristle.errors import StudyError
@@ -19,7 +19,7 @@ from bristle.study.study import Study
 def at(site, kind="none", *effects, **more):
     """Return what a site shows."""
     reasons = more.pop("reasons", ("With it z falls.",) if effects else ())
-    return Finding(site, kind, effects, 3.0, 1.0, 0.9, 0.012, reasons=reasons, **more)
+    return SiteDiagnosis(site, kind, effects, 3.0, 1.0, 0.9, 0.012, reasons=reasons, **more)
 
 
 def said(**findings):
@@ -103,7 +103,7 @@ def test_what_the_law_takes_up_is_told_with_the_part_that_does():
 
 def test_a_fault_is_told_once():
     text = "Velocity lags."
-    lag = SensorFault("velocity", "lag", 0.004, 1e-4, text)
+    lag = Finding("lag", "warning", text, channel="velocity", value=0.004, std=1e-4)
     verdict = conclude({"damper": at("damper")}, About(sensors=(lag,))).as_dict()
     assert verdict["words"].count(text) == 1
     assert verdict["effects"] == ["velocity_sensor"]

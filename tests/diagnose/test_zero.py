@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from test_model_based_faults import problems
 
+from bristle.core.finding import Finding
 from bristle.diagnosis import site as of_damper
 from bristle.diagnosis.decision import Decision
 from bristle.diagnosis.prepared import Opening
-from bristle.diagnosis.sensor_faults import SensorFault
 from bristle.diagnosis.site import free_zero, renewed_zero, zero_fault
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import identify
@@ -86,10 +86,10 @@ def test_a_zero_is_freed_where_a_constant_is_left_or_a_second_effect_took_it_up(
     assert alone.best.z == pytest.approx(1.0, abs=0.1)
     fault = zero_fault(freed.problem, alone)
     assert fault is not None
-    assert (fault.channel, fault.fault) == ("force", "bias")
+    assert (fault.channel, fault.kind) == ("force", "bias")
     assert fault.value == pytest.approx(OFFSET, abs=max(4.0 * fault.std, 0.01))
-    assert "beside stribeck" in fault.words
-    assert "static preload on the rod would look the same" in fault.words
+    assert "beside stribeck" in fault.text
+    assert "static preload on the rod would look the same" in fault.text
     pair = of("effect", opening, fitted(opening, ("stribeck", "gas_spring")))
     assert free_zero(opening, pair) is not None
     assert free_zero(opening, of("none", opening)) is None
@@ -115,7 +115,9 @@ def test_without_an_offset_nothing_is_tried_again():
 
 def test_a_zero_that_was_found_first_is_renewed_beside_an_effect():
     opening = opened(**HIDDEN)
-    first = SensorFault("force", "bias", OFFSET - 0.05, 0.001, "Force shows 0.55 N.")
+    first = Finding(
+        "bias", "warning", "Force shows 0.55 N.", channel="force", value=OFFSET - 0.05, std=0.001
+    )
     train, held_out = (
         problem.of([replace(r, force=r.force - first.value) for r in problem.runs]).with_free_zero()
         for problem in (opening.problem, opening.held_out)

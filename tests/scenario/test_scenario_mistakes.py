@@ -242,7 +242,8 @@ def test_a_file_that_may_not_be_read_is_a_finding(tmp_path, monkeypatch):
 
     monkeypatch.setattr("pathlib.Path.open", refuse)  # root may read anything: chmod is no test
     (finding,) = check_scenario(file, library=FAKE)
-    assert finding == (0, "error", "cannot be read (Permission denied).")
+    assert (finding.line, finding.level) == (0, "error")
+    assert finding.text == "cannot be read (Permission denied)."
 
 
 def test_all_mistakes_of_a_file_are_told_at_once(tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bristle.core.text import Finding
+from bristle.core.finding import Finding
 from bristle.system.scenario import check_scenario
 
 SCENARIO = """

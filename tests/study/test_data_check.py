@@ -12,7 +12,7 @@ import pytest
 from made import Columns, bench_run, write, write_runs
 
 from bristle.cli import main
-from bristle.data.checks.finding import Finding
+from bristle.core.finding import Finding
 from bristle.data.checks.runs import Excitation, _beyond, cycles, drive_levels
 from bristle.data.cut_off import clipped_ends
 from bristle.errors import StudyError

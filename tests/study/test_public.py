@@ -15,8 +15,8 @@ from made import bench_run, write_runs
 from matplotlib.figure import Figure
 
 import bristle
+from bristle.core.finding import Finding
 from bristle.data.measurement import read_measurements
-from bristle.diagnosis.sensor_faults import SensorFault
 from bristle.errors import (
     BristleError,
     DesignError,
@@ -307,7 +307,9 @@ def shown(found, study, files, tmp_path_factory):
     run = arrays(2)
     run["force"] = run["force"] + 200.0 * run["displacement"]
     fresh = tmp_path_factory.mktemp("fresh") / "rig"
-    fault = SensorFault("force", "gain", 1.05, 0.01, "The force is 5 % too large.")
+    fault = Finding(
+        "gain", "warning", "The force is 5 % too large.", channel="force", value=1.05, std=0.01
+    )
     nothing = bristle.Diagnosis("insufficient", (), "Too short.", sensors=(fault,))
     return {
         "results": bristle.run("bench_sine_bingham", {"run.stop": 0.2}),

@@ -11,7 +11,7 @@ from shaken import building, friction
 
 from bristle.cli import diagnose as diagnose_command
 from bristle.diagnosis.conclusion import About, conclude
-from bristle.diagnosis.site_diagnosis import Finding
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.errors import StudyError
 from bristle.identification.problem import Model
 from bristle.identification.rig import at_site, unassigned
@@ -88,15 +88,15 @@ def test_each_effect_acts_at_its_own_site():
 
 
 def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
-    cell = Finding("force", "effect", ("force_gain",), 3.0, 1.0, 1.0, 0.01, coordinate="1.15")
+    cell = SiteDiagnosis("force", "effect", ("force_gain",), 3.0, 1.0, 1.0, 0.01, coordinate="1.15")
     found = conclude({"layer": cell}, About())
     assert (found.kind, found.effects) == ("none", ())
-    assert [(f.channel, f.fault, f.value) for f in found.sensors] == [("force", "gain", 1.15)]
+    assert [(f.channel, f.kind, f.value) for f in found.sensors] == [("force", "gain", 1.15)]
     assert "1.15 times" in found.as_dict()["sensors"][0]["words"]
 
 
 def test_mass_of_the_base_is_a_rival_in_words_alone():
-    damper = Finding("damper", "effect", ("fluid_inertia",), 2.0, 1.0, 1.0, float("nan"))
+    damper = SiteDiagnosis("damper", "effect", ("fluid_inertia",), 2.0, 1.0, 1.0, float("nan"))
     found = conclude({"damper": damper}, About("reconstructed"))
     assert (found.kind, found.effects) == ("effect", ("fluid_inertia",))
     assert all(name in EFFECTS for name in found.effects)

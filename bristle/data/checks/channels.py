@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.finding import Finding, Level
 from ...core.text import plain, quantity
 from ..channels import DRIVE, device_channel
 from ..cut_off import clipped_ends
 from ..measurement import Measurement
 from ..noise import Noise, estimate_noise, is_switched, spikes_text
-from .finding import Finding, Level
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
 _HELD = 2  # samples per value from which a channel is one that was logged more slowly

@@ -15,12 +15,12 @@ from math import log
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.finding import Finding
 from ...core.text import plain, quantity
 from ..corrections import LEFT_OUT, Correction
 from ..force_shapes import RunForces, fitted_forces, force_parts
 from ..measurement import Measurement
 from ..relation import derivative_relation
-from .finding import Finding
 from .motion import velocity_of_run
 
 MIN_RUNS = 4

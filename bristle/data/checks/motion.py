@@ -9,6 +9,7 @@ from math import log10
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.finding import Finding, Level
 from ...core.text import plain
 from ..cut_off import numerical_derivative
 from ..measurement import Measurement
@@ -21,7 +22,6 @@ from ..relation import (
     power_factor,
     tells_sign,
 )
-from .finding import Finding, Level
 
 ACROSS = "across_device"
 """What stands before displacement and velocity across a device, as a level's name elsewhere."""

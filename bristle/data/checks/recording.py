@@ -9,13 +9,13 @@ from itertools import chain
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.finding import Finding
 from ...core.text import plain, quantity
 from ..channels import DRIVE
 from ..corrections import BETA, Correction, amplitude_of, drifting_amplitude, without_slow
 from ..measurement import Measurement
 from ..noise import is_switched
 from ..relation import power_spectrum
-from .finding import Finding
 
 # A channel that was interpolated to a faster rate before it was stored: it is straight in pieces.
 #

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.finding import Finding
 from ...core.text import plain, quantity
 from ...physics.drive import DRIVES
 from ..measurement import Measurement
 from ..noise import is_switched
 from ..tone import label_doubt, tone_of
-from .finding import Finding
 from .motion import velocity_of_run
 
 _LEVELS = 12  # at most; a voltage with more moves continuously

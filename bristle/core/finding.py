@@ -1,16 +1,16 @@
-"""What the data check finds: in a sentence with numbers, and what to do about it."""
+"""What a check finds, in files, in data and in channels: a sentence, and what to do about it."""
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from math import nan
 from typing import Any, Literal
 
-from ...errors import UnitError
-from ...units import parse
-from ..corrections import Correction
+from ..errors import UnitError
+from ..units import parse
 
 Level = Literal["error", "warning", "note"]
 _OF_ONE_RUN = ("run gain", "run sign", "run zero")
@@ -24,12 +24,13 @@ _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding.
+    """What a check finds, in a sentence with numbers; `kind` is for programs ("clipping").
 
-    `kind` names it for programs ("clipping"), `run` and `channel` are "" where it is about all;
-    `text` says it with numbers, `do` what to do, "" where there is nothing; `value` is the number
-    by which findings of one kind are ordered, worst last. `corrections` set it right where that can
-    be done.
+    `do` says what to do about it, "" where there is nothing. `line` 0 stands for the whole file, or
+    for an override. `run` and `channel` are "" where it is about all; `runs` are those that it was
+    seen in, () for all, and `either` is the channel that may be to blame instead. `value` is the
+    number by which findings of one kind are ordered, worst last, or the size of a fault, `std` its
+    uncertainty. `fixes` set it right where that can be done.
     """
 
     kind: str
@@ -39,11 +40,21 @@ class Finding:
     run: str = ""
     channel: str = ""
     value: float = 0.0
-    corrections: tuple[Correction, ...] = ()
+    fixes: tuple[Any, ...] = ()
+    std: float = nan
+    line: int = 0
+    either: str = ""
+    runs: tuple[str, ...] = ()
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the finding as JSON has it."""
-        return {**asdict(self), "corrections": [one._asdict() for one in self.corrections]}
+    def as_dict(self, *names: str) -> dict[str, Any]:
+        """Return some of its fields by name."""
+        return {name: getattr(self, name) for name in names}
+
+
+def worded(file: object, finding: Finding) -> str:
+    """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
+    place = f"{file}:{finding.line}" if finding.line else str(file)
+    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
 
 
 def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[Finding]]]:
