@@ -24,7 +24,8 @@ def component_page(name: str) -> str:
     if name == "Structure":
         parts.append(
             "These are the ports of the default building. Another one has a level per mass: `base` "
-            "where it is isolated, then `floor1`, `floor2` ... ([Buildings](../buildings.md))."
+            "where it is isolated, then `floor1`, `floor2` ... "
+            "([another building](../simulate.md#another-building))."
         )
     parts += ["## Inputs", _inputs(described), "## Outputs", _outputs(described)]
     parts += ["## Parameters", _parameters(described), *_of_effects(described)]

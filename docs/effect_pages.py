@@ -27,7 +27,8 @@ def effect_page(name: str) -> str:
     told = effect_as_dict(effect)
     site = {"damper": "a damper", "sensor": "a sensor"}.get(effect.site, f"the {effect.site}")
     laws = f" Joins the laws {' and '.join(told['laws'])}." if told["laws"] else ""
-    parts = [f"# {name}", told["about"], formula(told["text"])]
+    title = told["about"].partition(":")[0]
+    parts = [f"# {title} (`{name}`)", told["about"], formula(told["text"])]
     if shown := picture_of(name):
         wide = round(95 * shown[2])
         image = f'![Force with and without {name}]({name}.png){{ width="{wide}" }}'
@@ -50,7 +51,8 @@ def effect_page(name: str) -> str:
 
 def law_page(law: type[Law]) -> str:
     """Return the page of a damper's law: formula, parameters, the effects that join it, source."""
-    parts = [f"# {law.name}", formula(law.__doc__ or "")]
+    title = (law.__doc__ or "").strip().partition(":")[0]
+    parts = [f"# {title} (`{law.name}`)", formula(law.__doc__ or "")]
     rows = [
         [f"`{key}`", f"{p.value:g}", unit(p.unit), span(*p.bounds), p.text]
         for key, p in law.parameters.items()

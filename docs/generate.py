@@ -1,4 +1,4 @@
-"""Pages of components, effects, laws, commands and the API, made from the code.
+"""Pages of components, effects, laws, commands, the API and the rule, made from the code.
 
 As a hook of mkdocs it hands the pages over in memory; `python docs/generate.py FOLDER` writes them
 as files.
@@ -64,7 +64,20 @@ def pages() -> dict[str, str]:
     for law in laws_of("damper"):
         made[f"laws/{law.name}.md"] = law_page(law)
     made["cli.md"] = command_page()
+    made["rule_fields.md"] = rule_page()
     return made
+
+
+def rule_page() -> str:
+    """Return the page of every number that decides a verdict, from the rule's own text."""
+    from benchmarks._calibrate.page import every_field
+
+    return (
+        "# All fields of the decision rule\n\nWhat each number of "
+        "`bristle.diagnosis.rule.DecisionRule` decides, what it trades, and how its value was "
+        "found ([how to measure that](decision_rule.md)). Values after a name are those of that "
+        f"instance.\n\n{every_field()}\n"
+    )
 
 
 def images() -> dict[str, bytes]:

@@ -199,11 +199,6 @@ def test_a_table_that_moves_nowhere_says_that_it_tells_nothing() -> None:
     assert "neither support" not in said
 
 
-def test_the_docs_tell_every_field_as_it_is() -> None:
-    text = calibrate.PAGE.read_text(encoding="utf-8")
-    assert page.every_field() in text
-
-
 def test_without_trials_it_says_how_to_make_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

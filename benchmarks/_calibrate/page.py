@@ -29,7 +29,7 @@ def text(rows: dict[str, list[Traded]], cases: list[Stored], seed: int) -> str:
     out = [conditions(cases, seed)]
     for name, found in rows.items():
         out += [f"### {TITLES[name]}", sensitivity(found), table(found, RULES[name])]
-    return "\n\n".join([*out, "### All fields", every_field()])
+    return "\n\n".join(out)
 
 
 def conditions(cases: list[Stored], seed: int) -> str:
@@ -93,7 +93,7 @@ def _marked(cells: list[str], today: list[bool]) -> str:
 
 
 def every_field() -> str:
-    """Return what the rule says of each field, replayed or not."""
+    """Return what the rule says of each field, replayed or not: a page of its own."""
     known = told()
     lines = [["field", "value", "decides", "trades", "found"], ["---"] * 5]
     lines += [
