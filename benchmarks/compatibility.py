@@ -204,16 +204,17 @@ def try_all(names: Sequence[str], folder: Path, native: bool = False) -> list[Re
 
 
 def tables(results: Sequence[Result], today: date, native: bool = False) -> str:
-    """Return the page's two tables: the tools, and every FMU in every tool."""
+    """Return the page's table of tools, and a line for each FMU whose rows differ in one."""
     system = f"{platform.system()} {platform.machine()}"
     lines = ["| tool | version | platform | steps | result | date |", "|---|---|---|---|---|---|"]
-    tools = dict.fromkeys(result.tool for result in results)
     for tool in (*PACKAGES, C_HOST):
         own = [result for result in results if result.tool == tool]
         python = "without Python" if native else f"libpython {platform.python_version()}"
         number = python if tool == C_HOST else version(PACKAGES[tool])
         if own:
-            said = f"{sum(one.good for one in own)} of {len(own)} FMUs give equal rows"
+            good = [one.difference for one in own if one.good and one.difference is not None]
+            within = f" within {max(good):.0e}" if good and max(good) else ""
+            said = f"{len(good)} of {len(own)} FMUs give equal rows{within}"
             lines.append(
                 f"| {tool} | {number} | {system} | {own[0].steps} | {said} | {today.isoformat()} |"
             )
@@ -224,11 +225,8 @@ def tables(results: Sequence[Result], today: date, native: bool = False) -> str:
         number = version(package)
         said = "installed; this command does not run it" if number else f"not installed: {why}"
         lines.append(f"| {tool} | {number or ''} | {system} | | {said} | {today.isoformat()} |")
-    lines += ["", f"| FMU | {' | '.join(tools)} |", "|---" * (len(tools) + 1) + "|"]
-    for name in dict.fromkeys(result.fmu for result in results):
-        cells = [str(r) for tool in tools for r in results if (r.fmu, r.tool) == (name, tool)]
-        lines.append(f"| `{name}` | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    wrong = [f"- `{one.fmu}` in {one.tool}: {one}." for one in results if not one.good]
+    return "\n".join([*lines, *(["", *wrong] if wrong else [])])
 
 
 def rows(results: Sequence[Result]) -> list[Row]:

@@ -81,8 +81,9 @@ def test_what_was_seen_is_told() -> None:
     assert second.measured == "0 of 2"
     assert second.note == "One differs within 2e-06; Two fails: exit -11: without a word"
     text = compatibility.tables(seen, date(2026, 1, 2))
-    assert "| `One` | equal | differs within 2e-06 |" in text
-    assert "| `Two` | equal within 3e-12 | fails: exit -11: without a word |" in text
+    assert "| 2 of 2 FMUs give equal rows within 3e-12 |" in text
+    assert "- `One` in Ecos: differs within 2e-06." in text
+    assert "- `Two` in Ecos: fails: exit -11: without a word." in text
     assert "| libcosim | | " in text
     assert "2026-01-02 |" in text
 

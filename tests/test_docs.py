@@ -44,8 +44,8 @@ PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
 
 
 LONG = {f"docs/{name}.md" for name in (
-    "compare_controllers", "design", "elsewhere", "flow", "learn", "native", "one_fmu", "own_law",
-    "plan", "shake_table", "tutorial_bench", "tutorial_code",
+    "compare_controllers", "design", "elsewhere", "flow", "learn", "native", "own_law", "plan",
+    "shake_table", "tutorial_bench", "tutorial_code",
 )}  # fmt: skip
 """Pages whose commands search for effects, as the README's do, run scenarios at several steps,
 compile what is a user's own, or build FMUs for a host."""
@@ -250,7 +250,7 @@ def test_no_page_repeats_a_block_of_another() -> None:
 @pytest.mark.parametrize(
     ("word", "page"),
     [
-        ("Simulink", "elsewhere.md"), ("shock absorber", "tutorial_bench.md"), ("SSP", "ssp.md"),
+        ("Simulink", "elsewhere.md"), ("shock absorber", "tutorial_bench.md"), ("SSP", "elsewhere.md"),
         ("Excel", "measurements.md"), ("missing physics", "index.md"),
         ("Bouc-Wen", "laws/bouc_wen.md"),
     ],
