@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import studies
 from hypothesis import settings
 from toys import Maker, build_toys
 
@@ -41,6 +42,9 @@ os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
 # Instances of the same FMU share its unpacked files, over all tests and workers.
 _UNPACKED = "" if "BRISTLE_TEST_UNPACKED" in os.environ else tempfile.mkdtemp(prefix="bristle-fmu-")
 os.environ.setdefault("BRISTLE_TEST_UNPACKED", _UNPACKED)
+
+_STUDIES = "" if studies.FOLDER in os.environ else tempfile.mkdtemp(prefix="bristle-studies-")
+os.environ.setdefault(studies.FOLDER, _STUDIES)
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -82,7 +86,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
     Some of these FMUs are broken on purpose, and some were left as they answered Fatal.
     """
-    for folder in filter(None, (_BYTECODE, _UNPACKED)):
+    for folder in filter(None, (_BYTECODE, _UNPACKED, _STUDIES)):
         shutil.rmtree(folder, ignore_errors=True)
     if _STATUS in config.stash:
         sys.stdout.flush()
@@ -121,3 +125,27 @@ def toys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def scenario_of(toys: dict[str, Path], tmp_path: Path) -> Maker:
     """Return a function that writes a scenario of toys and returns its file."""
     return Maker(toys, tmp_path)
+
+
+@pytest.fixture
+def bench_study(tmp_path: Path) -> Path:
+    """Return a copy of the study of a bench with a hidden gas spring, identified and diagnosed."""
+    return studies.study("bench", tmp_path)
+
+
+@pytest.fixture
+def building_study(tmp_path: Path) -> Path:
+    """Return a copy of the study of a house whose isolation stiffens, identified and diagnosed."""
+    return studies.study("building", tmp_path)
+
+
+@pytest.fixture
+def device_study(tmp_path: Path) -> Path:
+    """Return a copy of the study of a brace between levels beside a tie, identified."""
+    return studies.study("device", tmp_path)
+
+
+@pytest.fixture
+def learned_study(tmp_path: Path) -> Path:
+    """Return a copy of the study of a bench with a force that a curve was learned of."""
+    return studies.study("learned", tmp_path)

@@ -38,12 +38,13 @@ def entry(call, time, dt, values, given, baked, times, samples, store, state, ne
 """
 """All functions of a component behind one, which is compiled once and takes arrays alone."""
 
-_ENTRIES: dict[int, tuple[Any, Any]] = {}
+_ENTRIES: dict[tuple[int, bool], tuple[Any, Any]] = {}
 
 
-def entry(functions: Any) -> Any:
-    """Return all functions of a component as one, compiled."""
-    if id(functions) not in _ENTRIES:
+def entry(functions: Any, machine: bool) -> Any:
+    """Return all functions of a component as one, compiled to machine code or as they are."""
+    known = (id(functions), machine)
+    if known not in _ENTRIES:
         calls = {
             "bind": "bind(given, store)",
             "follow": "follow(now, c)",
@@ -59,11 +60,13 @@ def entry(functions: Any) -> Any:
         namespace["__name__"] = f"entry_{len(_ENTRIES)}"
         exec(text, namespace)
         # Not kept: machine code whose module is made here could not be read by another process.
-        _ENTRIES[id(functions)] = (
+        _ENTRIES[known] = (
             functions,
-            compiled(namespace["entry"], ("linear.row",), keep=False),
+            compiled(namespace["entry"], ("linear.row",), keep=False)
+            if machine
+            else namespace["entry"],
         )
-    return _ENTRIES[id(functions)][1]
+    return _ENTRIES[known][1]
 
 
 def takes_samples(functions: Any) -> bool:
@@ -78,9 +81,9 @@ def bits(values: Any) -> bytes:
 class Arrays:
     """A component's compiled functions on arrays, driven as a host drives a component."""
 
-    def __init__(self, slave: ComponentSlave) -> None:
+    def __init__(self, slave: ComponentSlave, machine: bool = True) -> None:
         functions = slave.flat_functions()
-        self.call = entry(functions)
+        self.call = entry(functions, machine)
         self.values, self.baked = np.array(slave.flat_values()), np.array(slave.bake())
         self.given = np.zeros(len(slave._inputs))
         played = slave.samples() if isinstance(slave, SourceSlave) else ([], [])
@@ -130,10 +133,13 @@ def made(name: str, parameters: dict[str, Any], **more: Any) -> Any:
     return slave
 
 
-def check_run(name: str, parameters: dict[str, Any], late: str = "", **more: Any) -> None:
+def check_run(
+    name: str, parameters: dict[str, Any], late: str = "", machine: bool = True, **more: Any
+) -> None:
     """Drive a component in both forms; the outputs have the same bits, and so has the state.
 
-    `late` names an input that a host sets only after a while.
+    `late` names an input that a host sets only after a while. Without `machine` the functions on
+    arrays run as Python.
     """
     slave = made(name, parameters, **more)
     ports = [slave.vars[index].name for index in slave._inputs]
@@ -149,7 +155,7 @@ def check_run(name: str, parameters: dict[str, Any], late: str = "", **more: Any
 
     values = give(0)
     slave.exit_initialization_mode()
-    arrays = Arrays(slave)
+    arrays = Arrays(slave, machine)
     arrays.given[:] = slave.inputs_set()
     assert (slave.fault, arrays.code) == (0, 0)
     arrays.start(values)

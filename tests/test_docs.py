@@ -46,9 +46,9 @@ PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
 LONG = {f"docs/{name}.md" for name in (
     "compare_controllers", "design", "elsewhere", "flow", "learn", "native", "own_law", "plan",
     "shake_table", "tutorial_bench", "tutorial_code",
-)}  # fmt: skip
-"""Pages whose commands search for effects, as the README's do, run scenarios at several steps,
-compile what is a user's own, or build FMUs for a host."""
+)} | {"README.md"}  # fmt: skip
+"""Pages whose commands search for effects, run scenarios at several steps, compile what is a
+user's own, or build FMUs for a host."""
 
 
 @pytest.mark.parametrize(
@@ -104,6 +104,7 @@ def test_a_page_is_brought_up_to_date(tmp_path: Path) -> None:
     assert snippets.run_page(page) == 2
 
 
+@pytest.mark.slow
 def test_the_site_renders_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs")
     pytest.importorskip("material")

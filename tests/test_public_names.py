@@ -142,7 +142,13 @@ def test_the_page_of_the_api_has_every_name_with_all_its_arguments() -> None:
     assert not re.search(r"^-{3,}$", page, re.MULTILINE)  # no heading of a docstring is left
 
 
-@pytest.mark.parametrize("name", NAMES)
+SEARCHES = {"Comparison", "Diagnosis", "Identified", "Plan", "Study", "diagnose", "plan"}
+"""Names whose examples search or fit; what they show is what tests of the commands show."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SEARCHES else n for n in NAMES]
+)
 def test_the_example_of_every_public_name_runs(name: str, tmp_path: Path) -> None:
     """In a process of its own: examples define effects and laws, and run FMUs."""
     code = f"""
@@ -198,6 +204,7 @@ except bristle.BristleError as error:
 """
 
 
+@pytest.mark.slow  # mypy reads the whole package
 def test_a_users_script_is_typed(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     assert (ROOT / "bristle" / "py.typed").is_file()

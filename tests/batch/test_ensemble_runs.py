@@ -16,12 +16,11 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle.campaign import Ensemble, campaign, pool, read_ensemble
+from bristle.campaign import campaign, pool, read_ensemble
 from bristle.campaign.campaign import Outcome, Output, Plan
 from bristle.campaign.table import LEVELS, RunsTable, failures
 from bristle.core import files
 from bristle.errors import EnsembleError, RunError
-from bristle.system.scenario import load_scenario
 
 Write = Callable[..., Path]
 ROOT = Path(__file__).parents[2]
@@ -350,8 +349,3 @@ def test_fmus_give_nearly_the_same(write: Write) -> None:
     ).runs
     assert stepped[PEAK].tolist() == pytest.approx(compiled[PEAK].tolist(), rel=0.01)
     assert stepped[PEAK].tolist() != compiled[PEAK].tolist()
-
-
-def test_an_ensemble_is_a_function_of_the_package() -> None:
-    assert isinstance(bristle.ensemble("el_centro_damper_and_building", runs=1), Ensemble)
-    assert load_scenario("half_sine_pulse").stop > 0.5

@@ -13,14 +13,13 @@ import pytest
 import bristle
 from bristle.campaign import campaign, read_ensemble
 from bristle.campaign.campaign import Plan, scenario_of
-from bristle.campaign.identified import Places, _fixed
+from bristle.campaign.identified import Places
 from bristle.campaign.table import LEVELS, VARIES, notes, quantiles
 from bristle.cli import main
 from bristle.errors import BristleError, EnsembleError, RunError
 from bristle.model.model import StudyModel, new_model
 from bristle.model.model_file import model_text
 from bristle.system.scenario import Scenario
-from bristle.user_code.load import defined
 
 Write = Callable[..., Path]
 MASSES = '"structure.building.masses.2" = { uniform = [1.1, 1.4] }\n'
@@ -69,41 +68,6 @@ def test_parameters_are_drawn_together(write: Write, tmp_path: Path) -> None:
     np.testing.assert_allclose(drawn.mean(axis=0), [640.0, 400.0], rtol=5e-3)
     np.testing.assert_allclose(np.cov(drawn.T), COVARIANCE, rtol=0.1)
     assert plan.values(3) == read_ensemble(plan.file, 50).values(3)
-
-
-FOLLOWING = '''
-"""Growing: a force that follows a pressure."""
-
-from bristle.physics.effect import Effect, Parameter
-
-
-class Growing(Effect):
-    """Growing: a force in proportion to a pressure."""
-
-    name = "growing"
-    sites = ("damper",)
-    zero_at_rest = False
-    source = "made up"
-    expect = "a force that goes with the pressure"
-    channels = {"signal": "pressure"}
-    assumed = ("signal",)
-    parameters = {
-        "signal": Parameter(2e5, "Pa", (0.0, 1e7), "pressure"),
-        "m": Parameter(1e-6, "N/Pa", (0.0, 1e-3), "force per pressure"),
-    }
-
-    @staticmethod
-    def force(q, z, p):
-        return p.m * p.signal
-'''
-
-
-def test_what_follows_a_channel_is_no_parameter_of_the_scenarios_damper() -> None:
-    with defined({"growing": FOLLOWING}):
-        found = _fixed(a_model("growing"), Places("damper", "structure", bench=True))
-    assert found["damper.growing.on"] is True
-    assert found["damper.growing.m"] == 1e-6
-    assert "damper.growing.signal" not in found
 
 
 def test_the_scenario_has_the_models_values_and_effects(write: Write, tmp_path: Path) -> None:

@@ -117,6 +117,7 @@ print(json.dumps([found["time"].tolist(), found["force"].tolist(), float(found["
     return np.interp(time, t, force)
 
 
+@pytest.mark.slow
 def test_the_fmu_gives_the_prediction_alone_and_in_its_scenario(bench: Study) -> None:
     chosen(
         bench, "gas_spring", "coil_lag", "delay", sigma_a=700.0, v_n=0.03, gas_spring__k=75.0,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,17 +12,13 @@ from matplotlib.figure import Figure
 from predictions_made import DT, motion, predictions_with
 
 from bristle.comparison.comparison import compare, compare_predictions
-from bristle.comparison.conditions import Regime
 from bristle.comparison.panels import draw_pattern, residual_map, worst_window
 from bristle.comparison.predictions import halved, run_predictions
-from bristle.comparison.words import _where_right
 from bristle.data.left_out import MISSING
 from bristle.errors import RecordError
 from bristle.identification.histories import Bench
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.smoothing import posterior_draws, smooth
-
-VALUES = {"f_c": 1.2, "f_v": 0.7, "c_0": 20.0, "c_v": 6.0, "v_n": 0.1}
 
 
 def bench(law="lugre", values=None, n=4000, count=3, noise=0.01, skip=25):
@@ -290,13 +285,6 @@ def test_the_axis_of_a_signal_far_from_zero_begins_where_its_data_do():
     axes = Figure().add_subplot()
     draw_pattern(axes, found, pattern)
     assert axes.get_xlim()[0] > 20.0
-
-
-def test_where_it_is_right_is_said_once():
-    cell = Regime("at low speed and at 0 A", "at low speed", "at 0 A", 1.0, 900)
-    other = Regime("at high speed", "at high speed", "", 4.0, 900)
-    text = _where_right(SimpleNamespace(regimes=(cell, other), right=False, noise_known=True))
-    assert text == "At low speed and at 0 A it is right within its noise (z = 1.00)."
 
 
 def test_samples_that_do_not_count_make_no_error_smaller():

@@ -1,4 +1,4 @@
-"""Setup from flat numbers: compiled on arrays it gives the bits of plain Python, run and all."""
+"""Setup from flat numbers: on arrays it gives the bits of the component, run and all."""
 
 from __future__ import annotations
 
@@ -14,17 +14,26 @@ def effects_of(name: str) -> list[str]:
     return [effect.name for effect in catalogue.instantiate(name)._effects]  # type: ignore[attr-defined]
 
 
+both = pytest.mark.parametrize(
+    "machine", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["python", "machine"]
+)
+"""By default the functions on arrays run as Python. To compile a kind takes 10 to 25 s; that numba
+gives the numbers of Python is seen in test_compiled_laws, and in native FMUs."""
+
 DAMPERS = [name for name in catalogue.component_names() if name.endswith("Damper")]
 
 
+@both
 @pytest.mark.parametrize("name", DAMPERS)
-def test_a_damper(name: str) -> None:
-    check_run(name, {})
-    check_run(name, {"moving_mass": 2.0, "v_max": 0.2}, late="acceleration")
+def test_a_damper(name: str, machine: bool) -> None:
+    check_run(name, {}, machine=machine)
+    given = {"moving_mass": 2.0, "v_max": 0.2}
+    check_run(name, given, late="acceleration", machine=machine)
 
 
+@both
 @pytest.mark.parametrize("effect", effects_of("LuGreDamper"))
-def test_a_damper_with_an_effect(effect: str) -> None:
+def test_a_damper_with_an_effect(effect: str, machine: bool) -> None:
     known = catalogue.instantiate("LuGreDamper")
     given = {}
     for index, variable in known.vars.items():
@@ -32,8 +41,9 @@ def test_a_damper_with_an_effect(effect: str) -> None:
             high = known._bounds.get(variable.name, (None, None, None))[1]
             value = known[variable.name]
             given[variable.name] = value if high is None else min(1.01 * value, high)
-    check_run("LuGreDamper", {**given, f"{effect}.on": True, "sigma_a": 700.0})
-    check_run("BinghamDamper", {f"{effect}.on": effect in effects_of("BinghamDamper")})
+    check_run("LuGreDamper", {**given, f"{effect}.on": True, "sigma_a": 700.0}, machine=machine)
+    on = effect in effects_of("BinghamDamper")
+    check_run("BinghamDamper", {f"{effect}.on": on}, machine=machine)
 
 
 def test_two_series_elements_are_refused_in_both_forms() -> None:
@@ -45,13 +55,16 @@ def test_two_series_elements_are_refused_in_both_forms() -> None:
     single.configure()
     for name in on:
         single._set_any([single._index[name]], [True], bool)
-    assert slave.texts[Arrays(single).code].startswith("backlash and mount_compliance")
+    assert slave.texts[Arrays(single, machine=False).code].startswith(
+        "backlash and mount_compliance"
+    )
 
 
+@both
 @pytest.mark.parametrize("effect", ["", *effects_of("Structure")])
-def test_a_structure(effect: str) -> None:
+def test_a_structure(effect: str, machine: bool) -> None:
     on = {f"{effect}.on": True} if effect else {}
-    check_run("Structure", {**on, "attached_mass": 0.3})
+    check_run("Structure", {**on, "attached_mass": 0.3}, machine=machine)
 
 
 SIGNALS = [
@@ -93,9 +106,10 @@ def test_sensors() -> None:
     check_run("Sensors", SENSORS)
 
 
+@both
 @pytest.mark.parametrize(("name", "given"), CONTROLLERS, ids=str)
-def test_a_controller(name: str, given: dict[str, Any]) -> None:
-    check_run(name, given)
+def test_a_controller(name: str, given: dict[str, Any], machine: bool) -> None:
+    check_run(name, given, machine=machine)
 
 
 @pytest.mark.parametrize(
@@ -111,4 +125,4 @@ def test_a_text_that_is_none_of_its_words(name: str, parameter: str, text: str) 
     slave = made(name, {parameter: "odd"})
     with pytest.raises(ValueError, match=text):
         slave.configure()
-    assert slave.texts[Arrays(slave).code].format_map(slave).startswith(text)
+    assert slave.texts[Arrays(slave, machine=False).code].format_map(slave).startswith(text)

@@ -143,11 +143,10 @@ def test_a_native_fmu_conforms_and_keeps_the_rules_for_faults() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "Feedthrough",
         "Stair",
         *(
             pytest.param(one, marks=pytest.mark.slow)
-            for one in ("BouncingBall", "Dahlquist", "VanDerPol")
+            for one in ("BouncingBall", "Dahlquist", "Feedthrough", "VanDerPol")
         ),
     ],
 )

@@ -11,8 +11,9 @@ from scipy import linalg
 from bristle.component.controller_file import Controller
 from bristle.errors import DesignError
 from bristle.synthesis import Damper, DesignResult, Scheduling, Task, design, lmi
-from bristle.synthesis.analysis import responses
-from bristle.synthesis.kinds import _frame, gammas, plants_at
+from bristle.synthesis.analysis import least_gamma, responses
+from bristle.synthesis.kinds import gammas, plants_at, units_for
+from bristle.synthesis.plant import balancing
 from bristle.synthesis.sampling import reconstruct
 
 FINE = (0.0, 0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.08, 0.15, 0.3)
@@ -60,7 +61,9 @@ def test_the_bound_is_proved_at_the_grid_and_not_all_between(lpv: DesignResult) 
     assert solution is not None
     grid = np.array(lpv.task.scheduling.grid)
     plants = plants_at(lpv.task, grid)
-    units, states = _frame(lpv.task, plants)
+    middle = plants[lpv.task.scheduling.middle]
+    units = units_for(middle, least_gamma(middle, 1e-3))
+    states = balancing(units.normalised(middle), lpv.task.order)
     scaled = [units.normalised(plant).transformed(states) for plant in plants]
     worst, entry = lmi.eigenvalues(solution, scaled, grid, solution.gamma)
     assert np.all(worst <= lmi.ROUNDING * entry)
@@ -75,7 +78,9 @@ def test_closed_loop_dissipates_at_the_grid(lpv: DesignResult) -> None:
     assert solution is not None
     grid = np.array(lpv.task.scheduling.grid)
     plants = plants_at(lpv.task, grid)
-    units, states = _frame(lpv.task, plants)
+    middle = plants[lpv.task.scheduling.middle]
+    units = units_for(middle, least_gamma(middle, 1e-3))
+    states = balancing(units.normalised(middle), lpv.task.order)
     scaled = [units.normalised(plant).transformed(states) for plant in plants]
     bank = reconstruct(solution, scaled, grid, units)
     X, Y = solution.X0, solution.Y0

@@ -10,17 +10,6 @@ from test_starts import LAW, recorded_rig
 from bristle.core.finding import Finding
 from bristle.diagnosis import prepared
 from bristle.diagnosis.diagnosis import diagnose
-from bristle.diagnosis.prepared import _left, corrected
-
-
-def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
-    runs = recorded_rig((), {})
-    cut = Finding(
-        "clipping", "warning", "The voltage stands at 3 V.", channel="voltage", value=3.0, std=0.0
-    )
-    high = replace(runs[0], channels={**runs[0].channels, "voltage": np.full(3000, 3.0)})
-    kept = _left(corrected([high, *runs[1:]], [cut]))
-    assert [run.name for run in kept] == [run.name for run in runs[1:]]
 
 
 def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):

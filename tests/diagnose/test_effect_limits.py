@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.cli.diagnose import _not_excited
 from bristle.diagnosis.effect_limits import NO_AMOUNT, EffectLimit, effect_limits, limit_of
 from bristle.diagnosis.effect_size import STANDS_OUT, Known, Sized, resolved
 from bristle.diagnosis.view import verdict_view
@@ -206,7 +205,6 @@ def test_an_effect_without_an_amount_has_no_limit_and_says_why(known, monkeypatc
     assert (other.effect, other.why) == ("stribeck", NO_AMOUNT)
     rows = [limit.as_dict() for limit in (one, other)]
     assert limit_rows({"findings": [{"limits": rows}]})[1] == ["stribeck", NO_AMOUNT, "-", "-"]
-    assert _not_excited({"findings": [{"limits": rows}]}) == []
 
 
 def test_the_table_has_units_as_people_write_them():

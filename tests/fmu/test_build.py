@@ -22,7 +22,6 @@ from fmpy.validation import validate_fmu
 from fresh import fresh
 
 from bristle.errors import BuildError, PhysicsError, RecordError
-from bristle.fmu import build as builder
 from bristle.fmu import catalogue
 from bristle.fmu.build import Plan, build, build_all, built_guid, ensure, plan
 
@@ -61,13 +60,6 @@ def digest(path: Path) -> str:
 
 
 # -- the same bytes
-
-
-@each_component
-def test_two_builds_are_identical(component: str, tmp_path: Path) -> None:
-    again = build(plan(component), tmp_path / "elsewhere")
-    assert again.name == f"{component}.fmu"
-    assert again.read_bytes() == built(component).read_bytes()
 
 
 def copy_of_the_source(folder: Path) -> Path:
@@ -146,24 +138,6 @@ def test_a_name_a_building_and_start_values_change_the_digest(write: Any) -> Non
 
 
 # -- nothing done twice
-
-
-def test_what_stands_there_is_not_built_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first = build_all(tmp_path)
-    before = [(path, path.stat().st_mtime_ns, path.stat().st_ino) for path in first]
-    assert [path.stem for path in first] == COMPONENTS
-
-    def refuse(*_: Any) -> Path:
-        raise AssertionError("built again")
-
-    monkeypatch.setattr(builder, "_build_loose", refuse)
-    second = build_all(tmp_path)
-    assert [(path, path.stat().st_mtime_ns, path.stat().st_ino) for path in second] == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
-        [".lock", *(f"{name}.fmu" for name in COMPONENTS)]
-    )
 
 
 def test_only_the_named_ones_are_built(tmp_path: Path) -> None:
@@ -443,17 +417,6 @@ def shaken(path: str, values: dict[str, Any]) -> list[float]:
             assert fmu.step(0.5) == OK
             found.append(fmu.get("ground_acceleration"))
         return [*found, fmu.get("record")]
-
-
-def test_a_record_is_baked_in(write: Any, tmp_path: Path) -> None:
-    record = write(RAMP, "my ramp.csv")
-    path = build(plan("GroundMotion", name="Ramp", record=record), tmp_path)
-    record.unlink()
-    assert shaken(path, {}) == [1.0, 1.5, 2.0, 2.5, 3.0, "my_ramp"]
-    assert shaken(path, {"factor": 2.0})[:5] == [2.0, 3.0, 4.0, 5.0, 6.0]
-    usual = shaken(path, {"record": "el_centro_1940_ns", "peak": 1.0})
-    assert usual[0] != 1.0
-    assert usual[5] == "el_centro_1940_ns"
 
 
 def test_a_built_in_record_is_baked_in_by_its_name(tmp_path: Path) -> None:

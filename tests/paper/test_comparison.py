@@ -26,7 +26,6 @@ from benchmarks.paper.comparison.experiment import (
     LPV_0,
     NEWHALL,
     NONE,
-    SYLMAR,
     ZERO,
     Motion,
     measured,
@@ -43,21 +42,15 @@ from bristle.view.style import look
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "ground_motion"
 AT_NEWHALL = DATA / "northridge_1994_newhall_360_peer_rsn1044.csv"
 
-# Peak and RMS of the second floor's absolute acceleration [m/s2]: reference calculation.
+# Peak and RMS of the second floor's absolute acceleration [m/s2]: reference calculation, of which
+# the tests of the designs hold all cases against an integration of their own.
 LAWS = (ZERO, FOUR, CLIPPED, HINF, LPV_0, LPV)
 ACCELERATION = {
-    (EL_CENTRO, 0.2): "2.512/.398 2.212/.427 2.992/.410 2.591/.376 2.250/.378 2.301/.381",
-    (EL_CENTRO, 0.4): "6.536/1.174 4.020/.814 4.851/.871 4.951/.820 4.025/.778 4.126/.786",
     (EL_CENTRO, 0.6): "11.112/2.321 6.103/1.250 7.141/1.320 6.958/1.249 5.949/1.206 6.353/1.209",
-    (EL_CENTRO, 0.8): "15.747/3.609 10.415/1.759 9.467/1.767 9.793/1.701 7.981/1.629 8.678/1.634",
-    (NEWHALL, 0.3): "3.696/.588 3.385/.508 3.916/.531 3.799/.498 3.403/.494 3.561/.503",
     (NEWHALL, 0.7): "10.805/2.074 8.477/1.299 8.343/1.210 8.560/1.172 9.122/1.230 8.040/1.228",
-    (SYLMAR, 0.3): "4.040/.392 3.702/.341 4.423/.323 3.697/.300 4.371/.331 4.297/.335",
-    (SYLMAR, 0.7): "10.693/1.262 8.485/.792 8.769/.735 7.938/.686 9.569/.748 8.430/.757",
 }
 # Peak drift [mm] / peak force [N] / RMS voltage [V].
 OTHERS = {
-    (EL_CENTRO, 0.2): "2.6/4.87/4 3.9/8.35/2.44 4.8/2.85/.34 3.4/4.14/.41",
     (EL_CENTRO, 0.6): "15.6/5.94/4 18.1/9.80/3.88 17.7/8.55/1.67 13.6/8.81/1.53",
     (NEWHALL, 0.7): "20.4/5.94/4 22.3/9.85/2.66 24.0/8.03/1.59 21.9/8.94/1.65",
 }
@@ -189,6 +182,7 @@ def test_a_design_that_fails_is_said_with_its_words(
     assert not list((tmp_path / "out").glob("*.html"))
 
 
+@pytest.mark.slow
 def test_lugre_fits_a_lugre_damper_to_the_noise_and_bingham_does_not(report: Report) -> None:
     found = report.numbers.fits
     for specimen, part in found.groupby("specimen"):
@@ -198,6 +192,9 @@ def test_lugre_fits_a_lugre_damper_to_the_noise_and_bingham_does_not(report: Rep
         assert share["LuGre"] < 0.2 * share["LuGre, standard"]
         assert share["Bingham"] < share["Bingham, standard"]
         assert gain(found, str(specimen), "Bingham") == pytest.approx(0.05, abs=0.06)
+
+
+# The whole comparison takes 20 s. By default its designs, runs and texts are seen by themselves.
 
 
 @pytest.fixture(scope="session")
@@ -213,6 +210,7 @@ def written(report: Report) -> Path:
     return report.folder
 
 
+@pytest.mark.slow
 def test_everything_is_written(written: Path) -> None:
     names = {path.name for path in written.iterdir()}
     tables = {"table4.csv", "comparison.csv", "ledger.csv", "report.html", "hinf.json", "lpv.json"}
@@ -224,6 +222,7 @@ def test_everything_is_written(written: Path) -> None:
     assert {"summary.png", "accelerations-el-centro.png", "voltages.png"} <= figures
 
 
+@pytest.mark.slow
 def test_the_page_needs_no_network_and_holds_every_statement(written: Path) -> None:
     text = (written / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", text)
@@ -239,6 +238,7 @@ def test_the_page_needs_no_network_and_holds_every_statement(written: Path) -> N
         assert words in text
 
 
+@pytest.mark.slow
 def test_the_ledger_file_agrees_with_the_page(written: Path) -> None:
     ledger = pd.read_csv(written / "ledger.csv", comment="#")
     assert list(ledger["number"]) == list(range(1, 22))
@@ -248,6 +248,7 @@ def test_the_ledger_file_agrees_with_the_page(written: Path) -> None:
     assert set(shown) <= {"reproduced", "not reproduced", "undecidable"}
 
 
+@pytest.mark.slow
 def test_table_iv_holds_the_peaks_and_table_v_the_rms_of_all_motions(written: Path) -> None:
     peaks, rms = (pd.read_csv(written / f"table{n}.csv", comment="#") for n in (4, 5))
     cases = 4 + 2 * (len(at_hand()) - 1)
@@ -259,6 +260,7 @@ def test_table_iv_holds_the_peaks_and_table_v_the_rms_of_all_motions(written: Pa
         assert table[f"{kind}floor 2 acceleration [m/s2]"].notna().all()
 
 
+@pytest.mark.slow
 def test_runs_beyond_the_stroke_are_told_in_table_and_text(
     report: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -292,6 +294,7 @@ def test_a_drift_within_the_stroke_or_without_damper_is_not_beyond_it() -> None:
     assert measured(pd.DataFrame(drift), motion, 1.0, NONE)[BEYOND] == 0.0
 
 
+@pytest.mark.slow
 def test_figures_14_to_17_show_what_the_papers_show(report: Report) -> None:
     comparison = report.comparison
     if len(comparison.motions) == 1:
@@ -325,6 +328,7 @@ def test_figures_14_to_17_show_what_the_papers_show(report: Report) -> None:
             assert any(title.startswith(panel) for title in titles), panel
 
 
+@pytest.mark.slow
 def test_the_answer_as_json_holds_tables_and_ledger(report: Report) -> None:
     told = json.loads(json.dumps(answer(report), allow_nan=False))
     assert [row["number"] for row in told["ledger"]] == list(range(1, 22))
@@ -333,6 +337,7 @@ def test_the_answer_as_json_holds_tables_and_ledger(report: Report) -> None:
     assert all(Path(path).is_file() for path in told["files"])
 
 
+@pytest.mark.slow
 def test_what_is_printed_holds_tables_and_verdicts(
     report: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:

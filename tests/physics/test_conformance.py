@@ -36,10 +36,27 @@ LIBRARY = {
 }  # fmt: skip
 ALL = [EFFECTS[name] for name in sorted(EFFECTS)]
 
+
+def _usual(effect: type[Effect]) -> set[str]:
+    joined = laws_joined(effect)
+    return {"bingham", "lugre"} & {*joined} or {joined[0]}
+
+
 each_effect = pytest.mark.parametrize("effect", ALL, ids=lambda e: e.name)
 each_damper_effect = pytest.mark.parametrize(
     ("effect", "law"),
     [(e, law) for e in ALL if "damper" in e.sites for law in laws_joined(e)],
+    ids=lambda value: getattr(value, "name", value),
+)
+# What is played for a while: by default with the two laws that begin a study, or the first one.
+each_played_effect = pytest.mark.parametrize(
+    ("effect", "law"),
+    [
+        pytest.param(e, law, marks=() if law in _usual(e) else pytest.mark.slow)
+        for e in ALL
+        if "damper" in e.sites
+        for law in laws_joined(e)
+    ],
     ids=lambda value: getattr(value, "name", value),
 )
 each_structure_effect = pytest.mark.parametrize(
@@ -216,7 +233,7 @@ def test_a_building_at_rest_stays_at_rest(effect: type[Effect]) -> None:
 # -- energy
 
 
-@each_damper_effect
+@each_played_effect
 @pytest.mark.parametrize("alone", [False, True], ids=["with the law", "alone"])
 def test_closed_cycles_never_yield_energy(effect: type[Effect], law: str, alone: bool) -> None:
     if not effect.passive:
@@ -260,7 +277,7 @@ def test_closed_drifts_never_yield_energy(effect: type[Effect]) -> None:
 # -- robustness
 
 
-@each_damper_effect
+@each_played_effect
 def test_every_bound_can_be_simulated(effect: type[Effect], law: str) -> None:
     motion = sine(0.01, 3.0)
     corners = [{}]

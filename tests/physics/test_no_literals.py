@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -38,18 +39,29 @@ ELSEWHERE = {
 """Files in which such a word means something else, and what."""
 
 
-def literals(text: str) -> Iterator[tuple[int, str]]:
+@cache
+def trees() -> list[tuple[str, ast.Module]]:
+    """Return file and content of each module that is to know no name."""
+    paths = [(path, path.relative_to(PACKAGE)) for path in sorted(PACKAGE.rglob("*.py"))]
+    return [
+        (file.as_posix(), ast.parse(path.read_text(encoding="utf-8")))
+        for path, file in paths
+        if file.parts[0] not in EXEMPT
+    ]
+
+
+def literals(tree: ast.Module) -> Iterator[tuple[int, str]]:
     """Yield line and name of each string that is one, or the begin of a parameter's full name."""
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             name, dot, rest = node.value.partition(".")
             if name.isidentifier() and (not dot or not rest or rest.isidentifier()):
                 yield node.lineno, name
 
 
-def classes(text: str, names: set[str]) -> Iterator[tuple[int, str]]:
+def classes(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
     """Yield line and name of each use of a class by one of these names."""
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Name) and node.id in names:
             yield node.lineno, node.id
 
@@ -57,10 +69,9 @@ def classes(text: str, names: set[str]) -> Iterator[tuple[int, str]]:
 def selections(names: set[str]) -> list[tuple[str, int, str]]:
     """Return file, line and name of all strings in the package that are one of these names."""
     return [
-        (path.relative_to(PACKAGE).as_posix(), line, name)
-        for path in sorted(PACKAGE.rglob("*.py"))
-        if path.relative_to(PACKAGE).parts[0] not in EXEMPT
-        for line, name in literals(path.read_text(encoding="utf-8"))
+        (file, line, name)
+        for file, tree in trees()
+        for line, name in literals(tree)
         if name in names
     ]
 
@@ -73,13 +84,7 @@ def test_no_literal_selects_by_name(kind: str) -> None:
 
 def test_no_class_of_a_law_or_effect_is_named() -> None:
     own = {one.__name__ for one in (*EFFECTS.values(), *LAWS.values())}
-    found = [
-        (path.relative_to(PACKAGE).as_posix(), line, name)
-        for path in sorted(PACKAGE.rglob("*.py"))
-        if path.relative_to(PACKAGE).parts[0] not in EXEMPT
-        for line, name in classes(path.read_text(encoding="utf-8"), own)
-    ]
-    assert not found
+    assert not [(file, *place) for file, tree in trees() for place in classes(tree, own)]
 
 
 def test_every_exemption_is_needed() -> None:
@@ -98,4 +103,4 @@ def test_every_exemption_is_needed() -> None:
     ],
 )
 def test_a_name_is_seen_in_each_way_of_writing_it(text: str, names: list[str]) -> None:
-    assert [name for _, name in literals(text)] == names
+    assert [name for _, name in literals(ast.parse(text))] == names

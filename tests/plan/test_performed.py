@@ -15,7 +15,7 @@ from bristle.data.measurement import Measurement, measurements_of
 from bristle.data.table import from_arrays
 from bristle.errors import StudyError
 from bristle.planning.folder import PlanFolder, PlannedRun, write_plan
-from bristle.planning.performed import _in_order, compared, performed, planned_for
+from bristle.planning.performed import compared, performed, planned_for
 from bristle.study.steps import create_study
 from bristle.study.study import Study
 
@@ -203,11 +203,3 @@ def test_a_plan_of_another_study_is_told(lab: tuple[Path, Path], tmp_path: Path)
         "": (), study.name: (),
         "rig_b": (f"the plan was made for the study rig_b, and this one is {study.name}",),
     }  # fmt: skip
-
-
-def test_many_runs_are_paired_in_order_with_the_most_alike() -> None:
-    alike = np.full((12, 40), 0.1)
-    wanted = [3 * k + k % 2 for k in range(12)]
-    alike[range(12), wanted] = 0.9
-    assert _in_order(alike) == wanted
-    assert _in_order(np.array([[0.2, 0.9], [0.9, 0.8]])) == [0, 1]  # the order is kept

@@ -279,6 +279,7 @@ def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
     assert "V" not in "".join(units.values())
 
 
+@pytest.mark.slow
 def test_what_the_runs_at_hand_allow_of_an_effect_is_what_the_verdict_says(
     rig: bristle.Study,
 ) -> None:

@@ -226,15 +226,6 @@ def test_a_folder_that_is_no_study_is_refused(tmp_path, capsys):
     assert "no study" in capsys.readouterr().err
 
 
-def test_the_comparison_of_a_study_by_the_command(folder, capsys):
-    assert main(["compare", str(folder), "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["held_out"] is True
-    assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
-    assert main(["compare", str(folder), "--role", "train"]) == 0
-    assert "On the training runs" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("value", "std", "told"),
     [

@@ -19,7 +19,6 @@ from bristle.model.model_file import read_model
 from bristle.physics.damper import DamperModel
 from bristle.prediction.export import export_study
 from bristle.prediction.model_system import AGREEMENT, prediction
-from bristle.report.reproduce import _other_law
 from bristle.study.forms import forms_asked, in_form, knots_of
 from bristle.study.inputs import measurements
 from bristle.study.study import Study
@@ -229,9 +228,3 @@ def test_the_fmu_carries_the_form_to_the_last_bit(study: Study) -> None:
     force = np.interp(times, shown.index.to_numpy(), shown["damper.force"])
     rest = np.abs(run.v) > 2e-3  # a sign jumps between samples
     assert np.std((force - expected)[rest]) < 2.0 * AGREEMENT * np.std(expected)
-
-
-def test_a_report_makes_the_form_again() -> None:
-    assert _other_law("lugre", "lugre[quadratic]") == ["--command", "quadratic"]
-    assert _other_law("lugre[table 0 1]", "lugre") == ["--law", "lugre"]
-    assert _other_law("lugre", "dahl[table 0 1]") == ["--law", "dahl", "--command", "table"]

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.cli.learn import _of_command
 from bristle.diagnosis.prepared import Opening
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.verdict import SCHEMA
@@ -298,11 +297,6 @@ def test_a_signal_or_part_that_there_is_not_is_told(study, capsys, option, value
     told = capsys.readouterr().err
     assert value in told
     assert "Did you mean" in told
-
-
-def test_a_signal_goes_by_the_name_of_the_rig_s_command():
-    assert _of_command("current") == {"current": "voltage", "recent_current": "recent_voltage"}
-    assert _of_command("") == {}
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from made import Columns, bench_run, write, write_runs
 
 from bristle.cli import main
 from bristle.core.finding import Finding
-from bristle.data.checks.runs import Excitation, _beyond, cycles, drive_levels
+from bristle.data.checks.runs import cycles, drive_levels
 from bristle.data.cut_off import clipped_ends
 from bristle.errors import StudyError
 from bristle.study import Study, create_study
@@ -188,24 +188,6 @@ def test_held_out_run_beyond_the_training_is_found(tmp_path: Path) -> None:
     (finding,) = found(look, "beyond")
     assert (finding.run, finding.channel) == ("run_2", "voltage")
     assert finding.do.startswith('Exchange the roles in study.toml: run_2 to "train", run_')
-
-
-def reaching(name: str, speed: float, volts: float) -> Excitation:
-    return Excitation(name, 10.0, 0.02, speed, (0.5, 5.0), 20.0, "voltage", (), (0.0, volts), None)
-
-
-def test_the_runs_to_exchange_are_named() -> None:
-    train = [reaching("slow", 0.1, 5.0), reaching("fast", 0.2, 5.0), reaching("idle", 0.1, 0.0)]
-    (finding,) = _beyond(train, [reaching("strong", 0.1, 8.0)], parts=False)
-    # Without "fast" the held-out run would be too fast, with "slow" held out nothing is beyond.
-    assert finding.do == ('Exchange the roles in study.toml: strong to "train", slow to "holdout".')
-    both = [reaching("strong", 0.1, 8.0), reaching("stronger", 0.1, 9.5)]
-    first, second = _beyond(train, both, parts=False)
-    assert "strong to" in first.do
-    assert first.do.endswith("so measure more.")
-    assert second.do.startswith("Exchange the roles in study.toml: stronger to")
-    (finding,) = _beyond(train, [reaching("strong", 0.1, 8.0)], parts=True)
-    assert finding.do == "Record another run for training that reaches as far."
 
 
 def test_run_of_another_rig_is_found(tmp_path: Path) -> None:

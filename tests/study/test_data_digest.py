@@ -13,7 +13,6 @@ from made import bench_run, write, write_runs
 from bristle.data.corrections import Correction
 from bristle.errors import StudyError
 from bristle.study.changes import data_digest, other_data
-from bristle.study.learn import _written
 from bristle.study.steps import create_study
 from bristle.study.study import Study
 
@@ -122,8 +121,6 @@ def test_a_result_on_data_that_were_changed_meanwhile_is_refused(study, act, tol
         study.write_verdict(VERDICT)
     with pytest.raises(StudyError, match=match):
         study.add_step("identify bingham", "to see", model)
-    with pytest.raises(StudyError, match=match):
-        _written(study, None, "worn_bore")  # type: ignore[arg-type]  # refused before it is asked
     assert sorted(str(one) for one in study.folder.rglob("*")) == there
     again = Study(study.folder)
     again.model()

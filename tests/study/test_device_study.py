@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from braced import BRACE, DT, brace, noisy, shake, tie, tower
+from braced import BRACE, brace, noisy, shake, tower
+from studies import DEVICES, braced_tower
 
 import bristle
-from bristle.cli import main
-from bristle.data.channels import channel_unit
 from bristle.errors import PhysicsError, StudyError
 from bristle.page import channels_view
 from bristle.prediction.excitation import house_of
@@ -23,53 +20,11 @@ from bristle.study.rig import building_of
 from bristle.study.steps import identify_building_alone
 from bristle.study.study import Study
 
-BUILDING = """
-schema = 1
-name = "tower"
-masses = [1.5, 1.6, 1.7]
-stiffnesses = [1400.0, 1310.0, 1220.0]
-base = "isolated"
-damping_ratio = 0.02
 
-[[devices]]
-name = "brace"
-at = "storey1"
-"""
-TIE = """
-[[devices]]
-name = "tie"
-between = ["ground", "floor2"]
-"""
-DEVICES = [{"name": "brace", "at": "storey1"}, {"name": "tie", "between": ["ground", "floor2"]}]
-
-
-def files_in(folder: Path, *, two: bool = True, without: tuple[str, ...] = (), fine: int = 1):
-    """Write a building with one device or two and three runs of it; return the building's file."""
-    house = folder / "tower.toml"
-    house.write_text(BUILDING + (TIE if two else ""), encoding="utf-8")
-    b = tower(DEVICES[: 1 + two], floors=2, isolated=True)
-    laws = {"brace": (brace, True), "tie": (tie, False)}
-    for k in range(3):
-        own = {device.name: laws[device.name] for device in b.devices}
-        clean = shake(b, 40 + k, own, samples=3000 * fine, step=DT / fine)
-        run = noisy({n: y[::fine] for n, y in clean.items()}, 40 + k, without=without)
-        head = ",".join(f"{n} [{'s' if n == 'time' else channel_unit(n)}]" for n in run)
-        rows = np.column_stack(list(run.values()))
-        np.savetxt(folder / f"shake{k}.csv", rows, "%.9g", ",", header=head, comments="")
-    return house
-
-
-@pytest.fixture(scope="module")
-def two(tmp_path_factory):
+@pytest.fixture
+def two(device_study):
     """Return the study of a brace beside a tie whose force is measured, identified."""
-    folder = tmp_path_factory.mktemp("two")
-    house = files_in(folder, fine=4)
-    assert main(
-        ["study", "new", str(folder / "rig"), "--rig", "structure", "--building", str(house),
-         "--device", "brace", "--law", "tanh", "--data", str(folder / "*.csv")]
-    ) == 0  # fmt: skip
-    assert main(["identify", str(folder / "rig"), "--no-table"]) == 0
-    return Study(folder / "rig")
+    return Study(device_study)
 
 
 def test_the_commands_that_make_a_study_again_name_its_device(two):
@@ -104,28 +59,6 @@ def test_the_building_is_identified_beside_its_devices(two):
     assert found.after["z_equilibrium_holdout"] < 1.2
 
 
-def test_its_model_goes_into_a_scenario_at_its_place(two, tmp_path, capsys):
-    assert main(["export", str(two.folder), "--out", str(tmp_path)]) == 0
-    text = (tmp_path / "structure.toml").read_text()
-    for wire in (
-        '"structure.brace_force" = "damper.force"',
-        '"damper.displacement" = "structure.brace_displacement"',
-        '"structure.tie_force" = { from = "tie_measured.value", factor = 1.0 }',
-    ):
-        assert wire in text
-    assert main(["check", str(tmp_path / "structure.toml")]) == 0
-    capsys.readouterr()
-
-
-def test_building_and_model_predict_the_responses_in_closed_loop(two, capsys):
-    assert main(["predict", str(two.folder), "--draws", "0", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    rows = found["responses"] if "responses" in found else found["rows"]
-    for row in rows:
-        assert row["predicted"] == pytest.approx(row["measured"], rel=0.02)
-    assert any("the force of tie is the measured one" in note for note in found["notes"])
-
-
 def test_a_plan_and_a_building_for_several_dampers_are_refused(two, tmp_path):
     with pytest.raises(StudyError, match=r"no test can be planned beside tie\. A plan is for"):
         bristle.plan(two)
@@ -137,7 +70,7 @@ def test_a_plan_and_a_building_for_several_dampers_are_refused(two, tmp_path):
 
 
 def test_a_study_without_the_key_is_about_the_only_device(tmp_path):
-    house = files_in(tmp_path, two=False, without=("brace_force",))
+    house = braced_tower(tmp_path, DEVICES[:1], without=("brace_force",), fine=1)
     study = Study.create(
         tmp_path / "rig", sorted(tmp_path.glob("*.csv")), rig="structure", building=house,
         law="tanh",
@@ -153,7 +86,7 @@ def test_a_study_without_the_key_is_about_the_only_device(tmp_path):
 
 
 def test_what_is_wrong_with_a_device_is_named(tmp_path):
-    house = files_in(tmp_path)
+    house = braced_tower(tmp_path, fine=1)
     files = sorted(tmp_path.glob("*.csv"))
 
     def new(name, **choices):
@@ -181,7 +114,7 @@ def test_what_is_wrong_with_a_device_is_named(tmp_path):
 
 
 def test_the_channels_of_devices_are_corrected_by_either_name(tmp_path):
-    house = files_in(tmp_path)
+    house = braced_tower(tmp_path, fine=1)
     study = Study.create(
         tmp_path / "rig", sorted(tmp_path.glob("*.csv")), rig="structure", building=house,
         device="brace", law="tanh",

@@ -9,7 +9,6 @@ import pytest
 from house_made import study_of
 from shaken import building, friction
 
-from bristle.cli import diagnose as diagnose_command
 from bristle.diagnosis.conclusion import About, conclude
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.errors import StudyError
@@ -17,42 +16,6 @@ from bristle.identification.problem import Model
 from bristle.identification.rig import at_site, unassigned
 from bristle.physics.effect import EFFECTS
 from bristle.study.identify import identify_study
-from bristle.study.steps import (
-    add_effects,
-    before_after,
-    compare_study,
-    diagnose_study,
-    predictions,
-)
-
-
-def test_hidden_spring_is_found_added_and_the_error_falls(tmp_path, capsys):
-    study = study_of(tmp_path)
-    first = identify_study(study, table=False)
-    assert first.after["z_holdout"] > 1.5
-    assert any(note.startswith("layer: k = ") for note in first.notes)
-    assert compare_study(study).quantity == "force of the isolation layer"
-    found = diagnose_study(study)
-    assert (found.kind, found.effects) == ("effect", ("duffing",))
-    assert found.before is not None
-    assert found.before.z == pytest.approx(found.z_before)
-    assert study.verdict()["sites"] == {"duffing": "layer"}
-    assert "with duffing" in diagnose_command.text(found.as_dict(), study.folder)
-    pair = before_after(study)
-    assert pair is not None
-    two = predictions(study, pair)
-    assert {one.site for one in (*two.before, *two.after)} == {"layer"}
-    assert two.z_before == pytest.approx(compare_study(study).z, rel=1e-9)
-    assert two.z_after == pytest.approx(found.z_after, rel=0.02)
-    added = add_effects(study, found.effects, found=found)
-    assert added.step.before["z_holdout"] == pytest.approx(first.after["z_holdout"], rel=1e-6)
-    assert added.step.after["z_holdout"] == pytest.approx(1.0, abs=0.1)
-    value = study.model().effects["duffing"]
-    assert value["k_3"].origin == "identified"
-    assert value["shape"].value == pytest.approx(3.0, abs=0.3)
-    assert compare_study(study).z == pytest.approx(1.0, abs=0.1)
-    again = diagnose_study(study)
-    assert (again.kind, again.effects) == ("none", ())
 
 
 def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):

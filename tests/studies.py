@@ -1,0 +1,164 @@
+"""Four studies that many tests look at: made once a session, by the commands, and copied per test.
+
+`bench`: a damper with a gas spring that its law does not have. `building`: a house whose isolation
+stiffens. `device`: a brace between two levels beside a tie whose force is measured. `learned`: a
+bench whose hidden force a curve was learned of. Runs are from equations that share no code with
+the package.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import braced
+import numpy as np
+import shaken
+from numpy.typing import NDArray
+
+from bristle.cli import main
+from bristle.data.channels import channel_unit
+from tests.independent.generate import UNITS, make_case
+
+FOLDER = "BRISTLE_TEST_STUDIES"
+"""The variable that names the folder where a session keeps them, the same for all workers."""
+
+TOWER = """schema = 1
+name = "tower"
+masses = [1.5, 1.6, 1.7]
+stiffnesses = [1400.0, 1310.0, 1220.0]
+base = "isolated"
+damping_ratio = 0.02
+"""
+PLACES = {
+    "brace": '[[devices]]\nname = "brace"\nat = "storey1"\n',
+    "tie": '[[devices]]\nname = "tie"\nbetween = ["ground", "floor2"]\n',
+}
+DEVICES: list[dict[str, Any]] = [
+    {"name": "brace", "at": "storey1"},
+    {"name": "tie", "between": ["ground", "floor2"]},
+]
+STIFFENING = 1.5e7  # N/m3, of the springs below the house
+
+
+def study(name: str, folder: Path) -> Path:
+    """Copy a study into a folder; return its own, `folder / "rig"`."""
+    kept = Path(os.environ[FOLDER])
+    with (kept / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (kept / name).exists():
+            unfinished = kept / f"{name}.unfinished"
+            shutil.rmtree(unfinished, ignore_errors=True)
+            unfinished.mkdir()
+            _MADE[name](unfinished)
+            unfinished.rename(kept / name)
+    return Path(shutil.copytree(kept / name / "rig", folder / "rig"))
+
+
+def write(path: Path, columns: dict[str, NDArray[np.float64]]) -> Path:
+    """Write columns, by their titles, as CSV."""
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
+    return path
+
+
+def titled(channels: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Return channels of a building by titles with their units."""
+    return {
+        f"{name} [{'s' if name == 'time' else channel_unit(name)}]": values
+        for name, values in channels.items()
+    }
+
+
+def _order(*words: str | Path) -> None:
+    assert main([str(word) for word in words]) == 0
+
+
+def _bench(folder: Path) -> None:
+    for run in make_case(1, "gas_spring", strength=0.15, duration=4.0).runs:
+        if run["name"] in ("train_1", "train_2", "holdout_1"):
+            columns = {f"{name} [{unit}]": run[name] for name, unit in UNITS.items() if name in run}
+            write(folder / f"{run['name']}.csv", columns)
+    _order("study", "new", folder / "rig", "--law", "bingham", "--data", folder / "*.csv")
+    _order("identify", folder / "rig", "--no-table")
+    _order("diagnose", folder / "rig")
+
+
+def house(folder: Path) -> Path:
+    """Write runs of a house whose isolation stiffens, and its file; return that."""
+    building = shaken.building(1, True, 6)
+    for k, role in enumerate(("train", "train", "holdout")):
+        clean = shaken.shake(
+            building, 20 + k, None, lambda x, v: [STIFFENING * x[0] ** 3, 0.0], samples=2500
+        )
+        random = np.random.default_rng(k)
+        noisy = {
+            name: values + (name != "time") * 0.01 * np.std(values) * random.normal(size=2500)
+            for name, values in clean.items()
+        }
+        write(folder / f"{role}_{k}.csv", titled(noisy))
+    file = folder / "house.toml"
+    file.write_text(
+        'schema = 1\nname = "house"\nbase = "isolated"\ndamping_ratio = 0.02\n'
+        f"masses = {np.diag(building.M).tolist()}\nstiffnesses = {list(building.stiffnesses)}\n"
+    )
+    return file
+
+
+def _building(folder: Path) -> None:
+    rig = ("--rig", "structure", "--building", house(folder), "--law", "bingham")
+    _order("study", "new", folder / "rig", *rig, "--data", folder / "*.csv")
+    _order("identify", folder / "rig", "--no-table", "--json")
+    _order("diagnose", folder / "rig")
+
+
+def braced_tower(
+    folder: Path, devices: Sequence[Mapping[str, Any]] = DEVICES, without: tuple[str, ...] = (),
+    fine: int = 4,
+) -> Path:  # fmt: skip
+    """Write three runs of a tower with a brace, or a tie as well, and its file; return that.
+
+    The equations are solved with the `fine`th part of the logger's step.
+    """
+    tower = braced.tower(devices, floors=2, isolated=True)
+    laws = {"brace": (braced.brace, True), "tie": (braced.tie, False)}
+    forces = {device["name"]: laws[device["name"]] for device in devices}
+    for k in range(3):
+        clean = braced.shake(tower, 40 + k, forces, samples=3000 * fine, step=braced.DT / fine)
+        shown = {name: values[::fine] for name, values in clean.items()}
+        write(folder / f"shake{k}.csv", titled(braced.noisy(shown, 40 + k, without=without)))
+    file = folder / "tower.toml"
+    file.write_text(TOWER + "".join(PLACES[device["name"]] for device in devices))
+    return file
+
+
+def _device(folder: Path) -> None:
+    rig = ("--rig", "structure", "--building", braced_tower(folder), "--device", "brace")
+    _order("study", "new", folder / "rig", *rig, "--law", "tanh", "--data", folder / "*.csv")
+    _order("identify", folder / "rig", "--no-table")
+
+
+def _learned(folder: Path) -> None:
+    for k, seed in enumerate((1, 2, 3)):
+        random = np.random.default_rng(seed)
+        t = np.arange(2000) / 500.0
+        w = 2.0 * np.pi * random.uniform(0.5, 3.0, 6)[:, None]
+        angle, size = w * t + random.uniform(0.0, 6.0, 6)[:, None], 0.03 / w
+        x, v = (size * np.sin(angle)).sum(axis=0), (size * w * np.cos(angle)).sum(axis=0)
+        force = 6.0 * np.tanh(v / 3e-3) + 60.0 * v + 1.5 * np.sin(x / 2e-3)
+        noisy = [y + 0.005 * np.std(y) * random.standard_normal(len(t)) for y in (x, v, force)]
+        titles = ("time [s]", "x [m]", "v [m/s]", "F [N]")
+        write(folder / f"run_{k}.csv", dict(zip(titles, [t, *noisy], strict=True)))
+    _order("study", "new", folder / "rig", "--law", "tanh", "--data", folder / "*.csv")
+    _order("identify", folder / "rig", "--no-table", "--starts", "1")
+    _order("learn", folder / "rig", "--along", "displacement", "--as", "force")
+    _order("add", folder / "rig", "learned_1")
+
+
+_MADE: dict[str, Callable[[Path], None]] = {
+    "bench": _bench, "building": _building, "device": _device, "learned": _learned,
+}  # fmt: skip
