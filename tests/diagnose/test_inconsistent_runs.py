@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bristle.cli.diagnose import text
 from bristle.diagnosis.conclusion import About, conclude
 from bristle.diagnosis.decision import OTHER_FORM
 from bristle.diagnosis.inconsistent_runs import contradicted, groups, inconsistent_runs, odd_run
@@ -178,12 +175,6 @@ def test_a_verdict_stays_where_no_run_is_odd():
     assert found.after is not None
     rough = replace(found, after=replace(found.after, z=2.0))
     assert contradicted(rough, opened) is rough
-
-
-def test_after_runs_that_allow_no_verdict_comes_another_diagnosis():
-    verdict = {"kind": "insufficient", "effects": [], "laws": [{"law": "dahl"}], "findings": []}
-    told = text(verdict, Path("rig"))
-    assert re.findall(r"bristle (?!report).*rig\b", told) == ["bristle diagnose rig"]
 
 
 @pytest.mark.parametrize(
