@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from bristle.cli import main
 from bristle.data.channels import channel_unit
-from tests.independent.generate import UNITS, make_case
+from tests.independent.generate import UNITS, Case, make_case
 
 FOLDER = "BRISTLE_TEST_STUDIES"
 """The variable that names the folder where a session keeps them, the same for all workers."""
@@ -78,12 +78,18 @@ def _order(*words: str | Path) -> None:
     assert main([str(word) for word in words]) == 0
 
 
-def _bench(folder: Path) -> None:
-    for run in make_case(1, "gas_spring", strength=0.15, duration=4.0).runs:
+def case_study(case: Case, folder: Path) -> Path:
+    """Make a study of two training runs and one held out of a case; return its folder."""
+    for run in case.runs:
         if run["name"] in ("train_1", "train_2", "holdout_1"):
             columns = {f"{name} [{unit}]": run[name] for name, unit in UNITS.items() if name in run}
             write(folder / f"{run['name']}.csv", columns)
     _order("study", "new", folder / "rig", "--law", "bingham", "--data", folder / "*.csv")
+    return folder / "rig"
+
+
+def _bench(folder: Path) -> None:
+    case_study(make_case(1, "gas_spring", strength=0.15, duration=4.0), folder)
     _order("identify", folder / "rig", "--no-table")
     _order("diagnose", folder / "rig")
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from studies import case_study
 
 from bristle.cli import main
 from bristle.diagnosis.trials import Trial
@@ -23,7 +24,6 @@ from bristle.study.steps import create_study, diagnose_study
 from bristle.study.study import Study
 from tests.independent.generate import make_case
 from tests.study.made import bench_run, write_runs
-from tests.study.test_learning import UNITS, study_of
 
 NOISE = np.random.default_rng(1).standard_normal(6000) ** 2
 NAMES = ("gas_spring", "stribeck", "coil_lag", "saturation", "drift", "asymmetry")
@@ -167,7 +167,7 @@ def test_study_toml_takes_all_laws_or_none(tmp_path):
 def hidden(tmp_path_factory):
     """Return the folder of a study of a Bingham damper with a hidden gas spring, begun as LuGre."""
     case = make_case(1, "gas_spring", strength=0.15, duration=4.0)
-    study = study_of(case, tmp_path_factory.mktemp("law_free"))
+    study = Study(case_study(case, tmp_path_factory.mktemp("law_free")))
     study.add_step("begin", "by hand", new_model("lugre"), {}, {})
     return study.folder
 
@@ -200,7 +200,10 @@ def test_auto_takes_the_law_and_adds_the_effect(hidden):
 @pytest.mark.slow
 def test_no_effect_is_named_where_a_law_explains_the_runs():
     case = make_case(2, "none", duration=4.0)
-    runs = [{name: run[name] for name in UNITS} for run in case.runs]
+    runs = [
+        {name: run[name] for name in ("time", "displacement", "velocity", "voltage", "force")}
+        for run in case.runs
+    ]
     held_out = [runs[k] for k, run in enumerate(case.runs) if run["role"] == "holdout"]
     train = [runs[k] for k, run in enumerate(case.runs) if run["role"] == "train"]
     found = diagnose(train, "all", holdout=held_out)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_bench import Capture, asked, told
+from answers import Capture, asked, told
 
 
 def test_the_curve_is_the_force_that_was_hidden(learned_study: Path) -> None:

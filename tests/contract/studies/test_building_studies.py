@@ -8,7 +8,7 @@ from pathlib import Path
 import braced
 import pytest
 import studies
-from test_bench import Capture, asked, told
+from answers import Capture, asked, told
 
 from bristle.cli import main
 

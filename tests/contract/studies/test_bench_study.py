@@ -4,31 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from answers import Capture, asked, told
 
-from bristle.cli import main
-
-Capture = pytest.CaptureFixture[str]
 TRUE_K = 111.827  # N/m, of the gas spring that the runs hide
-
-
-def asked(capsys: Capture, *words: str | Path, code: int = 0) -> Any:
-    """Return a command's answer as JSON holds it."""
-    capsys.readouterr()
-    assert main([*map(str, words), "--json"]) == code
-    return json.loads(capsys.readouterr().out)
-
-
-def told(capsys: Capture, *words: str | Path, code: int = 0) -> str:
-    """Return what a command prints for people, in one line."""
-    capsys.readouterr()
-    assert main([*map(str, words)]) == code
-    captured = capsys.readouterr()
-    return " ".join((captured.out if code == 0 else captured.err).split())
 
 
 def test_the_verdict_names_what_is_hidden(bench_study: Path) -> None:
