@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from bristle.core.text import plain
 from bristle.data.measurement import measurements_of_frame
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Model, Problem, Run
 from bristle.physics import damper
@@ -280,7 +280,7 @@ def answer(law: str, times: int, _version: int = 1) -> Answer:
     """Return what a law leaves: the force on the bench [1], the displacement in simulation [m]."""
     with own_law() if law == OWN else nullcontext(law) as name:
         bench = Problem([on_bench(record(TRAIN, times), TRAIN, "multisine")])
-        found = identify(bench, name)
+        found = fit_from_starts(bench, Model(name))
         test = record(TEST)
         model = found.model
         errors = [(run.force - bench.predict(model, run))[run.skip :] for run in bench.runs]

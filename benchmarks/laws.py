@@ -23,10 +23,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bristle.data.measurement import Measurement, measurements_of_frame
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import Bench
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Problem
+from bristle.identification.problem import Model, Problem
 from bristle.physics.laws import LAWS, laws_of
 
 from ._rows import Row
@@ -119,7 +119,7 @@ def case(law: str, seed: int) -> Case:
     rng = np.random.default_rng([seed, *law.encode()])
     truth = truth_of(law, rng)
     problem = Problem([prepare(recorded(law, truth, rng, f"run_{k}")) for k in (1, 2)])
-    found = identify(problem, law)
+    found = fit_from_starts(problem, Model(law))
     errors = {
         name: (found.model.value(name) - truth[name]) / max(std, 1e-300)
         for name, std in found.std.items()

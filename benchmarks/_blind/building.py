@@ -14,7 +14,7 @@ from bristle.diagnosis import Diagnosis, diagnose_rig
 from bristle.diagnosis.site import try_effect
 from bristle.identification.building_sites import StructureProblem
 from bristle.identification.building_sites import structure_problems as problems
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.problem import Model
 from bristle.identification.rig_fit import fit_line
 from bristle.identification.start_grid import refine
@@ -119,7 +119,7 @@ def fitted(name: str, law: str, site: str, pair: Pair) -> Model:
     """Return a site's model with one effect, fitted to its training runs."""
     train, held = pair
     if site == "damper":
-        base = identify(train, law, starts=2).model
+        base = fit_from_starts(train, Model(law), starts=2).model
         if EFFECTS[name].site != "structure":
             return inseparable.best_of(name, base, train)
         return refine(try_effect(name, base, train, held).model, train)

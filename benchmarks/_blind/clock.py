@@ -17,9 +17,10 @@ from .plan import Task
 
 CODE = {
     "identification": """
-from bristle.identification.fit import Problem, identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
-identify(Problem([prepare(m) for m in train]), law)
+from bristle.identification.problem import Model, Problem
+fit_from_starts(Problem([prepare(m) for m in train]), Model(law))
 """,
     "diagnosis": """
 from bristle.diagnosis import diagnose

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.diagnosis.trials import short_search
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.start_grid import SearchContext, ranked_guesses, refine
@@ -78,7 +78,7 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
         Problem([as_run(run, case.channels, noisy.runs[0].noise) for run in made.clean(role)])
         for role in ("train", "holdout")
     )
-    base = identify(train, case.task.law, starts=2).model
+    base = fit_from_starts(train, Model(case.task.law), starts=2).model
     fits = {name: best_of(name, base, train) for name in (true, *rivals)}
     expected = noisy.expectation(fits[true])
     left = {name: _left(one, held) for name, one in fits.items()}

@@ -12,7 +12,7 @@ from ..core.text import plain
 from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identification.building_sites import StructureProblem
-from ..identification.fit import fit, identify
+from ..identification.fit import fit, fit_from_starts
 from ..identification.problem import Model, Problem, Run, in_noises, residuals, robust_z
 from ..identification.rig import DAMPER
 from ..identification.search import z_scale
@@ -354,10 +354,8 @@ def _explains(
         return True
     if not restart:
         return False
-    own = identify(
-        part, model.law, model.effects, 2, fixed=model.fixed,
-        values={name: model.value(name) for name in model.fixed}, limits=model.limits,
-    )  # fmt: skip
+    kept = {name: model.value(name) for name in model.fixed}
+    own = fit_from_starts(part, replace(model, values=kept), 2)
     return robust_z(part, own.model) <= rule.misfit
 
 

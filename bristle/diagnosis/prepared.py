@@ -15,7 +15,7 @@ from ..data.decimate import in_time
 from ..data.left_out import WAYS_OUT
 from ..data.measurement import Measurement
 from ..identification.building_sites import StructureProblem
-from ..identification.fit import identify
+from ..identification.fit import fit_from_starts
 from ..identification.prepare import SHORTEST
 from ..identification.problem import Model, Problem, Run
 from ..identification.rig import DAMPER, Seeds, bench_rig
@@ -231,7 +231,10 @@ def opening(
         return data
     say("fitting the present model")
     problem = data.problem
-    base = refine(present, problem) if identified else _identified(present, problem)
+    if identified:
+        base = refine(present, problem)
+    else:
+        base = fit_from_starts(problem, replace(present, values={})).model
     return opened_with(judge(base, problem, data.held_out), data)
 
 
@@ -282,13 +285,6 @@ def part_of(problem: Problem) -> Problem | None:
     ordered = sorted(runs, key=place)
     chosen = np.linspace(0, len(runs) - 1, min(FEWEST, len(runs))).round().astype(int)
     return problem.of([ordered[k].of(slice(ENOUGH // len(chosen))) for k in chosen])
-
-
-def _identified(present: Model, problem: Problem) -> Model:
-    found = identify(
-        problem, present.law, present.effects, fixed=present.fixed, limits=present.limits
-    )
-    return found.model
 
 
 def of_layer(model: Model, problem: Problem) -> list[str]:

@@ -400,7 +400,7 @@ def look_at_damper(
     say : is told what is being done
     made : the trials of single effects, where they were made before
     pairs : whether two effects are tried where no single one suffices
-    excess : variance [N2] that counts beside the noise, see `residuals.excess_of`; None for what
+    excess : variance [N2] that counts beside the noise, see `problem.excess_of`; None for what
         the best of these models misses
 
     Returns

@@ -7,7 +7,7 @@ that correlation in time counts in the intervals as well.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -227,25 +227,15 @@ def _spread(values: list[float], about: float) -> float:
     return float(np.sqrt(np.sum((np.array(values) - about) ** 2) / max(len(values) - 1, 1)))
 
 
-def identify(
-    problem: Problem,
-    law: str,
-    effects: tuple[str, ...] = (),
-    starts: int = 4,
-    *,
-    values: Mapping[str, float] | None = None,
-    fixed: tuple[str, ...] = (),
-    limits: Mapping[str, tuple[float, float]] | None = None,
-) -> Fit:
-    """Fit a law from several starts; return the best fit with its intervals.
+def fit_from_starts(problem: Problem, model: Model, starts: int = 4) -> Fit:
+    """Fit a model from several starts; return the best fit with its intervals.
 
     Parameters
     ----------
     problem : the runs
-    law, effects : names of the law and of the effects that are on
+    model : with the values of its effects to begin with, and those of fixed parameters [SI]; an
+        effect without values begins at the size of the rig
     starts : how many starting points are tried
-    values : parameters of effects to begin with, and those of `fixed` ones [SI]
-    fixed, limits : see `Model`
 
     Returns
     -------
@@ -253,12 +243,13 @@ def identify(
         With the parameters of a voltage that does not change held at zero and named in
         `unidentified`.
     """
-    given = {
+    law, fixed = model.law, model.fixed
+    at_size = {
         f"{effect}.{own}": problem.scaled(law, f"{effect}.{own}")
-        for effect in effects
+        for effect in model.effects
         for own in EFFECTS[effect].parameters
-    } | dict(values or {})
-    model = Model(law, effects, given, fixed, dict(limits or {}))
+    }
+    model = replace(model, values=at_size | model.values)
     driven = LAWS[law].driven() if steady(problem) else ()
     silent = tuple(name for name in driven if name not in fixed)
     model = without(model, silent)

@@ -448,10 +448,10 @@ class Problem:
     """Runs held against a model: predictions, and the noise that a true model would show."""
 
     free_zero = False
-    """Whether the force's zero is fitted along with every model; see `residuals.zero_of`."""
+    """Whether the force's zero is fitted along with every model; see `zero_of`."""
 
     excess = 0.0
-    """Variance [N2] of what no model here explains, beside the noise; see `residuals.excess_of`."""
+    """Variance [N2] of what no model here explains, beside the noise; see `excess_of`."""
 
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs

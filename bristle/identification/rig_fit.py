@@ -18,7 +18,7 @@ from ..physics.tuples import Inputs
 from .building_sites import StructureProblem, StructureRun, thinned
 from .error import ForceError, errors_by_run, pooled
 from .error_table import error_rms, force_rms
-from .fit import Fit, fit, identify
+from .fit import Fit, fit, fit_from_starts
 from .problem import Model, Problem, Run, excess_of, z_if_known
 from .rig import DAMPER, ROLES, Rig, Site, at_site
 from .start_grid import initial_guesses, refine
@@ -137,35 +137,36 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
     count : how many starting points are tried for the damper's law
     also : values in SI by name from which one more fit begins; the better one counts
     """
-    own = at_site(model, site.name, sites)
+    own, train = at_site(model, site.name, sites), site.train
 
-    def searched(train: Problem) -> Fit:
+    def search(problem: Problem) -> Fit:
         if site.is_line:
-            return _fit_line(own, train, also)
-        return _fit_law(own, train, MORE * count if train.excess else count, also)
+            return _fit_line(own, problem, also)
+        return _fit_law(own, problem, MORE * count if problem.excess else count, also)
 
     with series(MODEL, site.shown):
+        found = search(train)
         if site.is_line and not own.effects:
-            return searched(site.train)  # a line's weights follow its error by themselves
-        return weighed(site.train, searched)
+            return found  # a line's weights follow its error by themselves
+        return _beside_excess(found, train, search)
 
 
-def weighed(problem: Problem, searched: Callable[[Problem], Fit]) -> Fit:
-    """Return what a search ends at, made anew where its model does not explain the runs.
+def _beside_excess(found: Fit, problem: Problem, search: Callable[[Problem], Fit]) -> Fit:
+    """Return a fit, made anew where its model does not explain the runs.
 
-    What the model misses then counts beside the noise; see `residuals.excess_of`.
+    What the model misses then counts beside the noise; see `problem.excess_of`.
 
     Parameters
     ----------
+    found : what the search came to on the runs
     problem : the runs, without an excess
-    searched : the search for a model on them
+    search : for the model on runs
     """
-    found = searched(problem)
     excess = excess_of(problem, found.model)
     if not excess:
         return found
     problem = problem.with_excess(excess)
-    again, from_there = searched(problem), fit(problem, found.model)
+    again, from_there = search(problem), fit(problem, found.model)
     if again.cost <= from_there.cost:
         return again
     return _in_place_of(again, from_there)
@@ -183,10 +184,7 @@ def _fit_law(own: Model, train: Problem, count: int, also: Values) -> Fit:
     inside = isinstance(train, StructureProblem)
     layer = [name for name in own.effects if inside and EFFECTS[name].site == "structure"]
     if not layer:
-        found = identify(
-            train, own.law, own.effects, count, values=own.values, fixed=own.fixed,
-            limits=own.limits,
-        )  # fmt: skip
+        found = fit_from_starts(train, own, count)
         late = [] if inside else [name for name in own.effects if EFFECTS[name].start_shares]
         if late:  # whose defaults may be where the runs never come
             found = min(found, _fit_grown(own, late, train), key=lambda one: one.cost)
@@ -214,13 +212,12 @@ def _fit_grown(own: Model, late: list[str], train: Problem) -> Fit:
 
 def fit_damper(problem: Problem, present: Model) -> Fit:
     """Return the damper's law fitted anew, with the effects that the model has already."""
-    effects = present.effects
-    known = {n: v for n, v in present.values.items() if n.partition(".")[0] in effects}
-    kept = {n: v for n, v in present.values.items() if n in present.fixed}
-    return identify(
-        problem, present.law, effects, values={**known, **kept}, fixed=present.fixed,
-        limits=present.limits,
-    )  # fmt: skip
+    known = {
+        name: value
+        for name, value in present.values.items()
+        if name.partition(".")[0] in present.effects or name in present.fixed
+    }
+    return fit_from_starts(problem, replace(present, values=known))
 
 
 def _belongs(name: str, model: Model) -> bool:
@@ -254,7 +251,11 @@ def with_line(own: Model, site: Site) -> Model:
     own = replace(own, values=values, fixed=fixed, limits=limits)
     if not own.effects:
         return own
-    return weighed(train, lambda problem: fit(problem, own, with_std=False)).model
+
+    def search(problem: Problem) -> Fit:
+        return fit(problem, own, with_std=False)
+
+    return _beside_excess(search(train), train, search).model
 
 
 def _structure(problem: Problem) -> StructureProblem:

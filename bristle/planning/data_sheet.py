@@ -12,7 +12,7 @@ import numpy as np
 from ..core.config import Document
 from ..diagnosis.effect_size import Known as Fitted
 from ..errors import StudyError
-from ..identification.fit import identify
+from ..identification.fit import fit_from_starts
 from ..identification.problem import REFERENCE, Model, Problem, Run
 from ..identification.smoothing import posterior_draws
 from ..physics.laws import LAWS
@@ -172,7 +172,7 @@ def _rival(name: str, able: Sequence[str], fitted: Fitted) -> Model:
     if name in (NONE, model.law):
         return model
     if name in law_rivals():
-        return identify(fitted.problem, name, model.effects).model
+        return fit_from_starts(fitted.problem, Model(name, model.effects)).model
     refuse_no_rival(name)
     refuse_unable(name, able, model)
     return sized_rival(name, fitted).rival().model

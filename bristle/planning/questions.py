@@ -17,7 +17,7 @@ from ..diagnosis.prepared import Opening
 from ..diagnosis.rule import BENCH, DecisionRule
 from ..diagnosis.trials import LONG, joinable, short_search
 from ..errors import StudyError
-from ..identification.fit import identify
+from ..identification.fit import fit_from_starts
 from ..identification.problem import Model, Problem, Run
 from ..identification.start_grid import SearchContext, ranked_guesses, refine
 from ..learning.signals import ALONG
@@ -191,7 +191,7 @@ def _fitted(name: str, opened: Opening) -> Model:
     if name == NONE:
         return model
     if name in law_rivals():
-        return identify(problem, name, model.effects).model
+        return fit_from_starts(problem, Model(name, model.effects)).model
     plain = plain_name(name)
     refuse_no_rival(plain)
     refuse_unable(plain, able_beside(model, problem, opened.shown), model)

@@ -21,7 +21,7 @@ from ..diagnosis.rule import BENCH, SITE
 from ..diagnosis.site import joinable_at
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem, StructureRun
-from ..identification.fit import identify
+from ..identification.fit import fit_from_starts
 from ..identification.problem import Model, Problem, Run
 from ..identification.rig import DAMPER, at_site
 from ..identification.rig_fit import fit_line, joined
@@ -195,7 +195,7 @@ def _rivals(
     models: dict[str, Model] = {}
     for name in names:
         if name in LAWS and site == DAMPER:
-            models[name] = identify(opened.searched, name, model.effects).model
+            models[name] = fit_from_starts(opened.searched, Model(name, model.effects)).model
         own = next((one for one in able if _asked_for(one, (name,))), "")
         if own:
             models[name] = _with_effect(own, opened)

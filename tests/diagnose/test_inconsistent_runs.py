@@ -13,7 +13,8 @@ from bristle.diagnosis.inconsistent_runs import contradicted, groups, inconsiste
 from bristle.diagnosis.prepared import Opening
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import judge
-from bristle.identification.fit import fit, identify
+from bristle.identification.fit import fit, fit_from_starts
+from bristle.identification.problem import Model
 from bristle.identification.rig_fit import joined
 from tests.identify.truths import hidden_case, true_case
 
@@ -27,7 +28,7 @@ def test_runs_of_two_rigs_are_named(law, other):
     second, _, _ = true_case(4, law, other)
     train = first.of([*first.runs[:2], *second.runs[:1]])
     held_out = second.of(second.runs[1:3])
-    told = groups(identify(train, law).model, train, held_out)
+    told = groups(fit_from_starts(train, Model(law)).model, train, held_out)
     assert "these groups: " in told
     own, others = told.split("these groups: ")[1].split(". Were")[0].split("; ")
     assert own == ", ".join(run.name for run in first.runs[:2])

@@ -8,7 +8,7 @@ import pytest
 from bristle.diagnosis.inconsistent_runs import inconsistent_runs
 from bristle.diagnosis.model_faults import model_based_fault
 from bristle.diagnosis.trials import judge
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import Bench
 from bristle.identification.problem import Model, Problem, Run
 
@@ -36,7 +36,7 @@ def problems(**choices):
 
 
 def found(train, held_out):
-    base = identify(train, "bingham", starts=2).model
+    base = fit_from_starts(train, Model("bingham"), starts=2).model
     return model_based_fault(judge(base, train, held_out), train, held_out)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from bristle.data.measurement import measurements_of_frame
 from bristle.diagnosis.trials import joinable, short_search
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Model, Problem
 from bristle.identification.start_grid import SearchContext, initial_guesses, ranked_guesses, refine
@@ -52,7 +52,7 @@ def rig(effects, values):
 @pytest.fixture(scope="module")
 def springy():
     problem = rig(("gas_spring",), {"gas_spring.k": 200.0, "gas_spring.preload": 0.4})
-    return SearchContext(identify(problem, "bingham", starts=2).model, problem)
+    return SearchContext(fit_from_starts(problem, Model("bingham"), starts=2).model, problem)
 
 
 def test_a_start_from_which_nothing_moves_is_left_out():

@@ -14,7 +14,7 @@ from bristle.diagnosis.decision import Decision
 from bristle.diagnosis.prepared import Opening
 from bristle.diagnosis.site import free_zero, renewed_zero, zero_fault
 from bristle.diagnosis.trials import judge
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.problem import Model, errors, has_offset, robust_z, zero_of
 
 OFFSET = 0.6
@@ -27,13 +27,13 @@ def opened(**choices):
         problem.of([replace(run, force=run.force + OFFSET) for run in problem.runs])
         for problem in problems(**choices)
     )
-    model = identify(train, "bingham", starts=2).model
+    model = fit_from_starts(train, Model("bingham"), starts=2).model
     return Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
 
 
 def test_the_zero_is_fitted_along_with_every_model():
     train, _ = problems()
-    model = identify(train, "bingham", starts=2).model
+    model = fit_from_starts(train, Model("bingham"), starts=2).model
     off = train.of([replace(run, force=run.force + OFFSET) for run in train.runs])
     zero, std = zero_of(off, model)
     assert zero == pytest.approx(OFFSET, abs=4.0 * std)
@@ -45,7 +45,7 @@ def test_the_zero_is_fitted_along_with_every_model():
     assert not off.free_zero
     left = np.concatenate(errors(free, model, free.expectation(model)))
     assert abs(np.mean(left)) < 4.0 * std
-    fitted = identify(free, "bingham", starts=2).model
+    fitted = fit_from_starts(free, Model("bingham"), starts=2).model
     for name in model.free():
         assert fitted.value(name) == pytest.approx(model.value(name), rel=1e-2)
 
@@ -72,7 +72,7 @@ def of(kind, opening, model=None):
 
 def fitted(opening, effects):
     """Return a model with effects fitted to the training runs."""
-    return identify(opening.problem, "bingham", effects, starts=1).model
+    return fit_from_starts(opening.problem, Model("bingham", effects), starts=1).model
 
 
 def test_a_zero_is_freed_where_a_constant_is_left_or_a_second_effect_took_it_up():
@@ -101,14 +101,14 @@ def test_a_spring_that_says_more_than_a_zero_stays():
         effects=("gas_spring",),
         values={"gas_spring.k": 150.0, "gas_spring.preload": OFFSET, "gas_spring.k_2": 0.0},
     )
-    model = identify(train, "bingham", starts=2).model
+    model = fit_from_starts(train, Model("bingham"), starts=2).model
     opening = Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
     assert free_zero(opening, of("effect", opening, fitted(opening, ("gas_spring",)))) is None
 
 
 def test_without_an_offset_nothing_is_tried_again():
     train, held_out = problems(**HIDDEN)
-    model = identify(train, "bingham", starts=2).model
+    model = fit_from_starts(train, Model("bingham"), starts=2).model
     opening = Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
     assert free_zero(opening, of("unknown", opening)) is None
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from truths import hidden_case, true_case
 
-from bristle.identification.fit import fit, identify, multistart_refit
-from bristle.identification.problem import robust_z
+from bristle.identification.fit import fit, fit_from_starts, multistart_refit
+from bristle.identification.problem import Model, robust_z
 
 RIGS = ("bench_10N", "bench_2kN")
 NOISES = (0.01, 0.03)
@@ -19,7 +19,7 @@ CLOSED = {"backlash.gap": 7e-4, "backlash.k": 8e5, "backlash.c": 60.0, "backlash
 def errors(seed, law, rig, noise):
     """Return errors over standard deviations, widths of intervals over values, z of the truth."""
     train, held, truth = true_case(seed, law, rig, noise)
-    found = identify(train, law)
+    found = fit_from_starts(train, Model(law))
     assert found.unidentified == ()
     names = list(found.std)
     value = np.array([truth.values[name] for name in names])

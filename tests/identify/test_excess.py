@@ -9,7 +9,7 @@ import pytest
 from known_runs import bench_run, truth_of
 from scipy.optimize import least_squares
 
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.problem import (
     EXPLAINS,
     Model,
@@ -52,7 +52,7 @@ def test_a_fit_that_explains_the_runs_is_that_of_the_noise_to_the_last_bit(runs)
     problem = Problem(runs[0])
     found = fitted(problem)
     assert robust_z(problem, found.model) < EXPLAINS
-    by_noise = identify(problem, LAW, starts=2)
+    by_noise = fit_from_starts(problem, Model(LAW), starts=2)
     assert (found.model, found.std) == (by_noise.model, by_noise.std)
 
 
@@ -60,7 +60,7 @@ def test_a_fit_that_misses_something_is_nearly_least_squares(runs):
     """Huber's threshold of two noises and the noise of runs as weights would pull it away."""
     parts = [replace(run, force=run.force + 3e3 * run.v * np.abs(run.v)) for run in runs[0]]
     problem = Problem([parts[0], replace(parts[1], noise=0.1 * parts[1].noise)])
-    found, by_noise = fitted(problem).model, identify(problem, LAW, starts=2).model
+    found, by_noise = fitted(problem).model, fit_from_starts(problem, Model(LAW), starts=2).model
     assert robust_z(problem, found) > 3.0
 
     none = [(np.zeros(len(r.x)), np.ones(len(r.x)), np.zeros((1, len(r.x)))) for r in problem.runs]

@@ -15,7 +15,7 @@ from bristle.core.progress import watched_by
 from bristle.data.left_out import MISSING
 from bristle.identification import error_table, watch
 from bristle.identification.error_table import error_table as error_table_error_table
-from bristle.identification.fit import Fit, fit, identify
+from bristle.identification.fit import Fit, fit, fit_from_starts
 from bristle.identification.problem import Model, Problem
 from bristle.identification.search import z_of
 from bristle.identification.watch import LAW, MODEL, series, watched
@@ -92,10 +92,10 @@ def test_loops_are_what_was_measured_and_what_the_model_predicts(problem: Proble
 
 @pytest.mark.usefixtures("every_step")
 def test_a_fit_is_the_same_to_the_last_bit_whether_it_is_watched_or_not(problem: Problem) -> None:
-    alone = identify(problem, "bingham", starts=2)
+    alone = fit_from_starts(problem, Model("bingham"), starts=2)
     seen: Seen = []
     with watched_by(seen.append), series(MODEL):
-        found = identify(problem, "bingham", starts=2)
+        found = fit_from_starts(problem, Model("bingham"), starts=2)
     assert same(alone, found)
     assert {one["search"] for one in seen} == {1, 2, 3, 4}  # two starts, then the polish
 

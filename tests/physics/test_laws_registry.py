@@ -15,7 +15,7 @@ from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
 from bristle.fmu.controller import invertible
 from bristle.identification.error_table import error_table
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import Bench as CompiledBench
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.starts import start_models
@@ -232,7 +232,7 @@ def test_fits_find_its_parameters(law: type[Law], slow_law: type[Law]) -> None:
     assert all(start.bounds(n)[0] <= start.value(n) <= start.bounds(n)[1]
                for start in starts for n in truth)  # fmt: skip
     assert starts[0].value("v_s") == pytest.approx(0.03, rel=0.4)
-    found = identify(made, "hyperbolic")
+    found = fit_from_starts(made, Model("hyperbolic"))
     for name, value in truth.items():
         assert found.model.value(name) == pytest.approx(value, abs=5.0 * found.std[name])
 

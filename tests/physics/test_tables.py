@@ -13,7 +13,7 @@ from rigs import force_at
 
 from bristle.errors import PhysicsError, StudyError
 from bristle.fmu import catalogue
-from bristle.identification.fit import identify
+from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import Bench
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.starts import start_models
@@ -194,7 +194,7 @@ def test_a_fit_finds_a_curve(law: type[Law], effect: type[Effect]) -> None:
     made = problem("bingham", ["sloped"], {**truth, "sloped.scale": 2.0})
     held = ("sloped.scale", "sloped.curve[2]")
     given = {"sloped.scale": 2.0, "sloped.curve[2]": 0.0}
-    found = identify(made, "bingham", ("sloped",), 2, values=given, fixed=held)
+    found = fit_from_starts(made, Model("bingham", ("sloped",), given, held), 2)
     for name, value in truth.items():
         if name not in held:
             assert found.model.value(name) == pytest.approx(value, abs=5.0 * found.std[name])
@@ -307,7 +307,7 @@ def test_a_fit_finds_the_map(law: type[Law], effect: type[Effect], tmp_path: Pat
     made = problem("mapped", [], {**truth, "c_1": 4.0, "c_2": 0.3})
     start = start_models(made, Model("mapped"), 1)[0]
     assert start.value("map[2]") == pytest.approx(2.0, abs=0.7)
-    found = identify(made, "mapped", starts=2)
+    found = fit_from_starts(made, Model("mapped"), starts=2)
     for name, value in truth.items():
         assert found.model.value(name) == pytest.approx(value, abs=5.0 * found.std[name])
     path = tmp_path / "model.toml"
