@@ -11,23 +11,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from bristle.core.finding import Finding
-from bristle.data.checks.runs import tells_a_bend
 from bristle.data.measurement import Measurement
-from bristle.diagnosis.joint_search import Looks
+from bristle.diagnosis.joint_search import TrialsByLaw
 from bristle.diagnosis.law_choice import choose, search
 from bristle.diagnosis.law_trials import LawTrial, try_laws
-from bristle.diagnosis.prepared import (
-    BenchData,
-    Insufficient,
-    Opening,
-    Progress,
-    bench_data,
-    corrected,
-    opened_with,
-    opening,
-    silent,
-)
-from bristle.diagnosis.site import look_at_damper
+from bristle.diagnosis.prepared import Prepared, Progress, corrected, silent
+from bristle.diagnosis.rig_runs import BenchRuns
+from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import judge
 from bristle.identification.prepare import prepare
@@ -99,26 +89,25 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
     """
     split, data, rows = _laws(train, say)
 
-    chosen = choose(search(rows, Looks(lambda trial: opened_with(trial, data), say)))
-    assert chosen.opened is not None
-    opened = _with_effects(split, chosen.finding, chosen.opened, say)
+    chosen = choose(search(rows, TrialsByLaw(data, say)))
+    assert chosen.prepared is not None
+    opened = _with_effects(split, chosen.finding, chosen.prepared, say)
     return _found(opened, ()), _with_curves(opened, say)
 
 
 def _laws(
     train: Sequence[Measurement], say: Progress
-) -> tuple[Runs, BenchData, tuple[LawTrial, ...]]:
+) -> tuple[Runs, BenchRuns, tuple[LawTrial, ...]]:
     """Return training runs split in two, prepared, and the trials of all laws on them."""
     split = runs_of(list(train), [])
-    data = bench_data(split.train, split.holdout, Model(DEFAULT), say)
-    if isinstance(data, Insufficient):
-        raise ValueError(" ".join(data.reasons))
+    data = BenchRuns(split.train, split.holdout, Model(DEFAULT), say=say)
+    if data.damper is None:
+        raise ValueError(str(data.lacking))
     say("trying every law")
-    bends = tells_a_bend(split.train)
-    return split, data, try_laws(data.problem, data.held_out, Model(DEFAULT), bends=bends)
+    return split, data, try_laws(*data.damper, Model(DEFAULT), bends=data.bends)
 
 
-def _with_effects(split: Runs, finding: SiteDiagnosis, opened: Opening, say: Progress) -> Opening:
+def _with_effects(split: Runs, finding: SiteDiagnosis, opened: Prepared, say: Progress) -> Prepared:
     """Add effects as long as one is named, or lowers the error beyond chance; see `study auto`."""
     while len(opened.before.model.effects) < MOST_EFFECTS:
         if finding.kind == "effect" and finding.model is not None:
@@ -133,16 +122,17 @@ def _with_effects(split: Runs, finding: SiteDiagnosis, opened: Opening, say: Pro
         fitted = (_identified(one, opened.problem) for one in models)
         judged = [judge(one, opened.problem, opened.held_out) for one in fitted]
         model = min(judged, key=lambda one: one.z).model
-        again = opening(split.train, split.holdout, model, identified=True)
-        if isinstance(again, Insufficient):
+        runs = BenchRuns(split.train, split.holdout, model, identified=True)
+        again = runs.prepare(DAMPER)
+        if again is None:
             break
         opened = again
         if len(model.effects) < MOST_EFFECTS:
-            finding, opened = look_at_damper(opened)
+            finding, opened = diagnose_damper(opened)
     return opened
 
 
-def _with_curves(opened: Opening, say: Progress) -> Found:
+def _with_curves(opened: Prepared, say: Progress) -> Found:
     """Learn curves as long as one lowers the error beyond chance and the model is not full."""
     curves: tuple[Curve, ...] = ()
     with ExitStack() as stack:
@@ -161,7 +151,7 @@ def _with_curves(opened: Opening, say: Progress) -> Found:
     return _found(opened, curves)
 
 
-def _found(opened: Opening, curves: tuple[Curve, ...]) -> Found:
+def _found(opened: Prepared, curves: tuple[Curve, ...]) -> Found:
     before = opened.before
     return Found(before.model, curves, before.z, opened.faults, opened.problem.free_zero)
 

@@ -42,9 +42,11 @@ from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.recording import check_recording
 from bristle.data.measurement import Measurement
 from bristle.diagnosis.load_cell import low_pass_text
-from bristle.diagnosis.prepared import opening
-from bristle.diagnosis.site import look_at_damper
+from bristle.diagnosis.prepared import Prepared
+from bristle.diagnosis.rig_runs import BenchRuns
+from bristle.diagnosis.site import diagnose_damper
 from bristle.identification.problem import Model
+from bristle.identification.rig import DAMPER
 from tests.independent.generate import Case
 from tests.independent.rigs import Rig
 from tests.independent.specimen import Specimen
@@ -206,7 +208,7 @@ def _by_verdict(fault: str, number: int, rng: np.random.Generator) -> Answer:
             for run, T in zip(_performed(case, specimens, number), warm, strict=True)
         ]
     train, held = ([run for run in runs if run.name.startswith(r)] for r in ("train", "holdout"))
-    found, _ = look_at_damper(opening(train, held, Model(_task(number).law)))
+    found, _ = diagnose_damper(_prepared(train, held, _task(number).law))
     said = [found.kind, *found.effects, low_pass_text(found)]
     told = 0.0
     if fault == "cell" and (corner := re.search(r"corner near ([\d.]+) Hz", said[-1])):
@@ -285,8 +287,16 @@ def _told_by_model(runs: list[Measurement], number: int) -> list[Finding]:
     """Return the faults that a diagnosis of the runs begins with."""
     law = _task(number).law
     train, held = ([run for run in runs if run.name.startswith(r)] for r in ("train", "holdout"))
-    opened = opening(train, held, Model(law))
-    return list(opened.faults)
+    return list(_prepared(train, held, law).faults)
+
+
+def _prepared(train: list[Measurement], held: list[Measurement], law: str) -> Prepared:
+    """Return what the diagnosis of the runs begins with."""
+    runs = BenchRuns(train, held, Model(law))
+    prepared = runs.prepare(DAMPER)
+    if prepared is None:
+        raise RuntimeError(str(runs.lacking))
+    return prepared
 
 
 def _task(number: int) -> Task:

@@ -21,7 +21,7 @@ import traceback
 from time import perf_counter
 
 from bristle.diagnosis.joint_search import diagnose_laws
-from bristle.diagnosis.law_choice import Pair
+from bristle.diagnosis.law_choice import LawAndEffects
 from bristle.diagnosis.sensor_faults import instruments_of
 from bristle.identification.problem import Model
 from bristle.physics.forms import split_form
@@ -128,7 +128,9 @@ def _is(pair: tuple[str, tuple[str, ...]], law: str, effects: tuple[str, ...]) -
     return plain == law and set(pair[1]) == set(effects)
 
 
-def _simple(chosen: Pair, pairs: tuple[Pair, ...], law: str, effects: tuple[str, ...]) -> bool:
+def _simple(
+    chosen: LawAndEffects, pairs: tuple[LawAndEffects, ...], law: str, effects: tuple[str, ...]
+) -> bool:
     """Return whether a pair has no more parameters than the true one, where that was searched."""
     true = [one for one in pairs if _is((one.row.law, one.finding.effects), law, effects)]
     return all(chosen.fitted <= one.fitted for one in true)

@@ -27,8 +27,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bristle.diagnosis.prepared import Insufficient, Opening, opening, silent
-from bristle.diagnosis.rig_runs import BuildingRuns
+from bristle.diagnosis.prepared import Prepared
+from bristle.diagnosis.rig_runs import BenchRuns, BuildingRuns
 from bristle.diagnosis.trials import Trial
 from bristle.identification.problem import Model
 from bristle.identification.rig import DAMPER
@@ -153,9 +153,10 @@ def _of_bench(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
         train, held_out = (
             measurements(case.part(role), case.channels) for role in ("train", "holdout")
         )
-        opened = opening(train, held_out, Model(task.law))
-        if isinstance(opened, Insufficient):
-            return {"learned": False, "why": list(opened.reasons)}
+        runs = BenchRuns(train, held_out, Model(task.law))
+        opened = runs.prepare(DAMPER)
+        if opened is None:
+            return {"learned": False, "why": list(runs.lacking.reasons if runs.lacking else ())}
         return _learned(opened, task.form)
 
     return about, learned
@@ -170,10 +171,9 @@ def _of_building(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
 
     def learned() -> Answer:
         made = house(SEED + number, one, share)
-        runs = BuildingRuns(made.train, made.holdout, Model(LAW), made.building, silent)
+        runs = BuildingRuns(made.train, made.holdout, Model(LAW), made.building)
         sites = [site for site in runs.sites() if site != DAMPER]
-        openings = {site: runs.open_site(site) for site in sites}
-        able = {site: opened for site, opened in openings.items() if opened is not None}
+        able = {site: opened for site in sites if (opened := runs.prepare(site)) is not None}
         if one is None:
             told = [_learned(opened, "") for opened in able.values()]
             return {"learned": any(answer["learned"] for answer in told)}
@@ -183,7 +183,7 @@ def _of_building(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
     return about, learned
 
 
-def _learned(opened: Opening, form: str) -> Answer:
+def _learned(opened: Prepared, form: str) -> Answer:
     before, told = opened.before.z, list[Answer]()
     with ExitStack() as stack:
         while len(told) < MOST and (not told or opened.before.z > ADEQUATE):
@@ -205,7 +205,7 @@ def _learned(opened: Opening, form: str) -> Answer:
 
 
 def _closed(
-    opened: Opening, found: LearnedCurve, curve: Curve, form: str
+    opened: Prepared, found: LearnedCurve, curve: Curve, form: str
 ) -> tuple[Answer, str, Trial]:
     """Return what is told of a curve, its effect's text, and the trial of the model with it."""
     assert found.after is not None

@@ -21,11 +21,13 @@ from dataclasses import replace
 import numpy as np
 
 from bristle.diagnosis.effect_limits import limit_of
-from bristle.diagnosis.effect_size import Known, Sized
-from bristle.diagnosis.prepared import Insufficient, Opening, opening
-from bristle.diagnosis.site import look_at_damper
+from bristle.diagnosis.effect_size import Sized, SizeSearch
+from bristle.diagnosis.prepared import Prepared
+from bristle.diagnosis.rig_runs import BenchRuns
+from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.trials import joinable, judge
 from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.rig import DAMPER
 from bristle.identification.start_grid import refine
 
 from ._answers import Answer, Answers, ask
@@ -89,24 +91,25 @@ def _answered(kind: str, number: int) -> Answer:
     return _within(number) if kind == "clean" else _named(number)
 
 
-def _opened(number: int) -> Opening:
+def _opened(number: int) -> Prepared:
     """Return a clean case as a diagnosis opens it."""
     task = [one for one in make_plan(SEED, 6 * number + 12, "none") if one.noise == 0.01][number]
     case = cases.load(task)
     train, held_out = (
         measurements(case.part(role), case.channels) for role in ("train", "holdout")
     )
-    opened = opening(train, held_out, Model(task.law))
-    if isinstance(opened, Insufficient):
-        raise RuntimeError(json.dumps(opened.reasons))
+    runs = BenchRuns(train, held_out, Model(task.law))
+    opened = runs.prepare(DAMPER)
+    if opened is None:
+        raise RuntimeError(str(runs.lacking))
     return opened
 
 
-def _clean(opened: Opening) -> Known:
+def _clean(opened: Prepared) -> SizeSearch:
     deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
     model = opened.before.model
     expected = opened.problem.expectation(model)
-    return Known(opened.problem, model, expected, deciding, judging=opened.held_out)
+    return SizeSearch(opened.problem, model, expected, deciding, judging=opened.held_out)
 
 
 def _within(number: int) -> Answer:
@@ -137,7 +140,7 @@ def _named(number: int) -> Answer:
         )
         before = judge(refine(model, train, 6), train, held_out)
         again = replace(opened, problem=train, held_out=held_out, before=before)
-        found[name] = [name in look_at_damper(again)[0].effects]
+        found[name] = [name in diagnose_damper(again)[0].effects]
     return found
 
 
@@ -152,11 +155,11 @@ def _added(problem: Problem, sized: Sized, value: float) -> list[Run]:
     ]
 
 
-def _known(problem: Problem, model: Model, deciding: int) -> Known:
-    return Known(problem, model, problem.expectation(model), deciding)
+def _known(problem: Problem, model: Model, deciding: int) -> SizeSearch:
+    return SizeSearch(problem, model, problem.expectation(model), deciding)
 
 
-def _holds(name: str, clean: Known, size: float) -> bool:
+def _holds(name: str, clean: SizeSearch, size: float) -> bool:
     """Return whether the limit allows an effect that was added, of a size [log of its limit]."""
     sized, problem = Sized(name, clean), clean.problem
     limit = limit_of(sized).largest

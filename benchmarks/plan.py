@@ -27,14 +27,14 @@ import numpy as np
 
 import bristle
 from bristle.diagnosis.effect_limits import limit_of
-from bristle.diagnosis.effect_size import Known, Sized
-from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.effect_size import Sized, SizeSearch
 from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.trials import joinable
 from bristle.examples.make import Choice
 from bristle.examples.perform import perform_plan
 from bristle.identification.fit import intervals_of
 from bristle.identification.problem import Model
+from bristle.identification.rig import DAMPER
 from bristle.physics.effect import EFFECTS
 from bristle.planning.folder import PlannedRun
 from bristle.study.learn import learn_effect
@@ -102,12 +102,13 @@ def _campaign(number: int, folder: Path) -> Answer:
 
 def _shown(rig: TrueRig, runs: Sequence[PlannedRun]) -> Answer:
     """Return from what size each effect is named, and the deviations of the law's parameters."""
-    opened = BenchRuns(*rig.measured(runs), Model(rig.law), False, lambda _: None).open_damper()
-    if not isinstance(opened, Opening):
-        raise RuntimeError(json.dumps(opened.reasons))
+    campaign = BenchRuns(*rig.measured(runs), Model(rig.law))
+    opened = campaign.prepare(DAMPER)
+    if opened is None:
+        raise RuntimeError(str(campaign.lacking))
     model, problem = opened.before.model, opened.problem
     deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
-    known = Known(problem, model, problem.expectation(model), deciding)
+    known = SizeSearch(problem, model, problem.expectation(model), deciding)
     sizes = {}
     for name in joinable(model):
         if EFFECTS[name].amount:

@@ -63,7 +63,7 @@ def test_the_instances_differ_where_the_docs_say_so() -> None:
         varied.values_of("gain")
         == "0.02, RECONSTRUCTED 0.05, SITE 0.03, SENSOR 0.03, DRIVE 0.03, LIMITED 0.03"
     )
-    assert varied.values_of("loud") == "0.9"
+    assert varied.values_of("noise_overestimated") == "0.9"
 
 
 @pytest.mark.parametrize("base", [BENCH, SITE])

@@ -22,13 +22,14 @@ from benchmarks._blind import building, cases, plan, subject
 from benchmarks._blind.plan import Task
 from bristle.core.files import cache_folder
 from bristle.diagnosis.decision import decide
-from bristle.diagnosis.prepared import Insufficient, opening
+from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.rule import BENCH, DecisionRule
 from bristle.diagnosis.sensor_faults import instruments_of
-from bristle.diagnosis.site import Trials, is_organised, look_at
+from bristle.diagnosis.site import Trials, diagnose_line, is_organised, prepare_line
 from bristle.diagnosis.trials import BLOCK, Trial, parts_of
 from bristle.identification.building_sites import structure_problems
 from bristle.identification.problem import Model
+from bristle.identification.rig import DAMPER
 
 from .varied import variants
 
@@ -125,13 +126,14 @@ def made(task: Task) -> list[Stored]:
     )
     if task.kind == "structure":
         problems = structure_problems(train, holdout, building.file_of(case), task.law)
-        found = {s: look_at(s, *pair) for s, pair in problems.items() if s != "damper"}
+        lines = {s: prepare_line(s, *pair) for s, pair in problems.items() if s != "damper"}
+        found = {site: diagnose_line(site, one) for site, one in lines.items()}
         return [
             Stored(task, site, code, before=one.before, single=list(one.trials))
             for site, one in found.items()
         ]
-    opened = opening(train, holdout, Model(task.law))
-    if isinstance(opened, Insufficient):
+    opened = BenchRuns(train, holdout, Model(task.law)).prepare(DAMPER)
+    if opened is None:
         return [Stored(task, "", code, "insufficient")]
     trials = Trials(opened)
     first = trials.patterns[0] if trials.patterns else None

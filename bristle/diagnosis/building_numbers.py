@@ -77,7 +77,9 @@ def suited_masses(shaken: Shaken, building: Building, rule: DecisionRule = SITE)
     if float(np.max(np.abs(shift / (1.0 + shift)))) > rule.mass_doubt:
         return building
     moved = with_masses(building, shift)
-    return moved if _excess(shaken.lines(moved), rule) <= rule.moved * before else building
+    return (
+        moved if _excess(shaken.lines(moved), rule) <= rule.building_excess * before else building
+    )
 
 
 def with_masses(building: Building, shift: Array) -> Building:

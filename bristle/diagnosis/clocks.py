@@ -19,6 +19,7 @@ from ..data.corrections import LEFT_OUT
 from ..data.left_out import MISSING, merged
 from ..identification.problem import Model, Problem, Run, robust_z
 from ..identification.start_grid import refine
+from .model_faults import ModelBasedFaults
 from .rule import SENSOR, DecisionRule
 from .trials import Trial, judge
 
@@ -47,16 +48,6 @@ HUBER = 6.0
 
 
 @dataclass(frozen=True)
-class ClockFaults:
-    """Faults of clocks, the runs set right, and how the model does on them."""
-
-    faults: tuple[Finding, ...]
-    train: Problem
-    held_out: Problem
-    trial: Trial
-
-
-@dataclass(frozen=True)
 class Clocks:
     """The rate [s/s] by which the force's clock gains, and by how much it is late at each begin.
 
@@ -75,7 +66,7 @@ class Clocks:
 
 def clock_faults(
     before: Trial, train: Problem, held_out: Problem, rule: DecisionRule = SENSOR
-) -> ClockFaults | None:
+) -> ModelBasedFaults | None:
     """Return the faults of clocks that explain what a model leaves; None where they do not.
 
     Parameters
@@ -105,10 +96,10 @@ def clock_faults(
     moved = [_set_right(run, clocks, k) for k, run in enumerate(runs)]
     right = train.of(moved[:count]), held_out.of(moved[count:])
     trial = judge(refine(model, right[0]), *right)
-    faults = _told(clocks, runs, rule)
+    faults = _faults(clocks, runs, rule)
     if not faults or not _explain(trial, before, rule):
         return None
-    return ClockFaults(faults, *right, trial)
+    return ModelBasedFaults(faults, *right, trial)
 
 
 def _hopeless(
@@ -224,7 +215,7 @@ def _explain(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
 def _rate_matters(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> bool:
     longest = max(len(run.force) for run in runs)
     least = rule.least_delay / longest
-    return abs(clocks.rate) > max(rule.sure * clocks.rate_std, least)
+    return abs(clocks.rate) > max(rule.fault_sigma * clocks.rate_std, least)
 
 
 def _apart(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[float, list[int]]:
@@ -236,7 +227,7 @@ def _apart(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[float, 
         k
         for k, run in enumerate(runs)
         if abs(clocks.late[k] - usual)
-        > max(rule.sure * clocks.late_std[k], rule.least_delay * run.dt)
+        > max(rule.fault_sigma * clocks.late_std[k], rule.least_delay * run.dt)
     ]
     return usual, off
 
@@ -245,7 +236,7 @@ def _differ(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> bool:
     return _rate_matters(clocks, runs, rule) or bool(_apart(clocks, runs, rule)[1])
 
 
-def _told(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[Finding, ...]:
+def _faults(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[Finding, ...]:
     """Return the faults that clocks are; what all runs share is one, each run apart another."""
     out: list[Finding] = []
     rated = _rate_matters(clocks, runs, rule)
@@ -266,7 +257,7 @@ def _told(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[Finding,
         )  # fmt: skip
     coarsest = max(run.dt for run in runs)
     if (rated or off) and abs(usual) > max(
-        rule.sure * float(np.median(clocks.late_std)), rule.least_delay * coarsest
+        rule.fault_sigma * float(np.median(clocks.late_std)), rule.least_delay * coarsest
     ):
         out.append(_late(usual, float(np.median(clocks.late_std)), "In every run", ""))
     for k in off:

@@ -20,7 +20,7 @@ from ..identification.problem import Expected, Model, Problem, Run, residuals
 from ..identification.search import HUBER, descend, loss, mean_loss
 from ..identification.start_grid import Search, refine
 from ..physics.drive import DRIVES
-from .model_faults import ModelBasedFault, explains, has_rival, promise
+from .model_faults import ModelBasedFaults, explains, has_rival, promise
 from .rule import LIMITED, DecisionRule
 from .trials import Trial, judge
 
@@ -63,16 +63,14 @@ def limited_drive(
     before: Trial,
     train: Problem,
     held_out: Problem,
-    drive: str = "voltage",
     rule: DecisionRule = LIMITED,
-) -> ModelBasedFault | None:
+) -> ModelBasedFaults | None:
     """Return the limit of the command that explains what a model leaves; None where none does.
 
     Parameters
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
     train, held_out : runs to fit to, and those that decide
-    drive : the channel that is the runs' command, one of `data.channels.DRIVE`
     rule : the numbers that decide
     """
     if before.z < 1.0 + rule.gain or not _moving(train):
@@ -85,14 +83,15 @@ def limited_drive(
         return None
     found = min((_fitted(one, train, expected) for one in able), key=lambda one: one.cost)
     explained = promise(found.cost, at_first)
-    if explained < rule.share_when_clean or not found.value > rule.sure * found.std:
+    if explained < rule.share_when_clean or not found.value > rule.fault_sigma * found.std:
         return None
     right, other = _felt(train, found), _felt(held_out, found)
     trial = judge(refine(found.model, right, 4), right, other)
-    told = ModelBasedFault(_told(found, train, held_out, drive), right, other, trial)
-    if not explains(trial, before, rule) or has_rival(told, before, train, "limited_drive", rule):
+    fault = _fault(found, train, held_out)
+    shown = ModelBasedFaults((fault,), right, other, trial)
+    if not explains(trial, before, rule) or has_rival(shown, before, train, "limited_drive", rule):
         return None
-    return told
+    return shown
 
 
 def _largest(problem: Problem) -> float:
@@ -174,9 +173,10 @@ def _fitted(limit: _Limit, train: Problem, expected: Expected) -> _Limit:
     )
 
 
-def _told(limit: _Limit, train: Problem, held_out: Problem, drive: str) -> Finding:
+def _fault(limit: _Limit, train: Problem, held_out: Problem) -> Finding:
     """Return the fault that a limit is, with what it does to the runs."""
-    runs, most = [*train.runs, *held_out.runs], max(_largest(train), _largest(held_out))
+    runs, drive = [*train.runs, *held_out.runs], train.runs[0].drive
+    most = max(_largest(train), _largest(held_out))
     felt = [limited(run.V, run.dt, limit.fault, limit.value) for run in runs]
     gaps = [np.abs(run.V - one) for run, one in zip(runs, felt, strict=True)]
     apart = [gap > APART * most for gap in gaps]

@@ -13,6 +13,7 @@ from ..physics.effect import EFFECTS, Effect, effects_of, plain_name
 from . import words
 from .decision import Z
 from .load_cell import FORCE_GAIN, low_pass_text
+from .prepared import Insufficient
 from .rule import BENCH, SITE, DecisionRule
 from .sensor_faults import instruments_of
 from .site_diagnosis import SiteDiagnosis
@@ -28,7 +29,7 @@ NOT_DRIVEN = "No command was recorded: one that changed would look like this."
 
 
 @dataclass(frozen=True)
-class About:
+class VerdictContext:
     """What a verdict tells beside what the sites show.
 
     `force` of a damper is "measured" or "reconstructed"; `sensors` the faults that channels show;
@@ -45,21 +46,21 @@ class About:
     beside_layer: bool = True
 
 
-def conclude(findings: Mapping[str, SiteDiagnosis], about: About) -> Diagnosis:
+def conclude(findings: Mapping[str, SiteDiagnosis], context: VerdictContext) -> Diagnosis:
     """Return one verdict from what the sites of a rig show.
 
     Parameters
     ----------
     findings : by site, the damper's last
-    about : what else is known of the runs
+    context : what else is known of the runs
     """
-    if about.force == "measured" and about.beside_layer:
+    if context.force == "measured" and context.beside_layer:
         damper = findings.get(DAMPER)
         findings = {site: _after_the_force(found, damper) for site, found in findings.items()}
-    if not about.driven:
+    if not context.driven:
         findings = {site: _without_command(found) for site, found in findings.items()}
-    reconstructed = about.force == "reconstructed" and about.beside_layer
-    sensors = _sensors(findings, about)
+    reconstructed = context.force == "reconstructed" and context.beside_layer
+    sensors = _sensors(findings, context)
     parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
     parts = _beside_what_is_found(parts)
     named: list[str] = []
@@ -81,15 +82,22 @@ def conclude(findings: Mapping[str, SiteDiagnosis], about: About) -> Diagnosis:
         sites |= dict.fromkeys(shown, "sensor")
     effects = tuple(dict.fromkeys([*named, *rivals]))
     unknown = next((part for part in parts if part.kind == "unknown"), None)
-    reasons = [*_told(parts, kind, about), *(_without_load_cell(a) for a in alike.values())]
-    if kind == "unknown" and not about.driven:
+    reasons = [*_told(parts, kind, context), *(_without_load_cell(a) for a in alike.values())]
+    if kind == "unknown" and not context.driven:
         reasons.append(NOT_DRIVEN)
     return Diagnosis(
         kind, effects[: BENCH.most_alternatives] if kind == "ambiguous" else effects,
         tuple(reasons), findings, sensors, _untestable(findings, effects, reconstructed),
         unknown.coordinate if unknown else "", sites,
-        tuple(one for one in alike if one not in EFFECTS), about.force, about.noise,
+        tuple(one for one in alike if one not in EFFECTS), context.force, context.noise,
     )  # fmt: skip
+
+
+def insufficient(lacking: Insufficient) -> Diagnosis:
+    """Return the verdict on data that carry none."""
+    return Diagnosis(
+        "insufficient", (), lacking.reasons, sensors=lacking.faults, noise=lacking.noise
+    )
 
 
 def _without_command(found: SiteDiagnosis) -> SiteDiagnosis:
@@ -102,21 +110,21 @@ def _without_command(found: SiteDiagnosis) -> SiteDiagnosis:
     )
 
 
-def _sensors(findings: Mapping[str, SiteDiagnosis], about: About) -> tuple[Finding, ...]:
+def _sensors(findings: Mapping[str, SiteDiagnosis], context: VerdictContext) -> tuple[Finding, ...]:
     """Return the faults of all sensors; what a site tells anew takes the place of the first."""
     renewed = [fault for found in findings.values() for fault in found.sensors]
     again = {(one.channel, one.kind) for one in renewed}
-    first = [one for one in about.sensors if (one.channel, one.kind) not in again]
+    first = [one for one in context.sensors if (one.channel, one.kind) not in again]
     return (*first, *_of_load_cell(findings), *renewed)
 
 
-def _told(parts: Sequence[SiteDiagnosis], kind: str, about: About) -> list[str]:
+def _told(parts: Sequence[SiteDiagnosis], kind: str, context: VerdictContext) -> list[str]:
     """Return why the verdict is what it is, and what else is to be said of sites and runs."""
     return [
         *_reasons(parts, kind),
         *filter(None, map(low_pass_text, parts)),
         *(text for part in parts for text in effect_words(part)),
-        *about.notes,
+        *context.notes,
     ]
 
 

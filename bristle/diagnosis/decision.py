@@ -91,7 +91,7 @@ def decide(
     if not ranked or not missing(before, ranked[0], rule):
         return _without_effect(before, ranked, organised, rule)
     best = ranked[0]
-    if before.z < rule.loud:
+    if before.z < rule.noise_overestimated:
         return _too_loud(before, best, where)
     explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
     if best.z > rule.adequate:

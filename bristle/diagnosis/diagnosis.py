@@ -9,7 +9,6 @@ from ..comparison.conditions import label_errors, label_sentence, with_levels
 from ..comparison.predictions import run_predictions
 from ..data.channels import Labels, varying
 from ..data.measurement import Measurement
-from ..identification.building_sites import StructureProblem
 from ..identification.fit import intervals_of, multistart_refit
 from ..identification.problem import Model, Run
 from ..identification.rig import DAMPER
@@ -17,18 +16,20 @@ from ..identification.start_grid import is_rough
 from ..physics.building import Building
 from ..physics.effect import exclude
 from ..physics.laws import DEFAULT
-from .conclusion import conclude
+from .conclusion import conclude, insufficient
 from .effect_limits import EffectLimit, detectable, effect_limits, profiled, untestable
 from .experiments import separating
 from .inconsistent_runs import contradicted
-from .prepared import IN_BUILDING, Insufficient, Opening, Progress, of_layer, silent
+from .law_trials import better_law, try_laws
+from .prepared import Prepared, Progress, of_layer, silent
 from .remaining import patterns_of, remaining_residual
-from .rig_runs import BenchRuns, BuildingRuns
-from .rule import SITE
-from .site import joinable_at, look_at, look_at_damper
+from .rig_runs import RigRuns, runs_of_rig
+from .site import diagnose_damper, diagnose_line, joinable_at
 from .site_diagnosis import SiteDiagnosis
 from .trials import SHOWN, joinable, judge
 from .verdict import Diagnosis
+
+NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the law."
 
 # What is told of every site beside what is missing there.
 #
@@ -36,26 +37,28 @@ from .verdict import Diagnosis
 # organised, how well parameters are known, and which run would distinguish alternatives.
 
 
-def detailed(found: SiteDiagnosis, opened: Opening, *, profile: bool = False) -> SiteDiagnosis:
+def with_evidence(
+    found: SiteDiagnosis, prepared: Prepared, *, profile: bool = False
+) -> SiteDiagnosis:
     """Return a site's finding with limits, patterns, intervals and, where asked for, a next run.
 
     Parameters
     ----------
     found : what the site lacks
-    opened : its runs and its model
+    prepared : its runs and its model
     profile : whether the model is fitted again at every limit, see `profiled_limits`
     """
-    found = _with_limits(found, opened, profile)
-    found = _with_intervals(_with_patterns(found, opened), opened)
-    return _with_labels(found, opened)
+    found = _with_limits(found, prepared, profile)
+    found = _with_intervals(_with_patterns(found, prepared), prepared)
+    return _with_labels(found, prepared)
 
 
-def _with_labels(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
+def _with_labels(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding that says on which runs the present model errs, where a label tells it."""
-    runs = [*opened.problem.runs, *opened.held_out.runs]
+    runs = [*prepared.problem.runs, *prepared.held_out.runs]
     if found.kind == "none" or not found.noise_known or not varying(_known(runs)):
         return found
-    predictions = run_predictions(opened.problem.of(runs), opened.before.model)
+    predictions = run_predictions(prepared.problem.of(runs), prepared.before.model)
     told = label_sentence(label_errors(predictions))
     if not told:
         return found
@@ -67,71 +70,71 @@ def _known(runs: Sequence[Run]) -> list[Labels]:
     return with_levels(runs[0].drive, [run.V for run in runs], [run.labels for run in runs])
 
 
-def _with_limits(found: SiteDiagnosis, opened: Opening, profile: bool) -> SiteDiagnosis:
+def _with_limits(found: SiteDiagnosis, prepared: Prepared, profile: bool) -> SiteDiagnosis:
     """Return a finding with what the data could not show, and what would tell more."""
-    problem, model, rule = opened.searched, opened.before.model, opened.rule
+    problem, model, rule = prepared.searched, prepared.before.model, prepared.rule
     expected = problem.expectation(model)
     visible = detectable(problem, expected, rule, found.z_after)
-    hidden = untestable(model, problem, expected, visible, rule, _able(found, opened))
+    hidden = untestable(model, problem, expected, visible, rule, _able(found, prepared))
     experiment = None
-    if found.kind == "ambiguous" and opened.scope.choose_motion:
+    if found.kind == "ambiguous" and prepared.scope.choose_motion:
         members = [t.model for t in found.trials if set(t.effects) & set(found.effects)]
-        experiment = separating(members, opened.problem)
+        experiment = separating(members, prepared.problem)
     seen = visible if found.noise_known else float("nan")
     found = replace(found, detectable=seen, untestable=tuple(hidden), experiment=experiment)
-    return replace(found, limits=_limits(found, opened, profile))
+    return replace(found, limits=_limits(found, prepared, profile))
 
 
-def _limits(found: SiteDiagnosis, opened: Opening, profile: bool) -> tuple[EffectLimit, ...]:
+def _limits(found: SiteDiagnosis, prepared: Prepared, profile: bool) -> tuple[EffectLimit, ...]:
     """Return how large each further effect may be beside the model that a finding names."""
     if found.kind == "insufficient" or found.after is None or not found.noise_known:
         return ()
-    model = (found.after if found.kind == "effect" else opened.before).model
-    known = opened.known(model)
+    model = (found.after if found.kind == "effect" else prepared.before).model
+    known = prepared.known(model)
     able = [
         name
-        for name in _able(found, opened)
+        for name in _able(found, prepared)
         if not any(name == one or exclude(name, one) for one in model.effects)
     ]
     limits = effect_limits(known, able, found.untestable)
     return profiled(known, limits) if profile else limits
 
 
-def _able(found: SiteDiagnosis, opened: Opening) -> list[str]:
+def _able(found: SiteDiagnosis, prepared: Prepared) -> list[str]:
     """Return the effects that can join the model at a site."""
-    model = opened.before.model
+    model = prepared.before.model
     if model.law_class.site == "structure":
         return joinable_at(found.site, model)
-    shown = tuple(channel for channel in SHOWN if channel in opened.shown)
-    return [*joinable(model, shown), *of_layer(model, opened.problem)]
+    shown = tuple(channel for channel in SHOWN if channel in prepared.shown)
+    return [*joinable(model, shown), *of_layer(model, prepared.problem)]
 
 
-def _with_patterns(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
+def _with_patterns(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding with the coordinates that its residual depends on, where it has any."""
     if found.kind == "none" and not found.patterns:
         return found
-    patterns = list(found.patterns) or patterns_of(opened.before, opened.held_out)
+    patterns = list(found.patterns) or patterns_of(prepared.before, prepared.held_out)
     if found.kind != "unknown":
         return replace(found, patterns=tuple(patterns))
     coordinate, patterns, beside = remaining_residual(
-        opened.before, found.trials, patterns, opened.held_out, opened.rule
+        prepared.before, found.trials, patterns, prepared.held_out, prepared.rule
     )
     return replace(found, coordinate=coordinate, patterns=tuple(patterns), beside=beside)
 
 
-def _with_intervals(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
+def _with_intervals(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding with standard deviations; its model refitted where `Scope.sweeps` asks so.
 
     Parameters that the data cannot identify have none.
     """
     after = found.after
     assert after is not None
-    if not opened.scope.sweeps:
-        fitted = intervals_of(opened.problem, after.model)
+    if not prepared.scope.sweeps:
+        fitted = intervals_of(prepared.problem, after.model)
     else:
-        fitted = multistart_refit(opened.problem, after.model, opened.scope.sweeps)
-    if opened.scope.sweeps and is_rough(after.model):
-        again = judge(fitted.model, opened.problem, opened.held_out)
+        fitted = multistart_refit(prepared.problem, after.model, prepared.scope.sweeps)
+    if prepared.scope.sweeps and is_rough(after.model):
+        again = judge(fitted.model, prepared.problem, prepared.held_out)
         after = min(after, again, key=lambda one: one.z)
     identifiable = {n: s for n, s in fitted.std.items() if n not in fitted.unidentified}
     return replace(found, model=fitted.model, after=after, z_after=after.z, std=identifiable)
@@ -199,54 +202,72 @@ def diagnose_rig(
         If a run lacks a channel that is needed, is too short for a fit, or the building has other
         levels than were measured.
     """
-    runs: BenchRuns | BuildingRuns
-    if building is None:
-        runs = BenchRuns(train, holdout, present, identified, say)
-    else:
-        runs = BuildingRuns(train, holdout, present, building, say)
-        if runs.lacking is not None:
-            return _insufficient(runs.lacking)
-    findings = look_at_lines(runs, say, profile=profile)
+    runs = runs_of_rig(train, holdout, present, building, identified=identified, say=say)
+    if runs.lacking is not None:
+        return insufficient(runs.lacking)
+    findings = diagnose_lines(runs, say, profile=profile)
     runs.correct(findings)
-    opened = runs.open_damper()
-    if isinstance(opened, Insufficient):
-        return _insufficient(opened)
-    if opened is not None:
-        found, opened = look_at_damper(opened, say)
-        if isinstance(runs, BuildingRuns) and runs.suited_to(found):
-            again = runs.open_damper()
-            assert again is not None
-            found, opened = look_at_damper(again, say)
-        excused = runs.excused(found, findings)
-        say("intervals")
-        # What an instrument explains contradicts nothing.
-        settled = excused if excused is not found else contradicted(found, opened)
-        findings[DAMPER] = detailed(
-            runs.beside_other_laws(settled, opened), opened, profile=profile
-        )
-    return conclude(findings, runs.about())
+    prepared = runs.prepare(DAMPER)
+    if prepared is None:
+        return conclude(findings, runs.context(None))
+    found, prepared = diagnose_damper(prepared, say)
+    if runs.suit(found):
+        again = runs.prepare(DAMPER)
+        assert again is not None
+        found, prepared = diagnose_damper(again, say)
+    say("intervals")
+    found = settled(found, prepared, runs, findings)
+    if prepared.scope.any_law:
+        found = _beside_other_laws(found, prepared, runs.bends, say)
+    findings[DAMPER] = with_evidence(found, prepared, profile=profile)
+    return conclude(findings, runs.context(prepared))
 
 
-def _insufficient(why: Insufficient) -> Diagnosis:
-    return Diagnosis("insufficient", (), why.reasons, sensors=why.faults, noise=why.noise)
-
-
-def look_at_lines(
-    runs: BenchRuns | BuildingRuns, say: Progress = silent, *, profile: bool = False
+def diagnose_lines(
+    runs: RigRuns, say: Progress = silent, *, profile: bool = False
 ) -> dict[str, SiteDiagnosis]:
-    """Return what the isolation layer and the storeys show, by site; nothing on a bench."""
+    """Return what the isolation layer and the storeys lack, by site; nothing on a bench."""
     findings: dict[str, SiteDiagnosis] = {}
-    for name, pair in runs.lines().items():
-        say(f"{name}: effects of the structure")
-        findings[name] = _line(name, pair, runs.part(name), profile)
+    for site in runs.lines():
+        say(f"{site}: effects of the structure")
+        prepared = runs.prepare(site)
+        assert prepared is not None
+        found = contradicted(diagnose_line(site, prepared), prepared)
+        findings[site] = with_evidence(found, prepared, profile=profile)
     return findings
 
 
-def _line(
-    name: str, pair: tuple[StructureProblem, StructureProblem], present: Model, profile: bool
+def settled(
+    found: SiteDiagnosis,
+    prepared: Prepared,
+    runs: RigRuns,
+    findings: Mapping[str, SiteDiagnosis],
 ) -> SiteDiagnosis:
-    """Return what a layer or storey shows, on its runs for training and held out."""
-    found = look_at(name, *pair, present)
-    assert found.before is not None
-    opened = Opening(found.before, *pair, rule=SITE, scope=IN_BUILDING)
-    return detailed(contradicted(found, opened), opened, profile=profile)
+    """Return the damper's diagnosis, excused by an instrument or contradicted by its runs.
+
+    What an instrument explains contradicts nothing.
+
+    Parameters
+    ----------
+    found, prepared : what the damper lacks, and what its diagnosis began with
+    runs : of the rig
+    findings : what the other sites lack
+    """
+    excused = runs.excused(found, findings)
+    return excused if excused is not found else contradicted(found, prepared)
+
+
+def _beside_other_laws(
+    found: SiteDiagnosis, prepared: Prepared, bends: bool, say: Progress
+) -> SiteDiagnosis:
+    """Return a diagnosis that leaves an error with how much of it is the form of the law."""
+    judged = found.before if found.kind == "unknown" else found.after
+    if found.kind == "insufficient" or judged is None or judged.z <= prepared.rule.clean:
+        return found
+    if not found.noise_known:
+        return found
+    say("trying every law")
+    laws = try_laws(prepared.searched, prepared.held_out, judged.model, bends=bends)
+    other = better_law(judged, laws, prepared.rule)
+    text = NOT_THE_LAW if other is None else other.sentence(added=found.kind != "unknown")
+    return replace(found, other_law=other, reasons=(*found.reasons, text))

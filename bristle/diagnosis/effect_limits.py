@@ -19,7 +19,15 @@ from ..identification.problem import Expected, Model, Problem, absorbed, residua
 from ..identification.search import in_threads, loss
 from ..identification.start_grid import Search, initial_guesses, refine
 from ..physics.effect import EFFECTS, effects_of
-from .effect_size import ONE_SIDED, TWO_SIDED, Known, Sized, largest_allowed, named_size, resolved
+from .effect_size import (
+    ONE_SIDED,
+    TWO_SIDED,
+    Sized,
+    SizeSearch,
+    largest_allowed,
+    named_size,
+    resolved,
+)
 from .rule import BENCH, DecisionRule
 from .trials import joinable
 
@@ -76,7 +84,7 @@ class EffectLimit:
 
 
 def effect_limits(
-    known: Known, names: Sequence[str], hidden: Sequence[str] = ()
+    known: SizeSearch, names: Sequence[str], hidden: Sequence[str] = ()
 ) -> tuple[EffectLimit, ...]:
     """Return what runs allow of each effect, by name; of those without an `amount` that it lacks.
 
@@ -243,7 +251,7 @@ SWEEPS = 6
 """Jacobians of such a fit, which begins at what the runs gave without the effect."""
 
 
-def profiled(known: Known, limits: Sequence[EffectLimit]) -> tuple[EffectLimit, ...]:
+def profiled(known: SizeSearch, limits: Sequence[EffectLimit]) -> tuple[EffectLimit, ...]:
     """Return limits with each size checked by fits; those without a size as they are.
 
     Parameters
@@ -262,7 +270,7 @@ def profiled(known: Known, limits: Sequence[EffectLimit]) -> tuple[EffectLimit, 
     return tuple(in_threads(checked, limits))
 
 
-def _checked(known: Known, limit: EffectLimit) -> EffectLimit:
+def _checked(known: SizeSearch, limit: EffectLimit) -> EffectLimit:
     """Return a limit at which the likelihood of a model fitted there has fallen far enough.
 
     Of an effect that may have either sign it is the larger one of both.
@@ -325,7 +333,7 @@ def _fitted(sized: Sized, model: Model) -> Array:
     return left
 
 
-def _scatter(known: Known, change: Array) -> float:
+def _scatter(known: SizeSearch, change: Array) -> float:
     """Return the standard deviation of a change's (n,) product with the residual, of length one."""
     length = float(np.linalg.norm(change))
     return known.scatter(change / length) if length > 0.0 else 1.0

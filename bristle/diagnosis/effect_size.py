@@ -49,7 +49,7 @@ SMALL = 0.02
 
 
 @dataclass(frozen=True)
-class Known:
+class SizeSearch:
     """What all limits of some runs are found with: the model's residuals and sensitivities.
 
     `names` of the model's free parameters; `held_out` how many samples decide a verdict; `judging`
@@ -202,7 +202,7 @@ class Known:
 class Sized:
     """An effect in a model with one number for its size: 1 is that of a first guess, 0 is none."""
 
-    def __init__(self, name: str, known: Known) -> None:
+    def __init__(self, name: str, known: SizeSearch) -> None:
         effect, self.known = EFFECTS[name], known
         self.name, self.parameter = name, effect.amount.removeprefix("1/")
         self.falls = effect.amount.startswith("1/")
@@ -462,7 +462,7 @@ def _roughness(likelihood: Callable[[float], float], size: float) -> float:
     return 2.0 * sqrt(float(left @ left) / (len(shares) - 3))
 
 
-def _if_linear(known: Known, slope: Array, apart: float) -> tuple[float, float]:
+def _if_linear(known: SizeSearch, slope: Array, apart: float) -> tuple[float, float]:
     """Return where a likelihood ends, and its best, if the change is in proportion to the size.
 
     Parameters

@@ -49,7 +49,7 @@ class Experiment:
 
     def sentence(self, rule: DecisionRule = BENCH) -> str:
         """Return the run as a sentence of an experiment's plan."""
-        if self.deviations < rule.tells:
+        if self.deviations < rule.separating_sigma:
             return (
                 "No run within the strokes, speeds, accelerations and levels of the "
                 f"{self.drive.name} so far would distinguish them: at best the forces "

@@ -18,7 +18,7 @@ from ..identification.rig import DAMPER
 from ..identification.search import z_scale
 from .clocks import clock_faults
 from .decision import OTHER_FORM, Z, force_in
-from .prepared import Opening
+from .prepared import Prepared
 from .rule import BENCH, DecisionRule
 from .site_diagnosis import SiteDiagnosis
 from .trials import Trial
@@ -144,40 +144,42 @@ HELD_OUT_DIFFER = (
 )
 
 
-def contradicted(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
+def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding, insufficient where the runs contradict each other, with the reason.
 
     Parameters
     ----------
     found : what a site's trials lead to
-    opened : the site's runs and its model
+    prepared : the site's runs and its model
     """
     assert found.after is not None
     if not found.noise_known:
         return found  # of no run can be said what its error is over noise
-    opened = opened.with_excess(0.0)  # whether noise is all that a model leaves of some of the runs
+    prepared = prepared.with_excess(
+        0.0
+    )  # whether noise is all that a model leaves of some of the runs
     for apart in (_but_for_a_run, _but_for_clocks):
-        odd = apart(found, opened)
+        odd = apart(found, prepared)
         if odd is not found:
             return odd
-    before, rule, at_damper = opened.before, opened.rule, found.site == DAMPER
+    before, rule, at_damper = prepared.before, prepared.rule, found.site == DAMPER
     kind = kind_of(found.kind, before, found.after, rule)
-    runs = opened.searched, opened.held_out, rule
+    runs = prepared.searched, prepared.held_out, rule
     if found.kind == kind == "unknown":
-        told = groups(before.model, *runs, opened.scope.restart)
+        told = groups(before.model, *runs, prepared.scope.restart)
         return replace(found, kind="insufficient", reasons=(told,)) if told else found
     if found.kind == "unknown":
-        differ = HELD_OUT_DIFFER.format(force=force_in(opened.held_out, found.site))
+        differ = HELD_OUT_DIFFER.format(force=force_in(prepared.held_out, found.site))
         worst = inconsistent_runs(before.model, *runs, at_damper)
         told = " ".join(filter(None, [*found.reasons, differ, worst]))
         return replace(found, kind=kind, reasons=(told,))
     if kind == found.kind:
         return found
-    told = inconsistent_runs(found.after.model, opened.problem, *runs[1:], at_damper)
+    told = inconsistent_runs(found.after.model, prepared.problem, *runs[1:], at_damper)
     return replace(found, kind=kind, reasons=(told,))
 
 
-def _but_for_a_run(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
+def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding that names the run whose zero or gain is another one, if there is one.
 
     Where a model explains all other runs, what they leave together is no other form of an effect,
@@ -186,17 +188,17 @@ def _but_for_a_run(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
 
     Parameters
     ----------
-    found, opened : as in `contradicted`
+    found, prepared : as in `contradicted`
     """
-    for trial, added in _to_be_explained(found, opened):
+    for trial, added in _to_be_explained(found, prepared):
         called = f"The model with {' and '.join(added)}" if added else "One model"
-        told = odd_run(trial.model, opened.searched, opened.held_out, opened.rule, called)
+        told = odd_run(trial.model, prepared.searched, prepared.held_out, prepared.rule, called)
         if told:
             return _with_reason(found, trial, told)
     return found
 
 
-def _but_for_clocks(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
+def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding that names the runs whose loggers began apart, if that explains the rest.
 
     Beside a missing effect it shows only in what the effect leaves: clocks are looked at for the
@@ -204,29 +206,29 @@ def _but_for_clocks(found: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
 
     Parameters
     ----------
-    found, opened : as in `contradicted`
+    found, prepared : as in `contradicted`
     """
-    for trial, added in _to_be_explained(found, opened):
-        clocks = clock_faults(trial, opened.problem, opened.held_out) if added else None
+    for trial, added in _to_be_explained(found, prepared):
+        clocks = clock_faults(trial, prepared.problem, prepared.held_out) if added else None
         if clocks is not None:
             told = " ".join(fault.text for fault in clocks.faults)
-            seen = f"Told from {force_in(opened.problem)}."
+            seen = f"Told from {force_in(prepared.problem)}."
             return _with_reason(found, trial, f"With {' and '.join(added)}: {told} {seen}")
     return found
 
 
-def _to_be_explained(found: SiteDiagnosis, opened: Opening) -> list[tuple[Trial, list[str]]]:
+def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Trial, list[str]]]:
     """Return trials that leave more than noise, with the effects that they add, simplest first.
 
     None where the force is no measured one.
     """
-    after, problem = found.after, opened.problem
+    after, problem = found.after, prepared.problem
     assert after is not None
     by_equilibrium = isinstance(problem, StructureProblem) and problem.reconstructed
-    if found.site != DAMPER or by_equilibrium or max(after.train, after.z) <= opened.rule.misfit:
+    if found.site != DAMPER or by_equilibrium or max(after.train, after.z) <= prepared.rule.misfit:
         return []
-    own = opened.before.model.effects
-    trials = {one.model.effects: one for one in (opened.before, *found.trials[:1], after)}
+    own = prepared.before.model.effects
+    trials = {one.model.effects: one for one in (prepared.before, *found.trials[:1], after)}
     return [(one, [name for name in one.effects if name not in own]) for one in trials.values()]
 
 

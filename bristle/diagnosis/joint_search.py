@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..data.channels import DRIVE
-from ..data.checks.runs import tells_a_bend
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..identification.problem import Model, Problem
 from ..identification.rig import DAMPER
 from ..physics.building import Building
-from .conclusion import About, conclude
-from .diagnosis import detailed, look_at_lines
-from .inconsistent_runs import contradicted
-from .law_choice import LawVerdict, Pair, choose, equivalents, search, simplest
+from .conclusion import conclude, insufficient
+from .diagnosis import diagnose_lines, settled, with_evidence
+from .law_choice import LawAndEffects, LawVerdict, choose, equivalents, search, simplest
 from .law_trials import KeptFits, LawTrial, not_finite, try_laws, weighed_anew
-from .prepared import Insufficient, Opening, Progress, bench_data, opened_with, silent
-from .rig_runs import BuildingRuns
+from .prepared import Prepared, Progress, silent
+from .rig_runs import RigRuns, runs_of_rig
 from .rule import BENCH, DecisionRule
-from .site import Trials, look_at_damper, noise_is_all
-from .trials import Trial, missed_by
+from .site import Trials, diagnose_damper, noise_is_all
+from .trials import missed_by
 from .verdict import Diagnosis
 
 
@@ -55,43 +52,15 @@ def diagnose_laws(
     RecordError
         If a run lacks a channel that is needed, is too short for a fit, or no run shows a damper.
     """
-    if building is not None:
-        runs = BuildingRuns(train, holdout, present, building, say, free=True)
-        if runs.lacking is None:
-            wish = (named, profile)
-            return _in_building(runs, tells_a_bend(train), wish, kept, say, rule)
-    lacking = None if building is None else runs.lacking
-    data = lacking or bench_data(train, holdout, present, say)
-    if isinstance(data, Insufficient):
-        return Diagnosis("insufficient", (), data.reasons, sensors=data.faults, noise=data.noise)
-    say("trying every law")
-    bends = tells_a_bend(train)
-    rows = try_laws(data.problem, data.held_out, present, bends=bends, kept=kept)
-    looks = Looks(lambda trial: opened_with(trial, data), say)
-    sought = _sought(rows, looks, (data.problem, data.held_out), say, rule)
-    finding = contradicted(sought.chosen.finding, sought.opened)
-    finding = detailed(finding, sought.opened, profile=profile)
-    driven = any(run.has(name) for run in (*train, *holdout) for name in DRIVE)
-    about = About(sensors=sought.opened.faults, noise=data.noise, driven=driven)
-    laws = sought.verdict(named, data.problem, present, rule)
-    return replace(conclude({DAMPER: finding}, about), laws=laws)
-
-
-def _in_building(
-    runs: BuildingRuns, bends: bool, wish: tuple[str, bool], kept: KeptFits | None, say: Progress,
-    rule: DecisionRule,
-) -> Diagnosis:  # fmt: skip
-    """Return the law of a building's damper and what it misses, beside what other sites miss.
-
-    `wish` is the present law by name, and whether limits are profiled.
-    """
-    named, profile = wish
+    runs = runs_of_rig(train, holdout, present, building, any_law=True, say=say)
+    if runs.lacking is not None:
+        return insufficient(runs.lacking)
     if runs.damper is None:
         raise RecordError(
             "no law of a damper can be sought: the runs have neither its force nor its command."
         )
-    present = runs.part(DAMPER)
-    findings = look_at_lines(runs, say, profile=profile)
+    present, bends = runs.part(DAMPER), runs.bends
+    findings = diagnose_lines(runs, say, profile=profile)
     if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law at hand
         say("trying every law, with the building as its file has it")
         first = try_laws(*runs.damper, present, bends=bends)
@@ -102,34 +71,33 @@ def _in_building(
         assert runs.damper is not None
         say("trying every law")
         rows = try_laws(*runs.damper, present, bends=bends, kept=kept)
-        sought = _sought(rows, Looks(runs.opened_with, say), runs.damper, say, rule)
+        sought = _sought(rows, TrialsByLaw(runs, say), runs.damper, say, rule)
         runs.suppose(sought.chosen.row.trial.model)
         return sought
 
     sought = searched(kept)
-    if runs.suited_to(sought.chosen.finding):
+    if runs.suit(sought.chosen.finding):
         sought = searched(None)  # what was kept was fitted to the force of the file's numbers
-    found = sought.chosen.finding
-    excused = runs.excused(found, findings)
-    settled = excused if excused is not found else contradicted(found, sought.opened)
-    findings[DAMPER] = detailed(settled, sought.opened, profile=profile)
+    prepared = sought.prepared
+    found = settled(sought.chosen.finding, prepared, runs, findings)
+    findings[DAMPER] = with_evidence(found, prepared, profile=profile)
     laws = sought.verdict(named, runs.damper[0], present, rule)
-    return replace(conclude(findings, runs.about()), laws=laws)
+    return replace(conclude(findings, runs.context(prepared)), laws=laws)
 
 
 @dataclass(frozen=True)
 class _Sought:
     """What the search for law and effects came to: `chosen` of `pairs`, and how all laws do."""
 
-    chosen: Pair
-    pairs: tuple[Pair, ...]
+    chosen: LawAndEffects
+    pairs: tuple[LawAndEffects, ...]
     rows: tuple[LawTrial, ...]
 
     @property
-    def opened(self) -> Opening:
-        """What the look at the chosen law began with."""
-        assert self.chosen.opened is not None
-        return self.chosen.opened
+    def prepared(self) -> Prepared:
+        """What the diagnosis with the chosen law began with."""
+        assert self.chosen.prepared is not None
+        return self.chosen.prepared
 
     def verdict(
         self, named: str, problem: Problem, present: Model, rule: DecisionRule
@@ -142,7 +110,7 @@ class _Sought:
 
 def _sought(
     rows: tuple[LawTrial, ...],
-    looks: Looks,
+    by_law: TrialsByLaw,
     runs: tuple[Problem, Problem],
     say: Progress,
     rule: DecisionRule,
@@ -151,47 +119,50 @@ def _sought(
 
     Where no pair explains the runs, what the nearest one misses counts beside the noise for all.
     """
-    pairs = search(rows, looks, rule)
+    pairs = search(rows, by_law, rule)
     nearest = min(pairs, key=lambda pair: pair.reach(rule).z)
-    assert nearest.opened is not None
-    looks.excess = missed_by(nearest.reach(rule), nearest.opened.problem)
-    if looks.excess:
+    assert nearest.prepared is not None
+    by_law.excess = missed_by(nearest.reach(rule), nearest.prepared.problem)
+    if by_law.excess:
         say("what no law explains counts beside the noise")
-        train, held_out = (one.with_excess(looks.excess) for one in runs)
+        train, held_out = (one.with_excess(by_law.excess) for one in runs)
         rows = weighed_anew(rows, train, held_out)
-        pairs = search(rows, looks, rule)
+        pairs = search(rows, by_law, rule)
     chosen = choose(pairs, rule)
     say(f"intervals of {chosen.row.law}")
     return _Sought(chosen, tuple(pairs), rows)
 
 
-class Looks:
-    """What laws lack, on one rig's runs: a second look at a law takes up where the first ended.
+class TrialsByLaw:
+    """What laws lack, on one rig's runs: a second search for a law goes on where the first ended.
 
     Parameters
     ----------
-    opened_with : the trial of a law to what a look at the damper begins with
+    runs : of the rig
     say : called with a few words at each stage
     """
 
-    def __init__(self, opened_with: Callable[[Trial], Opening], say: Progress = silent) -> None:
-        self.opened_with, self.say = opened_with, say
+    def __init__(self, runs: RigRuns, say: Progress = silent) -> None:
+        self.runs, self.say = runs, say
         self.made: dict[str, Trials] = {}
-        self.excess = 0.0  # N2, see `look_at_damper`
+        self.excess = 0.0  # N2, see `diagnose_damper`
 
-    def __call__(self, row: LawTrial, pairs: bool) -> Pair:
+    def __call__(self, row: LawTrial, pairs: bool) -> LawAndEffects:
         """Return what a law lacks: single effects alone, or pairs as well where none suffices."""
         made = self.made.get(row.law)
         if made is None:
-            opened = self.opened_with(row.trial)
-            if noise_is_all(opened):
-                return Pair(row, *look_at_damper(opened, self.say, pairs=pairs, excess=0.0))
+            prepared = self.runs.prepare(DAMPER, row.trial)
+            assert prepared is not None
+            if noise_is_all(prepared):
+                return LawAndEffects(
+                    row, *diagnose_damper(prepared, self.say, pairs=pairs, excess=0.0)
+                )
             self.say(f"effects that {row.law} lacks (error / noise {row.trial.z:.2f})")
-            made = Trials(opened, self.say)
+            made = Trials(prepared, self.say)
             self.made[row.law] = made
         elif pairs:
             self.say(f"two effects that {row.law} lacks")
-        finding, opened = look_at_damper(
-            made.opened, self.say, made, pairs=pairs, excess=self.excess
+        finding, prepared = diagnose_damper(
+            made.prepared, self.say, made, pairs=pairs, excess=self.excess
         )
-        return Pair(row, finding, opened)
+        return LawAndEffects(row, finding, prepared)

@@ -14,7 +14,7 @@ from typing import Any
 from ..physics.forms import CURVED, LINEAR_FORM, split_form
 from .decision import missing
 from .law_trials import LawTrial
-from .prepared import Opening
+from .prepared import Prepared
 from .rule import BENCH, DecisionRule
 from .site_diagnosis import SiteDiagnosis
 from .trials import Difference, Trial, joinable, paired
@@ -24,12 +24,12 @@ EXPLAINING = ("none", "effect", "ambiguous")
 
 
 @dataclass(frozen=True)
-class Pair:
+class LawAndEffects:
     """A law with what it lacks: the law's row, what the search found, and what it began with."""
 
     row: LawTrial
     finding: SiteDiagnosis
-    opened: Opening | None = None
+    prepared: Prepared | None = None
 
     @property
     def after(self) -> Trial:
@@ -40,7 +40,9 @@ class Pair:
     @property
     def fitted(self) -> int:
         """How many parameters are fitted."""
-        return len(self.after.model.free()) + bool(self.opened and self.opened.problem.free_zero)
+        return len(self.after.model.free()) + bool(
+            self.prepared and self.prepared.problem.free_zero
+        )
 
     @property
     def explains(self) -> bool:
@@ -171,8 +173,10 @@ def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
 
 
 def search(
-    rows: Sequence[LawTrial], look: Callable[[LawTrial, bool], Pair], rule: DecisionRule = BENCH
-) -> list[Pair]:
+    rows: Sequence[LawTrial],
+    look: Callable[[LawTrial, bool], LawAndEffects],
+    rule: DecisionRule = BENCH,
+) -> list[LawAndEffects]:
     """Return the pairs that decide; `look` searches the effects that a law lacks.
 
     Where noise is all that the best law leaves, the simplest that it does not surpass comes first:
@@ -188,7 +192,7 @@ def search(
     look : called with a row, and whether to try two effects; returns what its law lacks
     rule : the numbers that decide
     """
-    first, begun = simplest(rows, rule), list[Pair]()
+    first, begun = simplest(rows, rule), list[LawAndEffects]()
     if first.trial.z <= rule.complete:
         begun.append(look(first, True))
         if begun[0].finding.kind == "none" and not first.contains:
@@ -210,19 +214,19 @@ def search(
     return found
 
 
-def _explained(found: Sequence[Pair], rule: DecisionRule) -> bool:
+def _explained(found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
     """Return whether a pair explains the runs so well that none could be clearly better."""
     return any(pair.explains and pair.after.z <= 1.0 + rule.law_gain for pair in found)
 
 
-def _best_passed_over(rows: Sequence[LawTrial], found: Sequence[Pair]) -> list[LawTrial]:
+def _best_passed_over(rows: Sequence[LawTrial], found: Sequence[LawAndEffects]) -> list[LawTrial]:
     """Return the law with the smallest z of which no variant and no form was searched, if any."""
     searched = {_base(pair.row) for pair in found}
     left = [row for row in rows if _base(row) not in searched]
     return sorted(left, key=lambda row: row.trial.z)[:1]
 
 
-def _worth_a_look(row: LawTrial, found: Sequence[Pair], rule: DecisionRule) -> bool:
+def _worth_a_look(row: LawTrial, found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
     """Return whether a law, with an effect, could be simpler than what explains the runs."""
     known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
     return not known or min(known) > _least_with_effect(row)
@@ -235,7 +239,7 @@ def _least_with_effect(row: LawTrial) -> int:
     return min((len(one.free()) for one in joined), default=row.fitted)
 
 
-def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
+def choose(pairs: Sequence[LawAndEffects], rule: DecisionRule = BENCH) -> LawAndEffects:
     """Return the pair of law and effects that the runs ask for.
 
     Of those that explain the runs and that the best one on held-out runs does not surpass, the
@@ -257,7 +261,7 @@ def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
     return chosen
 
 
-def _nearest(pairs: Sequence[Pair], rule: DecisionRule) -> Pair:
+def _nearest(pairs: Sequence[LawAndEffects], rule: DecisionRule) -> LawAndEffects:
     """Return the pair that comes nearest to the runs, the simplest of those that hardly differ."""
     reached = [pair.reach(rule) for pair in pairs]
     least = best_of(reached, rule)
@@ -270,7 +274,10 @@ def _nearest(pairs: Sequence[Pair], rule: DecisionRule) -> Pair:
 
 
 def equivalents(
-    chosen: Pair, pairs: Sequence[Pair], rows: Sequence[LawTrial], rule: DecisionRule = BENCH
+    chosen: LawAndEffects,
+    pairs: Sequence[LawAndEffects],
+    rows: Sequence[LawTrial],
+    rule: DecisionRule = BENCH,
 ) -> list[tuple[str, tuple[str, ...], float]]:
     """Return what explains the runs as well as the pair chosen: law, effects, z on held-out runs.
 
@@ -321,7 +328,7 @@ class LawVerdict:
     row: LawTrial
     before: str
     rows: tuple[LawTrial, ...]
-    pairs: tuple[Pair, ...]
+    pairs: tuple[LawAndEffects, ...]
     equivalents: tuple[tuple[str, tuple[str, ...], float], ...] = ()
     left_out: tuple[str, ...] = ()
 
@@ -344,7 +351,9 @@ class LawVerdict:
         }  # fmt: skip
 
 
-def rows_of(rows: tuple[LawTrial, ...], pairs: tuple[Pair, ...] = ()) -> list[dict[str, Any]]:
+def rows_of(
+    rows: tuple[LawTrial, ...], pairs: tuple[LawAndEffects, ...] = ()
+) -> list[dict[str, Any]]:
     """Return laws tried as json can hold them, with what each lacks where that was searched."""
     searched = {pair.row.law: pair for pair in pairs}
     out = []

@@ -33,29 +33,27 @@ BLOCK = 250
 
 
 @dataclass(frozen=True)
-class ModelBasedFault:
-    """A fault, the runs set right, and how the model does on them."""
+class ModelBasedFaults:
+    """Faults of sensors, the runs set right, and how the model does on them."""
 
-    fault: Finding
+    faults: tuple[Finding, ...]
     train: Problem
     held_out: Problem
     trial: Trial
 
 
-def model_based_fault(
+def model_based_faults(
     before: Trial,
     train: Problem,
     held_out: Problem,
-    drive: str = "voltage",
     rule: DecisionRule = DRIVE,
-) -> ModelBasedFault | None:
+) -> ModelBasedFaults | None:
     """Return the fault that explains what a model leaves; None where none does, or physics better.
 
     Parameters
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
     train, held_out : runs to fit to, and those that decide
-    drive : the channel that is the runs' drive, one of `data.channels.DRIVE`
     rule : the numbers that decide
     """
     if before.z < 1.0 + rule.gain:
@@ -67,9 +65,9 @@ def model_based_fault(
         and not has_rival(found, before, train, "force_bias", rule)
     ):
         return found
-    found = _late_drive(before, train, held_out, drive, rule)
+    found = _late_drive(before, train, held_out, rule)
     if found and explains(found.trial, before, rule):
-        sure = before.z > rule.plain
+        sure = before.z > rule.late_drive_z
         return found if sure or not has_rival(found, before, train, "late_drive", rule) else None
     return None
 
@@ -82,7 +80,7 @@ def explains(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
 
 
 def has_rival(
-    found: ModelBasedFault, before: Trial, train: Problem, fault: str, rule: DecisionRule
+    found: ModelBasedFaults, before: Trial, train: Problem, fault: str, rule: DecisionRule
 ) -> bool:
     """Return whether an effect that looks like the fault explains the runs as they are better.
 
@@ -119,7 +117,7 @@ def _loss(model: Model, problem: Problem) -> float:
 
 def _zero_of_force(
     before: Trial, train: Problem, held_out: Problem, rule: DecisionRule
-) -> ModelBasedFault | None:
+) -> ModelBasedFaults | None:
     """Return the offset of the force that fits best, as a preload without stiffness."""
     carrier = _carrier(before.model.law)
     if carrier is None or any(EFFECTS[name].offset for name in before.effects):
@@ -137,8 +135,8 @@ def _zero_of_force(
     fitted = refine(start, train)
     offset = fitted.value(own)
     plain = {k: v for k, v in fitted.values.items() if k not in (own, *others)}
-    right = [_shifted(problem, offset) for problem in (train, held_out)]
-    trial = judge(replace(base, values=plain), right[0], right[1])
+    right = _shifted(train, offset), _shifted(held_out, offset)
+    trial = judge(replace(base, values=plain), *right)
     fault = Finding(
         "bias", "warning",
         f"Force shows {quantity(offset, 'N')} whatever the motion and the "
@@ -146,7 +144,7 @@ def _zero_of_force(
         "stiffness of a spring: the zero of the load cell is off, or a preload acts on the rod.",
         channel="force", value=offset, std=_deviation(_left(trial.model, right[0])),
     )  # fmt: skip
-    return ModelBasedFault(fault, right[0], right[1], trial)
+    return ModelBasedFaults((fault,), *right, trial)
 
 
 def _carrier(law: str) -> type[Effect] | None:
@@ -176,12 +174,12 @@ def _deviation(left: Array) -> float:
 
 
 def _late_drive(
-    before: Trial, train: Problem, held_out: Problem, drive: str, rule: DecisionRule
-) -> ModelBasedFault | None:
+    before: Trial, train: Problem, held_out: Problem, rule: DecisionRule
+) -> ModelBasedFaults | None:
     """Return the delay of the voltage's record that fits best, the law refitted to it."""
     if steady(train):
         return None
-    model, dt = before.model, max(run.dt for run in train.runs)
+    model, dt, drive = before.model, max(run.dt for run in train.runs), train.runs[0].drive
     grid = dt * np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
     grid = grid[grid <= LATEST]
     at_first = _loss(model, train)
@@ -197,16 +195,14 @@ def _late_drive(
             return None
     bend = cost(late + dt) + cost(late - dt) - 2.0 * cost(late)
     std = dt * float(np.sqrt(2.0 / max(bend, 1e-12)))
-    right = [_moved(problem, late) for problem in (train, held_out)]
+    right = _moved(train, late), _moved(held_out, late)
     fault = Finding(
         "delay", "warning",
         f"The force follows the {drive} {1e3 * late:.2f} ms before the {drive} was recorded: its "
         "record is late.",
         channel=drive, value=late, std=std,
     )  # fmt: skip
-    return ModelBasedFault(
-        fault, right[0], right[1], judge(refine(model, right[0]), right[0], right[1])
-    )
+    return ModelBasedFaults((fault,), *right, judge(refine(model, right[0]), *right))
 
 
 def _cost_of_delay(model: Model, train: Problem) -> Callable[[float], float]:

@@ -1,34 +1,29 @@
-"""From measurements to trials at the damper: sensors' faults, the present model, every effect."""
+"""What the diagnosis of a site begins with: its runs, freed of sensors' faults, and its model."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 from ..core.finding import Finding
 from ..core.text import plain
 from ..data.corrections import LIMITS, TIMING, Correction, set_right
-from ..data.cut_off import beyond_range, derived_velocity, ends_of
+from ..data.cut_off import beyond_range, ends_of
 from ..data.decimate import in_time
 from ..data.left_out import WAYS_OUT
 from ..data.measurement import Measurement
-from ..identification.building_sites import StructureProblem
-from ..identification.fit import fit_from_starts
+from ..errors import StudyError
 from ..identification.prepare import SHORTEST
 from ..identification.problem import Model, Problem, Run
-from ..identification.rig import DAMPER, Seeds, bench_rig
-from ..identification.start_grid import refine
+from ..identification.rig import Seeds
 from ..physics.effect import effects_of
-from .clocks import clock_faults
-from .command_range import limited_drive
 from .decision import TOLD, in_runs
-from .effect_size import Known
-from .model_faults import model_based_fault
+from .effect_size import SizeSearch
 from .rule import BENCH, DecisionRule
-from .sensor_faults import sensor_faults
-from .trials import Trial, judge
+from .trials import Trial
 
 # Measurements as they would be without the faults of their sensors.
 
@@ -102,6 +97,12 @@ class Insufficient:
     noise: Mapping[str, float]
 
 
+def refuse_lacking(folder: Path, lacking: Insufficient | None) -> None:
+    """Raise StudyError where a study's runs carry no verdict, and nothing that rests on one."""
+    if lacking is not None:
+        raise StudyError(f"{folder}: {' '.join(lacking.reasons)}")
+
+
 @dataclass(frozen=True)
 class Scope:
     """What a rig allows at each of its sites: a bench has one site, a building many and long runs.
@@ -109,22 +110,24 @@ class Scope:
     `rank_all`: effects are tried, and ranked, even where noise is all that the model leaves.
     `restart`: fits begin anew from several starts before runs are called contradictory, and
     intervals are those of a refit of so many sweeps, `sweeps`; 0 takes the fit as it is.
-    `choose_motion`: the motion can be chosen, so that a run can be proposed.
+    `choose_motion`: the motion can be chosen, so that a run can be proposed. `any_law`: every law
+    can be held against the damper's samples; in a building the law decides which ones count.
     """
 
     rank_all: bool
     restart: bool
     sweeps: int
     choose_motion: bool
+    any_law: bool
 
 
-ON_BENCH = Scope(rank_all=True, restart=True, sweeps=4, choose_motion=True)
-IN_BUILDING = Scope(rank_all=False, restart=False, sweeps=0, choose_motion=False)
+ON_BENCH = Scope(rank_all=True, restart=True, sweeps=4, choose_motion=True, any_law=True)
+IN_BUILDING = Scope(rank_all=False, restart=False, sweeps=0, choose_motion=False, any_law=False)
 
 
 @dataclass(frozen=True)
-class Opening:
-    """What the look at a site begins with: runs freed of sensors' faults, and its model.
+class Prepared:
+    """What the diagnosis of a site begins with: runs freed of sensors' faults, and its model.
 
     `before` is the present model, fitted to `problem` and judged on `held_out`; `shown` the
     channels whose instruments may still have an effect; `part` the part of the training runs that
@@ -146,125 +149,17 @@ class Opening:
         """The training runs, or the part of them, that effects are searched on."""
         return self.part or self.problem
 
-    def with_excess(self, excess: float) -> Opening:
+    def with_excess(self, excess: float) -> Prepared:
         """Return the same runs with what no model explains counted beside the noise [N2]."""
         problem, held_out = (one.with_excess(excess) for one in (self.problem, self.held_out))
         part = None if self.part is None else self.part.with_excess(excess)
         return replace(self, problem=problem, held_out=held_out, part=part)
 
-    def known(self, model: Model) -> Known:
+    def known(self, model: Model) -> SizeSearch:
         """Return what sizes of effects beside a fitted model are found with."""
         deciding = sum(len(run.force) - run.skip for run in self.held_out.runs)
         expected = self.searched.expectation(model)
-        return Known(self.searched, model, expected, deciding, self.rule, self.held_out)
-
-
-@dataclass(frozen=True)
-class BenchData:
-    """A bench's runs, freed of the faults that channels show of each other, and smoothed.
-
-    `noise` is that of each channel, in SI; `shown` the channels whose instruments may still have an
-    effect.
-    """
-
-    problem: Problem
-    held_out: Problem
-    faults: tuple[Finding, ...]
-    noise: Mapping[str, float]
-    shown: tuple[str, ...]
-
-
-def bench_data(
-    train: Sequence[Measurement],
-    holdout: Sequence[Measurement],
-    present: Model,
-    say: Progress = silent,
-) -> BenchData | Insufficient:
-    """Return a bench's runs as every model is held against them, or why they carry no verdict.
-
-    Parameters
-    ----------
-    train, holdout : runs to fit to, and those that decide
-    present : the model as it is, whose effects must act on a bench
-    say : is told what is being done
-    """
-    say("looking for sensor faults")
-    faults = sensor_faults([*train, *holdout])
-    lacking = _lacking([*train, *holdout], faults)
-    noise = median_noise([*train, *holdout])
-    if lacking:
-        return Insufficient(tuple(lacking), tuple(faults), noise)
-    say("smoothing the motion")
-    whole = [corrected(runs, faults) for runs in (train, holdout)]
-    left = [_left(runs) for runs in whole]
-    if not all(left):
-        empty = zip(("for training", "held out"), whole, left, strict=True)
-        reasons = [_too_few(role, runs) for role, runs, kept in empty if not kept]
-        return Insufficient((*reasons, *(fault.text for fault in faults)), tuple(faults), noise)
-    problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
-    redundant = any(
-        run.has("displacement", "velocity") and not derived_velocity(run) for run in train
-    )
-    channels = ("force",) if redundant else ("force", "velocity")
-    return BenchData(problem, held_out, tuple(faults), noise, channels)
-
-
-def opening(
-    train: Sequence[Measurement],
-    holdout: Sequence[Measurement],
-    present: Model,
-    *,
-    identified: bool = False,
-    say: Progress = silent,
-) -> Opening | Insufficient:
-    """Return what a diagnosis begins with, or why the data carry no verdict.
-
-    Parameters
-    ----------
-    train, holdout : runs to fit to, and those that decide
-    present : the model as it is
-    identified : whether its values were fitted before: they are then refined, not sought anew
-    say : is told what is being done
-    """
-    data = bench_data(train, holdout, present, say)
-    if isinstance(data, Insufficient):
-        return data
-    say("fitting the present model")
-    problem = data.problem
-    if identified:
-        base = refine(present, problem)
-    else:
-        base = fit_from_starts(problem, replace(present, values={})).model
-    return opened_with(judge(base, problem, data.held_out), data)
-
-
-def opened_with(before: Trial, data: BenchData) -> Opening:
-    """Return what a diagnosis begins with: the runs freed of what a model shows of channels.
-
-    Parameters
-    ----------
-    before : the trial of a model that was fitted to these runs
-    data : the runs
-    """
-    problem, held_out, faults = data.problem, data.held_out, list(data.faults)
-    shown = model_based_fault(before, problem, held_out, problem.runs[0].drive)
-    if shown is not None:
-        faults.append(shown.fault)
-        problem, held_out, before = shown.train, shown.held_out, shown.trial
-        if shown.fault.kind == "bias":  # found without the effects that are tried next
-            problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
-            before = judge(before.model, problem, held_out)
-    else:
-        capped = limited_drive(before, problem, held_out, problem.runs[0].drive)
-        if capped is not None:
-            faults.append(capped.fault)
-            problem, held_out, before = capped.train, capped.held_out, capped.trial
-        apart = clock_faults(before, problem, held_out)
-        if apart is not None:
-            faults += apart.faults
-            problem, held_out, before = apart.train, apart.held_out, apart.trial
-    shown_by = (tuple(faults), data.noise, data.shown)
-    return Opening(before, problem, held_out, *shown_by, part_of(problem))
+        return SizeSearch(self.searched, model, expected, deciding, self.rule, self.held_out)
 
 
 def part_of(problem: Problem) -> Problem | None:
@@ -289,13 +184,13 @@ def part_of(problem: Problem) -> Problem | None:
 
 def of_layer(model: Model, problem: Problem) -> list[str]:
     """Return the layer's effects that can join a damper's model: a reconstructed force has them."""
-    if not (isinstance(problem, StructureProblem) and problem.joined_with_layer):
+    if not problem.joined_with_layer:
         return []
     able = [e.key("structure") for e in effects_of("structure") if "force" in e.hooks()]
     return [name for name in able if name not in model.effects]
 
 
-def _left(runs: Sequence[Measurement]) -> list[Measurement]:
+def with_samples(runs: Sequence[Measurement]) -> list[Measurement]:
     """Return the runs without those of which a fault has left too few samples."""
     return [
         run
@@ -304,7 +199,7 @@ def _left(runs: Sequence[Measurement]) -> list[Measurement]:
     ]
 
 
-def _too_few(role: str, runs: Sequence[Measurement]) -> str:
+def too_few(role: str, runs: Sequence[Measurement]) -> str:
     """Return the sentence that no run of a role has samples enough: where, why, what to do."""
     told, ways = [], dict[str, None]()
     for run in runs:
@@ -343,8 +238,8 @@ def lacking_in_building(
     reasons = _saturated(recorded, faults)
     for role, runs in zip(("for training", "held out"), right, strict=True):
         force = [replace(r, channels={"force": r["force"]}) for r in runs if r.has("force")]
-        if force and not _left(force):
-            reasons.append(_too_few(role, force))
+        if force and not with_samples(force):
+            reasons.append(too_few(role, force))
     return (
         Insufficient((*reasons, *(fault.text for fault in faults)), faults, noise)
         if reasons
@@ -367,10 +262,10 @@ def median_noise(runs: Sequence[Measurement]) -> dict[str, float]:
     }
 
 
-def _lacking(
+def lacking_on_bench(
     runs: Sequence[Measurement], faults: Sequence[Finding], rule: DecisionRule = BENCH
 ) -> list[str]:
-    """Return what keeps these data from carrying a verdict, in sentences."""
+    """Return what keeps the runs of a bench from carrying a verdict, in sentences."""
     out = []
     force = np.concatenate([run["force"] for run in runs if run.has("force")] or [np.zeros(1)])
     spread = float(np.std(force))

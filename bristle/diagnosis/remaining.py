@@ -108,9 +108,9 @@ def most_telling(
     telling = [pattern for pattern in rest if pattern.p <= rule.chance] or list(rest)
     if not telling:
         return ""
-    first = telling[0] if telling[0].share > rule.half * rest[0].share else rest[0]
+    first = telling[0] if telling[0].share > rule.pattern_share * rest[0].share else rest[0]
     struck = first.coordinate == "time_since_reversal"
-    if (struck or not _clear(telling, rule)) and ringing(trial, held_out) > rule.rings:
+    if (struck or not _clear(telling, rule)) and ringing(trial, held_out) > rule.resonance_share:
         return "frequency"
     return first.coordinate
 

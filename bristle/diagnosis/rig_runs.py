@@ -10,17 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from typing import Protocol
 
 from ..core.finding import Finding
 from ..data.channels import DRIVE
 from ..data.checks.runs import tells_a_bend
+from ..data.cut_off import derived_velocity
 from ..data.measurement import Measurement
-from ..errors import StudyError
 from ..identification.building_motion import responses
 from ..identification.building_sites import ANY_LAW, StructureProblem, problems_of
-from ..identification.problem import Model
-from ..identification.rig import DAMPER, at_site, corrected_for_delay, linear_storeys
+from ..identification.fit import fit_from_starts
+from ..identification.problem import Model, Problem
+from ..identification.rig import DAMPER, at_site, bench_rig, corrected_for_delay, linear_storeys
 from ..identification.rig_fit import fit_damper
 from ..identification.start_grid import refine
 from ..physics.building import GROUND, Building, with_damper
@@ -32,22 +33,29 @@ from .building_numbers import (
     with_storeys,
     within_prior,
 )
-from .conclusion import About
-from .law_trials import better_law, try_laws
+from .clocks import clock_faults
+from .command_range import limited_drive
+from .conclusion import VerdictContext
 from .load_cell import load_cell
+from .model_faults import model_based_faults
 from .prepared import (
+    DRAWS,
     IN_BUILDING,
     Insufficient,
-    Opening,
+    Prepared,
     Progress,
     corrected,
     lacking_in_building,
+    lacking_on_bench,
     median_noise,
-    opening,
+    part_of,
+    silent,
+    too_few,
+    with_samples,
 )
 from .rule import BENCH, INSIDE, RECONSTRUCTED, SITE, DecisionRule
 from .sensor_faults import sensor_faults
-from .site import excused_by_sensor, left_by_filter, present_at, shortened
+from .site import excused_by_sensor, left_by_filter, prepare_line, shortened
 from .site_diagnosis import SiteDiagnosis
 from .trials import SHOWN, Trial, judge
 from .verdict import late_values
@@ -174,19 +182,99 @@ SEARCHED = 12.0
 shaking is over. The best are then fitted to all that was recorded; held-out runs stay whole."""
 
 
+class RigRuns(Protocol):
+    """The runs of a rig as a diagnosis takes them, in turn: the lines first, then the damper.
+
+    Attributes
+    ----------
+    lacking : why the runs carry no verdict, None where they do; else nothing more is asked of them
+    """
+
+    lacking: Insufficient | None
+
+    @property
+    def damper(self) -> tuple[Problem, Problem] | None:
+        """The damper's runs for training and held out, None where no damper was measured."""
+
+    @property
+    def bends(self) -> bool:
+        """Whether the command has levels enough for a parabola."""
+
+    def sites(self) -> tuple[str, ...]:
+        """Return the names of the sites that the runs show."""
+
+    def lines(self) -> tuple[str, ...]:
+        """Return the sites beside the damper, whose models are lines."""
+
+    def part(self, site: str) -> Model:
+        """Return the part of the model at a site."""
+
+    def prepare(self, site: str, before: Trial | None = None) -> Prepared | None:
+        """Return what the diagnosis of a site begins with, None where the runs do not show it.
+
+        Parameters
+        ----------
+        site : "damper", "layer", "storey1" ...
+        before : of the damper, the trial of a model that was fitted to its runs; None fits that of
+            the rig
+        """
+
+    def suppose(self, damper: Model) -> None:
+        """Take a damper's law, fitted, in the place of the model's, whose other effects stay."""
+
+    def correct(self, findings: dict[str, SiteDiagnosis]) -> None:
+        """Set right what the lines tell of the load cell, and of the building's numbers."""
+
+    def suit(self, found: SiteDiagnosis) -> bool:
+        """Adjust the rig's numbers beside what was found at the damper; return whether so."""
+
+    def excused(self, found: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]) -> SiteDiagnosis:
+        """Return the damper's diagnosis, not unknown where an instrument explains what is left."""
+
+    def context(self, damper: Prepared | None) -> VerdictContext:
+        """Return what the verdict tells beside the sites, from what the damper's began with."""
+
+
+def runs_of_rig(
+    train: Sequence[Measurement],
+    holdout: Sequence[Measurement],
+    present: Model,
+    building: Building | None,
+    *,
+    identified: bool = False,
+    any_law: bool = False,
+    say: Progress = silent,
+) -> RigRuns:
+    """Return the runs of a bench, or of a building where there is one.
+
+    Parameters
+    ----------
+    train, holdout : measurements to fit to, and those that decide
+    present : the model as it is: the damper's law with the effects of all sites
+    building : the building that the damper is in, None for a test bench
+    identified, any_law : as `BenchRuns` and `BuildingRuns` take them
+    say : called with a few words at each stage
+    """
+    if building is None:
+        return BenchRuns(train, holdout, present, identified=identified, say=say)
+    return BuildingRuns(train, holdout, present, building, any_law=any_law, say=say)
+
+
 class BuildingRuns:
-    """The runs of a building; what is asked of them in turn, `diagnosis.diagnose_rig` has.
+    """The runs of a building.
 
     Parameters
     ----------
     train, holdout : measurements to fit to, and those that decide
     present : the model as it is, with the effects of all sites
     building : its masses are taken as known
-    free : whether the damper's law is sought: then those samples count that every law tells
+    any_law : whether the damper's law is sought: then those samples count that every law tells
+    say : called with a few words at each stage
 
     Attributes
     ----------
     lacking : why the runs carry no verdict, None where they do
+    bends : whether the command has levels enough for a parabola
     """
 
     def __init__(
@@ -195,12 +283,14 @@ class BuildingRuns:
         holdout: Sequence[Measurement],
         present: Model,
         building: Building,
-        say: Progress,
-        free: bool = False,
+        *,
+        any_law: bool = False,
+        say: Progress = silent,
     ) -> None:
         building = with_damper(building)
         self._device = building.device(building.studied)
-        self._building, self._say, self._free = building, say, free
+        self._building, self._say, self._any_law = building, say, any_law
+        self.bends = tells_a_bend(train)
         say("looking for sensor faults")
         self._sensors = tuple(faults_in_building([*train, *holdout], building))
         right = [without_faults(list(runs), self._sensors, building) for runs in (train, holdout)]
@@ -219,17 +309,16 @@ class BuildingRuns:
         self._notes: list[str] = []
 
     def _made(self, building: Building) -> dict[str, Pair]:
-        law = ANY_LAW if self._free else self._present.law
+        law = ANY_LAW if self._any_law else self._present.law
         return problems_of(self._train, self._holdout, building, law, self._straight)
 
-    def refuse_lacking(self, folder: Path) -> None:
-        """Raise StudyError where the runs carry no verdict, and nothing that rests on one."""
-        if self.lacking is not None:
-            raise StudyError(f"{folder}: {' '.join(self.lacking.reasons)}")
+    def sites(self) -> tuple[str, ...]:
+        """Return the names of the sites that the runs show."""
+        return tuple(self._problems)
 
-    def lines(self) -> dict[str, Pair]:
-        """Return the sites beside the damper, each with its runs for training and held out."""
-        return {site: pair for site, pair in self._problems.items() if site != DAMPER}
+    def lines(self) -> tuple[str, ...]:
+        """Return the sites beside the damper, whose models are lines."""
+        return tuple(site for site in self._problems if site != DAMPER)
 
     def part(self, site: str) -> Model:
         """Return the part of the model at a site."""
@@ -281,7 +370,7 @@ class BuildingRuns:
         self._problems = self._made(self._building)
         self._suit(self.part(DAMPER))
 
-    def suited_to(self, found: SiteDiagnosis) -> bool:
+    def suit(self, found: SiteDiagnosis) -> bool:
         """Adjust the building's numbers beside what was found at the damper; return whether so.
 
         Where the force follows from equilibrium, the file's numbers show in what an effect leaves,
@@ -320,25 +409,9 @@ class BuildingRuns:
             If a channel is missing, or the base moves in no run.
         """
         found = responses(list(runs), self._building, draws)
-        law = ANY_LAW if self._free else self._present.law
+        law = ANY_LAW if self._any_law else self._present.law
         made = problems_of(found, [], self._building, law, self._straight)
         return {site: pair[0] for site, pair in made.items()}
-
-    def sites(self) -> tuple[str, ...]:
-        """Return the names of the sites that the runs show."""
-        return tuple(self._problems)
-
-    def open_site(self, site: str) -> Opening | None:
-        """Return a site's model fitted and judged, None where the runs do not show that site."""
-        if site == DAMPER:
-            return self.open_damper()
-        if site not in self._problems:
-            return None
-        train, held_out = self._problems[site]
-        before = present_at(site, train, held_out, self.part(site))
-        return Opening(
-            before, train, held_out, self._sensors, self._noise, rule=SITE, scope=IN_BUILDING
-        )
 
     @property
     def damper(self) -> Pair | None:
@@ -353,57 +426,45 @@ class BuildingRuns:
         effects = (*damper.effects, *elsewhere)
         self._present = replace(damper, effects=effects, values={**values, **damper.values})
 
-    def open_damper(self) -> Opening | None:
-        """Return the damper's law fitted and judged, None where no damper was measured."""
-        if DAMPER not in self._problems:
+    def prepare(self, site: str, before: Trial | None = None) -> Prepared | None:
+        """Return what the diagnosis of a site begins with; see `RigRuns`."""
+        if site not in self._problems:
             return None
-        self._say("damper: its law, then effects")
-        train, held_out = self._problems[DAMPER]
-        model = refine(fit_damper(train, self.part(DAMPER)).model, train)
-        return self.opened_with(judge(model, train, held_out))
-
-    def opened_with(self, before: Trial) -> Opening:
-        """Return what a look at the damper begins with.
-
-        Parameters
-        ----------
-        before : the trial of a model that was fitted to its runs
-        """
-        train, held_out = self._problems[DAMPER]
+        train, held_out = self._problems[site]
+        if site != DAMPER:
+            return prepare_line(site, train, held_out, self.part(site), self._sensors, self._noise)
+        if before is None:
+            self._say("damper: its law, then effects")
+            model = refine(fit_damper(train, self.part(DAMPER)).model, train)
+            before = judge(model, train, held_out)
         # A force that no load cell shows cannot be late.
         shown, rule = ((), RECONSTRUCTED) if train.reconstructed else (SHOWN, INSIDE)
-        return Opening(
+        return Prepared(
             before, train, held_out, self._sensors, self._noise, shown,
             shortened(train, SEARCHED), rule, IN_BUILDING,
         )  # fmt: skip
 
-    def excused(
-        self, finding: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]
-    ) -> SiteDiagnosis:
-        """Return the damper's finding, not unknown where an instrument explains what is left."""
+    def excused(self, found: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]) -> SiteDiagnosis:
+        """Return the damper's diagnosis, not unknown where an instrument explains what is left."""
         if blurred(self._sensors) or not self._velocities:
             why = "Without the velocity of the base, its reversals are not located exactly."
-            finding = excused_by_sensor(finding, BENCH.blurred, why)
+            found = excused_by_sensor(found, BENCH.no_velocity_z, why)
         beside = findings.get(self._beside)
         if beside is not None and late_values(beside):
             most = left_by_filter(self._present.law, *self._problems[DAMPER])
             why = "The load cell is late in a different functional form."
-            finding = excused_by_sensor(finding, most, why)
-        return finding
+            found = excused_by_sensor(found, most, why)
+        return found
 
-    def beside_other_laws(self, finding: SiteDiagnosis, _opened: Opening) -> SiteDiagnosis:
-        """Return the damper's finding: the law decides which samples of a building count."""
-        return finding
-
-    def about(self) -> About:
-        """Return what the verdict tells beside the findings of the sites."""
+    def context(self, _damper: Prepared | None) -> VerdictContext:
+        """Return what the verdict tells beside the sites."""
         reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed
         force = "reconstructed" if reconstructed else "measured"
         beside = self._device.on_first
         notes = (*self._masses, *self._notes)
         if reconstructed and not beside:
             notes = (*notes, OF_STOREY)
-        return About(force, self._sensors, self._noise, notes, beside_layer=beside)
+        return VerdictContext(force, self._sensors, self._noise, notes, beside_layer=beside)
 
 
 def _suits(suited: Pair, given: Pair, damper: Model, rule: DecisionRule = BENCH) -> bool:
@@ -416,7 +477,7 @@ def _suits(suited: Pair, given: Pair, damper: Model, rule: DecisionRule = BENCH)
         base = fit_damper(pair[0], damper)
         return rule.excess(judge(base.model, *pair).z)
 
-    return left(suited) <= rule.moved * left(given)
+    return left(suited) <= rule.building_excess * left(given)
 
 
 def _rounded(layer: SiteDiagnosis, rule: DecisionRule = SITE) -> bool:
@@ -433,19 +494,22 @@ def _late(present: Model, layer: SiteDiagnosis) -> Model:
     return replace(present, effects=effects, values={**present.values, **late_values(layer)})
 
 
-# A bench's runs as a diagnosis takes them: one site, the damper.
-
-NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the law."
-
-
 class BenchRuns:
-    """The runs of a damper on a bench; what is asked of them in turn, `diagnosis.diagnose_rig` has.
+    """The runs of a damper on a bench: one site, the damper.
 
     Parameters
     ----------
     train, holdout : measurements to fit to, and those that decide
-    present : the model as it is
-    identified : whether its values were fitted before
+    present : the model as it is, whose effects must act on a bench
+    identified : whether its values were fitted before: they are then refined, not sought anew
+    say : called with a few words at each stage
+
+    Attributes
+    ----------
+    lacking : why the runs carry no verdict, None where they do
+    faults : those that channels show of each other
+    damper : the runs as every model is held against them, freed of these faults, and smoothed
+    bends : whether the command has levels enough for a parabola
     """
 
     def __init__(
@@ -453,62 +517,95 @@ class BenchRuns:
         train: Sequence[Measurement],
         holdout: Sequence[Measurement],
         present: Model,
-        identified: bool,
-        say: Progress,
+        *,
+        identified: bool = False,
+        say: Progress = silent,
     ) -> None:
-        self._train, self._holdout, self._say = train, holdout, say
-        self._present, self._identified = present, identified
-        self._opened: Opening | None = None
-
-    def lines(self) -> dict[str, tuple[StructureProblem, StructureProblem]]:
-        """Return the sites beside the damper: a bench has none."""
-        return {}
-
-    def part(self, _site: str) -> Model:
-        """Return the part of the model at a site."""
-        return self._present
-
-    def correct(self, _findings: dict[str, SiteDiagnosis]) -> None:
-        """Do nothing: on a bench no equilibrium tells of the load cell."""
+        self._present, self._identified, self._say = present, identified, say
+        recorded = [*train, *holdout]
+        self.bends = tells_a_bend(train)
+        self._driven = any(run.has(name) for run in recorded for name in DRIVE)
+        say("looking for sensor faults")
+        self.faults = tuple(sensor_faults(recorded))
+        self._noise = median_noise(recorded)
+        self.damper: tuple[Problem, Problem] | None = None
+        reasons = lacking_on_bench(recorded, self.faults)
+        if not reasons:
+            say("smoothing the motion")
+            right = corrected(train, self.faults), corrected(holdout, self.faults)
+            used = with_samples(right[0]), with_samples(right[1])
+            roles = zip(("for training", "held out"), right, used, strict=True)
+            reasons = [too_few(role, runs) for role, runs, left in roles if not left]
+            reasons += [fault.text for fault in self.faults] if reasons else []
+        self.lacking = Insufficient(tuple(reasons), self.faults, self._noise) if reasons else None
+        if not reasons:
+            self.damper = bench_rig(*used, DRAWS).sites(present)[DAMPER].pair
+        redundant = any(
+            run.has("displacement", "velocity") and not derived_velocity(run) for run in train
+        )
+        self._shown = SHOWN if redundant else (*SHOWN, "velocity")
 
     def sites(self) -> tuple[str, ...]:
         """Return the names of the sites that the runs show."""
         return (DAMPER,)
 
-    def open_site(self, site: str) -> Opening | Insufficient | None:
-        """Return a site's model fitted and judged; None for another site than the damper."""
-        return self.open_damper() if site == DAMPER else None
+    def lines(self) -> tuple[str, ...]:
+        """Return no site: a bench has none beside the damper."""
+        return ()
 
-    def open_damper(self) -> Opening | Insufficient:
-        """Return the damper's model fitted and judged, or why the data carry no verdict."""
-        opened = opening(
-            self._train, self._holdout, self._present, identified=self._identified, say=self._say
+    def part(self, _site: str) -> Model:
+        """Return the part of the model at a site."""
+        return self._present
+
+    def prepare(self, site: str, before: Trial | None = None) -> Prepared | None:
+        """Return what the diagnosis of a site begins with; see `RigRuns`."""
+        if site != DAMPER or self.damper is None:
+            return None
+        problem, held_out = self.damper
+        if before is None:
+            self._say("fitting the present model")
+            present = self._present
+            if self._identified:
+                model = refine(present, problem)
+            else:
+                model = fit_from_starts(problem, replace(present, values={})).model
+            before = judge(model, problem, held_out)
+        faults = self.faults
+        shown = model_based_faults(before, problem, held_out)
+        if shown is not None:
+            faults += shown.faults
+            problem, held_out, before = shown.train, shown.held_out, shown.trial
+            if shown.faults[0].kind == "bias":  # found without the effects that are tried next
+                problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
+                before = judge(before.model, problem, held_out)
+        else:
+            for look in (limited_drive, clock_faults):
+                shown = look(before, problem, held_out)
+                if shown is not None:
+                    faults += shown.faults
+                    problem, held_out, before = shown.train, shown.held_out, shown.trial
+        return Prepared(
+            before, problem, held_out, faults, self._noise, self._shown, part_of(problem)
         )
-        self._opened = opened if isinstance(opened, Opening) else None
-        return opened
+
+    def suppose(self, damper: Model) -> None:
+        """Take a damper's law, fitted, in the place of the model's."""
+        self._present = damper
+
+    def correct(self, _findings: dict[str, SiteDiagnosis]) -> None:
+        """Do nothing: on a bench no equilibrium tells of the load cell."""
+
+    def suit(self, _found: SiteDiagnosis) -> bool:
+        """Return that a bench has no numbers to adjust."""
+        return False
 
     def excused(
-        self, finding: SiteDiagnosis, _findings: Mapping[str, SiteDiagnosis]
+        self, found: SiteDiagnosis, _findings: Mapping[str, SiteDiagnosis]
     ) -> SiteDiagnosis:
-        """Return the damper's finding as it is."""
-        return finding
+        """Return the damper's diagnosis as it is."""
+        return found
 
-    def beside_other_laws(self, finding: SiteDiagnosis, opened: Opening) -> SiteDiagnosis:
-        """Return a finding that leaves an error with how much of it is the form of the law."""
-        judged = finding.before if finding.kind == "unknown" else finding.after
-        if finding.kind == "insufficient" or judged is None or judged.z <= opened.rule.clean:
-            return finding
-        if not finding.noise_known:
-            return finding
-        self._say("trying every law")
-        bends = tells_a_bend(self._train)
-        laws = try_laws(opened.searched, opened.held_out, judged.model, bends=bends)
-        other = better_law(judged, laws, opened.rule)
-        told = NOT_THE_LAW if other is None else other.sentence(added=finding.kind != "unknown")
-        return replace(finding, other_law=other, reasons=(*finding.reasons, told))
-
-    def about(self) -> About:
-        """Return what the verdict tells beside the damper's finding."""
-        assert self._opened is not None
-        driven = any(m.has(name) for m in (*self._train, *self._holdout) for name in DRIVE)
-        return About(sensors=self._opened.faults, noise=self._opened.noise, driven=driven)
+    def context(self, damper: Prepared | None) -> VerdictContext:
+        """Return what the verdict tells beside the sites."""
+        assert damper is not None
+        return VerdictContext(sensors=damper.faults, noise=damper.noise, driven=self._driven)

@@ -61,7 +61,7 @@ class DecisionRule:
     outside the library go unnoticed. Found: blind seeds.
     """
 
-    loud: float = 0.9
+    noise_overestimated: float = 0.9
     """z of the present model below which the noise was estimated too high for a verdict.
 
     Trades: if higher, sound data count as insufficient; if lower, effects are named against a wrong
@@ -236,7 +236,7 @@ class DecisionRule:
     Trades: if higher, more effects are reported as not testable. Found: the method.
     """
 
-    tells: float = 4.0
+    separating_sigma: float = 4.0
     """Standard deviations between rivals below which a proposed run separates them only by luck.
 
     Trades: if higher, useful runs are not proposed; if lower, useless ones are. Found: blind seeds.
@@ -249,13 +249,13 @@ class DecisionRule:
     blind seeds.
     """
 
-    rings: float = 0.4
+    resonance_share: float = 0.4
     """Share of a residual's power within a third of an octave, above which it is a resonance.
 
     Trades: the reverse of `clear`. Found: blind seeds.
     """
 
-    half: float = 0.5
+    pattern_share: float = 0.5
     """Share of the strongest pattern above which a significant pattern is named instead of it.
 
     Trades: if higher, chance patterns are named; if lower, significant patterns of little weight
@@ -264,7 +264,7 @@ class DecisionRule:
 
     # --- faults that channels show of each other
 
-    sure: float = 6.0
+    fault_sigma: float = 6.0
     """Standard deviations by which a channel's fault must differ from zero.
 
     Trades: if higher, small faults are missed; if lower, false alarms. Found: blind seeds; the
@@ -274,7 +274,7 @@ class DecisionRule:
     least_gain: float = 0.01
     """Smallest error of a gain that matters.
 
-    Trades: as `sure`. Found: stated, what a laboratory knows of its instruments.
+    Trades: as `fault_sigma`. Found: stated, what a laboratory knows of its instruments.
     """
 
     least_bias: float = 0.01
@@ -357,7 +357,7 @@ class DecisionRule:
     faults of the benchmarks.
     """
 
-    plain: float = 1.3
+    late_drive_z: float = 1.3
     """z above which a drive recorded late needs no comparison with effects.
 
     No effect precedes its cause, and no lead explains so much by chance alone. Trades: if lower,
@@ -366,7 +366,7 @@ class DecisionRule:
 
     # --- buildings
 
-    moved: float = 0.5
+    building_excess: float = 0.5
     """Largest share of the excess that may remain for changed numbers of a building to be accepted.
 
     Trades: if higher, the numbers absorb effects; if lower, errors of the file read as effects.
@@ -400,7 +400,7 @@ class DecisionRule:
     Trades and found: as `stiffness_known`.
     """
 
-    blurred: float = 1.25
+    no_velocity_z: float = 1.25
     """Largest z of a true sign law if the base's velocity had to be left out.
 
     Displacement and accelerometer alone then locate the jumps of the force. Trades: if higher,

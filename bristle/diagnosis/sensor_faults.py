@@ -178,7 +178,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         found.append(_turned(runs, rule))
         theta = -theta
         gain = -gain
-    if abs(theta[4]) > max(rule.sure * std[4], rule.least_corner):
+    if abs(theta[4]) > max(rule.fault_sigma * std[4], rule.least_corner):
         found.append(
             Finding(
                 "high-pass", "warning",
@@ -191,7 +191,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     theta, std = _pooled(runs, slow=False)
     theta, gain = theta * np.sign(theta[0]), 1.0 / abs(theta[0])
     spread = std[0] * gain * gain
-    if abs(gain - 1.0) > max(rule.sure * spread, rule.least_gain):
+    if abs(gain - 1.0) > max(rule.fault_sigma * spread, rule.least_gain):
         found.append(
             Finding(
                 "gain", "warning",
@@ -204,7 +204,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     found += _late(theta * gain, std * gain, _mean_step(runs), rule)
     bias, bias_std = -theta[5] * gain, std[5] * gain
     rms = float(np.sqrt(np.mean(np.concatenate([run["velocity"] for run in runs]) ** 2)))
-    if abs(bias) > max(rule.sure * bias_std, rule.least_bias * rms):
+    if abs(bias) > max(rule.fault_sigma * bias_std, rule.least_bias * rms):
         found.append(
             Finding(
                 "bias", "warning",
@@ -263,7 +263,7 @@ def _mean_step(runs: Sequence[Measurement]) -> float:
 def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[Finding]:
     """Return a delay of one channel, or a lag of the velocity's instrument."""
     late, late_std = float(theta[1]), float(std[1])
-    if abs(late) <= max(rule.sure * late_std, rule.least_delay * step):
+    if abs(late) <= max(rule.fault_sigma * late_std, rule.least_delay * step):
         return []
     order = _order(theta, std, rule) if late > 0.0 else 0
     if order:
@@ -298,8 +298,11 @@ def _order(theta: Array, std: Array, rule: DecisionRule) -> int:
     if abs(second) / second_std + abs(third) / third_std < shift:
         return 1
     # The series ends at F: of a long delay E is off by some hundredths.
-    bent = abs(second - 0.5) > 0.06 + rule.sure * second_std and abs(third) < 1.0 / 12.0 + third_std
-    ends = 1.0 / 6.0 - third > 0.5 * rule.sure * third_std and abs(third) < 0.05
+    bent = (
+        abs(second - 0.5) > 0.06 + rule.fault_sigma * second_std
+        and abs(third) < 1.0 / 12.0 + third_std
+    )
+    ends = 1.0 / 6.0 - third > 0.5 * rule.fault_sigma * third_std and abs(third) < 0.05
     return 2 if bent or ends else 0
 
 

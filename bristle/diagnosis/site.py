@@ -6,12 +6,11 @@ effects of the structure are few and distinct, and each is judged by held-out ru
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
@@ -37,32 +36,23 @@ from .decision import (
     missing,
     unexplained,
 )
-from .prepared import Opening, Progress, of_layer, silent
+from .prepared import IN_BUILDING, Prepared, Progress, of_layer, silent
 from .remaining import patterns_of
 from .rule import BENCH, SENSOR, SITE, DecisionRule
 from .site_diagnosis import SiteDiagnosis, of_decision
 from .trials import SECONDS, Trial, judge, missed_by, paired, try_all, try_members
 
-Array = NDArray[np.float64]
 
-
-def look_at(
-    site: str,
-    train: StructureProblem,
-    held_out: StructureProblem,
-    present: Model | None = None,
-    rule: DecisionRule = SITE,
-) -> SiteDiagnosis:
-    """Return what a layer's or storey's problem shows.
+def diagnose_line(site: str, prepared: Prepared) -> SiteDiagnosis:
+    """Return what a layer's or storey's line lacks.
 
     Parameters
     ----------
     site : "layer", "storey1", "storey2" ...
-    train, held_out : the site's runs to fit to, and those that decide
-    present : the effects that the model has at this site already, with their values; None if none
-    rule : the numbers that decide
+    prepared : its runs and its model; see `prepare_line`
     """
-    before = present_at(site, train, held_out, present)
+    before, rule = prepared.before, prepared.rule
+    train, held_out = prepared.problem, prepared.held_out
     names = joinable_at(site, before.model)
     if not held_out.noise_known:
         trials = [try_effect(name, before.model, train, held_out) for name in names]
@@ -79,14 +69,22 @@ def look_at(
     return of_decision(decide_site(before, trials, rule), before, tuple(trials), site)
 
 
-def present_at(
-    site: str, train: StructureProblem, held_out: StructureProblem, present: Model | None = None
-) -> Trial:
-    """Return how the present model of a layer or storey does, fitted: a line with its effects.
+def prepare_line(
+    site: str,
+    train: StructureProblem,
+    held_out: StructureProblem,
+    present: Model | None = None,
+    faults: tuple[Finding, ...] = (),
+    noise: Mapping[str, float] | None = None,
+) -> Prepared:
+    """Return the runs of a layer or storey with its present model, fitted: a line with its effects.
 
     Parameters
     ----------
-    site, train, held_out, present : as in `look_at`
+    site : "layer", "storey1", "storey2" ...
+    train, held_out : the site's runs to fit to, and those that decide
+    present : the effects that the model has at this site already, with their values; None if none
+    faults, noise : what is known of the channels
     """
     linear = law_of_part(site)
     base = fit_line(train, linear.name)
@@ -95,7 +93,8 @@ def present_at(
         limits = {**base.model.limits, **present.limits}
         start = replace(present, law=linear.name, values=values, limits=limits)
         base = fit(train, start, with_std=False)
-    return judge(base.model, train, held_out)
+    before = judge(base.model, train, held_out)
+    return Prepared(before, train, held_out, faults, noise or {}, rule=SITE, scope=IN_BUILDING)
 
 
 def joinable_at(site: str, base: Model) -> list[str]:
@@ -105,9 +104,7 @@ def joinable_at(site: str, base: Model) -> list[str]:
     return [name for name in able if name not in taken and acts_at(name, base, site, (site,))]
 
 
-def try_effect(
-    effect: str, base: Model, train: StructureProblem, held_out: StructureProblem
-) -> Trial:
+def try_effect(effect: str, base: Model, train: Problem, held_out: Problem) -> Trial:
     """Refit a model with one more effect of the structure from several starts; judge the best.
 
     Parameters
@@ -203,16 +200,16 @@ class Trials:
 
     Parameters
     ----------
-    opened : the runs and the present model
+    prepared : the runs and the present model
     say : is told what is being done
     earlier : the same trials by other weights, whose ends are where these begin
     """
 
     def __init__(
-        self, opened: Opening, say: Progress = silent, earlier: Trials | None = None
+        self, prepared: Prepared, say: Progress = silent, earlier: Trials | None = None
     ) -> None:
-        self.opened, self.say = opened, say
-        self.before = opened.before
+        self.prepared, self.say = prepared, say
+        self.before = prepared.before
         self.pairs: list[Trial] = []
         self._found: dict[tuple[str, ...], list[Trial]] = {}
         self._earlier = earlier._found if earlier else {}
@@ -226,18 +223,18 @@ class Trials:
         return min((self.before, *self.single, *self.pairs), key=lambda trial: trial.z)
 
     def with_excess(self, excess: float) -> Trials:
-        """Return the trials fitted and judged anew; see `Opening.with_excess`."""
+        """Return the trials fitted and judged anew; see `Prepared.with_excess`."""
         if excess not in self._weighed:
-            opened = self.opened.with_excess(excess)
-            before = refine(self.before.model, opened.problem)
-            opened = replace(opened, before=judge(before, opened.problem, opened.held_out))
-            self._weighed[excess] = Trials(opened, self.say, self)
+            prepared = self.prepared.with_excess(excess)
+            before = refine(self.before.model, prepared.problem)
+            prepared = replace(prepared, before=judge(before, prepared.problem, prepared.held_out))
+            self._weighed[excess] = Trials(prepared, self.say, self)
         return self._weighed[excess]
 
     @cached_property
     def patterns(self) -> list[ResidualPattern]:
         """Along which coordinates the present model's residual is organised."""
-        return patterns_of(self.before, self.opened.held_out)
+        return patterns_of(self.before, self.prepared.held_out)
 
     def grow(self, first: Trial) -> list[Trial]:
         """Return the trials of all effects added to a trial's model."""
@@ -248,40 +245,44 @@ class Trials:
 
     def reduce(self, pair: Trial) -> list[Trial]:
         """Return the trials of a pair's members alone."""
-        return try_members(pair, self.before.model, self.opened.problem, self.opened.held_out)
+        return try_members(pair, self.before.model, self.prepared.problem, self.prepared.held_out)
 
     def _all(self, first: Trial, most: int | None) -> list[Trial]:
         if first.effects in self._found:
             return [*self._found[first.effects]]
-        opened = self.opened
-        held_out = opened.held_out
+        prepared = self.prepared
+        held_out = prepared.held_out
         if first.effects in self._earlier:
             trials = in_threads(self._again, self._earlier[first.effects])
         else:
-            trials = try_all(first.model, opened.searched, held_out, shown=opened.shown, most=most)
+            trials = try_all(
+                first.model, prepared.searched, held_out, shown=prepared.shown, most=most
+            )
             trials = [*trials, *self._of_layer(first)]
         trials.sort(key=lambda trial: trial.z)
-        if opened.searched is not opened.problem:
+        if prepared.searched is not prepared.problem:
             best = trials[0].z
             for k, one in enumerate(trials[:CONTENDERS]):
                 if one.refined and one.z <= NEAR * best:
-                    trials[k] = judge(refine(one.model, opened.problem), opened.problem, held_out)
+                    trials[k] = judge(
+                        refine(one.model, prepared.problem), prepared.problem, held_out
+                    )
         self._found[first.effects] = sorted(trials, key=lambda trial: trial.z)
         return [*self._found[first.effects]]
 
     def _again(self, trial: Trial) -> Trial:
         """Return a trial fitted and judged by these runs' weights, from where it ended before."""
-        train, held_out = self.opened.searched, self.opened.held_out
+        train, held_out = self.prepared.searched, self.prepared.held_out
         model = refine(trial.model, train) if trial.refined else trial.model
         return replace(judge(model, train, held_out), refined=trial.refined)
 
     def _of_layer(self, first: Trial) -> list[Trial]:
         """Return the trials of the layer's effects, of which a reconstructed force has a share."""
-        problem, held_out = self.opened.problem, self.opened.held_out
-        if not (isinstance(problem, StructureProblem) and isinstance(held_out, StructureProblem)):
-            return []
-        names = of_layer(first.model, problem)
-        return [try_effect(name, first.model, problem, held_out) for name in names]
+        problem, held_out = self.prepared.problem, self.prepared.held_out
+        return [
+            try_effect(name, first.model, problem, held_out)
+            for name in of_layer(first.model, problem)
+        ]
 
 
 # The zero of a load cell beside an effect: both are fitted together.
@@ -294,32 +295,34 @@ class Trials:
 # the zero free.
 
 
-def free_zero(opened: Opening, decision: Decision, rule: DecisionRule = SENSOR) -> Opening | None:
+def free_zero(
+    prepared: Prepared, decision: Decision, rule: DecisionRule = SENSOR
+) -> Prepared | None:
     """Return what a diagnosis begins with where the zero of the force is to be fitted along.
 
     Parameters
     ----------
-    opened : runs and the present model, the zero taken as right
+    prepared : runs and the present model, the zero taken as right
     decision : what followed from that
     rule : the numbers that decide
 
     Returns
     -------
-    Opening or None
+    Prepared or None
         None where a zero would explain nothing: no constant is left, or a single effect that has
         one says more than a zero would.
     """
-    problem = opened.problem
-    known = problem.free_zero or _reconstructed(problem)
+    problem = prepared.problem
+    known = problem.free_zero or problem.reconstructed
     if known or decision.kind in ("none", "insufficient"):
         return None
-    if has_offset(opened.before.model) or not _significant(problem, opened.before.model, rule):
+    if has_offset(prepared.before.model) or not _significant(problem, prepared.before.model, rule):
         return None
     if not has_offset(decision.best.model):
         if not _significant(problem, decision.best.model, rule):
             return None
-        return _freed(opened)
-    freed = _freed(opened)
+        return _freed(prepared)
+    freed = _freed(prepared)
     alone = len(decision.effects) == 1
     return None if alone and missing(freed.before, decision.best) else freed
 
@@ -334,17 +337,17 @@ def zero_fault(problem: Problem, decision: Decision, rule: DecisionRule = SENSOR
     return _fault(*zero_of(problem, model), decision, problem.runs[0].drive)
 
 
-def renewed_zero(opened: Opening, decision: Decision) -> tuple[Finding, ...]:
+def renewed_zero(prepared: Prepared, decision: Decision) -> tuple[Finding, ...]:
     """Return the zero that was found before any effect as it is beside what was decided.
 
     Nothing where there was none, or where an effect has a constant force of its own.
     """
-    first = [one for one in opened.faults if (one.channel, one.kind) == ("force", "bias")]
+    first = [one for one in prepared.faults if (one.channel, one.kind) == ("force", "bias")]
     model = decision.best.model
-    if not first or not opened.problem.free_zero or has_offset(model):
+    if not first or not prepared.problem.free_zero or has_offset(model):
         return ()
-    more, std = zero_of(opened.problem, model)
-    drive = opened.problem.runs[0].drive
+    more, std = zero_of(prepared.problem, model)
+    drive = prepared.problem.runs[0].drive
     return (_fault(first[0].value + more, std, decision, drive),)
 
 
@@ -363,40 +366,35 @@ def _significant(problem: Problem, model: Model, rule: DecisionRule) -> bool:
     zero, std = zero_of(problem, model)
     force = np.concatenate([run.force for run in problem.runs])
     least = rule.least_bias * float(np.sqrt(np.mean(force**2)))
-    return abs(zero) > max(rule.sure * std, least)
+    return abs(zero) > max(rule.fault_sigma * std, least)
 
 
-def _freed(opened: Opening) -> Opening:
+def _freed(prepared: Prepared) -> Prepared:
     """Return what a diagnosis begins with, the zero of the force fitted along."""
-    train, held_out = opened.problem.with_free_zero(), opened.held_out.with_free_zero()
-    before = judge(refine(opened.before.model, train), train, held_out)
-    part = opened.part
+    train, held_out = prepared.problem.with_free_zero(), prepared.held_out.with_free_zero()
+    before = judge(refine(prepared.before.model, train), train, held_out)
+    part = prepared.part
     if part is not None:
-        part = train if part is opened.problem else part.with_free_zero()
-    return replace(opened, before=before, problem=train, held_out=held_out, part=part)
-
-
-def _reconstructed(problem: Problem) -> bool:
-    """Return whether no load cell made the force."""
-    return isinstance(problem, StructureProblem) and problem.reconstructed
+        part = train if part is prepared.problem else part.with_free_zero()
+    return replace(prepared, before=before, problem=train, held_out=held_out, part=part)
 
 
 # What the law of a damper lacks, on a bench or inside a building.
 
 
-def look_at_damper(
-    opened: Opening,
+def diagnose_damper(
+    prepared: Prepared,
     say: Progress = silent,
     made: Trials | None = None,
     *,
     pairs: bool = True,
     excess: float | None = None,
-) -> tuple[SiteDiagnosis, Opening]:
-    """Return what a damper's law lacks, by `opened.rule`.
+) -> tuple[SiteDiagnosis, Prepared]:
+    """Return what a damper's law lacks, by `prepared.rule`.
 
     Parameters
     ----------
-    opened : what the look begins with
+    prepared : what the look begins with
     say : is told what is being done
     made : the trials of single effects, where they were made before
     pairs : whether two effects are tried where no single one suffices
@@ -408,58 +406,60 @@ def look_at_damper(
     finding; and what the look began with: with the zero of the force free where that is off, and
     with the excess
     """
-    before, rule = opened.before, opened.rule
-    if noise_is_all(opened):
-        return of_decision(as_noise(before, ()), before), opened
-    made, decision = _decided(opened, say, made, pairs)
-    zero, freed = None, free_zero(opened, decision)
+    before, rule = prepared.before, prepared.rule
+    if noise_is_all(prepared):
+        return of_decision(as_noise(before, ()), before), prepared
+    made, decision = _decided(prepared, say, made, pairs)
+    zero, freed = None, free_zero(prepared, decision)
     if freed is not None:
         say("the zero of the force is fitted along with every effect")
         again, other = _decided(freed, say, None, pairs)
         zero = zero_fault(freed.problem, other)
         if zero is not None:
-            opened, made, decision = freed, again, other
+            prepared, made, decision = freed, again, other
     if excess is None:
-        excess = missed_by(made.best, opened.problem)
+        excess = missed_by(made.best, prepared.problem)
     if excess:
         say("what no effect explains counts beside the noise")
         made = made.with_excess(excess)
-        opened = made.opened
-        made, decision = _decided(opened, say, made, pairs)
-    before = opened.before
+        prepared = made.prepared
+        made, decision = _decided(prepared, say, made, pairs)
+    before = prepared.before
     if zero is not None:
-        sensors = tuple(filter(None, (zero_fault(opened.problem, decision),)))
+        sensors = tuple(filter(None, (zero_fault(prepared.problem, decision),)))
     else:
-        sensors = renewed_zero(opened, decision)
-    if not decision.effects and opened.held_out.noise_known:
+        sensors = renewed_zero(prepared, decision)
+    if not decision.effects and prepared.held_out.noise_known:
         decision = _rare(before, made.single, rule) or decision
     found = of_decision(decision, before, tuple(made.single))
     best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
     found = replace(found, sensors=sensors, together=best_pair)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
-    return replace(found, patterns=patterns, noise_known=opened.held_out.noise_known), opened
+    return replace(found, patterns=patterns, noise_known=prepared.held_out.noise_known), prepared
 
 
-def noise_is_all(opened: Opening) -> bool:
+def noise_is_all(prepared: Prepared) -> bool:
     """Return whether a model leaves nothing that an effect could lower, and none is ranked then."""
-    before = opened.before
-    known = opened.held_out.noise_known
-    return known and not opened.scope.rank_all and max(before.z, before.train) <= opened.rule.quiet
+    before = prepared.before
+    known = prepared.held_out.noise_known
+    return (
+        known and not prepared.scope.rank_all and max(before.z, before.train) <= prepared.rule.quiet
+    )
 
 
 def _decided(
-    opened: Opening, say: Progress, made: Trials | None, pairs: bool
+    prepared: Prepared, say: Progress, made: Trials | None, pairs: bool
 ) -> tuple[Trials, Decision]:
     """Return the trials of effects at a damper, and the decision that they lead to."""
-    made, rule = made or Trials(opened, say), opened.rule
-    if not opened.held_out.noise_known:
-        return made, decide_by_gains(opened.before, made.single, opened.held_out, rule)
+    made, rule = made or Trials(prepared, say), prepared.rule
+    if not prepared.held_out.noise_known:
+        return made, decide_by_gains(prepared.before, made.single, prepared.held_out, rule)
     organised = rule.organised < 1.0 and bool(made.patterns)
     if organised:
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)
     grow, reduce = (made.grow, made.reduce) if pairs else (_no_pairs, None)
-    where = force_in(opened.held_out)
-    return made, decide(opened.before, made.single, grow, organised, reduce, rule, where)
+    where = force_in(prepared.held_out)
+    return made, decide(prepared.before, made.single, grow, organised, reduce, rule, where)
 
 
 def _no_pairs(_first: Trial) -> list[Trial]:

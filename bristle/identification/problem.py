@@ -453,6 +453,9 @@ class Problem:
     excess = 0.0
     """Variance [N2] of what no model here explains, beside the noise; see `excess_of`."""
 
+    reconstructed = False
+    """Whether the force is a result of equilibrium, not measured."""
+
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
         self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
@@ -462,6 +465,11 @@ class Problem:
     def noise_known(self) -> bool:
         """Whether the force's noise is known in most runs, so that z says something."""
         return 2 * sum(not run.untold for run in self.runs) >= len(self.runs)
+
+    @property
+    def joined_with_layer(self) -> bool:
+        """Whether the force is that of the damper and the isolation layer together."""
+        return False
 
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from ..core.text import plain, quantity, scale
 from ..diagnosis.decision import missing
-from ..diagnosis.prepared import Opening
+from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import Trial, judge
 from ..identification.fit import intervals_of
 from ..identification.start_grid import refine
@@ -485,23 +485,23 @@ class Closed:
 
 
 def close(
-    opened: Opening, found: LearnedCurve, forms: Sequence[ClosedForm], rule: LearnRule = LEARN
+    prepared: Prepared, found: LearnedCurve, forms: Sequence[ClosedForm], rule: LearnRule = LEARN
 ) -> Closed | None:
     """Fit the closed forms that may name a curve in its place; return the first that does as well.
 
     Parameters
     ----------
-    opened : runs and the fitted model, as a diagnosis begins with them
+    prepared : runs and the fitted model, as a diagnosis begins with them
     found : the curve, with the name of its effect
     forms : fitted to the curve, the best first
     rule : the numbers that decide between curves
     """
     able = [one for one in forms if one.left <= rule.resembles][:CLOSED]
-    return next(filter(None, (fit_closed(opened, found, one, rule) for one in able)), None)
+    return next(filter(None, (fit_closed(prepared, found, one, rule) for one in able)), None)
 
 
 def fit_closed(
-    opened: Opening, found: LearnedCurve, form: ClosedForm, rule: LearnRule = LEARN
+    prepared: Prepared, found: LearnedCurve, form: ClosedForm, rule: LearnRule = LEARN
 ) -> Closed | None:
     """Fit a closed form in the place of a learned curve; None where it is clearly worse.
 
@@ -510,7 +510,7 @@ def fit_closed(
 
     Parameters
     ----------
-    opened : runs and the fitted model, as a diagnosis begins with them
+    prepared : runs and the fitted model, as a diagnosis begins with them
     found : the curve, with the name of its effect
     form : fitted to the curve
     rule : the numbers that decide between curves
@@ -525,12 +525,12 @@ def fit_closed(
     values = {k: v for k, v in values.items() if not k.startswith(f"{found.name}.curve[")}
     values |= {f"{found.name}.{n}": value for n, value, _ in formula.parameters}
     with defined({found.name: text}):
-        train = opened.searched.of(opened.searched.runs)
-        held_out = opened.held_out.of(opened.held_out.runs)
+        train = prepared.searched.of(prepared.searched.runs)
+        held_out = prepared.held_out.of(prepared.held_out.runs)
         model = refine(replace(base, values=values), train, SWEEPS)
         trial = judge(model, train, held_out)
         worst = (rule.as_good if form.left <= rule.follows else 1.0) * found.after.train
-        if trial.train > worst or not missing(found.before, trial, opened.rule):
+        if trial.train > worst or not missing(found.before, trial, prepared.rule):
             return None
         std = intervals_of(train, model).std
         given = tuple(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from ..core.progress import Count
 from ..diagnosis.decision import missing
-from ..diagnosis.prepared import Opening
+from ..diagnosis.prepared import Prepared
 from ..diagnosis.rule import DecisionRule
 from ..diagnosis.trials import Trial, judge
 from ..identification.fit import intervals_of
@@ -68,7 +68,7 @@ class LearnedCurve:
 
 
 def learn(
-    opened: Opening,
+    prepared: Prepared,
     name: str,
     *,
     parts: Sequence[str] = (),
@@ -80,14 +80,14 @@ def learn(
 
     Parameters
     ----------
-    opened : runs and the fitted model, as a diagnosis begins with them
+    prepared : runs and the fitted model, as a diagnosis begins with them
     name : of the effect that the curve becomes
     parts, along : names of `PARTS` and `ALONG` that are tried; empty for all
     rule : the numbers that decide whether a curve is kept; None takes the opening's
     learning : those that decide which one is tried
     """
-    rule = rule or opened.rule
-    before, train = opened.before, opened.searched
+    rule = rule or prepared.rule
+    before, train = prepared.before, prepared.searched
     residual = residual_of(train, before.model)
     worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
     promised = promises(residual, parts, along, learning)
@@ -98,14 +98,14 @@ def learn(
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
         return LearnedCurve(name, None, (), before, None, (), why)
-    fitted = _best_first(_fitted(chosen, name, before.model, opened), learning)
+    fitted = _best_first(_fitted(chosen, name, before.model, prepared), learning)
     if fitted[0].trial.train > rule.clean:
         model = with_law_of(before.model, fitted[0])
         surface = _explained(before, fitted[0], rule) < learning.enough
         tried = _second_look(residual_of(train, model), fitted, (parts, along), surface, learning)
-        more = _fitted(tried, name, model, opened)
+        more = _fitted(tried, name, model, prepared)
         fitted = _best_first([*fitted, *more], learning)
-    fitted[0] = _finer(fitted[0], name, opened, learning)
+    fitted[0] = _finer(fitted[0], name, prepared, learning)
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
     place = refusals.index("") if "" in refusals else 0
     kept = fitted[place]
@@ -148,7 +148,7 @@ def _second_look(
     return found
 
 
-def _finer(best: Fitted, name: str, opened: Opening, learning: LearnRule) -> Fitted:
+def _finer(best: Fitted, name: str, prepared: Prepared, learning: LearnRule) -> Fitted:
     """Return a curve with twice the knots where it does better with them, else as it is.
 
     How many it has is what the scan makes of it; what depends steeply on a signal may need more.
@@ -158,8 +158,8 @@ def _finer(best: Fitted, name: str, opened: Opening, learning: LearnRule) -> Fit
     if best.trial.train <= learning.coarse or not is_table:
         return best
     again = Promise(curve.finer(), best.loss)
-    model = with_law_of(opened.before.model, best)
-    (found,) = _fitted([again], name, model, opened)
+    model = with_law_of(prepared.before.model, best)
+    (found,) = _fitted([again], name, model, prepared)
     return found if found.loss <= learning.finer * best.loss else best
 
 
@@ -187,7 +187,7 @@ def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRul
     return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""
 
 
-def _fitted(chosen: Sequence[Promise], name: str, base: Model, opened: Opening) -> list[Fitted]:
+def _fitted(chosen: Sequence[Promise], name: str, base: Model, prepared: Prepared) -> list[Fitted]:
     """Return the curves fitted with everything else, from a model's values."""
     texts = {
         f"{name}_{k}": effect_text(f"{name}_{k}", one.curve, "a trial")
@@ -195,8 +195,8 @@ def _fitted(chosen: Sequence[Promise], name: str, base: Model, opened: Opening) 
     }
     count = Count("fitting a curve", len(chosen))
     with defined(texts):
-        train, held_out = (one.of(one.runs) for one in (opened.searched, opened.held_out))
-        there = replace(opened, problem=train, part=None, held_out=held_out)
+        train, held_out = (one.of(one.runs) for one in (prepared.searched, prepared.held_out))
+        there = replace(prepared, problem=train, part=None, held_out=held_out)
 
         def fitted(one: tuple[str, Promise]) -> Fitted:
             own, promise = one
@@ -207,7 +207,7 @@ def _fitted(chosen: Sequence[Promise], name: str, base: Model, opened: Opening) 
         return in_threads(fitted, list(zip(texts, chosen, strict=True)))
 
 
-def _inside(curve: Curve, own: str, base: Model, opened: Opening) -> Fitted:
+def _inside(curve: Curve, own: str, base: Model, prepared: Prepared) -> Fitted:
     """Return a curve fitted inside a model, as the effect `own`.
 
     From what the scan says of it; where that leaves more error than no curve, from none.
@@ -217,9 +217,9 @@ def _inside(curve: Curve, own: str, base: Model, opened: Opening) -> Fitted:
     curve : as the scan has it
     own : name of its effect, which is defined
     base : the model that the scan was made beside
-    opened : runs to fit to and those that decide, with the present model
+    prepared : runs to fit to and those that decide, with the present model
     """
-    train, present = opened.problem, opened.before.model
+    train, present = prepared.problem, prepared.before.model
     entries = [f"{own}.{entry}" for entry in curve.entries]
     values = dict(zip(entries, begun(curve), strict=True))
     memory = {f"{own}.{n}": value for n, value in curve.memory}
@@ -244,7 +244,7 @@ def _inside(curve: Curve, own: str, base: Model, opened: Opening) -> Fitted:
         model = replace(
             model, values={**model.values, **dict(zip(entries, fitted.values, strict=True))}
         )
-    trial = judge(model, train, opened.held_out)
+    trial = judge(model, train, prepared.held_out)
     deviations = tuple(std.get(entry, 0.0) for entry in entries)
     return Fitted(fitted, deviations, trial, _left_out(train, model))
 

@@ -51,7 +51,8 @@ class Added:
         now, then = (one.shown(value) for value in (one.now, one.then))
         change = f"from {now} to {then}" if isfinite(one.now) else f"to {then}"
         if self.settles:
-            does = f"settle {name}: with it they are {then} apart; a verdict needs {BENCH.tells:g}"
+            needed = f"{BENCH.separating_sigma:g}"
+            does = f"settle {name}: with it they are {then} apart; a verdict needs {needed}"
         elif one.purpose == "separate":
             does = f"raise the distance of {where} {change}"
         elif one.purpose == "see":
@@ -179,8 +180,8 @@ def _told(
     if purpose == "see":
         row = _visible(row, stand[site].purposes, name, (factor * values[best], values[best]))
     elif purpose == "separate":
-        distances = BENCH.tells / (factor * values[best]), BENCH.tells / values[best]
-        row = replace(row, now=distances[0], then=distances[1])
+        needed = BENCH.separating_sigma
+        row = replace(row, now=needed / (factor * values[best]), then=needed / values[best])
     else:
         row = replace(row, now=row.then, then=row.then / factor)
     return Added(channel, row, factor, bool(settled))

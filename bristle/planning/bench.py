@@ -10,10 +10,10 @@ import numpy as np
 
 from ..core.progress import tell
 from ..diagnosis.decision import refuse_unknown_noise
-from ..diagnosis.prepared import Opening
+from ..diagnosis.prepared import Prepared, refuse_lacking
 from ..diagnosis.rig_runs import BenchRuns
-from ..errors import StudyError
 from ..identification.problem import Run
+from ..identification.rig import DAMPER
 from ..physics.effect import plain_name
 from ..study.identified import is_identified
 from ..study.identify import as_model
@@ -83,7 +83,7 @@ def plan_study(
     return replace(made, notes=_notes(study, opened))
 
 
-def _notes(study: Study, opened: Opening) -> tuple[str, ...]:
+def _notes(study: Study, opened: Prepared) -> tuple[str, ...]:
     """Return what weakens a plan: an error that an effect would take away first."""
     missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
     if not missing and opened.before.z > opened.rule.clean:
@@ -98,19 +98,21 @@ def _errors(run: Run) -> Any:
     return out
 
 
-def _opened(study: Study) -> Opening:
+def _opened(study: Study) -> Prepared:
     """Return the model of a study with its runs."""
     study.usable_effects()
     model, runs = study.model(), study.runs()
-    identified = is_identified(model)
-    opened = BenchRuns(runs.train, runs.holdout, as_model(model), identified, tell).open_damper()
-    if not isinstance(opened, Opening):
-        raise StudyError(f"{study.folder}: {' '.join(opened.reasons)}")
+    rig = BenchRuns(
+        runs.train, runs.holdout, as_model(model), identified=is_identified(model), say=tell
+    )
+    refuse_lacking(study.folder, rig.lacking)
+    opened = rig.prepare(DAMPER)
+    assert opened is not None
     refuse_unknown_noise(study.folder, opened.held_out)
     return opened
 
 
-def _purposes(request: PlanRequest, opened: Opening, limits: RigLimits, drive: str) -> Purposes:
+def _purposes(request: PlanRequest, opened: Prepared, limits: RigLimits, drive: str) -> Purposes:
     """Return what a plan is for, with the models and effects that this takes."""
     model = opened.before.model
     effects: tuple[SizedRival, ...] = ()

@@ -16,7 +16,7 @@ from ..core.progress import tell
 from ..core.text import plain, quantity
 from ..data.measurement import Measurement
 from ..diagnosis.decision import refuse_unknown_noise
-from ..diagnosis.prepared import Opening, median_noise
+from ..diagnosis.prepared import Prepared, median_noise, refuse_lacking
 from ..diagnosis.rig_runs import BuildingRuns
 from ..errors import StudyError
 from ..identification.rig import DAMPER
@@ -151,7 +151,7 @@ BELOW, ABOVE = 0.3, 1.3
 
 
 def limits_of_shaking(
-    runs: Sequence[Measurement], sites: Mapping[str, Opening], house: BuildingWithFile
+    runs: Sequence[Measurement], sites: Mapping[str, Prepared], house: BuildingWithFile
 ) -> RigLimits:
     """Return what table, building and amplifier have done already.
 
@@ -244,7 +244,7 @@ def plan_building(
     measured = [*runs.train, *runs.holdout]
     motions = records_at_hand(measured, records, Path.cwd())
     house = BuildingWithFile(building, study.folder / model.building if model.building else None)
-    found = BuildingRuns(runs.train, runs.holdout, as_model(model), building, tell)
+    found = BuildingRuns(runs.train, runs.holdout, as_model(model), building, say=tell)
     sites = _opened(study, found)
     rig = _within(limits_of_shaking(measured, sites, house), limits or {})
     given = request is not None and not request.nothing
@@ -305,13 +305,13 @@ def _refuse_devices(building: Building) -> None:
         )
 
 
-def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
+def _opened(study: Study, found: BuildingRuns) -> dict[str, Prepared]:
     """Return the models of the sites, fitted."""
-    found.refuse_lacking(study.folder)
+    refuse_lacking(study.folder, found.lacking)
     sites = {}
     for site in found.sites():
         tell(f"fitting {site}")
-        opened = found.open_site(site)
+        opened = found.prepare(site)
         if opened is not None and opened.held_out.runs:
             sites[site] = opened
     for opened in sites.values():
@@ -326,7 +326,7 @@ def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
     return sites
 
 
-def _notes(study: Study, sites: Mapping[str, Opening]) -> tuple[str, ...]:
+def _notes(study: Study, sites: Mapping[str, Prepared]) -> tuple[str, ...]:
     """Return what weakens a plan: an error that an effect would take away first."""
     missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
     if missing:
@@ -335,7 +335,7 @@ def _notes(study: Study, sites: Mapping[str, Opening]) -> tuple[str, ...]:
     return tuple(f"At {site_name(site)} the model {misfit_note(z)}" for site, z in loud.items())
 
 
-def _stated(purposes: Any, opened: Opening, seed: int) -> Stated:
+def _stated(purposes: Any, opened: Prepared, seed: int) -> Stated:
     measured = Measured(opened.problem.runs, opened.held_out.runs)
     return stated(purposes, opened.searched, measured, max(opened.before.z, 1.0), seed)
 

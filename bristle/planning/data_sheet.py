@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.config import Document
-from ..diagnosis.effect_size import Known as Fitted
+from ..diagnosis.effect_size import SizeSearch as Fitted
 from ..errors import StudyError
 from ..identification.fit import fit_from_starts
 from ..identification.problem import REFERENCE, Model, Problem, Run

@@ -97,12 +97,13 @@ def outcomes(
 
 
 def _separated(now: Sequence[Information], then: Sequence[Information]) -> list[Outcome]:
-    before = {one.name: BENCH.tells / one.value if one.value else inf for one in separated(now)}
-    after = {one.name: BENCH.tells / one.value if one.value else inf for one in separated(then)}
+    needed = BENCH.separating_sigma
+    before = {one.name: needed / one.value if one.value else inf for one in separated(now)}
+    after = {one.name: needed / one.value if one.value else inf for one in separated(then)}
     return [
         Outcome(
-            "separate", name, f"distance; a verdict needs {BENCH.tells:g}", "std", before[name],
-            after[name], after[name] >= BENCH.tells,
+            "separate", name, f"distance; a verdict needs {needed:g}", "std", before[name],
+            after[name], after[name] >= needed,
         )
         for name in after
     ]  # fmt: skip

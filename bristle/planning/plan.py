@@ -164,7 +164,7 @@ class Plan(Viewable):
         gained = one.then**2 - one.now**2
         if one.purpose != "separate" or gained <= 0.0:
             return ""
-        count = len(self.tests) * (BENCH.tells**2 - one.now**2) / gained
+        count = len(self.tests) * (BENCH.separating_sigma**2 - one.now**2) / gained
         return f"; about {ceil(count)} such tests would" if count <= MANY * len(self.tests) else ""
 
     def write(self, folder: Path | str) -> Path:

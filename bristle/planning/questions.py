@@ -12,8 +12,8 @@ import numpy as np
 from ..core.progress import tell
 from ..core.text import command, quantity, short_z, unknown
 from ..diagnosis.effect_limits import NO_AMOUNT, EffectLimit, limit_of
-from ..diagnosis.effect_size import SMALLEST, Known, Sized, named_distance, resolved
-from ..diagnosis.prepared import Opening
+from ..diagnosis.effect_size import SMALLEST, Sized, SizeSearch, named_distance, resolved
+from ..diagnosis.prepared import Prepared
 from ..diagnosis.rule import BENCH, DecisionRule
 from ..diagnosis.trials import LONG, joinable, short_search
 from ..errors import StudyError
@@ -67,7 +67,7 @@ class SizedRival:
         return Rival(self.sized.name, found, self.sized.without())
 
 
-def effects_beside(opened: Opening, names: Sequence[str] = ()) -> list[SizedRival]:
+def effects_beside(opened: Prepared, names: Sequence[str] = ()) -> list[SizedRival]:
     """Return effects that could join a model, each at the size from which it would be named now.
 
     Parameters
@@ -88,7 +88,7 @@ def effects_beside(opened: Opening, names: Sequence[str] = ()) -> list[SizedRiva
     return [sized_rival(name, fitted) for name in names or able]
 
 
-def sized_rival(name: str, fitted: Known) -> SizedRival:
+def sized_rival(name: str, fitted: SizeSearch) -> SizedRival:
     """Return an effect beside a model, at the size from which it would be named."""
     sized = Sized(name, fitted)
     least = resolved(sized, SMALLEST)
@@ -151,7 +151,7 @@ def refuse_no_rival(name: str) -> None:
         raise StudyError(unknown("effect or law", name, known))
 
 
-def rivals(opened: Opening, names: Sequence[str]) -> list[Question]:
+def rivals(opened: Prepared, names: Sequence[str]) -> list[Question]:
     """Return questions whose rivals are each other: the model with one effect, or with another.
 
     Parameters
@@ -185,7 +185,7 @@ def rivals_of(models: Mapping[str, Model]) -> list[Question]:
     return [Question(model, tuple(asked[name])) for name, model in models.items()]
 
 
-def _fitted(name: str, opened: Opening) -> Model:
+def _fitted(name: str, opened: Prepared) -> Model:
     """Return the model with an effect, or with another law, fitted to the training runs."""
     model, problem = opened.before.model, opened.searched
     if name == NONE:
@@ -339,7 +339,9 @@ def separated(known: Sequence[Information], rule: DecisionRule = BENCH) -> list[
         for name, distance in one.distances().items():
             apart[name] = min(apart.get(name, inf), distance)
     return [
-        Figure("separate", name, rule.tells / distance if distance else inf, 1.0 / ENOUGH)
+        Figure(
+            "separate", name, rule.separating_sigma / distance if distance else inf, 1.0 / ENOUGH
+        )
         for name, distance in apart.items()
     ]
 

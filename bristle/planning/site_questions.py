@@ -16,7 +16,7 @@ import numpy as np
 from ..core.progress import tell
 from ..core.text import unknown
 from ..diagnosis.conclusion import lookalikes
-from ..diagnosis.prepared import Opening, of_layer
+from ..diagnosis.prepared import Prepared, of_layer
 from ..diagnosis.rule import BENCH, SITE
 from ..diagnosis.site import joinable_at
 from ..errors import StudyError
@@ -104,7 +104,7 @@ def are_twins(one: str, other: str) -> bool:
     return any(name in EFFECTS and twin in twins_of(name) for name, twin in pairs)
 
 
-def able_at(site: str, opened: Opening) -> list[str]:
+def able_at(site: str, opened: Prepared) -> list[str]:
     """Return the effects with a size that can join the model of a site."""
     model = opened.before.model
     if site != DAMPER:
@@ -118,7 +118,7 @@ def able_at(site: str, opened: Opening) -> list[str]:
 
 
 def purposes_at(
-    sites: Mapping[str, Opening], requests: Sequence[SiteRequest], limits: RigLimits, drive: str
+    sites: Mapping[str, Prepared], requests: Sequence[SiteRequest], limits: RigLimits, drive: str
 ) -> dict[str, Purposes]:
     """Return what a plan is for, by site; sites of which nothing is asked are left out.
 
@@ -157,7 +157,7 @@ def purposes_at(
 
 
 def _with_request(
-    found: Purposes, request: PlanRequest, site: str, opened: Opening, able: Sequence[str]
+    found: Purposes, request: PlanRequest, site: str, opened: Prepared, able: Sequence[str]
 ) -> Purposes:
     """Return purposes with what a request asks of a site, but for parts without a form."""
     model = opened.before.model
@@ -179,7 +179,7 @@ def _asked_for(name: str, names: Sequence[str]) -> bool:
     return name in names or plain_name(name) in names
 
 
-def _sized(names: Sequence[str], opened: Opening) -> list[SizedRival]:
+def _sized(names: Sequence[str], opened: Prepared) -> list[SizedRival]:
     """Return effects, each at the size from which it would be named now."""
     if not names:
         return []
@@ -188,7 +188,7 @@ def _sized(names: Sequence[str], opened: Opening) -> list[SizedRival]:
 
 
 def _rivals(
-    names: Sequence[str], site: str, opened: Opening, able: Sequence[str]
+    names: Sequence[str], site: str, opened: Prepared, able: Sequence[str]
 ) -> list[Question]:
     """Return rivals at a site: those that can act there; of a single one the model as it is."""
     model = opened.before.model
@@ -208,7 +208,7 @@ def _rivals(
     return rivals_of(models)
 
 
-def _with_effect(name: str, opened: Opening) -> Model:
+def _with_effect(name: str, opened: Prepared) -> Model:
     """Return the model of a site with one more effect, fitted."""
     if EFFECTS[name].site == "structure":
         tell(f"fitting {name}")
@@ -250,7 +250,7 @@ def _meant(own: Mapping[str, str], names: Sequence[str]) -> set[str]:
 
 
 def _refuse_unknown(
-    request: PlanRequest, able: Mapping[str, Sequence[str]], sites: Mapping[str, Opening]
+    request: PlanRequest, able: Mapping[str, Sequence[str]], sites: Mapping[str, Prepared]
 ) -> None:
     """Refuse names of effects and parameters that no site has."""
     there = sorted({name for names in able.values() for name in names})
@@ -268,7 +268,7 @@ def _refuse_unknown(
             parameters_of(own, (name,))
 
 
-def _refuse_effect(name: str, there: Sequence[str], sites: Mapping[str, Opening]) -> None:
+def _refuse_effect(name: str, there: Sequence[str], sites: Mapping[str, Prepared]) -> None:
     if name not in EFFECTS:
         raise StudyError(unknown("effect", name, sorted(EFFECTS)))
     inside = [site for site, one in sites.items() if name in one.before.model.effects]
@@ -280,7 +280,7 @@ def _refuse_effect(name: str, there: Sequence[str], sites: Mapping[str, Opening]
     )
 
 
-def _learned_at(requests: Sequence[SiteRequest], sites: Mapping[str, Opening]) -> list[str]:
+def _learned_at(requests: Sequence[SiteRequest], sites: Mapping[str, Prepared]) -> list[str]:
     """Return the sites at which a part without a form is to be learned: where the model errs."""
     named = [site for one in requests if one.request.learn is not None for site in one.sites]
     loud = [site for site, one in sites.items() if one.before.z > one.rule.clean]
@@ -288,7 +288,7 @@ def _learned_at(requests: Sequence[SiteRequest], sites: Mapping[str, Opening]) -
 
 
 def _parts(
-    site: str, opened: Opening, names: Sequence[str], limits: RigLimits, drive: str
+    site: str, opened: Prepared, names: Sequence[str], limits: RigLimits, drive: str
 ) -> Question:
     """Return the question what a part without a form does at a site, along coordinates there."""
     runs = [*opened.problem.runs, *opened.held_out.runs]
@@ -442,7 +442,7 @@ def _apart(
             in_layer = _distance(problem, problem.runs, *(_part(one, line) for one in two))
             apart = hypot(at_damper, in_layer)
             key = (DAMPER, "separate", rival.name)
-            out[key] = max(out.get(key, 0.0), BENCH.tells / apart if apart else inf)
+            out[key] = max(out.get(key, 0.0), BENCH.separating_sigma / apart if apart else inf)
     return out
 
 

@@ -12,8 +12,8 @@ from keyword import iskeyword
 from ..core.files import write_whole
 from ..core.progress import tell
 from ..diagnosis.decision import noise_not_known
-from ..diagnosis.prepared import Insufficient, Opening
-from ..diagnosis.rig_runs import BenchRuns, BuildingRuns
+from ..diagnosis.prepared import Prepared
+from ..diagnosis.rig_runs import RigRuns, runs_of_rig
 from ..errors import StudyError
 from ..learning.closed_forms import close, closed_forms
 from ..learning.curve import Place, refuse_elsewhere
@@ -29,8 +29,6 @@ from .identified import is_identified
 from .identify import as_model
 from .rig import building_of
 from .study import Study
-
-Runs = BenchRuns | BuildingRuns
 
 
 def learn_effect(
@@ -127,33 +125,31 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     return replace(learned, file=file, picture=picture)
 
 
-def _opened(study: Study, at: str) -> tuple[str, Opening]:
+def _opened(study: Study, at: str) -> tuple[str, Prepared]:
     """Return the site to learn at, and what is known there."""
-    rig = _rig(study)
-    if isinstance(rig, BuildingRuns):
-        rig.refuse_lacking(study.folder)
+    rig, nothing = _rig(study), f"{study.folder}: nothing can be learned from these runs."
+    if rig.lacking is not None:
+        raise StudyError(f"{nothing} {' '.join(rig.lacking.reasons)}")
     there = rig.sites()
     if at and at not in there:
         raise StudyError(
             f"--at: these runs do not show the site {at}; they show {', '.join(there)}."
         )
-    openings = [(site, rig.open_site(site)) for site in ([at] if at else _wanted(study, there))]
-    opened = [(site, one) for site, one in openings if isinstance(one, Opening)]
-    able = [(site, one) for site, one in opened if one.held_out.noise_known]
+    wanted = [at] if at else _wanted(study, there)
+    prepared = {site: one for site in wanted if (one := rig.prepare(site)) is not None}
+    able = [(site, one) for site, one in prepared.items() if one.held_out.noise_known]
     if not able:
-        why = [" ".join(one.reasons) for _, one in openings if isinstance(one, Insufficient)]
-        why += list(dict.fromkeys(noise_not_known(one.held_out) for _, one in opened))
-        raise StudyError(f"{study.folder}: nothing can be learned from these runs. {' '.join(why)}")
+        why = dict.fromkeys(noise_not_known(one.held_out) for one in prepared.values())
+        raise StudyError(f"{nothing} {' '.join(why)}")
     return max(able, key=lambda pair: pair[1].before.z)
 
 
-def _rig(study: Study) -> Runs:
+def _rig(study: Study) -> RigRuns:
     model, runs = study.model(), study.runs()
-    known = is_identified(model)
-    building, present = building_of(study, model), as_model(model)
-    if building is None:
-        return BenchRuns(runs.train, runs.holdout, present, known, tell)
-    return BuildingRuns(runs.train, runs.holdout, present, building, tell)
+    return runs_of_rig(
+        runs.train, runs.holdout, as_model(model), building_of(study, model),
+        identified=is_identified(model), say=tell,
+    )  # fmt: skip
 
 
 def _wanted(study: Study, there: Sequence[str]) -> list[str]:

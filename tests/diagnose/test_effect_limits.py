@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.diagnosis.effect_limits import NO_AMOUNT, EffectLimit, effect_limits, limit_of
-from bristle.diagnosis.effect_size import STANDS_OUT, Known, Sized, resolved
+from bristle.diagnosis.effect_size import STANDS_OUT, Sized, SizeSearch, resolved
 from bristle.diagnosis.view import verdict_view
 from bristle.diagnosis.words import limit_rows
 from bristle.identification.fit import intervals_of
@@ -27,7 +27,7 @@ def known():
     """Return two runs of a Bingham damper, the law fitted to them."""
     problem = problem_of(steps)
     model = refine(Model("bingham", (), VALUES), problem)
-    return Known(problem, model, problem.expectation(model), 6000)
+    return SizeSearch(problem, model, problem.expectation(model), 6000)
 
 
 def test_the_limit_of_a_linear_effect_is_that_of_a_fit_with_it(known):
@@ -44,7 +44,7 @@ def test_the_limit_of_a_linear_effect_is_that_of_a_fit_with_it(known):
 
 def test_a_limit_on_the_command_has_the_unit_of_the_runs(known):
     runs = [replace(run, drive="current") for run in known.problem.runs]
-    driven = Known(known.problem.of(runs), known.model, known.expected, 6000)
+    driven = SizeSearch(known.problem.of(runs), known.model, known.expected, 6000)
     assert limit_of(Sized("saturation", driven)).unit == "A"
     assert limit_of(Sized("saturation", known)).unit == "V"
     assert limit_of(Sized(SPRING, driven)).unit == "N/m"
@@ -53,7 +53,7 @@ def test_a_limit_on_the_command_has_the_unit_of_the_runs(known):
 def test_a_tenth_of_the_noise_allows_a_tenth(known):
     problem = problem_of(steps, noise=1e-3)
     model = refine(Model("bingham", (), VALUES), problem)
-    finer = Known(problem, model, problem.expectation(model), 6000)
+    finer = SizeSearch(problem, model, problem.expectation(model), 6000)
     wide, narrow = (limit_of(Sized("fluid_inertia", one)).largest for one in (known, finer))
     assert 4.0 < wide / narrow < 25.0  # the noise of both is drawn anew
 
@@ -75,7 +75,7 @@ def test_what_is_named_is_no_less_than_what_is_allowed_where_the_model_errs(know
     runs = [replace(run, force=known.problem.predict(there, run)) for run in known.problem.runs]
     problem = known.problem.of(runs)
     model = refine(known.model, problem, 6)
-    limit = limit_of(Sized(name, Known(problem, model, problem.expectation(model), 6000)))
+    limit = limit_of(Sized(name, SizeSearch(problem, model, problem.expectation(model), 6000)))
     assert limit.named == limit.largest
     assert limit.named_share == pytest.approx(limit.share)
 
@@ -97,7 +97,7 @@ def test_a_parameter_that_the_runs_hardly_tell_is_not_moved_beyond_its_sensitivi
     straight = {**VALUES, "v_n": 90.0}  # its exponential is one at the speeds of these runs
     problem = problem_of(steps, values=straight)
     model = replace(refine(Model("bingham", (), straight, ("v_n",)), problem), fixed=())
-    known = Known(problem, model, problem.expectation(model), 6000)
+    known = SizeSearch(problem, model, problem.expectation(model), 6000)
     sized = Sized("quadratic_damping", known)  # what v_n would absorb, moved by many powers of ten
     alone = limit_of(sized)
     change = sized.change(alone.named / sized.one)
@@ -113,7 +113,7 @@ def test_a_parameter_that_the_runs_hardly_tell_is_not_moved_beyond_its_sensitivi
 def test_a_parameter_that_changes_nothing_on_these_runs_stays():
     problem = problem_of(lambda _: np.zeros(len(T)))
     model = replace(refine(Model("bingham", (), VALUES, ("f_v", "c_v")), problem), fixed=())
-    known = Known(problem, model, problem.expectation(model), 6000)
+    known = SizeSearch(problem, model, problem.expectation(model), 6000)
     sized = Sized("delay", known)
     alone = limit_of(sized)
     steps_taken = dict(zip(known.search.names, known.steps(sized.change(1.0)), strict=True))
@@ -155,7 +155,7 @@ def test_a_limit_allows_what_is_in_series_with_the_damper(known, name, times):
     ]
     added = problem.of(runs)
     model = refine(known.model, added, 6)
-    told = limit_of(Sized(name, Known(added, model, added.expectation(model), 6000))).largest
+    told = limit_of(Sized(name, SizeSearch(added, model, added.expectation(model), 6000))).largest
     assert told <= there if sized.falls else told >= there
 
 
@@ -182,13 +182,13 @@ def test_a_few_samples_far_out_do_not_bend_the_model(known):
 def test_what_hides_an_effect_is_told():
     problem = problem_of(steady)
     model = refine(Model("bingham", (), VALUES, ("f_v", "c_v")), problem)
-    still = Known(problem, model, problem.expectation(model), 6000)
+    still = SizeSearch(problem, model, problem.expectation(model), 6000)
     found = {one.effect: one for one in effect_limits(still, ("coil_lag", SPRING), ("coil_lag",))}
     assert found["coil_lag"].why == "the command is constant"
     assert found[SPRING].why == ""
     sprung = {**VALUES, "gas_spring.k": 50.0, "gas_spring.k_3": 1e4}
     both = Model("bingham", (SPRING,), sprung, ("f_v", "c_v", "gas_spring.k_2"))
-    taken = Known(problem, both, problem.expectation(both), 6000)
+    taken = SizeSearch(problem, both, problem.expectation(both), 6000)
     assert limit_of(Sized("duffing", taken)).why == "gas_spring.k_3 of the model absorbs it"
 
 

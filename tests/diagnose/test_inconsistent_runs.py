@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.conclusion import VerdictContext, conclude
 from bristle.diagnosis.decision import OTHER_FORM
 from bristle.diagnosis.inconsistent_runs import contradicted, groups, inconsistent_runs, odd_run
-from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit, fit_from_starts
@@ -105,7 +105,7 @@ def test_a_run_beyond_all_others_is_not_called_odd():
     assert odd_run(fit(train, truth, with_std=False).model, train, first.of([])) == ""
 
 
-def sprung_finding(place: int, gain: float) -> tuple[SiteDiagnosis, Opening]:
+def sprung_finding(place: int, gain: float) -> tuple[SiteDiagnosis, Prepared]:
     """Return what is found on a damper beside a spring, with one run whose force is scaled."""
     first, second, truth = true_case(5, "bingham")
     both = [*first.runs, *second.runs]
@@ -119,7 +119,7 @@ def sprung_finding(place: int, gain: float) -> tuple[SiteDiagnosis, Opening]:
         "damper", "effect", ("gas_spring",), before.z, single.z, 0.8, float("nan"),
         trials=(single,), before=before, after=single, reasons=("It gains.", OTHER_FORM),
     )  # fmt: skip
-    return found, Opening(before, train, held_out)
+    return found, Prepared(before, train, held_out)
 
 
 @pytest.mark.parametrize("place", [1, 4])
@@ -162,7 +162,7 @@ def test_a_logger_that_began_apart_is_told_beside_a_missing_effect(named):
     after = single if named else before
     kind, effects = ("effect", ("gas_spring",)) if named else ("unknown", ())
     found = replace(found, kind=kind, effects=effects, trials=(single,), before=before, after=after)
-    told = contradicted(found, Opening(before, train, opened.held_out))
+    told = contradicted(found, Prepared(before, train, opened.held_out))
     assert told.kind == ("effect" if named else "insufficient")
     assert told.effects == effects
     assert told.reasons[-1].startswith(f"With gas_spring: In {runs[1].name} the force is on record")
@@ -190,6 +190,6 @@ def test_the_layer_waits_for_a_measured_force_that_contradicts_itself(force, dam
     nan = float("nan")
     layer = SiteDiagnosis("layer", "unknown", (), 2.2, 2.2, 0.0, nan, reasons=("It errs.",))
     other = SiteDiagnosis("damper", damper, (), 4.0, 4.0, 0.0, nan, reasons=("One run is odd.",))
-    told = conclude({"layer": layer, "damper": other}, About(force=force))
+    told = conclude({"layer": layer, "damper": other}, VerdictContext(force=force))
     assert told.kind == kind
     assert ("set right first" in " ".join(told.reasons)) == (kind == "insufficient")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bristle.diagnosis.law_choice import (
+    LawAndEffects,
     LawVerdict,
-    Pair,
     as_good,
     best_of,
     choose,
@@ -58,7 +58,7 @@ def pair(law, z_alone, kind="none", effects=(), z=None, **choices):
     gone = SiteDiagnosis(
         "damper", kind, tuple(effects), z_alone, after.z, 0.0, float("nan"), after=after
     )
-    return Pair(first, gone)
+    return LawAndEffects(first, gone)
 
 
 def looker(*pairs):

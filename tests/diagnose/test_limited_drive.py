@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,23 +49,24 @@ def made(seed, command=steps, limit=None, effects=(), values=None):
 
 
 def found(drive="voltage", **how):
-    train, held_out = Problem([made(s, **how) for s in (1, 2, 3)]), Problem([made(4, **how)])
+    runs = [replace(made(seed, **how), drive=drive) for seed in (1, 2, 3, 4)]
+    train, held_out = Problem(runs[:3]), Problem(runs[3:])
     model = fit(train, Model("bingham", (), LAW), with_std=False).model
     before = judge(model, train, held_out)
-    return before, limited_drive(before, train, held_out, drive)
+    return before, limited_drive(before, train, held_out)
 
 
 @pytest.mark.parametrize("command", [steps, sine])
 @pytest.mark.parametrize("limit", [("slew", 12.0), ("range", 4.5)])
 def test_a_limit_is_told_with_its_value_and_set_right(command, limit):
     before, told = found(command=command, limit=limit)
-    assert (told.fault.channel, told.fault.kind) == ("voltage", limit[0])
-    assert told.fault.value == pytest.approx(limit[1], rel=0.02)
-    assert abs(told.fault.value - limit[1]) < 5.0 * told.fault.std
+    assert (told.faults[0].channel, told.faults[0].kind) == ("voltage", limit[0])
+    assert told.faults[0].value == pytest.approx(limit[1], rel=0.02)
+    assert abs(told.faults[0].value - limit[1]) < 5.0 * told.faults[0].std
     assert before.z > 1.2
     assert told.trial.z == pytest.approx(1.0, abs=0.06)
-    assert "4 of 4 runs" in told.fault.text
-    assert f'fault = "{limit[0]}"' in told.fault.text
+    assert "4 of 4 runs" in told.faults[0].text
+    assert f'fault = "{limit[0]}"' in told.faults[0].text
     apart = told.held_out.runs[0].V - limited(made(4, command=command).V, DT, *limit)
     assert float(np.max(np.abs(apart))) < 0.1
 
@@ -85,8 +88,8 @@ def test_effects_are_no_limit(effect):
 
 def test_a_current_is_told_in_its_own_unit():
     _, told = found(drive="current", limit=("slew", 12.0))
-    assert told.fault.channel == "current"
-    assert told.fault.text.startswith("Current reaches the coil no faster than 12 A/s")
+    assert told.faults[0].channel == "current"
+    assert told.faults[0].text.startswith("Current reaches the coil no faster than 12 A/s")
 
 
 def test_clean_runs_and_commands_that_are_held_show_none():

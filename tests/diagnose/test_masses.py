@@ -9,7 +9,7 @@ from shaken import building, friction, measured, shake
 from bristle.diagnosis.building_numbers import Shaken, suited_masses, text_of_masses, with_masses
 from bristle.diagnosis.load_cell import load_cell
 from bristle.diagnosis.rule import SITE
-from bristle.diagnosis.site import look_at
+from bristle.diagnosis.site import diagnose_line, prepare_line
 from bristle.identification.building_motion import responses
 
 DOUBTS = (
@@ -36,16 +36,27 @@ def clean():
     return shaken()
 
 
+def lacking(lines):
+    """Return what each line lacks, by site."""
+    return {s: diagnose_line(s, prepare_line(s, *pair)) for s, pair in lines.items()}
+
+
 @pytest.mark.parametrize("doubt", DOUBTS)
 def test_masses_that_are_off_are_found_and_no_fault_is_told(clean, doubt):
     b, runs = clean
     told = with_masses(b, np.array(doubt))
-    before = [look_at(site, *pair).kind for site, pair in runs.lines(told).items()]
+    before = [
+        diagnose_line(site, prepare_line(site, *pair)).kind
+        for site, pair in runs.lines(told).items()
+    ]
     assert "unknown" in before
     found = suited_masses(runs, told)
     # The base's mass stands for a part of its force that the layer's line absorbs by itself.
     assert np.diag(found.M)[1:] == pytest.approx(np.diag(b.M)[1:], rel=3e-3)
-    after = {site: look_at(site, *pair) for site, pair in runs.lines(found).items()}
+    after = {
+        site: diagnose_line(site, prepare_line(site, *pair))
+        for site, pair in runs.lines(found).items()
+    }
     assert {one.kind for one in after.values()} == {"none"}
     (text,) = text_of_masses(told, found)
     assert "floor1" in text
@@ -63,7 +74,7 @@ def test_without_a_measured_force_the_ratio_of_the_floors_is_found(doubt):
     assert np.diag(found.M)[0] == np.diag(told.M)[0]
     (text,) = text_of_masses(told, found, runs.measured)
     assert "load cell" not in text
-    assert {look_at(site, *pair).kind for site, pair in runs.lines(found).items()} == {"none"}
+    assert {one.kind for one in lacking(runs.lines(found)).values()} == {"none"}
 
 
 def test_right_masses_stay(clean):
@@ -74,14 +85,14 @@ def test_right_masses_stay(clean):
 
 def test_a_small_gain_is_masses_and_a_large_one_a_fault():
     b, runs = shaken(1.014)
-    sites = runs.lines(suited_masses(runs, b)).items()
-    assert {look_at(site, *pair).kind for site, pair in sites} == {"none"}
+    sites = lacking(runs.lines(suited_masses(runs, b)))
+    assert {one.kind for one in sites.values()} == {"none"}
     b, runs = shaken(1.06)
     found = suited_masses(runs, b)
     assert np.diag(found.M)[1:] == pytest.approx(1.06 * np.diag(b.M)[1:], rel=5e-3)
     b, runs = shaken(1.15)
     assert suited_masses(runs, b) is b, "no file is so wrong"
-    layer = look_at("layer", *runs.lines(b)["layer"])
+    layer = diagnose_line("layer", prepare_line("layer", *runs.lines(b)["layer"]))
     cell = load_cell(layer, runs.train, runs.holdout, b)
     assert cell is not None
     assert cell[0].effects == ("force_gain",)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bristle.diagnosis.inconsistent_runs import inconsistent_runs
-from bristle.diagnosis.model_faults import model_based_fault
+from bristle.diagnosis.model_faults import model_based_faults
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import Bench
@@ -37,7 +37,7 @@ def problems(**choices):
 
 def found(train, held_out):
     base = fit_from_starts(train, Model("bingham"), starts=2).model
-    return model_based_fault(judge(base, train, held_out), train, held_out)
+    return model_based_faults(judge(base, train, held_out), train, held_out)
 
 
 def preload(k):
@@ -46,7 +46,7 @@ def preload(k):
 
 
 def test_a_force_off_its_zero():
-    fault = found(*problems(**preload(0.0))).fault
+    fault = found(*problems(**preload(0.0))).faults[0]
     assert (fault.channel, fault.kind) == ("force", "bias")
     assert fault.value == pytest.approx(OFFSET, abs=max(4.0 * fault.std, 0.01))
 
@@ -63,8 +63,8 @@ def test_a_damper_stronger_one_way_is_physics():
 def test_a_voltage_recorded_late():
     shift = round(LATE / DT)
     late = found(*problems(spoil=lambda V: np.concatenate([np.full(shift, V[0]), V[:-shift]])))
-    assert (late.fault.channel, late.fault.kind) == ("voltage", "delay")
-    assert late.fault.value == pytest.approx(LATE, abs=max(4.0 * late.fault.std, 1e-4))
+    assert (late.faults[0].channel, late.faults[0].kind) == ("voltage", "delay")
+    assert late.faults[0].value == pytest.approx(LATE, abs=max(4.0 * late.faults[0].std, 1e-4))
     assert late.trial.z == pytest.approx(1.0, abs=0.1)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bristle.diagnosis.effect_limits import EffectLimit, limit_of, profiled
-from bristle.diagnosis.effect_size import Known, Sized
+from bristle.diagnosis.effect_size import Sized, SizeSearch
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.start_grid import refine
 
@@ -17,11 +17,11 @@ TRUE = Model("bingham", values={"f_c": 5.0, "c_0": 20.0, "v_n": 100.0}, fixed=("
 
 
 @pytest.fixture(scope="module")
-def known() -> Known:
+def known() -> SizeSearch:
     return known_with(TRUE, 0.0)
 
 
-def known_with(other: Model, share: float) -> Known:
+def known_with(other: Model, share: float) -> SizeSearch:
     """Return what limits are found with, for runs that have a share of what `other` has more."""
     rng = np.random.default_rng(3)
     runs = []
@@ -39,10 +39,10 @@ def known_with(other: Model, share: float) -> Known:
         runs.append(replace(one, force=force))
     problem = Problem(runs)
     model = refine(TRUE, problem)
-    return Known(problem, model, problem.expectation(model), 1500)
+    return SizeSearch(problem, model, problem.expectation(model), 1500)
 
 
-def test_where_all_is_linear_the_profile_agrees(known: Known) -> None:
+def test_where_all_is_linear_the_profile_agrees(known: SizeSearch) -> None:
     limit = limit_of(Sized("gas_spring", known))
     (found,) = profiled(known, [limit])
     assert found.profiled
@@ -70,7 +70,7 @@ def test_the_profile_agrees_on_either_side_of_none(
     assert found.largest == pytest.approx(limit.largest, rel=0.1)
 
 
-def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: Known) -> None:
+def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: SizeSearch) -> None:
     limit = limit_of(Sized("gas_spring", known))
     assert limit.largest is not None
     assert limit.share is not None
@@ -83,7 +83,7 @@ def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: Known) -> Non
     assert dict(found.moved) == pytest.approx(dict(limit.moved), rel=0.2)
 
 
-def test_what_is_named_is_no_less_than_a_limit_that_was_moved(known: Known) -> None:
+def test_what_is_named_is_no_less_than_a_limit_that_was_moved(known: SizeSearch) -> None:
     limit = limit_of(Sized("gas_spring", known))
     assert limit.largest is not None
     less = replace(limit, named=0.1 * limit.largest, named_share=1e-9)
@@ -91,7 +91,7 @@ def test_what_is_named_is_no_less_than_a_limit_that_was_moved(known: Known) -> N
     assert (found.named, found.named_share) == (found.largest, found.share)
 
 
-def test_what_has_no_size_stays_as_it_is(known: Known) -> None:
+def test_what_has_no_size_stays_as_it_is(known: SizeSearch) -> None:
     hidden = EffectLimit("coil_lag", why="the command is constant")
     coarse = EffectLimit("backlash", "gap", "m", largest=1e-6, coarse=True)
     assert profiled(known, [hidden, coarse]) == (hidden, coarse)

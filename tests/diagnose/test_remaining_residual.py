@@ -10,7 +10,7 @@ import pytest
 from bristle.comparison.patterns import LEVEL, ResidualPattern
 from bristle.data.left_out import MISSING
 from bristle.diagnosis import remaining
-from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.conclusion import VerdictContext, conclude
 from bristle.diagnosis.remaining import most_telling, patterns_of, ringing
 from bristle.diagnosis.rule import BENCH
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
@@ -38,19 +38,22 @@ def rings(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_significant_place_is_named_before_one_that_tells_little_more(rings):
-    found = [pattern("rest", 0.20, sure=False), pattern("speed", 1.1 * BENCH.half * 0.20)]
+    found = [pattern("rest", 0.20, sure=False), pattern("speed", 1.1 * BENCH.pattern_share * 0.20)]
     assert most_telling(found, None, None) == "speed"
 
 
 def test_not_before_one_that_tells_far_more(rings):
-    found = [pattern("rest", 0.26, sure=False), pattern("acceleration", 0.9 * BENCH.half * 0.26)]
+    found = [
+        pattern("rest", 0.26, sure=False),
+        pattern("acceleration", 0.9 * BENCH.pattern_share * 0.26),
+    ]
     assert most_telling(found, None, None) == "rest"
 
 
 def test_what_rings_and_follows_nothing_else_clearly_has_a_frequency(rings):
     found = [pattern("speed", 0.9 * BENCH.clear)]
     assert most_telling(found, None, None) == "speed"
-    rings(1.1 * BENCH.rings)
+    rings(1.1 * BENCH.resonance_share)
     assert most_telling(found, None, None) == "frequency"
     assert most_telling([pattern("displacement", 1.1 * BENCH.clear)], None, None) == "displacement"
 
@@ -58,7 +61,7 @@ def test_what_rings_and_follows_nothing_else_clearly_has_a_frequency(rings):
 def test_what_rings_after_each_reversal_has_a_frequency(rings):
     found = [pattern("time_since_reversal", 1.1 * BENCH.clear)]
     assert most_telling(found, None, None) == "time_since_reversal"
-    rings(1.1 * BENCH.rings)
+    rings(1.1 * BENCH.resonance_share)
     assert most_telling(found, None, None) == "frequency"
 
 
@@ -103,5 +106,5 @@ def test_nothing_is_named_where_there_is_no_place(rings):
 )
 def test_a_drive_that_nobody_recorded_leaves_a_doubt(driven, kind, doubted):
     shown = SiteDiagnosis("damper", kind, (), 2.0, 2.0, 0.0, 0.01, reasons=("Something.",))
-    found = conclude({"damper": shown}, About(driven=driven))
+    found = conclude({"damper": shown}, VerdictContext(driven=driven))
     assert ("No command was recorded" in found.words) is doubted

@@ -11,13 +11,13 @@ from shaken import building, friction, measured, shake
 from bristle.core.finding import Finding
 from bristle.diagnosis import diagnose_rig, rig_runs
 from bristle.diagnosis import site as of_damper
-from bristle.diagnosis.conclusion import About, conclude, lookalikes
+from bristle.diagnosis.conclusion import VerdictContext, conclude, lookalikes
 from bristle.diagnosis.decision import Decision
 from bristle.diagnosis.inconsistent_runs import kind_of
 from bristle.diagnosis.load_cell import load_cell
-from bristle.diagnosis.prepared import IN_BUILDING, Opening
+from bristle.diagnosis.prepared import IN_BUILDING, Prepared
 from bristle.diagnosis.rule import BENCH, INSIDE
-from bristle.diagnosis.site import look_at, shortened
+from bristle.diagnosis.site import diagnose_line, prepare_line, shortened
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis, of_decision
 from bristle.diagnosis.trials import Trial, judge
 from bristle.errors import RecordError
@@ -60,7 +60,8 @@ def findings(hidden):
     b, runs = runs_of(hidden)
     found = responses(runs, b)
     problems = problems_of(found[:2], found[2:], b)
-    return {s: look_at(s, *problems[s]) for s in ("layer", "storey1", "storey2")}, found, b
+    lines = {s: prepare_line(s, *problems[s]) for s in ("layer", "storey1", "storey2")}
+    return {site: diagnose_line(site, one) for site, one in lines.items()}, found, b
 
 
 @pytest.mark.parametrize("effect", HIDDEN)
@@ -110,7 +111,7 @@ def test_a_load_cell_that_is_late_or_wrong_is_told_from_physics(what, value):
         runs.append(measured(clean, i))
     found = responses(runs, b)
     problems = problems_of(found[:2], found[2:], b)
-    layer = look_at("layer", *problems["layer"])
+    layer = diagnose_line("layer", prepare_line("layer", *problems["layer"]))
     told = load_cell(layer, found[:2], found[2:], b)
     assert told is not None
     finding, (train, _) = told
@@ -192,12 +193,12 @@ def test_findings_of_sites_become_one_verdict():
         return SiteDiagnosis(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
 
     both = {"layer": at("layer", "effect", "duffing"), "storey1": at("storey1", "none")}
-    assert conclude(both, About()).effects == ("duffing",)
+    assert conclude(both, VerdictContext()).effects == ("duffing",)
     both["storey1"] = at("storey1", "effect", "storey_softening")
-    found = conclude(both, About())
+    found = conclude(both, VerdictContext())
     assert (found.kind, found.effects) == ("effect", ("duffing", "storey_softening"))
     both["storey1"] = at("storey1", "unknown")
-    found = conclude(both, About())
+    found = conclude(both, VerdictContext())
     assert (found.kind, found.coordinate) == ("unknown", "velocity")
     assert "Besides, the model misses duffing (layer)." in found.words
 
@@ -213,7 +214,7 @@ def test_what_is_found_is_named_whatever_a_quiet_site_does():
             "layer": seen("layer", kind, 1.17, *effects),
             "damper": seen("damper", "effect", 6.28, "flattening"),
         }
-        found = conclude(sites, About())
+        found = conclude(sites, VerdictContext())
         assert (found.kind, found.effects) == ("effect", ("flattening",))
         assert "little beside what was found: Because." in found.words
 
@@ -223,18 +224,18 @@ def test_a_loud_site_without_a_name_stays_unknown_beside_a_finding():
         "layer": seen("layer", "unknown", 2.0),
         "damper": seen("damper", "effect", 3.0, "flattening"),
     }
-    assert conclude(sites, About()).kind == "unknown"
+    assert conclude(sites, VerdictContext()).kind == "unknown"
 
 
 @pytest.mark.parametrize("name", ["fluid_inertia", "base_friction"])
 def test_an_ambiguous_verdict_has_two_names_that_can_be_added(name):
     sites = {"damper": seen("damper", "effect", 7.41, name)}
-    found = conclude(sites, About(force="reconstructed"))
+    found = conclude(sites, VerdictContext(force="reconstructed"))
     assert (found.kind, found.effects) == ("effect", (name,))
     assert all(one not in EFFECTS for one in found.alternatives)
     assert "a load cell at the damper would distinguish them" in found.words
     twins = {"damper": seen("damper", "effect", 7.41, "gas_spring")}
-    both = conclude(twins, About(force="reconstructed"))
+    both = conclude(twins, VerdictContext(force="reconstructed"))
     assert (both.kind, both.effects) == ("ambiguous", ("gas_spring", "duffing"))
 
 
@@ -280,7 +281,7 @@ def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
 
 def test_lag_of_a_velocity_is_its_instrument():
     lag = Finding("lag", "warning", "Velocity lags.", channel="velocity", value=0.004, std=1e-4)
-    found = conclude({"layer": NOTHING}, About(sensors=(lag,)))
+    found = conclude({"layer": NOTHING}, VerdictContext(sensors=(lag,)))
     assert (found.kind, found.effects) == ("effect", ("velocity_sensor",))
     assert found.sites == {"velocity_sensor": "sensor"}
     assert "velocity_sensor (sensor)" in found.words
@@ -305,8 +306,8 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
 
     monkeypatch.setattr(of_damper, "try_all", search)
     none = StructureProblem([])
-    inside = Opening(trial((), z, train), none, none, part=none, rule=INSIDE, scope=IN_BUILDING)
-    found, _ = of_damper.look_at_damper(inside)
+    inside = Prepared(trial((), z, train), none, none, part=none, rule=INSIDE, scope=IN_BUILDING)
+    found, _ = of_damper.diagnose_damper(inside)
     assert len(asked) == searched
     assert found.kind == "none"
     assert BENCH.quiet < 1.02, (

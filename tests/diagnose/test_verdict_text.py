@@ -7,7 +7,7 @@ import json
 import pytest
 
 from bristle.core.finding import Finding
-from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.conclusion import VerdictContext, conclude
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.verdict import current
 from bristle.diagnosis.words import TONES, fault_rows, fault_texts, headline, sentences, untestable
@@ -23,7 +23,7 @@ def at(site, kind="none", *effects, **more):
 
 
 def said(**findings):
-    return conclude(findings, About()).as_dict()
+    return conclude(findings, VerdictContext()).as_dict()
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_an_effect_at_two_sites_and_one_that_looks_alike_have_their_sites():
     both = {f"storey{i}": at(f"storey{i}", "effect", "storey_softening") for i in (1, 2)}
     assert headline(said(**both)) == "The model misses storey_softening (storey1, storey2)."
     damper = {"storey1": at("storey1"), "damper": at("damper", "effect", "gas_spring")}
-    verdict = conclude(damper, About("reconstructed")).as_dict()
+    verdict = conclude(damper, VerdictContext("reconstructed")).as_dict()
     assert verdict["sites"] == {"gas_spring": "damper", "duffing": "layer"}
     assert headline(verdict).startswith("The model misses either gas_spring (damper) or duffing (l")
 
@@ -97,14 +97,14 @@ def test_what_the_law_takes_up_is_told_with_the_part_that_does():
     # A law that has no such part is offered it.
     tried = {**said(damper=hidden), "ranking": [{"effect": "base_friction", "site": "damper"}]}
     assert untestable(tried) == ["base_friction"]
-    late = conclude({"damper": at("damper")}, About("reconstructed")).as_dict()
+    late = conclude({"damper": at("damper")}, VerdictContext("reconstructed")).as_dict()
     assert untestable({**late, "ranking": tried["ranking"]}) == [f"base_friction ({told})"]
 
 
 def test_a_fault_is_told_once():
     text = "Velocity lags."
     lag = Finding("lag", "warning", text, channel="velocity", value=0.004, std=1e-4)
-    verdict = conclude({"damper": at("damper")}, About(sensors=(lag,))).as_dict()
+    verdict = conclude({"damper": at("damper")}, VerdictContext(sensors=(lag,))).as_dict()
     assert verdict["words"].count(text) == 1
     assert verdict["effects"] == ["velocity_sensor"]
 

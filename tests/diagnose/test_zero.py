@@ -11,7 +11,7 @@ from test_model_based_faults import problems
 from bristle.core.finding import Finding
 from bristle.diagnosis import site as of_damper
 from bristle.diagnosis.decision import Decision
-from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.site import free_zero, renewed_zero, zero_fault
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit_from_starts
@@ -28,7 +28,7 @@ def opened(**choices):
         for problem in problems(**choices)
     )
     model = fit_from_starts(train, Model("bingham"), starts=2).model
-    return Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
+    return Prepared(judge(model, train, held_out), train, held_out, (), {}, ("force",))
 
 
 def test_the_zero_is_fitted_along_with_every_model():
@@ -102,14 +102,14 @@ def test_a_spring_that_says_more_than_a_zero_stays():
         values={"gas_spring.k": 150.0, "gas_spring.preload": OFFSET, "gas_spring.k_2": 0.0},
     )
     model = fit_from_starts(train, Model("bingham"), starts=2).model
-    opening = Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
+    opening = Prepared(judge(model, train, held_out), train, held_out, (), {}, ("force",))
     assert free_zero(opening, of("effect", opening, fitted(opening, ("gas_spring",)))) is None
 
 
 def test_without_an_offset_nothing_is_tried_again():
     train, held_out = problems(**HIDDEN)
     model = fit_from_starts(train, Model("bingham"), starts=2).model
-    opening = Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
+    opening = Prepared(judge(model, train, held_out), train, held_out, (), {}, ("force",))
     assert free_zero(opening, of("unknown", opening)) is None
 
 
@@ -133,7 +133,7 @@ def test_a_zero_that_was_found_first_is_renewed_beside_an_effect():
 
 @pytest.mark.slow
 def test_an_effect_is_named_alone_and_the_zero_told():
-    found, _ = of_damper.look_at_damper(opened(**HIDDEN))
+    found, _ = of_damper.diagnose_damper(opened(**HIDDEN))
     assert (found.kind, found.effects) == ("effect", ("stribeck",))
     (fault,) = found.sensors
     assert fault.value == pytest.approx(OFFSET, abs=0.02)

@@ -14,7 +14,6 @@ from scipy.ndimage import uniform_filter1d
 import bristle
 from bristle.cli import main
 from bristle.core.text import quantity
-from bristle.diagnosis.prepared import Opening
 from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.rule import BENCH
 from bristle.errors import StudyError
@@ -256,7 +255,7 @@ def test_laws_are_told_apart_before_the_first_measurement(sheet: Path) -> None:
     found = bristle.plan(sheet, separate=["bingham", "lugre", "none"], **few)
     then = {one.name: one.then for one in found.outcomes}
     assert then["bingham or none"] == 0.0  # the data sheet's law is the model as it is
-    assert then["bingham or lugre"] == then["lugre or none"] > BENCH.tells
+    assert then["bingham or lugre"] == then["lugre or none"] > BENCH.separating_sigma
     with pytest.raises(StudyError, match=r'no effect or law "lugree"\. Did you mean "lugre"'):
         bristle.plan(sheet, separate=["lugree", "none"])
 
@@ -297,8 +296,8 @@ def test_what_the_runs_at_hand_allow_of_an_effect_is_what_the_verdict_says(
 def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Study) -> None:
     told = {one.effect: one for one in bristle.diagnose(rig, write=False).limits["damper"]}
     runs, model = rig.runs(), as_model(rig.model())
-    opened = BenchRuns(runs.train, runs.holdout, model, True, lambda _: None).open_damper()
-    assert isinstance(opened, Opening)
+    opened = BenchRuns(runs.train, runs.holdout, model, identified=True).prepare("damper")
+    assert opened is not None
     names = ["delay", "stribeck", "saturation"]
     purposes = Purposes(opened.before.model, tuple(effects_beside(opened, names)))
     measured = Measured(opened.problem.runs, opened.held_out.runs)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.verdict import SCHEMA
 from bristle.errors import StudyError
@@ -155,15 +155,17 @@ def test_what_is_refused_leaves_the_study_as_it_was(study, learned):
 class House:
     """The sites of a building as `learn_effect` asks for them, with the z of each."""
 
+    lacking = None
+
     def __init__(self, **z: float) -> None:
         self.z = z
 
     def sites(self):
         return tuple(self.z)
 
-    def open_site(self, site):
+    def prepare(self, site):
         problem = Problem([])
-        return Opening(trial(self.z[site]), problem, problem)
+        return Prepared(trial(self.z[site]), problem, problem)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from house_made import study_of
 from shaken import building, friction
 
-from bristle.diagnosis.conclusion import About, conclude
+from bristle.diagnosis.conclusion import VerdictContext, conclude
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.errors import StudyError
 from bristle.identification.problem import Model
@@ -52,7 +52,7 @@ def test_each_effect_acts_at_its_own_site():
 
 def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
     cell = SiteDiagnosis("force", "effect", ("force_gain",), 3.0, 1.0, 1.0, 0.01, coordinate="1.15")
-    found = conclude({"layer": cell}, About())
+    found = conclude({"layer": cell}, VerdictContext())
     assert (found.kind, found.effects) == ("none", ())
     assert [(f.channel, f.kind, f.value) for f in found.sensors] == [("force", "gain", 1.15)]
     assert "1.15 times" in found.as_dict()["sensors"][0]["words"]
@@ -60,7 +60,7 @@ def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
 
 def test_mass_of_the_base_is_a_rival_in_words_alone():
     damper = SiteDiagnosis("damper", "effect", ("fluid_inertia",), 2.0, 1.0, 1.0, float("nan"))
-    found = conclude({"damper": damper}, About("reconstructed"))
+    found = conclude({"damper": damper}, VerdictContext("reconstructed"))
     assert (found.kind, found.effects) == ("effect", ("fluid_inertia",))
     assert all(name in EFFECTS for name in found.effects)
     assert found.alternatives == ("a mass of the base that the file does not know",)

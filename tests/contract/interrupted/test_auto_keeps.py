@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bristle.cli import main
-from bristle.diagnosis import joint_search, law_trials
+from bristle.diagnosis import joint_search, law_trials, rig_runs
 from bristle.study.forms import NAME
 from bristle.study.study import Study
 
@@ -45,7 +45,7 @@ def auto(rig: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, monkeypatch):
     with monkeypatch.context() as stopped:
-        stopped.setattr(joint_search, "bench_data", interrupt)
+        stopped.setattr(rig_runs, "sensor_faults", interrupt)
         told = auto(rig, capsys)
     assert told == "interrupted. The study is as it was. The same command begins anew."
     assert not (rig / "reports" / NAME).exists()

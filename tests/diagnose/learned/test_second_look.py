@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnosis.prepared import Opening
+from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import Trial, judge
 from bristle.identification.fit import fit
 from bristle.identification.histories import Bench
@@ -87,7 +87,7 @@ def test_a_fit_that_the_second_scan_misleads_begins_from_the_present_model(monke
     curve = Curve("force", "displacement", (), (-0.01, 0.0, 0.01), (5.0, 0.0, 5.0))
     monkeypatch.setattr(learned_fit, "refine", lambda start, train, sweeps: start)
     with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
-        opened = Opening(judge(present, problem, problem), problem, problem)
+        opened = Prepared(judge(present, problem, problem), problem, problem)
         found = learned_fit._inside(curve, "learned_9", far, opened)
     assert found.trial.train == pytest.approx(1.0, abs=0.05)
     assert found.curve.values == (0.0, 0.0, 0.0)
