@@ -190,6 +190,24 @@ def print_view(view: View, files: Iterable[Path | str]) -> None:
         print(f"  {path}")
 
 
+def print_study_view(view: View, arguments: argparse.Namespace, *pictures: Path | None) -> None:
+    """Print the view of a study's result, and the pictures that were drawn.
+
+    Parameters
+    ----------
+    view : of the result
+    arguments : of the command, with `folder` and `details`
+    pictures : their files, None for one that was not drawn
+    """
+    from ..core.text import command
+    from ..view import terminal
+
+    elsewhere = command("report", arguments.folder)
+    print(terminal.text(view, details=arguments.details, elsewhere=elsewhere))
+    for picture in filter(None, pictures):
+        print(f"Picture: {picture}")
+
+
 def print_table(
     heads: Sequence[str], rows: Iterable[Sequence[str | Text]], title: str | None = None, *,
     lines: bool = False,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,8 +34,9 @@ def main(arguments: argparse.Namespace) -> int:
     from ..core.progress import tell
     from ..page.embedded import linked_section
     from ..report.study_page import gather, render
-    from ..study.history import Staircase
     from ..study.study import Study
+    from ..study.view import steps_table
+    from ..view import terminal
 
     study = Study(arguments.folder)
     content = gather(study, open_test=not arguments.keep_test_closed, what_if=arguments.what_if)
@@ -59,13 +59,7 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print_json(answer)
         return 0
-    stairs = Staircase(content.history_steps, cut_off=study.settings.cut_off)
-    if sys.stdout.isatty():
-        from rich.console import Console
-
-        Console(highlight=False).print(stairs)
-    else:
-        print(stairs)
+    print("\n".join(terminal.lines(steps_table(content.history_steps, study.settings.cut_off))))
     if content.trouble:
         print(f"The model could not be compared: {content.trouble}")
     print(f"\nReport: {file}")

@@ -18,6 +18,7 @@ from ._options import (
     channels_of,
     files_of,
     print_json,
+    print_study_view,
     test_files,
 )
 
@@ -512,32 +513,14 @@ def _print_corrections(joined: Sequence[RunCorrections]) -> None:
 
 def _auto(arguments: argparse.Namespace) -> int:
     from ..study.auto import complete
-    from ..study.history import staircase
     from ..study.steps import verdict_of
     from ..study.study import Study
-    from .diagnose import text
+    from ..study.view import completed_view
 
     study = Study(arguments.folder)
-    quiet = arguments.json or not sys.stdout.isatty()
-    low = study.settings.cut_off
-    shown: list[int] = []
-
-    def show() -> None:
-        steps = study.steps()
-        if quiet:
-            return
-        print(f"\n{staircase(steps, cut_off=low)}\n", flush=True)
-        shown.append(len(steps))
-
-    done = complete(
-        study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn, on_step=show
-    )
+    done = complete(study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn)
     if arguments.json:
         print_json(done.as_dict())
         return 0
-    if not shown:
-        print(f"{staircase(study.steps(), cut_off=low)}\n")
-    for one in done.curves:
-        print("\n".join(one.sentences()) + "\n")
-    print(text(verdict_of(study, done.verdict), arguments.folder, details=arguments.details))
+    print_study_view(completed_view(study, done, verdict_of(study, done.verdict)), arguments)
     return 0

@@ -3,20 +3,48 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from ..physics.drive import DRIVES
+from ..physics.effect import EFFECTS
+
+_LIBRARY = "bristle.physics.effects."
 
 NAMES = {
     **{f"{name}_rate": f"recent changes of the {name}" for name in DRIVES},
     "dissipated_energy": "the energy dissipated so far",
     "time_since_reversal": "the time since the last reversal",
-    "rest": "the recent time at rest",
+    "rest": "how long the damper has just been at rest",
     "time": "time",
     "direction": "the direction of motion",
 }
 OF_STOREY = {"displacement": "drift", "velocity": "drift rate", "speed": "drift speed"}
 """What the motion at a storey is called."""
+
+
+PROPER = ("Duffing", "Stribeck")
+"""Names of effects that begin with that of a person."""
+
+
+def effect_name(name: str) -> str:
+    """Return an effect as people write it, "gas spring"; a user's own as it is typed.
+
+    Parameters
+    ----------
+    name : as in a model, of one at another site with it: "base_friction@damper"
+    """
+    key, _, site = name.partition("@")
+    effect = EFFECTS.get(key)
+    if effect is None or not effect.__module__.startswith(_LIBRARY):
+        return name
+    title = effect.first_line().partition(":")[0]
+    own = title if title.startswith(PROPER) else title[:1].lower() + title[1:]
+    return f"{own} of {site_name(site)}" if site else own
+
+
+def effect_names(names: Iterable[str]) -> str:
+    """Return effects as people write them, as a list in words."""
+    return joined([effect_name(name) for name in names])
 
 
 def name_of(coordinate: str, site: str = "") -> str:

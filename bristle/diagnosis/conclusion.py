@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..comparison.names import effect_name
 from ..core.finding import Finding
 from ..data.corrections import TIMING, Correction
 from ..identification.rig import DAMPER
-from ..physics.effect import EFFECTS, Effect, effects_of, plain_name
+from ..physics.effect import EFFECTS, Effect, effects_of
 from . import words
-from .decision import Z
+from .decision import NOISE
 from .load_cell import FORCE_GAIN, low_pass_text
 from .prepared import Insufficient
 from .rule import BENCH, SITE, DecisionRule
@@ -25,7 +26,7 @@ LAYER = "layer"
 
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
 LITTLE = "Little beside what was found:"
-NOT_DRIVEN = "No command was recorded: one that changed would look like this."
+NOT_DRIVEN = "No command was recorded: if it changed during the runs, it would look like this."
 
 
 @dataclass(frozen=True)
@@ -137,8 +138,8 @@ def _after_the_force(found: SiteDiagnosis, damper: SiteDiagnosis | None) -> Site
     if found.site != LAYER or found.kind != "unknown" or not waits:
         return found
     why = (
-        f"{Z} = {found.z_before:.2f}, by an equilibrium that has the damper's force in it; that is "
-        "to be set right first."
+        f"The error is {found.z_before:.2f} {NOISE}, by an equilibrium that has the damper's force "
+        "in it: that is to be set right first."
     )
     return replace(found, kind="insufficient", reasons=(why,))
 
@@ -182,7 +183,8 @@ def _reasons(parts: Sequence[SiteDiagnosis], kind: str) -> list[str]:
         return list(parts[0].reasons)
     if kind == "none" and parts:
         low, high = (f(part.z_before for part in parts) for f in (min, max))
-        out = [f"On held-out runs {Z} = {low:.2f} to {high:.2f} at the {len(parts)} sites."]
+        sites = f"at the {len(parts)} sites"
+        out = [f"The error on held-out runs is {low:.2f} to {high:.2f} {NOISE} {sites}."]
         parts = [part for part in parts if part.z_before > BENCH.clean]
     else:
         told = [part for part in parts if part.kind == "none" and part.reasons]
@@ -218,7 +220,7 @@ def lookalikes(effects: tuple[str, ...]) -> dict[str, str]:
     """Return what else would do the same to a reconstructed force as these effects, and why."""
     twins: dict[str, str] = {}
     for name in (name for name in effects if name in EFFECTS):
-        effect, why = EFFECTS[name], ELSEWHERE.format(name=plain_name(name))
+        effect, why = EFFECTS[name], ELSEWHERE.format(name=effect_name(name))
         own = {effect.key(site): why for site in effect.sites[1:] if not _has_twin(effect, site)}
         for twin, why in {**effect.lookalikes, **own}.items():
             if twin not in effects:
@@ -245,7 +247,7 @@ def _of_load_cell(findings: Mapping[str, SiteDiagnosis]) -> list[Finding]:
             text = f"The load cell shows {gain:.4g} times the force that equilibrium requires"
             if finding.noise_known:
                 before, after = finding.z_before, finding.z_after
-                text += f" ({Z} {before:.3g} before, {after:.3g} with that corrected)"
+                text += f" (error {before:.3g} {NOISE}, {after:.3g} with that corrected)"
             text += "."
             out.append(
                 Finding("gain", "warning", text, channel="force", value=gain, std=float("nan"))

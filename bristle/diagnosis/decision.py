@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..comparison.names import joined
+from ..comparison.names import effect_name, joined
 from ..core.text import plain
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem
@@ -23,13 +23,13 @@ from ..physics.effect import EFFECTS
 from .rule import BENCH, DecisionRule
 from .trials import Trial, paired
 
-Z = "error / noise (z)"
-"""How z is introduced in a sentence."""
+NOISE = "times the noise (z)"
+"""What stands behind z in a sentence: "the error is 1.02 times the noise (z)"."""
 
 TOLD = 3
 """Runs that a sentence names one by one."""
 
-OTHER_FORM = "A residual remains: the effect in the rig has a different functional form."
+OTHER_FORM = "A part of the error remains: the effect in the rig follows another formula."
 
 
 def in_runs(names: Sequence[str], samples: int) -> str:
@@ -140,25 +140,28 @@ def _without_effect(
 
 def as_noise(before: Trial, ranked: Sequence[Trial]) -> Decision:
     """Return the decision that nothing is missing, `ranked` being the trials, best first."""
-    reason = f"On held-out runs {Z} = {before.z:.2f}"
+    reason = f"The error on held-out runs is {before.z:.2f} {NOISE}"
     if ranked:
         gain = 100.0 * max(0.0, 1.0 - ranked[0].z / before.z)
         more = f" by more than {gain:.1f} %" if gain >= 0.05 else ""
-        reason += f", and no effect lowers it{more}"
+        reason += f", and no effect of the library lowers it{more}"
     return Decision("none", (), before, 0.0, (reason + ".",))
 
 
 def unexplained(before: Trial, rule: DecisionRule) -> str:
     """Return the sentence that no effect gains enough."""
     least = f"{100.0 * rule.gain:.0f} %"
-    return f"On held-out runs {Z} = {before.z:.2f}; no effect of the library lowers it by {least}."
+    return (
+        f"The error on held-out runs is {before.z:.2f} {NOISE}; no effect of the library lowers "
+        f"it by {least}."
+    )
 
 
 def in_part(name: str, best: Trial, explained: float) -> str:
     """Return the sentence that the best effect explains too little."""
     return (
-        f"The best effect of the library, {name}, explains {100.0 * explained:.0f} % of what is "
-        f"missing and leaves {Z} = {best.z:.2f}."
+        f"The best effect of the library, {effect_name(name)}, explains only "
+        f"{100.0 * explained:.0f} % of what is missing: with it the error is {best.z:.2f} {NOISE}."
     )
 
 
@@ -172,8 +175,8 @@ def gained(name: str, before: Trial, best: Trial, explained: float) -> str:
     explained : the effect's share of the excess
     """
     return (
-        f"With {name} the {Z} on held-out runs falls from {before.z:.2f} to {best.z:.2f}; that is "
-        f"{100.0 * explained:.0f} % of what exceeds the noise."
+        f"With {effect_name(name)} the error on held-out runs falls from {before.z:.2f} to "
+        f"{best.z:.2f} {NOISE}: it explains {100.0 * explained:.0f} % of the error beyond noise."
     )
 
 
@@ -181,11 +184,11 @@ def _too_loud(before: Trial, best: Trial, where: str) -> Decision:
     return Decision(
         "insufficient", (), before, 0.0,
         (
-            f"On held-out runs {Z} = {before.z:.2f}: the noise of {where} was estimated too high, "
-            "as happens where a force turns within a few samples. "
-            f"{_new(best, before)[0].capitalize()} lowers the error further, but this noise "
-            "estimate cannot decide. State the noise in study.toml, noise = ... in [channels.NAME] "
-            "of what was measured, or sample faster.",
+            f"The error on held-out runs is {before.z:.2f} {NOISE}: the noise of {where} was "
+            "estimated too high, as happens where a force turns within a few samples. "
+            f"With {effect_name(_new(best, before)[0])} the error is lower still, but against this "
+            "noise that proves nothing. State the noise in study.toml, noise = ... in "
+            "[channels.NAME] of what was measured, or sample faster.",
         ),
     )  # fmt: skip
 
@@ -226,9 +229,9 @@ def _pair(
     return Decision(
         "effect", names, pair, explained,
         (
-            f"No single effect explains the {Z} of {before.z:.2f} on held-out runs: the best, "
-            f"{_new(best, before)[0]}, leaves {best.z:.2f}; {names[0]} and {names[1]} together "
-            f"leave {pair.z:.2f}.",
+            f"No single effect explains the error on held-out runs, {before.z:.2f} {NOISE}: the "
+            f"best, {effect_name(_new(best, before)[0])}, leaves {best.z:.2f}; "
+            f"{effect_name(names[0])} and {effect_name(names[1])} together leave {pair.z:.2f}.",
         ),
     )  # fmt: skip
 
@@ -321,8 +324,8 @@ def decide_by_gains(
     best = able[0]
     name, explained = best.effects[-1], 1.0 - (best.rms / before.rms) ** 2
     gained = (
-        f"With {name} the error on held-out runs falls from {share(before)} to {share(best)} of "
-        "the force, noise included."
+        f"With {effect_name(name)} the error on held-out runs falls from {share(before)} to "
+        f"{share(best)} of the force, noise included."
     )
     if explained < rule.part:
         return Decision(

@@ -136,7 +136,7 @@ def _why_hidden(sized: Sized) -> str:
     change = sized.change(1.0)
     if np.linalg.norm(change) > known.rule.silent * known.size and known.search.names:
         alike = np.abs(known.own.T @ change)
-        return f"{known.search.names[int(np.argmax(alike))]} of the model absorbs it"
+        return f"{known.search.names[int(np.argmax(alike))]} hides it"
     problem = known.problem
     held = all(steady(problem.of([run])) for run in problem.runs)
     still = held and "V" in EFFECTS[sized.name].needs

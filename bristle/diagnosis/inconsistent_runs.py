@@ -17,7 +17,7 @@ from ..identification.problem import Model, Problem, Run, in_noises, residuals, 
 from ..identification.rig import DAMPER
 from ..identification.search import z_scale
 from .clocks import clock_faults
-from .decision import OTHER_FORM, Z, force_in
+from .decision import OTHER_FORM, force_in
 from .prepared import Prepared
 from .rule import BENCH, DecisionRule
 from .site_diagnosis import SiteDiagnosis
@@ -298,8 +298,9 @@ def inconsistent_runs(
         if zeros and run.name in bad
     ]
     return " ".join([
-        f"One model does not explain the force of all runs: its {Z} is largest in {worst}, while "
-        f"it explains {_list(good)}.",
+        f"One model does not explain the force of all runs: its error over the "
+        f"noise (z) is largest in {worst}, "
+        f"while it explains {_list(good)}.",
         *filter(None, shifted),
         "Were they taken on one rig, with one setting? If a run does not belong, "
         f"{LEFT_OUT}.",

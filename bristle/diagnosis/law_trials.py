@@ -20,7 +20,7 @@ from ..identification.watch import LAW, series
 from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
 from ..physics.laws import base_and_variant, law_names
-from .decision import Z
+from .decision import NOISE
 from .rule import BENCH, DecisionRule
 from .trials import Trial, judge
 
@@ -157,7 +157,7 @@ class OtherLaw:
             else ("Without a further effect", "what is missing")
         )
         return (
-            f"{lead}, the law {plain}{bent} leaves {Z} = {short_z(self.z)}: its form alone "
+            f"{lead}, the law {plain}{bent} leaves {short_z(self.z)} {NOISE}: its form alone "
             f"explains {100.0 * self.share:.0f} % of {rest}."
         )
 

@@ -24,9 +24,9 @@ from ..identification.start_grid import refine
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
 from .decision import (
+    NOISE,
     OTHER_FORM,
     Decision,
-    Z,
     as_noise,
     decide,
     decide_by_gains,
@@ -493,7 +493,7 @@ def excused_by_sensor(
     gains = any(1.0 - trial.z / before.z >= rule.gain for trial in found.trials)
     if found.kind != "unknown" or gains or max(before.z, before.train) > most:
         return found
-    why = f"{reason} This explains the {Z} of {before.z:.2f}."
+    why = f"{reason} This explains the error, {before.z:.2f} {NOISE}."
     return replace(found, kind="none", reasons=(why,))
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
-from ..comparison.names import joined
+from ..comparison.names import effect_name, effect_names, site_name
 from ..core.text import percent, quantity, short_z, with_interval
 from ..data.channels import channel_unit, is_channel
 from ..identification.error import ForceError
-from ..physics.drive import text_for
+from ..physics.drive import Drive, text_for
 from ..physics.effect import EFFECTS
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.plots import ROW, draw_ranking
@@ -57,7 +57,8 @@ def verdict_view(verdict: Verdict) -> View:
     shown, apart = why[:_WHY], why[_WHY:]
     named = [_about(str(name), verdict) for name in verdict.get("effects") or []]
     hidden = untestable(verdict)
-    notes = [*fault_texts(verdict, " ".join(why)), *(verdict.get("notes") or [])]
+    notes = [*fault_texts(verdict, " ".join(why)), *_errors_beside(verdict)]
+    notes += verdict.get("notes") or []
     if hidden:
         notes.append(f"Not testable with these runs: {', '.join(hidden)}.")
     separate = separating(verdict)
@@ -66,7 +67,7 @@ def verdict_view(verdict: Verdict) -> View:
         (
             *(Text(text, "say") for text in named if kind == "effect"),
             *(Text(text) for text in named if kind != "effect"),
-            Text(" ".join([_error(verdict), *_errors_beside(verdict), _gain(verdict)]).strip()),
+            Text(error_text(verdict)),
             *map(Text, shown),
             Text(f"To distinguish them: {separate}" if separate else ""),
             *(Text(f"{note.rstrip('.')}.", "note") for note in notes),
@@ -80,19 +81,35 @@ def verdict_view(verdict: Verdict) -> View:
 
 def _about(name: str, verdict: Verdict) -> str:
     """Return what an effect is, and its parameters with their 95 % intervals."""
+    known = EFFECTS[name].parameters if name in EFFECTS else {}
     values = {
-        key.partition(".")[2]: one
+        own: (one["value"], one["std"], known[own].unit if own in known else "1")
         for found in verdict.get("findings") or []
         for key, one in (found.get("values") or {}).items()
-        if key.partition(".")[0] == name
+        for effect, _, own in [key.partition(".")]
+        if effect == name
     }
+    return effect_text(name, values, drive_of(verdict))
+
+
+def effect_text(
+    name: str, values: Mapping[str, tuple[float, float | None, str]], drive: Drive
+) -> str:
+    """Return what an effect is, and its parameters with their 95 % intervals.
+
+    Parameters
+    ----------
+    name : of the effect
+    values : by parameter the value, its standard deviation if one is known, and the unit
+    drive : what commands the damper
+    """
     told = []
-    for key, one in values.items():
-        text, half = with_interval(one["value"], one["std"])
-        unit = EFFECTS[name].parameters[key].unit if name in EFFECTS else "1"
-        told.append(f"{key} = {text} {half}" + ("" if unit == "1" else f" {unit}"))
+    for key, (value, std, unit) in values.items():
+        text, half = with_interval(value, std)
+        spread = "" if half == "-" else f" {half}"
+        told.append(f"{key} = {text}{spread}" + ("" if unit == "1" else f" {unit}"))
     sizes = f" {', '.join(told)} (95 %)." if told else ""
-    return about(name, drive_of(verdict)) + sizes
+    return about(name, drive) + sizes
 
 
 def worst(verdict: Verdict) -> Mapping[str, Any]:
@@ -113,19 +130,20 @@ def _gain(verdict: Verdict) -> str:
         return ""
     before, after = (ForceError.of(one).text() for one in both if one)
     where = f" at the {at['site']}" if len(verdict["findings"]) > 1 else ""
-    return f"Fitted again{where}: {before}, with {joined(at['effects'])} {after}."
+    return f"; fitted again{where} {before}, with {effect_names(at['effects'])} {after}"
 
 
-def _error(verdict: Verdict) -> str:
+def error_text(verdict: Verdict) -> str:
     """Return the error of the model as the study has it, which every command prints alike."""
     role = _judged(verdict)
     if not role:
-        return ""
+        return _gain(verdict).removeprefix("; ")
     sites = (verdict.get("error_by_site") or {}).get(role, {})
-    by_site = [f"{site} {ForceError.of(one).text()}" for site, one in sites.items()]
-    more = f"; {', '.join(by_site)}" if len(by_site) > 1 else ""
+    by_site = [f"{site_name(site)} {ForceError.of(one).text()}" for site, one in sites.items()]
+    more = f" ({', '.join(by_site)})" if len(by_site) > 1 else ""
     error = ForceError.of(verdict["error"][role]).text()
-    return f"The study's model errs by {error} on the {_ROLES[role]}{more}."
+    which = f"Force error of the study's model on the {_ROLES[role]}"
+    return f"{which}: {error}{more}{_gain(verdict)}."
 
 
 def _errors_beside(verdict: Verdict) -> list[str]:
@@ -152,12 +170,11 @@ def _tables(verdict: Verdict) -> list[Block]:
         blocks.append(Table(LIMITS, limits, (2, 3), title, note=note))
     if hidden := untestable(verdict):
         drive, rows = drive_of(verdict), []
-        for told in hidden:
-            name = told.partition(" ")[0]
+        for told, name in zip(hidden, map(str, verdict["untestable"]), strict=True):
             expect = text_for(EFFECTS[name].expect, drive) if name in EFFECTS else ""
             rows.append([told, about(name, drive), expect])
         header = ("effect", "what it does", "what it would look like")
-        note = "They may still be present: the data do not excite them, or the model absorbs them."
+        note = "They may be present: these runs do not excite them, or the model hides them."
         blocks.append(Table(header, rows, title="Not testable with these runs", note=note))
     floor = [
         f"{name} {quantity(value, channel_unit(name) if is_channel(name) else '1', fine=True)}"
@@ -188,15 +205,16 @@ def _trials(verdict: Verdict) -> list[Block]:
         if row["effect"] in named:
             strong.append(len(rows))
         z = [row.get("z_train"), row.get("z_holdout")]
-        gain = percent(row["gain"]) if row.get("gain") is not None else "-"
-        search = "" if row.get("refined", True) else "short"
+        gain = percent(row["gain"]) if row.get("gain") is not None else "not tried"
+        search = "full" if row.get("refined", True) else "short"
         site = f" ({row['site']})" if several else ""
-        rows.append([f"with {row['effect']}{site}", *(map(_z, z) if known else ()), gain, search])
-    z_columns = ("z, training", "z, held out") if known else ()
-    header = ("model", *z_columns, "error lower by", "search")
+        named_so = f"with {effect_name(row['effect'])}{site}"
+        rows.append([named_so, *(map(_z, z) if known else ()), gain, search])
+    z_columns = ("z train", "z held out") if known else ()
+    header = ("model", *z_columns, "error lower by", "fit")
     note = (
-        "Each effect added to the model, all parameters fitted again; held-out runs decide. Short "
-        "search: it gains too little to be sought at length."
+        "Each effect added to the model, all parameters fitted again; held-out runs decide. Short: "
+        "a first fit gained too little to go on."
     )
     numbers = range(1, len(header) - 1)
     note = f"{_Z} {note}" if known else note
@@ -204,7 +222,7 @@ def _trials(verdict: Verdict) -> list[Block]:
 
 
 def _z(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
+    return "not known" if value is None else f"{value:.3f}"
 
 
 def draw_verdict(verdict: Verdict) -> Page:
@@ -225,7 +243,7 @@ def draw_verdict(verdict: Verdict) -> Page:
             return Page(7.6, 0.0, headline(verdict), " ".join(reasons(verdict)))
         own = [str(name) for name in at.get("effects") or []]
         if at.get("kind") == "effect" and len(own) > 1 and at.get("z_holdout_after") is not None:
-            rows.append((joined(own), float(at["z_holdout_after"])))
+            rows.append((" and ".join(own), float(at["z_holdout_after"])))
         rows.sort(key=lambda row: row[1])
         without = "the present model"
         if verdict.get("laws"):
@@ -238,7 +256,7 @@ def draw_verdict(verdict: Verdict) -> Page:
         )  # fmt: skip
         grid = page.grid(1, 1, top=0.3, bottom=0.5, left=1.9, right=0.7)
         axes = page.figure.add_subplot(grid[0, 0])
-        named = {_label(name) for name in (*(verdict.get("effects") or ()), joined(own))}
+        named = {_label(name) for name in (*(verdict.get("effects") or ()), " and ".join(own))}
         names, values = [_label(name) for name, _ in rows], [z for _, z in rows]
         draw_ranking(axes, names, values, float(before), named)
         axes.set_title(f"dashed: {without}, z = {short_z(before)}", loc="right", fontsize=8.5)
@@ -248,4 +266,4 @@ def draw_verdict(verdict: Verdict) -> Page:
 
 def _label(name: str) -> str:
     """Return an effect, or a pair of them, as it stands beside its bar: a pair in two lines."""
-    return f"with {name}".replace(" and ", "\nand ")
+    return "with " + "\nand ".join(map(effect_name, name.split(" and ")))

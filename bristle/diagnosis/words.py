@@ -9,14 +9,14 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..comparison.names import joined, name_of, site_name
+from ..comparison.names import effect_name, effect_names, joined, name_of, site_name
 from ..core.text import quantity, short_z
 from ..identification.error import ForceError
 from ..identification.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS, instrument_of
 from ..physics.forms import LINEAR_FORM
-from .decision import Z
+from .decision import NOISE
 from .rule import BENCH, DecisionRule
 from .sensor_faults import size_text
 from .site_diagnosis import SiteDiagnosis
@@ -29,8 +29,8 @@ MOST_EQUAL = 3
 """Pairs of law and effects that a verdict names as doing as well."""
 
 HEADER = (
-    "law", "command", "fitted", "z, training", "z, held out", "above the best",
-    "error, training", "error, held out",
+    "law", "command", "fitted", "z train", "z held out", "z above best", "error train",
+    "error held out",
 )  # fmt: skip
 """Columns of the table of laws; the last two are those of `ERRORS`."""
 
@@ -38,9 +38,8 @@ ERRORS = ("error_train", "error_holdout")
 """Where a row has the error of the force; one of an earlier version has another error, and none."""
 
 TABLE_NOTE = (
-    "z: error / noise; a true model has 1. Above the best: z less that of the best law, the mean "
-    "over held-out runs with its 95 % interval. A law that contains a missing effect errs less "
-    "than the true law without it."
+    "z: error / noise; a true model has 1. z above best: mean over the held-out runs, with its "
+    "95 % interval. A law that contains a missing effect errs less than the true law without it."
 )
 
 
@@ -64,28 +63,28 @@ def law_sentences(verdict: Row) -> list[str]:
     own = (verdict["law"], verdict["command"])
     mine = next(row for row in rows if (row["law"], row["command"]) == own)
     z = short_z(mine.get("z_with_effects", mine["z_holdout"]))
-    with_what = f" with {joined(mine['effects'])}" if mine.get("kind") == "effect" else ""
+    with_what = f" with {effect_names(mine['effects'])}" if mine.get("kind") == "effect" else ""
     count = len({row["law"] for row in rows})
     if not verdict.get("noise_known", True):
-        out = [f"Of {count} laws {law_name(mine)}{with_what} leaves the least on held-out runs."]
+        out = [f"Of {count} laws {law_name(mine)}{with_what} has the least error on held-out runs."]
     elif verdict.get("kind") == "unknown":
         out = [
-            f"None of {count} laws explains the runs, with an effect or without; {law_name(mine)} "
-            f"comes nearest, {Z} = {z} without."
+            f"{count} laws were tried, each alone and with every effect, and none explains the "
+            f"runs. {law_name(mine)} comes nearest: alone its error is {z} {NOISE}."
         ]
     else:
         out = [
-            f"Of {count} laws it is the simplest that explains the runs: "
-            f"{law_name(mine)}{with_what} has {Z} = {z} on held-out runs."
+            f"{law_name(mine)}{with_what} is the simplest of {count} laws that explains the runs: "
+            f"the error on held-out runs is {z} {NOISE}."
         ]
     if unfit:
         out.append(left_out(unfit))
     equal = [_pair_name(row) for row in verdict.get("equivalent") or []]
     if equal:
         more = f", and {len(equal) - MOST_EQUAL} more" if len(equal) > MOST_EQUAL else ""
-        verb = "explain" if len(equal) > 1 else "explains"
+        does = "do others" if len(equal) > 1 else "does another"
         text = joined(equal[:MOST_EQUAL]) if not more else ", ".join(equal[:MOST_EQUAL])
-        out.append(f"As far as these runs tell, {text}{more} {verb} them as well.")
+        out.append(f"As far as these runs tell, so {does}: {text}{more}.")
     return out
 
 
@@ -97,7 +96,7 @@ def left_out(laws: Sequence[str]) -> str:
 
 def _pair_name(row: Row) -> str:
     effects = row.get("effects") or []
-    return f"{law_name(row)} with {joined(effects) if effects else 'nothing missing'}"
+    return f"{law_name(row)} {f'with {effect_names(effects)}' if effects else 'alone'}"
 
 
 def law_table(rows: Sequence[Row]) -> list[list[str]]:
@@ -109,12 +108,13 @@ def law_table(rows: Sequence[Row]) -> list[list[str]]:
 
 def _cells(row: Row, size: float) -> list[str]:
     half, above = row.get("interval95"), row["z_above_best"]  # None where no noise is known
-    spread = f" +- {half:.2f}" if half is not None else ""
+    spread = f" ± {half:.2f}" if half is not None else ""
     return [
         str(row["law"]), str(row["command"]), str(row["fitted"]),
         short_z(row["z_train"]), short_z(row["z_holdout"]),
-        f"{above:.2f}{spread}" if above else "-",
-        *(ForceError.of(row[key]).text("N", size) if row.get(key) else "-" for key in ERRORS),
+        f"{above:.2f}{spread}" if above else "best",
+        *(ForceError.of(one).text("N", size) if (one := row.get(key)) else "not judged"
+          for key in ERRORS),
     ]  # fmt: skip
 
 
@@ -143,31 +143,38 @@ def headline(verdict: Verdict) -> str:
     """Return the verdict in one sentence."""
     kind, effects = verdict.get("kind"), effects_at(verdict)
     model = f"the law {law_name(verdict)}" if verdict.get("laws") else "the model"
-    misses = f"{model[:1].upper()}{model[1:]} misses"
     if kind == "effect":
-        return f"{misses} {joined(effects)}."
+        return f"Missing from {model}: {joined(effects)}."
     if kind == "ambiguous":
-        which = f"either {' or '.join(effects)}" if len(effects) == 2 else _one_of(effects)
-        return f"{misses} {which}. The data cannot distinguish them."
+        which = " or ".join(effects) if len(effects) == 2 else _one_of(effects)
+        return f"Missing from {model}: {which}. These runs cannot tell them apart."
     if kind == "unknown":
-        return f"{misses} something that no known effect explains."
+        return f"Something is missing from {model} that no effect of the library explains."
     if kind == "none":
-        return f"These data show nothing that {model} misses."
+        return f"Nothing is missing from {model}: it explains these runs to within their noise."
     return "These data do not allow a verdict."
 
 
 def effects_at(verdict: Verdict) -> list[str]:
-    """Return the effects, each with its sites where the rig has several: "duffing (layer)"."""
+    """Return the effects as people write them, with their sites where the rig has several."""
     sites, findings = verdict.get("sites") or {}, verdict.get("findings") or []
     several = bool(set(sites.values()) - {DAMPER}) or len(findings) > 1
     names = [str(name) for name in verdict.get("effects") or []]
     if verdict.get("kind") == "ambiguous":
         names += [str(one) for one in verdict.get("alternatives") or []]
     if not several:
-        return names
+        return [effect_name(one) for one in names]
     at = {one: [found["site"] for found in findings if one in found["effects"]] for one in names}
     places = {one: at[one] if len(at[one]) > 1 else [sites[one]] for one in names if one in sites}
-    return [f"{one} ({', '.join(places[one])})" if one in places else one for one in names]
+    return [
+        f"{effect_name(one)} ({_sites(places[one])})" if one in places else effect_name(one)
+        for one in names
+    ]
+
+
+def _sites(sites: Sequence[str]) -> str:
+    """Return sites in brackets behind an effect: "damper", "isolation layer, storey 1"."""
+    return ", ".join(site_name(site).removeprefix("the ") for site in sites)
 
 
 def _gains(verdict: Verdict) -> list[str]:
@@ -177,12 +184,14 @@ def _gains(verdict: Verdict) -> list[str]:
     out = []
     if alone:
         first, *others = alone
-        texts = [f"{first['effects'][0]} lowers the error by {100.0 * first['gain']:.0f} %"]
-        texts += [f"{row['effects'][0]} by {100.0 * row['gain']:.0f} %" for row in others]
+        texts = [f"{effect_name(first['effects'][0])} by {100.0 * first['gain']:.0f} %"]
+        texts += [
+            f"{effect_name(row['effects'][0])} by {100.0 * row['gain']:.0f} %" for row in others
+        ]
         each = ", each added alone" if others else ""
-        out.append(f"Still, {joined(texts)}{each}.")
+        out.append(f"What lowers the error most: {joined(texts)}{each}.")
     out += [
-        f"{joined(row['effects'])} together lower it by {100.0 * row['gain']:.0f} %."
+        f"{effect_names(row['effects'])} together lower it by {100.0 * row['gain']:.0f} %."
         for row in rows
         if len(row["effects"]) > 1
     ]
@@ -196,14 +205,14 @@ def _one_of(effects: Sequence[str]) -> str:
 def _besides(verdict: Verdict) -> list[str]:
     """Return that other sites miss an effect, where something unknown is missing at one."""
     effects = effects_at(verdict) if verdict.get("kind") == "unknown" else []
-    return [f"Besides, the model misses {joined(effects)}."] if effects else []
+    return [f"Missing besides: {joined(effects)}."] if effects else []
 
 
 def _limits(verdict: Verdict) -> list[str]:
     share = verdict.get("detectable")
     if verdict.get("kind") != "none" or not isinstance(share, int | float):
         return []
-    return [f"An effect that leaves {100.0 * share:.2g} % of the force would have been seen."]
+    return [f"No other effect of the library is above {100.0 * share:.2g} % of the force."]
 
 
 def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
@@ -220,12 +229,12 @@ def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
     )
     if sure and (beside := at.get("coordinate_beside")):
         return [
-            f"With {joined(beside)}, which comes nearest, the remaining error depends mainly on "
-            f"{name}; `bristle compare` shows the error of the model without it."
+            f"With {effect_names(beside)}, which comes nearest, the remaining error depends "
+            f"mainly on {name}; `bristle compare` shows the error of the model without it."
         ]
     if sure:
         return [f"The remaining error depends mainly on {name}."]
-    return [f"The remaining error depends on no coordinate beyond chance; the nearest is {name}."]
+    return [f"The remaining error may depend on {name}, but that may be chance."]
 
 
 def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
@@ -245,7 +254,7 @@ def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
         alike[fault["channel"], fault["fault"], *alone].append(fault)
     texts = [_told(*faults) for faults in alike.values()]
     if any(map(_is_set_right, faults)):
-        texts.append("The verdict and its numbers are those with that set right.")
+        texts.append("The verdict and its numbers are for the runs with that corrected.")
     return texts
 
 
@@ -310,9 +319,10 @@ def untestable(verdict: Verdict) -> list[str]:
     out = []
     for name in map(str, verdict.get("untestable") or []):
         sites = [found["site"] for found in findings if name in found.get("untestable", [])]
-        notes = [", ".join(sites)] if len(findings) > 1 and sites else []
+        notes = [_sites(sites)] if len(findings) > 1 and sites else []
         notes += _absorbing(name, sites or [DAMPER], verdict)
-        out.append(f"{name} ({': '.join(notes)})" if notes else name)
+        named = effect_name(name)
+        out.append(f"{named} ({': '.join(notes)})" if notes else named)
     return out
 
 
@@ -325,18 +335,16 @@ def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
         (row["effect"], row.get("site")) == (name, DAMPER) for row in ranking
     )
     return (
-        [f"the law's {part} force absorbs it"] if part and DAMPER in sites and not offered else []
+        [f"it hides in the law's {part} force"] if part and DAMPER in sites and not offered else []
     )
 
 
-LIMITS = ("effect", "still possible (95 %)", "of the force", "named from")
+LIMITS = ("effect", "at most (95 %)", "of force", "named from")
 """Columns of the table of limits."""
 
 LIMITS_NOTES = (
-    "Still possible: the size that these runs do not exclude, law and known effects refitted.",
-    "Of the force: what such an effect leaves of it; -: not resolved by the sampling step, or the "
-    "reason stands in the row.",
-    "Named from: about the size at which 9 of 10 verdicts would name it, as the rule predicts.",
+    "At most: the size that these runs do not exclude, with all other parameters fitted again.",
+    "Named from: about the size at which 9 of 10 verdicts would name it.",
 )
 
 
@@ -345,21 +353,21 @@ def limit_rows(verdict: Verdict) -> list[list[str]]:
     findings = verdict.get("findings") or []
     rows = []
     for found in findings:
-        site = f" ({found['site']})" if len(findings) > 1 else ""
+        site = f" ({_sites([found['site']])})" if len(findings) > 1 else ""
         for one in found.get("limits") or []:
-            rows.append([f"{one['effect']}{site}", *_limit_cells(one)])
+            rows.append([f"{effect_name(one['effect'])}{site}", *_limit_cells(one)])
     return rows
 
 
 def _limit_cells(limit: Mapping[str, Any]) -> list[str]:
     if limit.get("why"):
-        return [str(limit["why"]), "-", "-"]
+        return [str(limit["why"]), "", ""]
     unit = limit["unit"]
     named = limit["named_from"]
     return [
         f"{limit['parameter']} {limit['side']} {quantity(limit['limit95'], unit, 2, fine=True)}",
-        f"{100.0 * limit['share']:.2g} %" if limit["share"] is not None else "-",
-        quantity(named, unit, 2, fine=True) if named is not None else "-",
+        f"{100.0 * limit['share']:.2g} %" if limit["share"] is not None else "below a sample",
+        quantity(named, unit, 2, fine=True) if named is not None else "no size",
     ]
 
 

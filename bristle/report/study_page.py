@@ -25,7 +25,7 @@ from ..planning.performed import shows
 from ..study.budget_picture import budgets, draw_budget, sentence
 from ..study.history import HistoryStep, history_steps
 from ..study.study_file import TEST
-from ..study.view import or_dash
+from ..study.view import or_nothing
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
@@ -399,7 +399,7 @@ def _history(content: Content) -> str:
     with_z = [one for one in content.history_steps if one.z is not None]
     header = ["step", "what", "z held-out", "z training", "why"]
     rows = [
-        [str(step.number), step.what, or_dash(one.z), or_dash(one.z_train), step.why]
+        [str(step.number), step.what, or_nothing(one.z), or_nothing(one.z_train), step.why]
         for step, one in zip(content.steps, content.history_steps, strict=True)
     ]  # fmt: skip
     picture = ""
@@ -407,7 +407,7 @@ def _history(content: Content) -> str:
         from ..study.pictures import staircase_page
         from ..view.style import png
 
-        fall = " → ".join(or_dash(one.z) for one in with_z)
+        fall = " → ".join(or_nothing(one.z) for one in with_z)
         # Their forces are low-passed, and those of the rest of the page are not: z tells it all.
         picture = html.figure(
             png(staircase_page([replace(one, rms=None) for one in with_z])),

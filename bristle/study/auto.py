@@ -69,7 +69,6 @@ def complete(
     greedy: bool = False,
     curves: bool = False,
     say: Say = tell,
-    on_step: Callable[[], None] | None = None,
 ) -> Completed:
     """Identify, diagnose and add until the verdict is none, ambiguous, unknown or insufficient.
 
@@ -85,7 +84,6 @@ def complete(
         error most, as long as one does so by enough and beyond chance; see `gaining`
     curves : whether to go on where the verdict is unknown, by learning a curve
     say : called with a few words at each stage
-    on_step : called after each new step of the history
     """
     steps: list[Step] = []
     learned: list[LearnedEffect] = []
@@ -94,8 +92,6 @@ def complete(
         if step is not None:
             steps.append(step)
             keeps(_kept(steps))
-            if on_step is not None:
-                on_step()
 
     free = _begun_free(study, law_or_all(study, law), say, stepped)
     while True:

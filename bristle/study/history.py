@@ -13,19 +13,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import count, takewhile
-from math import log10, sqrt
+from math import sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core.config import other_schema, toml_content
 from ..core.files import read_json, write_json, write_whole
-from ..core.text import percent, plain, quantity, short_z
 from ..errors import StudyError
 from ..version import __version__
-
-if TYPE_CHECKING:
-    from rich.text import Text
-
 
 # What a study found from its data, set aside when the data are read in another way.
 #
@@ -454,12 +449,8 @@ class History:
             write_whole(self.path(number) / "verdict.json", verdict.read_bytes())
 
 
-# The staircase of a study's history, for the terminal: the error of each model, step by step.
+# The staircase of a study's history: the error of each model, step by step.
 
-WIDTH = 40
-"""Characters of the longest bar."""
-NAME = 40
-"""Characters of the longest step's name."""
 CLOSE = 1.1
 """z up to which an error is drawn as being on the noise floor."""
 
@@ -489,91 +480,6 @@ class HistoryStep:
         return self.share * sqrt(1.0 - 1.0 / self.z**2)
 
 
-@dataclass(frozen=True)
-class Staircase:
-    """The steps of a history; `str` gives plain text, rich prints it in colour.
-
-    `floor` is the z that noise alone explains; `cut_off` [Hz] of the low-pass on the forces whose
-    RMS errors are told where a step does not tell, 0 for none.
-    """
-
-    history_steps: tuple[HistoryStep, ...]
-    floor: float = 1.0
-    unit: str = "N"
-    cut_off: float = 0.0
-
-    def __str__(self) -> str:
-        return "\n".join("".join(text for text, _ in line).rstrip() for line in self._lines("#"))
-
-    def __rich__(self) -> Text:
-        from rich.text import Text
-
-        lines = [Text.assemble(*parts) for parts in self._lines("█")]
-        return Text("\n").join(lines)
-
-    def _lines(self, mark: str) -> list[list[tuple[str, str]]]:
-        """Return the lines as pairs of text and style."""
-        if not self.history_steps:
-            return [[("The history is empty.", "")]]
-        names = [_cut(f"{one.number} {one.what}") for one in self.history_steps]
-        wide = max(len(name) for name in [*names, "  noise floor"])
-        known = [one.z for one in self.history_steps if one.z is not None]
-        top = max([*known, 2.0 * self.floor])
-        title = "error / noise (z) on held-out runs"
-        lines = [[(f"{'':{wide}}  {title}", "dim")]]
-        for name, one in zip(names, self.history_steps, strict=True):
-            lines.append([(f"{name:{wide}}  ", "bold"), *self._line(one, top, mark)])
-        lines.append([(f"{'  noise floor':{wide}}  ", "dim"), (f"| {plain(self.floor)}", "green")])
-        return lines
-
-    def _size(self) -> float:
-        return max((one.rms for one in self.history_steps if one.rms is not None), default=0.0)
-
-    def _line(self, one: HistoryStep, top: float, mark: str) -> list[tuple[str, str]]:
-        if one.z is None:
-            if one.share is None:
-                return [("not judged", "dim")]
-            return [(f"z not known, {100.0 * one.share:.1f} % of the force is missed", "dim")]
-        done = one.z <= CLOSE * self.floor
-        share = log10(max(one.z / self.floor, 1.0)) / log10(top / self.floor)
-        bar = mark * max(1, round(WIDTH * share))
-        colour = "green" if done else "dark_orange"
-        cut_off = self.cut_off if one.cut_off is None else one.cut_off
-        low = f" below {cut_off:g} Hz" if cut_off else ""
-        of_force = f" ({percent(one.share)})" if one.share is not None else ""
-        size = f"{quantity(one.rms or 0.0, self.unit, 4, self._size())}{of_force}{low}"
-        about = [] if one.rms is None else [f"error {size}"]
-        about += [] if one.z_train is None else [f"training z = {short_z(one.z_train)}"]
-        tail = f"   {', '.join(about)}" if about else ""
-        return [(bar, colour), (f" {short_z(one.z)}", f"bold {colour}"), (tail, "dim")]
-
-
-def staircase(steps: Sequence[Step], noise_floor: float = 1.0, cut_off: float = 0.0) -> Staircase:
-    """Return the staircase of a history, to print as it is or to show live.
-
-    Parameters
-    ----------
-    steps : list of Step
-        Their `after` holds "z_holdout", "z_train", "error_holdout" [N]; a step without is "not
-        judged", unless the next one's `before` holds them. Of steps with a low-passed error
-        alone, "rms_holdout", the staircase says so.
-    noise_floor : float
-        z that noise alone explains.
-    cut_off : float
-        Hz, of the low-pass behind a step's "rms_holdout" where the step does not tell it; 0 for
-        none.
-
-    Examples
-    --------
-    >>> from bristle.study import Step
-    >>> print(staircase([Step(0, "identify", "", {}, {"z_holdout": 4.0})]))
-                   error / noise (z) on held-out runs
-    0 identify     ######################################## 4.00
-      noise floor  | 1
-    """
-    return Staircase(tuple(history_steps(steps)), noise_floor, cut_off=cut_off)
-
-
 def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
     """Return the steps of a history: what each step's `after` says, or the next one's `before`."""
     out = []
@@ -590,11 +496,6 @@ def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
         low = 0.0 if new else _staircase_number(errors.get("cut_off"))
         out.append(HistoryStep(step.number, step.what, z, z_train, rms, share, low))
     return out
-
-
-def _cut(name: str) -> str:
-    """Return a step's name, no longer than `NAME`."""
-    return name if len(name) <= NAME else f"{name[: NAME - 3]}..."
 
 
 def _staircase_number(value: Any) -> float | None:

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..comparison.names import effect_names
 from ..core.finding import grouped, sentence
-from ..core.text import plain, short_z
+from ..core.text import command, percent, plain, scale, short_z
+from ..diagnosis.conclusion import is_correctable
+from ..diagnosis.effect_limits import NO_AMOUNT
+from ..diagnosis.view import effect_text, error_text, verdict_view
 from ..errors import RecordError
-from ..view.blocks import Figure, Table, Text, View, view_of
+from ..model.model import Value
+from ..model.model_file import read_model
+from ..physics.drive import DRIVES
+from ..physics.forms import joined_form
+from ..view.blocks import Figure, Next, Table, Text, View, view_of
 from ..view.style import Page
+from .auto import Completed
 from .data_check import DataCheck
 from .fit_view import identified_view as identified_view
+from .forms import law_command
 from .history import HistoryStep, history_steps
 from .pictures import draw_run, staircase_page
 from .study import Study
@@ -27,14 +41,7 @@ def data_check_view(found: DataCheck) -> View:
 @view_of(Study)
 def study_view(study: Study) -> View:
     """Return the view of a study: its runs, verdict and history, and how the error fell."""
-    settings, steps = study.settings, study.steps()
-    rows = [
-        [
-            str(step.number), step.what, or_dash(one.z), or_dash(one.z_train),
-            "-" if one.rms is None else _error_of(one),
-        ]
-        for step, one in zip(steps, history_steps(steps), strict=True)
-    ]  # fmt: skip
+    settings = study.settings
     roles = [run.role for run in settings.runs]
     held_out, test = roles.count("holdout"), roles.count(TEST)
     verdict = study.verdict()
@@ -48,7 +55,7 @@ def study_view(study: Study) -> View:
             Text(settings.excluded_text),
             Text(f"Verdict: {verdict.get('words')}" if verdict else ""),
             Text(study.stale(verdict) if verdict else ""),
-            Table(("step", "what", "z, held out", "z, training", "RMS error [N]"), rows, (2, 3, 4)),
+            steps_table(history_steps(study.steps()), settings.cut_off),
             Figure(lambda: study_page(study), settings.title),
         ),
     )  # fmt: skip
@@ -71,12 +78,180 @@ def study_page(study: Study) -> Page:
     return draw_run(runs[0])
 
 
-def _error_of(step: HistoryStep) -> str:
-    """Return the error of a step, which says below which frequency one of an old version is."""
-    low = f" below {step.cut_off:g} Hz" if step.cut_off else ""
-    return f"{plain(step.rms or 0.0, 4)}{low}"
+def diagnosed_view(verdict: Mapping[str, Any], folder: Path) -> View:
+    """Return the view of a verdict on a study's model, with the commands that follow.
+
+    Parameters
+    ----------
+    verdict : as verdict.json has it
+    folder : of the study, as it is typed
+    """
+    view = verdict_view(verdict)
+    return view._replace(blocks=(*view.blocks, *next_steps(verdict, folder)))
 
 
-def or_dash(z: float | None) -> str:
-    """Return z as text, "-" where there is none."""
-    return "-" if z is None else short_z(z)
+def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
+    """Return what a study has found: what its model has by now, how the error fell, what remains.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    verdict : on its present model, as verdict.json has it
+    """
+    view, model = diagnosed_view(verdict, study.folder), study.model(to_show=True)
+    steps = history_steps(study.steps())
+    judged = [one for one in steps if one.rms is not None]
+    began = read_model(study.history.model_file(steps[0].number), study.folder, to_show=True)
+    added = [name for name in model.effects if name not in began.effects]
+    if not added or not judged:
+        return view
+    own = [effect_text(name, _sizes(model.effects[name]), DRIVES[model.drive]) for name in added]
+    told = [Text(text, "say") for text in own]
+    title = f"Found and added: {effect_names(added)}."
+    if verdict.get("kind") != "none":
+        title, told = view.title, [Text(title, "say"), *told]
+    fall = Text(_fall(judged[0], judged[-1]))
+    rest = [one for one in view.blocks if one != Text(error_text(verdict))]
+    return view._replace(title=title, blocks=(*told, fall, *rest))
+
+
+def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) -> View:
+    """Return what `study auto` came to: the story, how the error fell, what was learned.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    done : what was done
+    verdict : the last one, as verdict.json has it
+    """
+    view = story_view(study, verdict)
+    table = steps_table(history_steps(study.steps()), study.settings.cut_off)
+    curves = [Text(" ".join(one.sentences())) for one in done.curves]
+    return view._replace(blocks=(*curves, *view.blocks, table))
+
+
+def _sizes(values: Mapping[str, Value]) -> dict[str, tuple[float, float | None, str]]:
+    """Return the values of an effect with standard deviation and unit."""
+    return {name: (one.value, one.std, one.unit) for name, one in values.items()}
+
+
+def _fall(first: HistoryStep, last: HistoryStep) -> str:
+    """Return the sentence that tells how the error on held-out runs fell."""
+    factor, unit = scale("N", max(first.rms or 0.0, last.rms or 0.0))
+    texts = [_error(one, factor, unit) for one in (first, last)]
+    return f"Force error on the held-out runs: {' -> '.join(texts)}."
+
+
+def _error(step: HistoryStep, factor: float, unit: str) -> str:
+    share = f" ({percent(step.share)})" if step.share is not None else ""
+    return f"{plain(factor * (step.rms or 0.0), 4)} {unit}{share}"
+
+
+def steps_table(steps: Sequence[HistoryStep], cut_off: float = 0.0) -> Table:
+    """Return the table of a history: the error of each model on held-out runs.
+
+    Parameters
+    ----------
+    steps : of the history
+    cut_off : Hz, of the low-pass on the forces of a step that does not tell its own; 0 for none
+    """
+    factor, unit = scale("N", max((one.rms for one in steps if one.rms is not None), default=0.0))
+    rows = [[_named(one, cut_off), *_step(one, factor)] for one in steps]
+    header = ("step", f"error [{unit}]", "of force", "z", "z train")
+    note = "z: error / noise; a true model has 1."
+    return Table(header, rows, range(1, 5), "Error of each model on the held-out runs", note=note)
+
+
+def _named(step: HistoryStep, cut_off: float) -> str:
+    """Return a step with its number, and below which frequency its error is if not all of it."""
+    low = cut_off if step.cut_off is None else step.cut_off
+    below = f" (below {low:g} Hz)" if low and step.rms is not None else ""
+    return f"{step.number} {step.what}{below}"
+
+
+def _step(step: HistoryStep, factor: float) -> list[str]:
+    if step.z is None and step.share is None:
+        return ["not judged", "", "", ""]
+    error = "" if step.rms is None else plain(factor * step.rms, 4)
+    share = "" if step.share is None else percent(step.share)
+    return [error, share, short_z(step.z), or_nothing(step.z_train)]
+
+
+def or_nothing(z: float | None) -> str:
+    """Return z as text, "" where there is none."""
+    return "" if z is None else short_z(z)
+
+
+# The commands that follow from a verdict.
+
+
+def next_steps(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
+    """Return the commands that follow from a verdict: what sets the data right comes first."""
+    then = _with_law(verdict, folder)
+    if not any(map(is_correctable, verdict.get("sensors") or [])):
+        return then
+    if verdict["kind"] == "insufficient":
+        then = [Next(command("diagnose", folder))]
+    correct = command("study", "check", folder, "--correct")
+    return [Next(correct, "corrects the runs that are named"), *then]
+
+
+def _with_law(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
+    """Return the commands for the model; first another law where the verdict asks for it."""
+    then = _then(verdict, folder)
+    if not verdict.get("laws") or verdict["kind"] == "insufficient":
+        return then
+    law = joined_form(verdict["law"], verdict["command"])
+    return then if law == verdict["law_before"] else [Next(law_command(folder, law)), *then]
+
+
+def _then(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
+    kind, report = verdict["kind"], Next(command("report", folder), "all of it on one page")
+    if kind == "ambiguous":
+        return [
+            Next(command("plan", folder), "writes a test that distinguishes them"),
+            Next(command("add", folder, verdict["effects"][0]), "takes the first"),
+        ]
+    if kind == "effect":
+        return [Next(command("add", folder, *verdict["effects"]), "puts it into the model")]
+    if kind == "unknown":
+        other_law = any(found.get("other_law") for found in verdict["findings"])
+        every = command("diagnose", folder, "--law", "all")
+        return [
+            *([Next(every, "tries every law with its effects")] if other_law else []),
+            Next(command("learn", folder), "learns what is missing"),
+            *_gaining(verdict, folder),
+            Next(command("compare", folder), "shows where the error is"),
+            Next("bristle new effect NAME", "starts your own effect"),
+        ]
+    if kind == "insufficient":
+        right = f"after {folder / 'study.toml'} is set right where the text says so, or new runs"
+        return [Next(command("diagnose", folder), right)]
+    hidden = not_excited(verdict)
+    if kind == "none" and hidden:
+        plan = command("plan", folder, "--see", *hidden)
+        return [report, Next(plan, "plans tests that show what these cannot")]
+    return [report, Next(command("export", folder), "writes the model as an FMU")]
+
+
+def not_excited(verdict: Mapping[str, Any]) -> list[str]:
+    """Return the effects that these runs cannot show, and others may.
+
+    What a parameter of another effect absorbs is that effect.
+    """
+    rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
+    hidden = [row for row in rows if row.get("why") and "." not in row["why"].partition(" ")[0]]
+    return sorted({row["effect"] for row in hidden if row["why"] != NO_AMOUNT})
+
+
+def _gaining(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
+    """Return the commands that add what gains most where nothing explains the error, if any."""
+    gains = verdict.get("gains") or []
+    if not gains:
+        return []
+    best = max(gains, key=lambda row: row["gain"])
+    greedy = command("study", "auto", folder, "--greedy")
+    return [
+        Next(command("add", folder, *best["effects"]), f"error {100.0 * best['gain']:.0f} % lower"),
+        Next(greedy, "adds effects as long as one gains"),
+    ]

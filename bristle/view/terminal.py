@@ -8,6 +8,8 @@ from textwrap import wrap
 from .blocks import Block, Formula, Next, Table, Text, View
 
 WIDTH = 100
+MOST = 12
+"""Lines of an answer, besides its tables, notes and blank lines; the rest is with the details."""
 WIDEST = 120
 """Of a table, before the cells of a row stand below each other."""
 _NEXT = "Next:  "
@@ -16,24 +18,30 @@ _NEXT = "Next:  "
 def text(view: View, *, details: bool = False, elsewhere: str = "") -> str:
     """Return the answer of a view as text, with its details where they are asked for.
 
-    Notes, which warn and say what is left out, are never left away. `elsewhere` is a command that
-    shows the details too.
+    Tables stay, and so do notes, which warn and say what is left out. Of words that go beyond
+    `MOST` lines the last ones are details. `elsewhere` is a command that shows the details too.
     """
-    more = [one for one in view.details if details or _is_note(one)]
-    every = [one for one in (*view.blocks, *more) if not isinstance(one, Next)]
     out = wrap(view.title, WIDTH)
+    then = [one for one in view.blocks if isinstance(one, Next)]
+    room, kept, cut = MOST - len(out) - len(then) - 1, list[Block](), list[Block]()
+    for block in view.blocks:
+        words = isinstance(block, Text) and not _is_note(block)
+        room -= len(lines(block)) if words else 0
+        (cut if room < 0 and words else kept).append(block)
+    more = [*cut, *view.details]
     last: Block = Text("")
-    for one in every:
+    for one in (*kept, *(one for one in more if details or _is_note(one))):
+        if isinstance(one, Next):
+            continue
         gap = type(one) is not type(last) or isinstance(one, Table)
         if own := lines(one):
             out += [*([""] if gap else []), *own]
             last = one
-    then = [one for one in view.blocks if isinstance(one, Next)]
     out += [""] if then else []
     for k, step in enumerate(then):
         why = f"   # {step.why}" if step.why else ""
         out.append(f"{_NEXT if k == 0 else ' ' * len(_NEXT)}{step.command}{why}")
-    if not details and any(not _is_note(one) and lines(one) for one in view.details):
+    if not details and any(not _is_note(one) and lines(one) for one in more):
         out.append(f"Details:  --details{f', or {elsewhere}' if elsewhere else ''}")
     return "\n".join(out)
 
@@ -51,7 +59,8 @@ def lines(block: Block) -> list[str]:
     if isinstance(block, Formula):
         return [f"  {block.text}"]
     if isinstance(block, Text) and block.text:
-        return wrap(f"Note: {block.text}" if block.kind == "note" else block.text, WIDTH)
+        warns = block.kind != "note" or block.text.startswith("Warning:")
+        return wrap(block.text if warns else f"Note: {block.text}", WIDTH)
     return []
 
 

@@ -37,7 +37,7 @@ def test_none_where_nothing_helps_and_the_error_is_noise():
     found = decide(trial(1.02), [trial(1.02, "stribeck"), trial(1.015, "coil_lag")], refuse)
     assert found.kind == "none"
     assert found.effects == ()
-    assert "error / noise (z) = 1.02" in found.reasons[0]
+    assert "1.02 times the noise (z)" in found.reasons[0]
 
 
 def test_a_gain_below_the_smallest_is_none_and_above_it_an_effect():
@@ -83,7 +83,7 @@ def test_an_effect_of_another_form_keeps_its_name_and_says_that_a_residual_remai
     trials = [trial(1.4, "gas_spring"), trial(2.6, "stribeck")]
     found = decide(trial(3.0), trials, no_more)
     assert (found.kind, found.effects) == ("effect", ("gas_spring",))
-    assert any("different functional form" in reason for reason in found.reasons)
+    assert any("follows another formula" in reason for reason in found.reasons)
 
 
 def test_rivals_that_the_data_cannot_distinguish_are_ambiguous():
@@ -116,7 +116,7 @@ def test_unknown_where_the_best_effect_leaves_most_of_it():
     found = decide(trial(3.0), [trial(2.5, "stribeck")], no_more)
     assert (found.kind, found.effects) == ("unknown", ())
     assert found.best.effects == ()
-    assert "stribeck" in found.reasons[0]
+    assert "Stribeck effect" in found.reasons[0]
 
 
 @pytest.mark.parametrize(("z", "organised"), [(BENCH.clean + 0.05, False), (1.05, True)])

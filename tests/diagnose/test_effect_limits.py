@@ -16,6 +16,7 @@ from bristle.identification.problem import Model, residuals
 from bristle.identification.search import HUBER
 from bristle.identification.start_grid import refine
 from bristle.physics.effect import EFFECTS
+from bristle.study.view import not_excited
 from bristle.view.blocks import Table
 from tests.diagnose.test_limits import VALUES, T, problem_of, steady, steps
 
@@ -189,7 +190,7 @@ def test_what_hides_an_effect_is_told():
     sprung = {**VALUES, "gas_spring.k": 50.0, "gas_spring.k_3": 1e4}
     both = Model("bingham", (SPRING,), sprung, ("f_v", "c_v", "gas_spring.k_2"))
     taken = SizeSearch(problem, both, problem.expectation(both), 6000)
-    assert limit_of(Sized("duffing", taken)).why == "gas_spring.k_3 of the model absorbs it"
+    assert limit_of(Sized("duffing", taken)).why == "gas_spring.k_3 hides it"
 
 
 def test_every_effect_says_how_much_there_is_of_it():
@@ -204,23 +205,23 @@ def test_an_effect_without_an_amount_has_no_limit_and_says_why(known, monkeypatc
     assert (one.effect, one.why) == (SPRING, "")
     assert (other.effect, other.why) == ("stribeck", NO_AMOUNT)
     rows = [limit.as_dict() for limit in (one, other)]
-    assert limit_rows({"findings": [{"limits": rows}]})[1] == ["stribeck", NO_AMOUNT, "-", "-"]
+    assert limit_rows({"findings": [{"limits": rows}]})[1] == ["Stribeck effect", NO_AMOUNT, "", ""]
 
 
 def test_the_table_has_units_as_people_write_them():
     limits = [
         EffectLimit("coil_lag", "tau", "s", False, 1.4e-3, 2e-4, 0.011, 2e-3),
         EffectLimit("mount_compliance", "k", "N/m", True, 2.1e7, None, None, None, True),
-        EffectLimit("base_friction", why="f_c of the model absorbs it"),
+        EffectLimit("base_friction", why="f_c hides it"),
     ]
     verdict = {"findings": [{"site": "damper", "limits": [one.as_dict() for one in limits]}]}
     assert limit_rows(verdict) == [
-        ["coil_lag", "tau below 1.4 ms", "0.02 %", "11 ms"],
-        ["mount_compliance", "k above 21 MN/m", "-", "-"],
-        ["base_friction", "f_c of the model absorbs it", "-", "-"],
+        ["coil lag", "tau below 1.4 ms", "0.02 %", "11 ms"],
+        ["mount compliance", "k above 21 MN/m", "below a sample", "no size"],
+        ["base friction", "f_c hides it", "", ""],
     ]
     tables = [one.header for one in verdict_view({"kind": "none", **verdict}).every(Table)]
-    assert tables == [("effect", "still possible (95 %)", "of the force", "named from")]
+    assert tables == [("effect", "at most (95 %)", "of force", "named from")]
     assert not list(verdict_view({"kind": "none", "findings": []}).every(Table))
 
 

@@ -39,8 +39,8 @@ def test_effects_that_gain_are_told_with_what_each_gains():
     ]
     assert [row["gain"] for row in rows] == [0.2, 0.1, 0.5]
     told = " ".join(sentences({"kind": "unknown", "effects": [], "reasons": [], "gains": rows}))
-    assert "stribeck lowers the error by 20 % and coil_lag by 10 %, each added alone." in told
-    assert "stribeck and coil_lag together lower it by 50 %." in told
+    assert "Stribeck effect by 20 % and coil lag by 10 %, each added alone." in told
+    assert "Stribeck effect and coil lag together lower it by 50 %." in told
 
 
 def test_a_pair_that_gains_no_more_than_the_best_effect_is_not_told():

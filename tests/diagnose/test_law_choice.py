@@ -277,23 +277,27 @@ def test_the_verdict_tells_law_table_and_what_does_as_well():
     verdict = LawVerdict(true.row, "lugre", rows, (true, best), (("bouc_wen", (), 1.003),))
     told = {"kind": "effect", "effects": ["gas_spring"], **verdict.as_dict()}
     assert (told["law"], told["command"], told["law_before"]) == ("bingham", "linear", "lugre")
-    assert headline(told) == "The law bingham misses gas_spring."
+    assert headline(told) == "Missing from the law bingham: gas spring."
     first, second = law_sentences(told)
-    assert "bingham with gas_spring has error / noise (z) = 1.00" in first
-    assert "bouc_wen with nothing missing explains them as well" in second
+    assert "bingham with gas spring is the simplest of " in first
+    assert "1.00 times the noise (z)" in first
+    assert "so does another: bouc_wen alone." in second
     table = law_table(told["laws"])
     assert [cells[:2] for cells in table][-1] == ["lugre", "quadratic"]
-    assert table[0][5] == "-"
-    assert (table[0][6], table[0][7]) == ("1.003 N (10.0 %)", "-")  # nobody asked on held-out runs
+    assert table[0][5] == "best"
+    assert (table[0][6], table[0][7]) == (
+        "1.003 N (10.0 %)",
+        "not judged",
+    )  # nobody asked on held-out runs
     old = [{"rms_train": 0.3, "rms_holdout": 0.4, **one} for one in told["laws"]]
     for one in old:  # another error than the one that is told today
         del one["error_train"], one["error_holdout"]
-    assert {cells[k] for cells in law_table(old) for k in (6, 7)} == {"-"}
+    assert {cells[k] for cells in law_table(old) for k in (6, 7)} == {"not judged"}
 
 
 def test_a_verdict_on_a_law_given_says_nothing_of_laws():
     assert law_sentences({"kind": "none", "effects": []}) == []
-    assert headline({"kind": "effect", "effects": ["drift"]}) == "The model misses drift."
+    assert headline({"kind": "effect", "effects": ["drift"]}) == "Missing from the model: drift."
 
 
 def test_an_effect_that_explains_most_near_rest_is_not_preferred_to_a_law_with_half_the_error():

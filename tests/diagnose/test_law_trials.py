@@ -71,12 +71,12 @@ def test_how_much_of_an_error_is_the_form_of_the_law_is_told():
     assert other is not None
     assert (other.law, other.z, other.share) == ("tanh[quadratic]", 2.0, pytest.approx(0.625))
     assert other.sentence() == (
-        "Without a further effect, the law tanh with a quadratic command leaves error / noise (z) "
-        "= 2.00: its form alone explains 62 % of what is missing."
+        "Without a further effect, the law tanh with a quadratic command leaves 2.00 "
+        "times the noise (z): its form alone explains 62 % of what is missing."
     )
     assert other.sentence(added=True) == (
-        "With the same effects, the law tanh with a quadratic command leaves error / noise (z) = "
-        "2.00: its form alone explains 62 % of what then remains above the noise."
+        "With the same effects, the law tanh with a quadratic command leaves 2.00 times the "
+        "noise (z): its form alone explains 62 % of what then remains above the noise."
     )
     assert other.as_dict()["command"] == "quadratic"
     assert better_law(judged, laws[2:]) is None

@@ -37,4 +37,4 @@ def test_the_dashed_line_names_its_model(laws: dict[str, Any], words: str) -> No
 def test_the_pair_of_effects_that_a_verdict_names_has_a_bar() -> None:
     page = draw_verdict(PAIR)
     names = [label.get_text() for label in page.figure.axes[0].get_yticklabels()]
-    assert names == ["with delay\nand gas_spring", "with delay", "with gas_spring"]
+    assert names == ["with delay\nand gas spring", "with delay", "with gas spring"]

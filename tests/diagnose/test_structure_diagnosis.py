@@ -200,7 +200,7 @@ def test_findings_of_sites_become_one_verdict():
     both["storey1"] = at("storey1", "unknown")
     found = conclude(both, VerdictContext())
     assert (found.kind, found.coordinate) == ("unknown", "velocity")
-    assert "Besides, the model misses duffing (layer)." in found.words
+    assert "Missing besides: Duffing spring (isolation layer)." in found.words
 
 
 def seen(site, kind, before, *effects):

@@ -29,11 +29,20 @@ def said(**findings):
 @pytest.mark.parametrize(
     ("verdict", "says"),
     [
-        ({"kind": "effect", "effects": ["a", "b"]}, "The model misses a and b."),
-        ({"kind": "ambiguous", "effects": ["a", "b"]}, "The model misses either a or b. The data "),
-        ({"kind": "ambiguous", "effects": ["a", "b", "c"]}, "The model misses one of a, b and c. "),
-        ({"kind": "unknown", "effects": []}, "The model misses something that no known effect"),
-        ({"kind": "none", "effects": []}, "These data show nothing that the model misses."),
+        ({"kind": "effect", "effects": ["a", "b"]}, "Missing from the model: a and b."),
+        (
+            {"kind": "ambiguous", "effects": ["a", "b"]},
+            "Missing from the model: a or b. These runs cannot ",
+        ),
+        (
+            {"kind": "ambiguous", "effects": ["a", "b", "c"]},
+            "Missing from the model: one of a, b and c. ",
+        ),
+        ({"kind": "unknown", "effects": []}, "Something is missing from the model that no effect "),
+        (
+            {"kind": "none", "effects": []},
+            "Nothing is missing from the model: it explains these runs ",
+        ),
         ({"kind": "insufficient", "effects": []}, "These data do not allow a verdict."),
     ],
 )
@@ -44,31 +53,35 @@ def test_every_kind_has_a_headline(verdict, says):
 
 def test_a_bench_names_no_site_and_a_building_does():
     assert said(damper=at("damper", "effect", "stribeck"))["words"] == (
-        "The model misses stribeck. With it z falls."
+        "Missing from the model: Stribeck effect. With it z falls."
     )
     both = said(layer=at("layer", "effect", "duffing"), damper=at("damper", "effect", "stribeck"))
     assert both["words"] == (
-        "The model misses duffing (layer) and stribeck (damper). "
+        "Missing from the model: Duffing spring (isolation layer) and Stribeck effect (damper). "
         "At the isolation layer: with it z falls. At the damper: with it z falls."
     )
 
 
 def test_an_effect_at_two_sites_and_one_that_looks_alike_have_their_sites():
     both = {f"storey{i}": at(f"storey{i}", "effect", "storey_softening") for i in (1, 2)}
-    assert headline(said(**both)) == "The model misses storey_softening (storey1, storey2)."
+    assert headline(said(**both)) == (
+        "Missing from the model: storey softening (storey 1, storey 2)."
+    )
     damper = {"storey1": at("storey1"), "damper": at("damper", "effect", "gas_spring")}
     verdict = conclude(damper, VerdictContext("reconstructed")).as_dict()
     assert verdict["sites"] == {"gas_spring": "damper", "duffing": "layer"}
-    assert headline(verdict).startswith("The model misses either gas_spring (damper) or duffing (l")
+    assert headline(verdict).startswith(
+        "Missing from the model: gas spring (damper) or Duffing spring (isolation layer). "
+    )
 
 
 def test_what_the_rest_depends_on_is_told_with_how_sure_that_is():
     verdict = {"kind": "unknown", "effects": [], "coordinate": "rest", "reasons": []}
     chance = [{"coordinate": "rest", "share": 0.1, "p": 0.2}]
-    assert "beyond chance" in sentences({**verdict, "organised": chance})[-1]
+    assert "may be chance" in sentences({**verdict, "organised": chance})[-1]
     sure = [{**chance[0], "p": 0.001}]
     assert sentences({**verdict, "organised": sure})[-1].startswith("The remaining error depends ")
-    assert "beyond chance" not in sentences({**verdict, "coordinate": "frequency"})[-1]
+    assert "may be chance" not in sentences({**verdict, "coordinate": "frequency"})[-1]
 
 
 def test_the_coordinate_of_a_storey_is_its_drift():
@@ -80,25 +93,25 @@ def test_effects_that_no_run_showed_are_told_with_their_sites():
     hidden = {"storey1": at("storey1", untestable=("storey_softening",)), "layer": at("layer")}
     verdict = said(**hidden)
     assert verdict["untestable"] == ["storey_softening"]
-    assert untestable(verdict) == ["storey_softening (storey1)"]
+    assert untestable(verdict) == ["storey softening (storey 1)"]
     one = said(damper=at("damper", untestable=("coil_lag",)))
-    assert untestable(one) == ["coil_lag"]
+    assert untestable(one) == ["coil lag"]
 
 
 def test_what_the_law_takes_up_is_told_with_the_part_that_does():
     hidden = at("damper", untestable=("base_friction",))
-    told = "the law's yield force absorbs it"
-    assert untestable(said(damper=hidden)) == [f"base_friction ({told})"]
+    told = "it hides in the law's yield force"
+    assert untestable(said(damper=hidden)) == [f"base friction ({told})"]
     building = said(layer=at("layer"), damper=hidden)
-    assert untestable(building) == [f"base_friction (damper: {told})"]
+    assert untestable(building) == [f"base friction (damper: {told})"]
     # In the layer it is another friction, which these runs alone do not show.
     layer = said(layer=at("layer", untestable=("base_friction",)), damper=at("damper"))
-    assert untestable(layer) == ["base_friction (layer)"]
+    assert untestable(layer) == ["base friction (isolation layer)"]
     # A law that has no such part is offered it.
     tried = {**said(damper=hidden), "ranking": [{"effect": "base_friction", "site": "damper"}]}
-    assert untestable(tried) == ["base_friction"]
+    assert untestable(tried) == ["base friction"]
     late = conclude({"damper": at("damper")}, VerdictContext("reconstructed")).as_dict()
-    assert untestable({**late, "ranking": tried["ranking"]}) == [f"base_friction ({told})"]
+    assert untestable({**late, "ranking": tried["ranking"]}) == [f"base friction ({told})"]
 
 
 def test_a_fault_is_told_once():
@@ -166,7 +179,7 @@ def test_the_table_of_faults_says_the_value_with_its_unit_and_the_run(channel, f
     assert fault_rows({"sensors": [{**one, "run": "r1"}]})[0][3] == "r1"
 
 
-SET_RIGHT = "The verdict and its numbers are those with that set right."
+SET_RIGHT = "The verdict and its numbers are for the runs with that corrected."
 
 
 def test_a_verdict_says_that_it_is_on_runs_whose_faults_are_set_right():

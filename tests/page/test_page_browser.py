@@ -185,7 +185,7 @@ def test_files_that_are_clean_have_their_verdict_after_five_clicks(tmp_path: Pat
         page.get_by_role("link", name="Next: fit the model").wait_for(timeout=120_000)
         page.get_by_role("link", name="What is missing").click()
         seen.press("Diagnose")
-        page.get_by_text("These data show nothing that").wait_for(timeout=600_000)
+        page.get_by_text("Nothing is missing from").wait_for(timeout=600_000)
         assert 0 < page.evaluate("window.clicks") <= 5
 
 
@@ -246,7 +246,7 @@ def test_the_hour_on_an_example_from_its_making_to_a_running_fmu(tmp_path: Path)
         other.get_by_role("button", name="Cancel").wait_for(timeout=60_000)
         assert other.get_by_role("button", name="Diagnose", exact=True).is_disabled()
         for tab in (page, other):
-            tab.get_by_text("The model misses").wait_for(timeout=600_000)
+            tab.get_by_text("Missing from the model").wait_for(timeout=600_000)
         other.close()
 
         page.get_by_role("link", name=re.compile("^Next: add")).click()

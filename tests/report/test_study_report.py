@@ -128,7 +128,8 @@ def test_what_the_lab_wrote_is_text_and_no_markup(page):
 def test_the_page_says_what_the_study_holds(page, folder):
     text = text_of(page)
     assert (
-        "The model misses either stribeck or flattening. The data cannot distinguish them." in text
+        "Missing from the model: Stribeck effect or flattening. These runs cannot tell them apart."
+        in text
     )
     assert "A sine of 12 mm at 3 Hz &amp; 6 V tells the two apart." in text
     assert "Sensor: gain of velocity, 1.05." in text
@@ -178,8 +179,11 @@ def test_a_single_run_is_said_to_be_weaker(tmp_path):
 @pytest.mark.parametrize(
     ("verdict", "words"),
     [
-        ({"kind": "none", "detectable": 0.031}, "3.1 % of the force would have been seen"),
-        ({"kind": "effect", "effects": ["gas_spring"]}, "The model misses gas_spring"),
+        (
+            {"kind": "none", "detectable": 0.031},
+            "No other effect of the library is above 3.1 % of the force",
+        ),
+        ({"kind": "effect", "effects": ["gas_spring"]}, "Missing from the model: gas spring"),
         (
             {"kind": "unknown", "coordinate": "displacement"},
             "The remaining error depends mainly on displacement.",
@@ -211,7 +215,7 @@ def test_the_command_writes_the_file_and_says_where(folder, tmp_path, capsys):
     assert main(["report", str(folder)]) == 0
     said = capsys.readouterr().out
     assert str(folder / "reports" / "report.html") in said
-    assert "noise floor" in said
+    assert "z: error / noise" in said
     other = tmp_path / "elsewhere.html"
     assert main(["report", str(folder), "--out", str(other), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)

@@ -176,7 +176,7 @@ def hidden(tmp_path_factory):
 def test_the_pair_of_law_and_effect_is_found(hidden, capsys):
     assert main(["diagnose", str(hidden), "--law", "all"]) == 0
     shown = capsys.readouterr().out
-    assert shown.startswith("The law bingham misses gas_spring.")
+    assert shown.startswith("Missing from the law bingham: gas spring.")
     assert "--law bingham , then:  bristle add" in shown
     found = json.loads((hidden / "verdict.json").read_text())
     assert (found["schema"], found["kind"], found["effects"]) == (2, "effect", ["gas_spring"])

@@ -1,13 +1,11 @@
-"""The staircase of a history, for the terminal."""
+"""The table of a history: the error of each model on held-out runs, step by step."""
 
 from __future__ import annotations
 
-from io import StringIO
-
-from rich.console import Console
-
 from bristle.study import Step
-from bristle.study.history import staircase
+from bristle.study.history import history_steps
+from bristle.study.view import steps_table
+from bristle.view import terminal
 
 STEPS = [
     Step(0, "begin with lugre", "made"),
@@ -17,51 +15,42 @@ STEPS = [
 ]
 
 
-def test_bars_fall_with_the_error_on_a_scale_of_ratios():
-    lines = str(staircase(STEPS)).splitlines()
-    bars = [line.count("#") for line in lines]
-    assert "not judged" in lines[1]
-    assert bars[2] == 40
-    assert bars[3] == round(40 * 0.582)  # log 3 / log 6.6, from what the next step began with
-    assert bars[4] == 1
-    assert "error 0.88 N, training z = 6.30" in lines[2]
-    assert lines[-1].endswith("| 1")
+def rows(*steps, cut_off=0.0):
+    return [list(row) for row in steps_table(history_steps(steps), cut_off).rows]
 
 
-def test_plain_text_holds_nothing_but_ascii():
-    assert str(staircase(STEPS)).isascii()
+def test_each_step_has_its_error_or_what_the_next_one_began_with():
+    assert rows(*STEPS) == [
+        ["0 begin with lugre", "not judged", "", "", ""],
+        ["1 identify lugre", "0.88", "", "6.60", "6.30"],
+        ["2 edited by hand", "", "", "3.00", ""],
+        ["3 add gas_spring", "0.2", "", "1.02", ""],
+    ]
 
 
-def test_on_a_terminal_it_is_coloured():
-    out = StringIO()
-    Console(file=out, force_terminal=True, width=120).print(staircase(STEPS))
-    assert "\u2588" in out.getvalue()
-    assert "\x1b[" in out.getvalue()
+def test_the_unit_stands_in_the_header_and_z_is_explained_beside_it():
+    table = steps_table(history_steps(STEPS))
+    assert tuple(table.header) == ("step", "error [N]", "of force", "z", "z train")
+    assert "z: error / noise" in table.note
+    assert max(map(len, terminal.lines(table))) <= terminal.WIDTH
 
 
-def test_an_empty_history_says_so():
-    assert str(staircase([])) == "The history is empty."
-
-
-def test_a_name_longer_than_its_column_is_cut_visibly():
-    long = [Step(0, "identify modified_bouc_wen[quadratic] + gas_spring", "", {}, {"z_holdout": 3})]
-    assert "0 identify modified_bouc_wen[quadrati...  ####" in str(staircase(long))
-    (line,) = {line for line in str(staircase(STEPS)).splitlines() if "add gas_spring" in line}
-    assert line.startswith("3 add gas_spring    #")
+def test_an_empty_history_has_no_row():
+    assert rows() == []
 
 
 def test_each_step_tells_the_low_pass_of_its_own_error():
     told = [{"z_holdout": 4.0, "rms_holdout": 2.0, **own} for own in ({}, {"cut_off": 0.0})]
     told.append({**told[0], "cut_off": 5.0})
     steps = [Step(k, f"identify {k}", "", {}, one) for k, one in enumerate(told)]
-    lines = str(staircase(steps, cut_off=18.0)).splitlines()
-    assert [line.partition("2 N")[2] for line in lines[1:4]] == [" below 18 Hz", "", " below 5 Hz"]
+    assert [row[0] for row in rows(*steps, cut_off=18.0)] == [
+        "0 identify 0 (below 18 Hz)", "1 identify 1", "2 identify 2 (below 5 Hz)",
+    ]  # fmt: skip
 
 
 def test_a_step_with_the_low_passed_error_alone_says_so_beside_one_with_the_error():
     low = {"z_holdout": 4.0, "rms_holdout": 2.0, "share_holdout": 0.2, "cut_off": 18.0}
     new = {**low, "z_holdout": 2.0, "error_holdout": 2.5, "error_share_holdout": 0.24}
-    steps = [Step(1, "old", "", {}, low), Step(2, "new", "", {}, new)]
-    old, now = str(staircase(steps)).splitlines()[1:3]
-    assert old.endswith("error 2 N (20.0 %) below 18 Hz")
-    assert now.endswith("error 2.5 N (24.0 %)")
+    assert [row[:3] for row in rows(Step(1, "old", "", {}, low), Step(2, "new", "", {}, new))] == [
+        ["1 old (below 18 Hz)", "2", "20.0 %"], ["2 new", "2.5", "24.0 %"],
+    ]  # fmt: skip

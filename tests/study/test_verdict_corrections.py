@@ -9,11 +9,11 @@ import pytest
 from study.made import write_runs
 
 from bristle.cli import main
-from bristle.cli.diagnose import text
 from bristle.data.corrections import Correction
 from bristle.diagnosis.conclusion import corrections_of
 from bristle.diagnosis.verdict import SCHEMA
 from bristle.study import Study, create_study
+from bristle.study.view import next_steps
 
 LATE = {"channel": "force", "fault": "delay", "value": 0.004, "words": "late", "run": "run_2"}
 CLOCK = {"channel": "force", "fault": "clock", "value": 8e-5, "words": "fast"}
@@ -53,7 +53,6 @@ def test_the_check_writes_what_the_verdict_found_once(
 
 def test_the_command_that_corrects_the_data_comes_before_the_effect() -> None:
     add = "bristle add rig gas_spring"
-    late, clipped = (text(verdict(one), Path("rig")) for one in (LATE, CLIPPED))
-    assert late.index("bristle study check rig --correct") < late.index(add)
-    assert add in clipped
-    assert "--correct" not in clipped
+    commands = [one.command for one in next_steps(verdict(LATE), Path("rig"))]
+    assert commands == ["bristle study check rig --correct", add]
+    assert [one.command for one in next_steps(verdict(CLIPPED), Path("rig"))] == [add]

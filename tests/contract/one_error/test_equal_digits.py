@@ -99,7 +99,7 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
     assert error.counted() in compared
     assert json.loads(run(["compare", folder, "--json"], capsys))["total"]["error"] == told
     diagnosed = " ".join(run(["diagnose", folder, "--law", "bingham"], capsys).split())
-    assert f"The study's model errs by {text} on the held-out runs." in diagnosed
+    assert f"Force error of the study's model on the held-out runs: {text}" in diagnosed
     verdict = json.loads((rig / "verdict.json").read_text())
     assert verdict["error"]["holdout"] == told
 

@@ -111,7 +111,7 @@ def test_an_effect_is_named_for_the_error_that_it_takes(
     study = study_of(tmp_path, HARD, capsys)
     assert main(["diagnose", str(study)]) == 0
     told = capsys.readouterr().out
-    assert told.startswith("The model misses duffing")
+    assert told.startswith("Missing from the model: Duffing spring")
     assert "of the force, noise included" in told
     assert "z = " not in told
     verdict = json.loads((study / "verdict.json").read_text(encoding="utf-8"))
