@@ -119,7 +119,8 @@ def label_sentence(errors: Sequence[LabelError]) -> str:
     others = f"z = {short_z(rest[0].z)} at most at {_values(rest, own)}"
     if rest[0].z <= CLOSE:
         return f"Only the runs at {label}{where} are wrong: z = {short_z(own[0].z)}, and {others}."
-    return f"It is worst in the runs at {label}{where}: z = {short_z(own[0].z)}, and {others}."
+    most = f"The error is largest in the runs at {label}{where}"
+    return f"{most}: z = {short_z(own[0].z)}, and {others}."
 
 
 def _of_one_run(far: LabelError, others: float) -> str:
@@ -133,7 +134,9 @@ def _of_one_run(far: LabelError, others: float) -> str:
     label = "" if far.unit else f"{name_of(far.name)} "
     wrong = f"is wrong: z = {short_z(far.z)}" if others <= CLOSE else ""
     begin = (
-        f"Only {far.run} {wrong}" if wrong else f"It is worst in {far.run}: z = {short_z(far.z)}"
+        f"Only {far.run} {wrong}"
+        if wrong
+        else f"The error is largest in {far.run}: z = {short_z(far.z)}"
     )
     return (
         f"{begin}, and z = {short_z(others)} at most in the other runs. It is the only run at "

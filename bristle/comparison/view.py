@@ -37,8 +37,9 @@ _HISTORY, _PANELS = 3.1, 3.2
 """Heights of the history with its error, and of a row of two panels [in]."""
 LOOPS = 4.6
 """Height of two rows of loops of single cycles [in]."""
-_EXCESS = "of what exceeds noise"
+_EXCESS = "beyond noise"
 """The column that a table has where the noise is known."""
+_NOTE = "z: error / noise; a true model has 1."
 _SHOWN = 6  # coordinates in a table
 _TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 
@@ -59,22 +60,23 @@ def site_table(comparison: Comparison) -> Table:
     """Return the error at each site of a building, the worst first."""
     known = [one.total.signal for one in comparison.sites if one.total.samples]
     factor, unit = scale("N", max(known, default=0.0))
-    header = ["site", "z", "95 %", f"error [{unit}]", "of RMS", f"noise [{unit}]", "depends on"]
-    title = "Error at every site, each over its own noise (z); RMS at all frequencies"
-    return Table(header, [_site(one, factor) for one in comparison.sites], range(1, 6), title)
+    header = ["site", f"error [{unit}]", "of force", f"noise [{unit}]", "z", "95 %", "depends on"]
+    rows = [_site(one, factor) for one in comparison.sites]
+    return Table(header, rows, range(1, 6), "Error at every site", note=_NOTE)
 
 
 def _site(one: SiteMisfit, factor: float) -> list[str]:
     name = site_name(one.site).removeprefix("the ")
     if not one.total.samples:
-        return [name, "-", one.why_not, "-", "-", "-", "-"]
+        return [name, "", "", "", "", "", one.why_not]
     (low, high), total, pattern = one.z_interval, one.total, one.pattern
     worth = pattern is not None and pattern.share >= FAINT
     return [
-        name, short_z(one.z), one.why_not or f"{short_z(low)} - {short_z(high)}",
-        plain(factor * total.rms, 4), percent(total.share),
-        "-" if one.why_not else plain(factor * total.noise),
-        name_of(pattern.coordinate, one.site) if pattern is not None and worth else "-",
+        name, plain(factor * total.rms, 4), percent(total.share),
+        "" if one.why_not else plain(factor * total.noise), short_z(one.z),
+        "" if one.why_not else f"{short_z(low)} to {short_z(high)}",
+        one.why_not
+        or (name_of(pattern.coordinate, one.site) if pattern is not None and worth else "nothing"),
     ]  # fmt: skip
 
 
@@ -83,16 +85,17 @@ def run_table(comparison: Comparison) -> Table:
     factor, unit = scale(comparison.unit, comparison.total.signal)
     known = known_of(comparison.predictions)
     names = varying(known)
-    header = ["run", "z", f"error [{unit}]", "of RMS", "fit", "VAF"]
-    header += [f"noise [{unit}]", "half step [z]", *names]
+    header = ["run", f"error [{unit}]", "of force", f"noise [{unit}]", "z", "fit", "VAF"]
+    header += ["half step [z]", *names]
     own = [[_label(name, one[name]) for name in names] for one in known]
     rows = [[*_run(run, factor), *labels] for run, labels in zip(comparison.runs, own, strict=True)]
     if len(rows) > 1:
         rows.append([*_run(comparison.total, factor), *["" for _ in names]])
-    title = "Error / noise (z), RMS at all frequencies, and the sensitivity to halving the step"
+    title = "Error on each run"
     if comparison.sites:
-        title = f"{capitalised(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
-    return Table(header, rows, range(1, len(header)), title)
+        title = f"{capitalised(site_name(comparison.site))}: error on each run"
+    note = f"{_NOTE} Half step: what half the calculation step changes, over the noise."
+    return _as_known(comparison, Table(header, rows, range(1, len(header)), title, note=note))
 
 
 def _label(name: str, value: Label) -> str:
@@ -104,7 +107,7 @@ def label_table(comparison: Comparison) -> Table:
     rows = [
         [name_of(one.name), one.text, short_z(one.z), str(one.runs)] for one in comparison.labels
     ]
-    title = "Error by what is known of whole runs"
+    title = "Error by the labels of the runs"
     return Table(["label", "value", "z", "runs"], rows, (1, 2, 3), title)
 
 
@@ -113,19 +116,19 @@ def _run(run: RunMisfit, factor: float) -> list[str]:
     if run.z != run.z:
         numerical = short_z(None)
     return [
-        run.name, short_z(run.z), plain(factor * run.rms, 4), percent(run.share), percent(run.fit),
-        percent(run.accounted), plain(factor * run.noise), numerical,
+        run.name, plain(factor * run.rms, 4), percent(run.share), plain(factor * run.noise),
+        short_z(run.z), percent(run.fit), percent(run.accounted), numerical,
     ]  # fmt: skip
 
 
 def pattern_table(comparison: Comparison) -> Table:
     """Return the coordinates by how much of the error's power each carries."""
-    header = ["coordinate", "of the error", _EXCESS, "chance"]
+    header = ["coordinate", "of error", _EXCESS, "chance"]
     rows = [_pattern(one, comparison.site) for one in comparison.patterns[:_SHOWN]]
-    title = "Where the error occurs: the share of its power along each coordinate"
+    title = "What the error depends on"
     note = (
-        "Chance: how often a true model, with an error as correlated as this one, would show such "
-        "a share along any coordinate."
+        "Of error: the part of its power along the coordinate. Chance: how often a true model "
+        "would show such a part along any coordinate."
     )
     return _as_known(comparison, Table(header, rows, (1, 2, 3), title, note=note))
 
@@ -149,7 +152,7 @@ def band_table(comparison: Comparison) -> Table:
         ]
         for band in comparison.spectrum.bands
     ]  # fmt: skip
-    title = "In frequency; coherence of the error with the prediction"
+    title = "The error by frequency"
     return _as_known(comparison, Table(header, rows, range(1, 5), title))
 
 
@@ -157,8 +160,13 @@ def _as_known(comparison: Comparison, table: Table) -> Table:
     """Return a table without what only a known noise tells."""
     if comparison.noise_known:
         return table
-    kept = [k for k, name in enumerate(table.header) if name not in ("z", _EXCESS)]
+    apart = ("z", _EXCESS, "half step [z]")
+    kept = [
+        k for k, name in enumerate(table.header)
+        if name not in apart and not name.startswith("noise [")
+    ]  # fmt: skip
     return table._replace(
+        note="" if _NOTE in table.note else table.note,
         header=[table.header[k] for k in kept],
         rows=[[row[k] for k in kept] for row in table.rows],
         numbers=range(1, len(kept)),
@@ -271,13 +279,12 @@ def headline(comparison: Comparison) -> str:
     if comparison.right:
         if comparison.sites and not any(one.fails for one in comparison.sites):
             return "The model is right within its noise at every site"
-        return f"The model's {what} is right within its noise (z = {z:.2f})"
+        return f"The model's {what} is right within its noise (error / noise z = {z:.2f})"
     times = plain(z, 2 if z < 100.0 else 3)
-    text = f"The model's {what} is wrong by {times} times what noise explains"
+    off = f"The model's {what} is off by {percent(comparison.error.headline[1])}"
+    text = f"{off}, {times} times the noise (z)"
     if not comparison.noise_known:
-        text = (
-            f"The model misses {100.0 * comparison.total.share:.1f} % of the {what}, noise included"
-        )
+        text = f"{off}, noise included"
     if comparison.first:
         along = name_of(comparison.first.coordinate, comparison.site)
         text += f"; the error depends mainly on {along}"

@@ -58,7 +58,7 @@ def _how_wrong(comparison: Comparison) -> str:
         text = f"{where} the {what} by {size}, noise included, which is not known"
     elif not comparison.right:
         times = plain(total.z)
-        text = f"{where} the {what} by {size}, {times} times the noise{step}"
+        text = f"{where} the {what} by {size}, {times} times the noise (z){step}"
     else:
         text = f"{where} the {what} by {size}, which the noise explains (z = {total.z:.2f}){step}"
     beside = total.error.beside(comparison.unit)
@@ -121,7 +121,7 @@ def _where(comparison: Comparison, finder: Finder) -> str:
 
 def _where_right(comparison: Comparison) -> str:
     if not comparison.noise_known:
-        return "Give the noise of the force in study.toml, and the error is told in units of it."
+        return "State the noise of the force in study.toml to know how much of the error is noise."
     every = comparison.regimes
     whole = (
         f"between {min(r.z for r in every):.2f} and {max(r.z for r in every):.2f}" if every else ""
@@ -145,7 +145,7 @@ def _where_right(comparison: Comparison) -> str:
     if comparison.right:
         return f"The model is best {best.text} (z = {best.z:.2f})."
     text = "The model is nowhere right within its noise. It is best "
-    text += f"{best.text} (z = {short_z(best.z)})"
+    text += f"{best.text}, with z = {short_z(best.z)}"
     return text + (f"; {loud}." if loud else ".")
 
 
@@ -172,7 +172,7 @@ def _loudest(comparison: Comparison) -> str:
     low = comparison.spectrum.bands[min(chosen)].low
     high = comparison.spectrum.bands[max(chosen)].high
     span = f"below {plain(high)} Hz" if low == 0.0 else f"between {plain(low)} and {plain(high)} Hz"
-    return f"{_percent(share)} of what exceeds the noise lies {span}"
+    return f"{_percent(share)} of the error beyond noise lies {span}"
 
 
 def _pattern_text(pattern: ResidualPattern, prediction: RunPrediction) -> str:

@@ -54,11 +54,13 @@ def diagnosis_view(found: Diagnosis) -> View:
 def verdict_view(verdict: Verdict) -> View:
     """Return the view of the content of verdict.json."""
     kind, why = str(verdict["kind"]), reasons(verdict)
-    shown, apart = why[:_WHY], why[_WHY:]
+    asks = [text for text in why if "study.toml" in text]
+    told = [text for text in why if text not in asks]
+    shown, apart = told[:_WHY], told[_WHY:]
     named = [_about(str(name), verdict) for name in verdict.get("effects") or []]
     hidden = untestable(verdict)
     notes = [*fault_texts(verdict, " ".join(why)), *_errors_beside(verdict)]
-    notes += verdict.get("notes") or []
+    notes += [*asks, *(verdict.get("notes") or [])]
     if hidden:
         notes.append(f"Not testable with these runs: {', '.join(hidden)}.")
     separate = separating(verdict)

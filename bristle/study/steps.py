@@ -40,6 +40,7 @@ from ..physics.building import Building, frequencies
 from ..physics.effect import EFFECTS
 from ..physics.forms import joined_form
 from ..physics.laws import law_names
+from ..view import Viewable
 from .forms import LawFits, law_command, law_or_all, with_law
 from .history import Step
 from .identified import Identified, is_identified
@@ -477,8 +478,8 @@ def predictions(study: Study, pair: BeforeAfter) -> TwoPredictions:
 # The building of a study alone: its stiffnesses and damping ratios from its own response.
 
 
-@dataclass(frozen=True)
-class IdentifiedBuilding:
+@dataclass(frozen=True, repr=False)
+class IdentifiedBuilding(Viewable):
     """What the response said of the building.
 
     `given` as it was, `fit` as found on the training runs; `before`, `after` the worst level's z

@@ -158,8 +158,14 @@ def steps_table(steps: Sequence[HistoryStep], cut_off: float = 0.0) -> Table:
     factor, unit = scale("N", max((one.rms for one in steps if one.rms is not None), default=0.0))
     rows = [[_named(one, cut_off), *_step(one, factor)] for one in steps]
     header = ("step", f"error [{unit}]", "of force", "z", "z train")
-    note = "z: error / noise; a true model has 1."
-    return Table(header, rows, range(1, 5), "Error of each model on the held-out runs", note=note)
+    title, note = (
+        "Error of each model on the held-out runs",
+        "z: error / noise; a true model has 1.",
+    )
+    if all(one.z is None for one in steps) and any(one.share is not None for one in steps):
+        header, rows = header[:3], [row[:3] for row in rows]
+        note = "How much of it is noise is not known."
+    return Table(header, rows, range(1, len(header)), title, note=note)
 
 
 def _named(step: HistoryStep, cut_off: float) -> str:

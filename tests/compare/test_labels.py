@@ -50,7 +50,9 @@ def test_one_run_that_has_a_value_of_its_own_is_named() -> None:
         "Only late is wrong: z = 4.40, and z = 1.10 at most in the other runs. It is the only run "
         "at temperature 21 °C, which need not be the cause."
     )
-    assert label_sentence(errors(1.9)).startswith("It is worst in late: z = 4.40, and z = 1.90 at")
+    assert label_sentence(errors(1.9)).startswith(
+        "The error is largest in late: z = 4.40, and z = 1.90 at"
+    )
 
 
 def test_words_are_named_each() -> None:

@@ -83,7 +83,9 @@ def test_compare_says_on_which_runs_the_error_is(lab, tmp_path) -> None:
     comparison = bristle.compare(study)
     told = " ".join(comparison.sentences)
     # The spring acts at 1 A, and most where the amplitude is largest: either label is right.
-    assert "It is worst in the runs at amplitude 10 mm" in told or "runs at 1 A" in told, told
+    assert "The error is largest in the runs at amplitude 10 mm" in told or "runs at 1 A" in told, (
+        told
+    )
     worst = max((one for one in comparison.labels if one.name == "current"), key=lambda one: one.z)
     assert (worst.value, worst.text) == (1.0, "1 A")
     assert comparison.as_dict()["labels"][0].keys() == {"label", "value", "z", "runs"}
@@ -404,7 +406,7 @@ def test_labels_part_the_runs_or_they_are_not_told() -> None:
 
     assert label_sentence(errors(1.0, 1.02, 0.99)) == ""
     assert label_sentence(errors(1.0, 1.02, 4.0)).startswith("Only the runs at temperature 40 °C")
-    assert label_sentence(errors(2.0, 2.1, 5.0)).startswith("It is worst in the runs at")
+    assert label_sentence(errors(2.0, 2.1, 5.0)).startswith("The error is largest in the runs at")
     assert label_sentence(errors(5.0, 5.1, 5.2)) == ""
     assert label_sentence([]) == ""
 

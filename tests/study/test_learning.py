@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 
 from bristle.cli import main
-from bristle.cli.add import text
 from bristle.diagnosis import Diagnosis
 from bristle.errors import RecordError, StudyError
 from bristle.study import steps
 from bristle.study.api import diagnose
 from bristle.study.auto import complete
+from bristle.study.fit_view import added_view
 from bristle.study.steps import (
     add_effects,
     before_after,
@@ -23,6 +23,7 @@ from bristle.study.steps import (
     predictions,
 )
 from bristle.study.study import Study
+from bristle.view.terminal import text
 from tests.independent.generate import make_case
 
 UNITS = {"time": "s", "displacement": "m", "velocity": "m/s", "voltage": "V", "force": "N"}
@@ -82,7 +83,7 @@ def test_adding_tells_where_the_verdict_is_about_another_law(study):
     study.write_verdict({**study.verdict(), "law": "lugre", "command": "linear"})
     added = add_effects(study, ["gas_spring"])
     assert added.as_dict()["other_law"] == "lugre"
-    told = text(added, study.folder)
+    told = text(added_view(added, study.folder))
     assert "The verdict is about the law lugre; this model has bingham." in told
     assert "--law lugre" in told
 

@@ -62,7 +62,7 @@ def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFi
     rows = [line for line in told.splitlines() if line.startswith("  z, ")]
     assert len(rows) == 2
     assert all(row.count("not known") == 2 for row in rows)
-    assert "it cannot be told from the force" in told
+    assert "How much of it is noise is not known" in told
     assert "times the noise" not in told
     assert main(["identify", str(study), "--no-table", "--dry-run", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -83,7 +83,8 @@ def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFi
     assert all("z_holdout" not in step.after for step in steps)
     assert main(["report", str(study)]) == 0
     told = capsys.readouterr().out
-    assert "z not known" in told
+    assert "How much of it is noise is not known." in told
+    assert "z" not in told.partition("Report")[0].split()
     assert "nan" not in told
     page = (study / "reports" / "report.html").read_text(encoding="utf-8")
     assert "z = not known" in page
