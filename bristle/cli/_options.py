@@ -190,6 +190,10 @@ def print_view(view: View, files: Iterable[Path | str]) -> None:
         print(f"  {path}")
 
 
+IN_REPORT = ("add", "compare", "diagnose", "identify", "study")
+"""Commands whose details stand in a study's report too."""
+
+
 def print_study_view(view: View, arguments: argparse.Namespace, *pictures: Path | None) -> None:
     """Print the view of a study's result, and the pictures that were drawn.
 
@@ -202,7 +206,7 @@ def print_study_view(view: View, arguments: argparse.Namespace, *pictures: Path 
     from ..core.text import command
     from ..view import terminal
 
-    elsewhere = command("report", arguments.folder)
+    elsewhere = command("report", arguments.folder) if arguments.command in IN_REPORT else ""
     print(terminal.text(view, details=arguments.details, elsewhere=elsewhere))
     for picture in filter(None, pictures):
         print(f"Picture: {picture}")

@@ -12,8 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Collection
 
-from ..core.text import command
-from ._options import add_json, add_study, add_trust, print_json
+from ._options import add_details, add_json, add_study, add_trust, print_json, print_study_view
 
 HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
@@ -44,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "show the learned effect; write nothing"
     parser.add_argument("--dry-run", action="store_true", help=text)
     add_trust(parser)
+    add_details(parser)
     add_json(parser)
 
 
@@ -53,6 +53,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..learning.signals import ALONG
     from ..study.learn import learn_effect
     from ..study.study import Study
+    from ..study.view import learned_with_next
 
     study = Study(arguments.folder)
     signals = {name: name for name in (*ALONG, *study.settings.beside)}
@@ -69,17 +70,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(found.as_dict())
         return 0
-    print("\n".join(found.sentences()))
-    for one in found.found.others:
-        print(
-            f"  also fitted: {one.curve.words()}, z = {one.trial.z:.2f} on held-out runs, "
-            f"{one.trial.train:.2f} on training runs"
-        )
-    if found.file is not None:
-        print(f"\nEffect:  {found.file}\nPicture: {found.picture}")
-        print(f"\nNext:  {command('add', arguments.folder, found.name)}")
-    elif found.found.refused:
-        print(f"\nNext:  {command('compare', arguments.folder)}")
+    print_study_view(learned_with_next(found, arguments.folder), arguments)
     return 0
 
 

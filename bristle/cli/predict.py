@@ -11,7 +11,7 @@ import argparse
 from math import isfinite
 from pathlib import Path
 
-from ._options import add_json, add_study, add_trust, print_json
+from ._options import add_details, add_json, add_study, add_trust, print_json, print_study_view
 from .compare import add_role
 
 HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 %% band"
@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--with-limits", action="store_true", help=text)
     add_trust(parser)
+    add_details(parser)
     add_json(parser)
 
 
@@ -46,7 +47,6 @@ def main(arguments: argparse.Namespace) -> int:
     from ..prediction.excitation import house_of, trials_in
     from ..prediction.monte_carlo import DRAWS
     from ..study.study import Study
-    from ..view.terminal import print_tables
 
     _refuse(arguments)
     study = Study(arguments.folder)
@@ -62,14 +62,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(found.as_dict())
         return 0
-    print("\n".join(found.sentences()))
-    print_tables(found.tables())
-    if any(row.inside is False for row in found.rows):
-        print("\n* the measured figure is outside the band")
-    for note in found.notes:
-        # A command that ends a note is copied to a shell: no full stop is part of it.
-        end = "" if note.endswith(".") or ":  bristle " in note else "."
-        print(f"{note[:1].upper()}{note[1:]}{end}")
+    print_study_view(found.view(), arguments)
     return 0
 
 

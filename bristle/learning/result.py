@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..comparison.names import site_name
-from ..core.text import plain, quantity, shown
+from ..core.text import plain, quantity
+from ..view import Viewable
 from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
 from .curve import Curve
 from .fit import LearnedCurve
@@ -21,8 +22,8 @@ DRAWN = 400
 """Points of a closed form that a page draws."""
 
 
-@dataclass(frozen=True)
-class LearnedEffect:
+@dataclass(frozen=True, repr=False)
+class LearnedEffect(Viewable):
     """A learned curve as an effect of a study: `file` its effect's, None where none is kept.
 
     `forms` the closed forms fitted to it, the best first; `closed` the one that the effect has in
@@ -42,9 +43,6 @@ class LearnedEffect:
         """The effect's name."""
         return self.found.name
 
-    def __repr__(self) -> str:
-        return shown(self, self.name, self.sentences())
-
     def sentences(self) -> list[str]:
         """Return what was learned, as an engineer would say it."""
         found = self.found
@@ -53,9 +51,9 @@ class LearnedEffect:
         curve = found.curve
         fall = 100.0 * (1.0 - _excess(found.after.z) / max(_excess(found.before.z), 1e-12))
         out = [
-            f"{self.name} is {curve.words()}{self._where()}. With it the error / noise (z) on "
-            f"held-out runs falls from {found.before.z:.2f} to {found.after.z:.2f}; that is "
-            f"{fall:.0f} % of what exceeds the noise."
+            f"{self.name} is {curve.words()}{self._where()}. With it the error on held-out runs "
+            f"falls from {found.before.z:.2f} to {found.after.z:.2f} times the noise (z): it "
+            f"explains {fall:.0f} % of the error beyond noise."
         ]
         best = self.closed.form if self.closed else name_of(self.forms)
         if best is not None:
@@ -65,7 +63,7 @@ class LearnedEffect:
             )
             if self.closed is not None:
                 out.append(
-                    f"The effect has that formula, which leaves z = {self.closed.trial.z:.2f}: "
+                    f"The effect has that formula, with z = {self.closed.trial.z:.2f}: "
                     + ", ".join(self._values())
                     + "."
                 )
@@ -81,7 +79,7 @@ class LearnedEffect:
             near = nearest_of(self.forms)
             text = f": the nearest, {in_words(near, curve)}, leaves " if near else ""
             text += f"{100.0 * near.left:.0f} % of its variation" if near else ""
-            out.append(f"No closed form follows it{text}.")
+            out.append(f"No formula follows the curve{text}.")
         return [*out, *self._line()]
 
     def _where(self) -> str:
@@ -99,7 +97,7 @@ class LearnedEffect:
     def _values(self) -> list[str]:
         assert self.closed is not None
         return [
-            f"{name} = {plain(value, 4)} +- {plain(1.96 * self.closed.std[name], 2)}"
+            f"{name} = {plain(value, 4)} ± {plain(1.96 * self.closed.std[name], 2)}"
             + (f" {unit}" if unit != "1" else "")
             for name, value, unit in self.closed.formula.parameters
         ]

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.names import name_of
+from ..comparison.names import effect_name, name_of
 from ..core.text import command, percent, plain, scale
 from ..data.channels import channel_unit
 from ..model.draws import widest
+from ..view import Viewable
 
 Band = tuple[float, float]
-KINDS = {"peak": "Peak", "rms": "RMS"}
+KINDS = {"peak": "Peaks", "rms": "RMS"}
 PARAMETERS, MISSED = "the parameters", "what the model misses"
 CAUSES = (PARAMETERS, MISSED)
 """Causes of a band beside effects that the runs do not exclude."""
@@ -85,8 +86,8 @@ class Predicted:
         }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ClosedLoop:
+@dataclass(frozen=True, repr=False)
+class ClosedLoop(Viewable):
     """The responses of a building with a model's damper under ground motions alone.
 
     `rows` per run, response and kind of figure; `draws` how many draws made the bands; `step` the
@@ -135,26 +136,21 @@ class ClosedLoop:
         said = (
             f"The least certain peak is that of {name_of(least.response)} in {least.run}: "
             f"{least.told()}; {percent(share, 0)} of the band's variance is "
-            f"{first}{', which the runs do not exclude' if open_effect else ''}."
+            + (
+                f"{effect_name(first)}, which the runs do not exclude."
+                if open_effect
+                else f"{first}."
+            )
         )
         most, share = widest([row.parts for row in rows], CAUSES)
         if not most:
             return (said, "No effect that the runs do not exclude widens the bands by much.")
         return (
             said,
-            f"Over all figures {most} widens the bands most, by {percent(share, 0)} of the "
-            f"variance. A test that shows it would narrow them:  "
+            f"Over all figures {effect_name(most)} widens the bands most, by {percent(share, 0)} "
+            "of the variance. A test that shows it would narrow them:  "
             f"{command('plan', self.folder, '--see', most.partition(' ')[0])}",
         )
-
-    def tables(self) -> list[tuple[str, list[str], list[list[str]]]]:
-        """Return title, header and rows of a table per run and kind of figure."""
-        out = []
-        for run in dict.fromkeys(row.run for row in self.rows):
-            for kind, title in KINDS.items():
-                rows = [row for row in self.rows if (row.run, row.kind) == (run, kind)]
-                out.append((f"{title}, {run}", *_table(rows, bool(self.step))))
-        return out
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it as JSON has it, in SI."""
@@ -195,41 +191,3 @@ def _both(rows: Sequence[Predicted], *, before: bool) -> str:
                 f"(median; at worst {percent(worst)}, {name_of(response)})"
             )
     return " and ".join(parts)
-
-
-def _table(rows: Sequence[Predicted], with_before: bool) -> tuple[list[str], list[list[str]]]:
-    measured = any(row.measured is not None for row in rows)
-    parts = any(row.parts for row in rows)
-    header = ["response", *(["measured"] if measured else []), "predicted", "95 % band"]
-    header += ["of it"] if parts else []
-    header += ["error"] if measured else []
-    header += (["before", "error before"] if measured else ["before"]) if with_before else []
-    return header, [_cells(row, measured, with_before, parts) for row in rows]
-
-
-def _cells(row: Predicted, measured: bool, with_before: bool, parts: bool) -> list[str]:
-    size = max(row.predicted, row.measured or 0.0)
-    factor, unit = scale(row.unit, size)
-
-    def text(value: float | None) -> str:
-        return "-" if value is None else plain(factor * value, 4)
-
-    outside = " *" if row.inside is False else ""
-    band = f"{text(row.band[0])} to {text(row.band[1])}{outside}" if row.band else "-"
-    cells = [f"{name_of(row.response)} [{unit}]", *([text(row.measured)] if measured else [])]
-    cells += [text(row.predicted), band, *([_of_it(row)] if parts else [])]
-    cells += [_percent(row.error)] if measured else []
-    if with_before:
-        cells += [text(row.before), *([_percent(row.error_before)] if measured else [])]
-    return cells
-
-
-def _of_it(row: Predicted) -> str:
-    """Return the two largest parts of a band's variance."""
-    return ", ".join(f"{name} {percent(part, 0)}" for name, part in [*row.parts.items()][:2]) or "-"
-
-
-def _percent(error: float | None) -> str:
-    if error is None:
-        return "-"
-    return f"{'+' if error >= 0.0 else '-'}{percent(abs(error))}"

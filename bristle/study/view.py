@@ -13,6 +13,7 @@ from ..diagnosis.conclusion import is_correctable
 from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, error_text, verdict_view
 from ..errors import RecordError
+from ..learning.result import LearnedEffect
 from ..model.model import Value
 from ..model.model_file import read_model
 from ..physics.drive import DRIVES
@@ -115,6 +116,17 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     return view._replace(title=title, blocks=(*told, fall, *rest))
 
 
+def learned_with_next(found: LearnedEffect, folder: Path) -> View:
+    """Return the view of what was learned in a study, with the command that follows."""
+    then: tuple[Next, ...] = ()
+    if found.file is not None:
+        then = (Next(command("add", folder, found.name), "puts it into the model"),)
+    elif found.found.refused:
+        then = (Next(command("compare", folder), "shows where the error is"),)
+    view = found.view()
+    return view._replace(blocks=(*view.blocks, *then))
+
+
 def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) -> View:
     """Return what `study auto` came to: the story, how the error fell, what was learned.
 
@@ -157,11 +169,9 @@ def steps_table(steps: Sequence[HistoryStep], cut_off: float = 0.0) -> Table:
     """
     factor, unit = scale("N", max((one.rms for one in steps if one.rms is not None), default=0.0))
     rows = [[_named(one, cut_off), *_step(one, factor)] for one in steps]
-    header = ("step", f"error [{unit}]", "of force", "z", "z train")
-    title, note = (
-        "Error of each model on the held-out runs",
-        "z: error / noise; a true model has 1.",
-    )
+    header = ["step", f"error [{unit}]", "of force", "z", "z train"]
+    title = "Error of each model on the held-out runs"
+    note = "z: error / noise; a true model has 1."
     if all(one.z is None for one in steps) and any(one.share is not None for one in steps):
         header, rows = header[:3], [row[:3] for row in rows]
         note = "How much of it is noise is not known."

@@ -106,9 +106,3 @@ def _stacked(header: Sequence[str], row: Sequence[str]) -> list[str]:
     told = [f"{title}: {cell}" for title, cell in zip(header[1:], row[1:], strict=True) if cell]
     inside = (wrap(one, WIDTH, initial_indent=" " * 4, subsequent_indent=" " * 6) for one in told)
     return [f"  {row[0]}", *(line for lines in inside for line in lines)]
-
-
-def print_tables(tables: Iterable[tuple[str, Sequence[str], Sequence[Sequence[str]]]]) -> None:
-    """Print tables of (title, header, rows), columns aligned, the first one to the left."""
-    for title, header, rows in tables:
-        print("", title, *aligned(header, rows, range(1, len(header))), sep="\n")

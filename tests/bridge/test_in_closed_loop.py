@@ -32,6 +32,7 @@ from bristle.prediction.model_system import BuildingWithFile, Excitation
 from bristle.prediction.monte_carlo import Figures, Simulator
 from bristle.study import Study, create_study
 from bristle.study.steps import uses_of_test_set
+from bristle.view.blocks import Table
 
 DRAG = 8.0  # N s/m
 
@@ -93,7 +94,7 @@ def test_the_model_before_the_last_step_stands_beside_it(found: ClosedLoop) -> N
     assert one.before_band is not None
     assert one.measured is not None
     assert one.measured > one.before_band[1]
-    header = found.tables()[0][1]
+    header = next(found.view().every(Table)).header
     assert header[-2:] == ["before", "error before"]
 
 

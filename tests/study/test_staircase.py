@@ -30,7 +30,7 @@ def test_each_step_has_its_error_or_what_the_next_one_began_with():
 
 def test_the_unit_stands_in_the_header_and_z_is_explained_beside_it():
     table = steps_table(history_steps(STEPS))
-    assert tuple(table.header) == ("step", "error [N]", "of force", "z", "z train")
+    assert list(table.header) == ["step", "error [N]", "of force", "z", "z train"]
     assert "z: error / noise" in table.note
     assert max(map(len, terminal.lines(table))) <= terminal.WIDTH
 

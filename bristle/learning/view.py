@@ -1,0 +1,23 @@
+"""What was learned, in words and tables."""
+
+from __future__ import annotations
+
+from ..core.text import short_z
+from ..view.blocks import Block, Table, Text, View, view_of
+from .result import LearnedEffect
+
+
+@view_of(LearnedEffect)
+def learned_view(found: LearnedEffect) -> View:
+    """Return the view of a learned effect: what it is, what it explains, its files."""
+    title, *rest = found.sentences()
+    files: list[Block] = []
+    if found.file is not None:
+        files.append(Text(f"Effect: {found.file}. Picture: {found.picture}."))
+    others = [
+        [one.curve.words(), short_z(one.trial.z), short_z(one.trial.train)]
+        for one in found.found.others
+    ]
+    header, note = ("also fitted", "z held out", "z train"), "z: error / noise; a true model has 1."
+    table = [Table(header, others, (1, 2), note=note)] if others else []
+    return View(title, (*map(Text, rest), *files), tuple(table))
