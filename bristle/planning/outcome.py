@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
 
+from ..comparison.names import effect_name
 from ..core.text import plain, quantity
 from ..diagnosis.effect_size import ONE_SIDED, TWO_SIDED
 from ..diagnosis.rule import BENCH
@@ -52,7 +53,9 @@ class Outcome:
 
     def cells(self) -> list[str]:
         """Return the row of a table."""
-        return [self.name, self.what, self.shown(self.now), self.shown(self.then)]
+        site, colon, name = self.name.rpartition(": ")
+        named = f"{site}{colon}{effect_name(name)}"
+        return [named, self.what, self.shown(self.now), self.shown(self.then)]
 
     def shown(self, value: float) -> str:
         """Return one of its numbers with the unit."""

@@ -14,7 +14,7 @@ def plan_view(plan: Plan) -> View:
     rows = [[run.name, run.purpose, run.about] for run in runs]
     told = Table(HEADER, [one.cells() for one in plan.outcomes], (2, 3))
     return View(
-        f"Tests for {plan.study or 'a new rig'}",
+        f"{len(runs) or 'No'} tests planned for {plan.study or 'a new rig'}.",
         (*map(Text, plan.sentences()), *((told,) if plan.outcomes else ())),
         (Table(("run", "for", "what"), rows), Figure(plan.plot, runs[0].about)) if rows else (),
     )

@@ -137,7 +137,8 @@ def error_text(found: Identified) -> str:
     """Return the sentence of the error of the force, before and after where both are known."""
     parts = []
     for role in reversed(_roles(found)):
-        told = " -> ".join(errors.force[role].text() for _, errors in _columns(found))
+        texts = [errors.force[role].text() for _, errors in _columns(found)]
+        told = " -> ".join(dict.fromkeys(texts))
         parts.append(f"{told} on the {_NAMES[role]}")
     return f"Force error: {', '.join(parts)}."
 

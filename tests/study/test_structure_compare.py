@@ -123,7 +123,7 @@ def test_the_command_tells_of_every_site(stiff, capsys):
     begin = next(i for i, line in enumerate(lines) if line.startswith("Error at every site"))
     assert lines[begin + 2].split()[:2] == ["isolation", "layer"]
     assert lines[begin + 2].split()[-1] == "displacement"
-    assert {lines[begin + i].split()[-1] for i in (3, 4)} == {"-"}
+    assert {lines[begin + i].split()[-1] for i in (3, 4)} == {"nothing"}
 
 
 def test_the_report_tells_of_every_site(stiff):

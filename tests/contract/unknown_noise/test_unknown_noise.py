@@ -113,7 +113,8 @@ def test_an_effect_is_named_for_the_error_that_it_takes(
     assert main(["diagnose", str(study)]) == 0
     told = capsys.readouterr().out
     assert told.startswith("Missing from the model: Duffing spring")
-    assert "of the force, noise included" in told
+
+    assert "of the force, noise included" in " ".join(told.split())
     assert "z = " not in told
     verdict = json.loads((study / "verdict.json").read_text(encoding="utf-8"))
     assert set(numbers_of_z(verdict)) == {None}
