@@ -16,7 +16,6 @@ from bristle.identification.problem import Model, residuals
 from bristle.identification.search import HUBER
 from bristle.identification.start_grid import refine
 from bristle.physics.effect import EFFECTS
-from bristle.study.view import not_excited
 from bristle.view.blocks import Table
 from tests.diagnose.test_limits import VALUES, T, problem_of, steady, steps
 

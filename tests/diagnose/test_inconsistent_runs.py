@@ -16,7 +16,6 @@ from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit, fit_from_starts
 from bristle.identification.problem import Model
 from bristle.identification.rig_fit import joined
-from bristle.study.view import next_steps
 from tests.identify.truths import hidden_case, true_case
 
 

@@ -26,7 +26,7 @@ def test_the_verdict_names_what_is_hidden(bench_study: Path) -> None:
     (found,) = verdict["findings"]
     k = found["values"]["gas_spring.k"]
     assert abs(k["value"] - TRUE_K) < 4.0 * k["std"] < 0.05 * TRUE_K
-    assert verdict["words"].startswith("The model misses gas_spring.")
+    assert verdict["words"].startswith("Missing from the model: gas spring.")
 
 
 def test_compare_judges_the_held_out_run_by_hand_alike(bench_study: Path, capsys: Capture) -> None:
@@ -96,7 +96,7 @@ def test_the_report_is_one_file_with_verdict_and_error(bench_study: Path, capsys
     found = asked(capsys, "report", bench_study)
     assert (found["verdict"], found["trouble"]) == ("effect", None)
     page = Path(found["report"]).read_text()
-    assert "The model misses gas_spring." in page
+    assert "Missing from the model: gas spring." in page
     assert 'src="http' not in page
     compared = asked(capsys, "compare", bench_study)
     assert found["z_holdout"] == pytest.approx(compared["z"])

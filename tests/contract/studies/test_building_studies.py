@@ -81,4 +81,4 @@ def test_the_building_is_identified_alone(device_study: Path, capsys: Capture) -
     asked(capsys, "identify", device_study, "--structure", "--dry-run")
     text = told(capsys, "identify", device_study, "--structure", "--dry-run")
     assert text.startswith("tower: 3 level(s), masses as given")
-    assert "what equilibrium leaves, worst level" in text
+    assert "equilibrium error" in text
