@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from bristle.comparison.predictions import RunPrediction
-from bristle.core.text import short_z
+from bristle.core.text import plain, short_z
 from bristle.model.model_file import read_model
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
@@ -46,14 +46,16 @@ def draw(folder: Path, target: Path) -> Path:
     added = max(step.number for step in steps if step.what.startswith("add "))
     names = steps[added].what.removeprefix("add ")
     verdict = json.loads((study.history.path(added - 1) / "verdict.json").read_text())
+    about = EFFECTS[verdict["effects"][0]].first_line()
     against = comparer(study)
     shown = [_prediction(study, against, number) for number in (added - 1, added)]
     with look():
         page = Page(
             11.0,
             4.15,
-            f"The verdict after a minute: “Missing: {names}.”",
-            f"{EFFECTS[verdict['effects'][0]].first_line()} {verdict['words']}",
+            f"Missing from the model: {about[:1].lower()}{about[1:].partition(':')[0]}.",
+            f"{about} The force error on held-out runs falls from {_error(steps[added - 1])} to "
+            f"{_error(steps[added])}.",
             "$ bristle " + " && bristle ".join(COMMANDS),
         )
         grid = page.grid(1, 3, bottom=0.55, right=0.6, column_gap=0.7, width_ratios=(1, 1, 0.8))
@@ -72,6 +74,12 @@ def _prediction(study: Study, against: Any, number: int) -> RunPrediction:
     """Return the drawn run with what the model of a step predicts."""
     model = as_model(read_model(study.history.model_file(number), study.folder))
     return next(one for one in against.predictions(model) if one.name == RUN)
+
+
+def _error(step: Step) -> str:
+    """Return the error of a step's model in the unit of the force and in per cent of it."""
+    share = 100.0 * step.after["error_share_holdout"]
+    return f"{plain(step.after['error_holdout'], 3)} N ({share:.1f} %)"
 
 
 def _loop(axes: Axes, run: RunPrediction, title: str) -> None:
