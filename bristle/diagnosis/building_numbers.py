@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.building_motion import Response
 from ..identification.building_sites import StructureProblem, damper_run, problems_of
 from ..identification.problem import Model
@@ -26,7 +26,6 @@ from ..physics.laws import LAWS, law_of_part
 from .rule import BENCH, SITE, DecisionRule
 from .trials import judge
 
-Array = NDArray[np.float64]
 DEVIATIONS = 3.0
 """Standard deviations of a mass that the doubt about it amounts to."""
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.finding import Finding
 from ..core.text import plain
 from ..data.corrections import LEFT_OUT
@@ -22,8 +22,6 @@ from ..identification.start_grid import refine
 from .model_faults import ModelBasedFaults
 from .rule import SENSOR, DecisionRule
 from .trials import Trial, judge
-
-Array = NDArray[np.float64]
 
 WINDOW = 250
 """Samples of a window at the least, longer than a residual's correlation."""

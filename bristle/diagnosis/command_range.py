@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.finding import Finding
 from ..core.text import plain, quantity
 from ..data.corrections import LIMITS, limited
@@ -23,8 +23,6 @@ from ..physics.drive import DRIVES
 from .model_faults import ModelBasedFaults, explains, has_rival, promise
 from .rule import LIMITED, DecisionRule
 from .trials import Trial, judge
-
-Array = NDArray[np.float64]
 
 NODES = 7
 """Limits of each kind that are looked at first."""

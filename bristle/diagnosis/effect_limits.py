@@ -11,9 +11,9 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..comparison.predictions import rms
+from ..core.arrays import Array
 from ..core.progress import Count
 from ..identification.problem import Expected, Model, Problem, absorbed, residuals, steady
 from ..identification.search import in_threads, loss
@@ -145,7 +145,6 @@ def _why_hidden(sized: Sized) -> str:
 
 # What these data could not show: the smallest visible share, and effects that leave no trace.
 
-Array = NDArray[np.float64]
 
 BELOW = 0.9
 """A z below this is no chance: the noise expected was too large, as of a base that has friction and

@@ -11,8 +11,8 @@ from functools import cached_property
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.corrections import jumps
 from ..identification.problem import BLOCK, Expected, Model, Problem, drawn_noise, residuals
 from ..identification.search import HUBER, losses, mean_loss
@@ -20,8 +20,6 @@ from ..identification.start_grid import Search, initial_guesses
 from ..physics.drive import DRIVES, unit_for
 from ..physics.effect import EFFECTS
 from .rule import BENCH, DecisionRule
-
-Array = NDArray[np.float64]
 
 KEPT = 8
 """Changes of an effect that are kept, for sizes that are asked for again."""

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.problem import Model, Problem, Run, at_means
 from ..identification.start_grid import Search
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .rule import BENCH, DecisionRule
-
-Array = NDArray[np.float64]
 
 LENGTH = 12.0
 """Length of a proposed run [s]."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import plain
 from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
@@ -25,7 +25,6 @@ from .trials import Trial
 
 # The one run whose force was recorded with another zero or gain than in all others.
 
-Array = NDArray[np.float64]
 
 FEWEST = 4
 """Runs from which one that differs is told: three others must agree."""

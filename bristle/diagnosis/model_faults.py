@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.finding import Finding
 from ..core.text import quantity
 from ..data.left_out import MISSING, merged
@@ -22,8 +22,6 @@ from ..identification.start_grid import SearchContext, ranked_guesses, refine
 from ..physics.effect import EFFECTS, Effect, effects_of
 from .rule import DRIVE, DecisionRule
 from .trials import Trial, joinable, judge, short_search
-
-Array = NDArray[np.float64]
 
 LATEST = 0.15
 """Largest delay of the voltage that is looked for [s]."""

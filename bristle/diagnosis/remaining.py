@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ..comparison.patterns import ResidualPattern, residual_patterns
 from ..comparison.predictions import coordinates_of_run, late_speed
+from ..core.arrays import Array
 from ..identification.building_sites import StructureRun
 from ..identification.problem import Problem, Run
 from .decision import missing
 from .rule import BENCH, DecisionRule
 from .trials import Trial
-
-Array = NDArray[np.float64]
 
 FLIPS = 499
 """Random patterns of signs that say what chance would organise."""

@@ -14,10 +14,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ..comparison.names import joined
+from ..core.arrays import Array
 from ..core.finding import Finding
 from ..core.text import plain, quantity
 from ..data.channels import channel_unit
@@ -104,8 +104,6 @@ def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Fi
             )  # fmt: skip
     return found
 
-
-Array = NDArray[np.float64]
 
 WINDOW = 2.0
 """Length of the pieces [s] over which velocity is integrated: longer ones drift with its noise."""

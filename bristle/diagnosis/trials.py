@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Count
 from ..identification.error import ForceError, errors_by_run, force_error, pooled
 from ..identification.problem import (
@@ -30,8 +30,6 @@ from ..identification.start_grid import (
 )
 from ..physics.effect import EFFECTS, effects_of, exclude
 from .rule import BENCH
-
-Array = NDArray[np.float64]
 
 SCREENING = 3
 """Jacobians of the screening that decides which effects are searched as a second one."""

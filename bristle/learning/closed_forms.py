@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ..core.arrays import Array
 from ..core.text import plain, quantity, scale
 from ..diagnosis.decision import missing
 from ..diagnosis.prepared import Prepared
@@ -25,7 +25,6 @@ from .rule import LEARN, LearnRule
 
 # The formulas that a learned curve may follow.
 
-Array = NDArray[np.float64]
 
 NODES = 80
 """Values of a parameter in which a form is not linear that are looked at."""

@@ -7,9 +7,9 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..comparison.names import site_name
+from ..core.arrays import Array
 from ..core.text import scale, short_z
 from ..view.style import BLUE, GREY, PALE, VERMILION, Page, look, png, ramp
 from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
@@ -20,8 +20,6 @@ from .surface import continues
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 BESIDE = 18

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Indices
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.problem import Model, Problem, Run
 from ..identification.rig import DAMPER
@@ -20,7 +20,6 @@ from .rule import LEARN
 
 # The residual of a fitted model, with what a curve of each part of its law would add to it.
 
-Array = NDArray[np.float64]
 
 FOLDS = 8
 """Stretches of the training runs that are left out in turn, at least."""
@@ -39,11 +38,11 @@ class Residual:
 
     r: Array
     weight: Array
-    fold: NDArray[np.int64]
+    fold: Indices
     known: Array
     parts: dict[str, Array]
     runs: list[Run]
-    keeps: list[NDArray[np.int64]]
+    keeps: list[Indices]
     slow: float
     top: float
     drive: str
@@ -109,7 +108,7 @@ def _joined(values: list[Array], runs: list[Run]) -> Array:
     return np.concatenate([value[run.skip :] for value, run in pairs])
 
 
-def _folds(runs: list[Run]) -> NDArray[np.int64]:
+def _folds(runs: list[Run]) -> Indices:
     """Return which stretch each sample belongs to; no stretch goes over a run's end."""
     each = max(2, -(-FOLDS // len(runs)))
     counts = [len(run.force) - run.skip for run in runs]
@@ -118,7 +117,7 @@ def _folds(runs: list[Run]) -> NDArray[np.int64]:
     )
 
 
-def _samples(runs: list[Run]) -> tuple[list[Run], list[NDArray[np.int64]]]:
+def _samples(runs: list[Run]) -> tuple[list[Run], list[Indices]]:
     """Return the whole runs, from which a memory follows, and which of their samples count."""
     wholes, keeps = [], []
     for run in runs:
@@ -193,7 +192,7 @@ class Hats(NamedTuple):
     They are constant beyond the ends. The shares of a sample add up to 1.
     """
 
-    at: NDArray[np.int64]
+    at: Indices
     share: Array
     knots: int
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from .curve import Curve, inside, may_change
 from .normal import Hats, Normal, Residual, hats_at
 from .rule import LEARN, LearnRule
@@ -111,8 +111,6 @@ def _rings_at(known: Normal, frequency: float, damping: float) -> Promise | None
     curve = Curve(RING, RING, memory, (0.0,), (share,), drive=residual.drive)
     return Promise(curve, normal.left_out(none))
 
-
-Array = NDArray[np.float64]
 
 FINE = 13
 """Knots of the spline that is looked at."""

@@ -8,12 +8,10 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
+from ..core.arrays import Array
 from ..identification.problem import Run
-
-Array = NDArray[np.float64]
 
 TIMES = (0.02, 0.1, 0.5, 2.5)
 """Time constants [s] at which a memory is looked at."""

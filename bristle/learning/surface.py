@@ -12,15 +12,13 @@ from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from .curve import Curve, inside, may_change
 from .normal import Hats, Normal, Residual, hats_at, products
 from .rule import LEARN, LearnRule
 from .screen import SMOOTH, Promise, distinct, knots_of, signals, smoothest
 from .signals import Along
-
-Array = NDArray[np.float64]
 
 PARTS_OF_SURFACE = ("force", "friction", "yield", "viscous", "fluid")
 """Parts that a surface may change. Those in proportion to the command are special cases."""
