@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.identification.fit import fit_from_starts
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Model, Problem
 from bristle.physics.laws import LAWS, laws_of
@@ -104,7 +104,7 @@ def recorded(
 ) -> Measurement:
     """Return one run of a law, and of effects with it, measured with noise."""
     t, x, v, a, V = motion(rng)
-    force = Bench(law, list(effects)).force(x, v, a, V, STEP / FINER, values)
+    force = DamperForces(law, list(effects)).force(x, v, a, V, STEP / FINER, values)
     seen = {"displacement [m]": x, "velocity [m/s]": v, "voltage [V]": V, "force [N]": force}
     frame = {"time [s]": t[::FINER]}
     for title, signal in seen.items():

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 import bristle
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 
 
 def compile_ahead() -> None:
@@ -16,7 +16,7 @@ def compile_ahead() -> None:
     bristle.run("half_sine_pulse", {"run.stop": 0.01}, engine="compiled")
     still = np.zeros(8)
     for effects in ([], ["coil_lag"]):
-        Bench("lugre", effects).force(still, still, still, still, 0.002, {})
+        DamperForces("lugre", effects).force(still, still, still, still, 0.002, {})
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ QUICK = (
 
 def compared(effect: str, form: str, law: str) -> tuple[float, float]:
     """Return RMS of the generator's force and of what the package's law leaves of it [N]."""
-    from bristle.identification.histories import Bench
+    from bristle.identification.histories import DamperForces
     from tests.independent.experiments import bench_experiment
     from tests.independent.rigs import draw_rig
     from tests.independent.specimen import Specimen
@@ -50,7 +50,7 @@ def compared(effect: str, form: str, law: str) -> tuple[float, float]:
     own = forms.true_values({"effect": effect, "form": form, "parameters": fields}, rig.force)
     assert own is not None
     motion = [seen[name] for name in ("displacement", "velocity", "acceleration", "voltage")]
-    force = Bench(law, [effect]).force(*motion, run.step, {**rig.values, **own})
+    force = DamperForces(law, [effect]).force(*motion, run.step, {**rig.values, **own})
     left = force - seen["force_shown"]
     return float(np.sqrt(np.mean(seen["force_shown"] ** 2))), float(np.sqrt(np.mean(left**2)))
 

@@ -25,7 +25,7 @@ from ..errors import RecordError
 from ..physics.building import GROUND, Building, Device, frequencies, with_damper
 from .kalman import Samples, kalman_smooth, room
 from .prepare import refuse_short, untold
-from .smoothing import EDGE, Motion, posterior_draws, random_motion, smooth_steps
+from .smoothing import EDGE, SmoothedMotion, posterior_draws, random_motion, smooth_steps
 
 # Slow displacements of levels that have none of their own.
 #
@@ -259,7 +259,7 @@ def corrected(
     if not draws:
         return level, np.zeros((0, len(state), 3))
     x, v, a = state.T.copy()
-    motion = Motion(x, v, a, level["std"], jerk, np.ones(2))
+    motion = SmoothedMotion(x, v, a, level["std"], jerk, np.ones(2))
     noise = (float(np.sqrt(r[0])), float(np.sqrt(r[1])))
     seen = (bool(have[0]), bool(have[1]))
     error = posterior_draws(len(state), dt, noise, jerk, seen, draws, seed, motion)

@@ -29,7 +29,7 @@ from ..physics.laws import DEFAULT, base_and_variant
 from ..physics.tuples import Inputs
 from .building_motion import Response, responses, shear
 from .equilibrium import reconstructed
-from .histories import Along
+from .histories import StructureForces
 from .problem import Model, Problem, Run, absorbed, of_one_site
 
 SLIDING = 3.0
@@ -98,7 +98,7 @@ class StructureProblem(Problem):
         self.reconstructed = reconstructed
         self.beside = beside
         self.damped = damped
-        self._along: dict[tuple[str, ...], Along] = {}
+        self._along: dict[tuple[str, ...], StructureForces] = {}
 
     def of(self, runs: list[Run]) -> StructureProblem:
         """Return the same problem for other runs."""
@@ -128,10 +128,10 @@ class StructureProblem(Problem):
             and not (self.joined_with_layer and "structure" in effect.sites)
         ]
 
-    def along(self, effects: tuple[str, ...]) -> Along:
+    def along(self, effects: tuple[str, ...]) -> StructureForces:
         """Return what gives the forces of these effects along a motion, made at first use."""
         if effects not in self._along:
-            self._along[effects] = Along(list(effects), self.storey)
+            self._along[effects] = StructureForces(list(effects), self.storey)
         return self._along[effects]
 
     def _expected(self, model: Model, run: Run, draws: int) -> tuple[Array, Array, Array]:

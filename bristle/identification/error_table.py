@@ -290,7 +290,7 @@ PARTS: tuple[tuple[str, tuple[str, ...]], ...] = (
 """Parts of a law by name, with the hooks that make them, in the order in which they are taken."""
 
 
-class Share(NamedTuple):
+class ForceShare(NamedTuple):
     """A part of a model's force: `force` (n,) [N], and its RMS over that of the whole."""
 
     name: str
@@ -298,7 +298,7 @@ class Share(NamedTuple):
     share: float
 
 
-def force_budget(problem: Problem, model: Model, run: Run) -> list[Share]:
+def force_budget(problem: Problem, model: Model, run: Run) -> list[ForceShare]:
     """Return what the parts of a model make of its force in a run; they sum up to the force.
 
     The force loses them one after the other: first the effects, the last one first, then the parts
@@ -316,7 +316,7 @@ def force_budget(problem: Problem, model: Model, run: Run) -> list[Share]:
 
     Returns
     -------
-    list of Share
+    list of ForceShare
         Parts of the law, then effects in the order of the model. "rest of the law" is what none of
         the parts takes, left out where there is none.
     """
@@ -333,9 +333,9 @@ def force_budget(problem: Problem, model: Model, run: Run) -> list[Share]:
     return [*parts, *reversed(out[:effects])]
 
 
-def _share(name: str, force: Array, size: float) -> Share:
+def _share(name: str, force: Array, size: float) -> ForceShare:
     own = float(np.sqrt(np.mean(force**2)))
-    return Share(name, force, own / size if size > 0.0 else 0.0)
+    return ForceShare(name, force, own / size if size > 0.0 else 0.0)
 
 
 def _less_and_less(model: Model) -> Iterator[tuple[str, Model]]:

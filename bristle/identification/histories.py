@@ -236,11 +236,11 @@ def keep(name: str, wanted: str) -> None:
         return
     still = np.zeros(2)
     effects = [] if name == law_history.__name__ else [LIBRARY.slots.effects[0].name]
-    Bench(next(iter(LAWS)), effects).force(still, still, still, still, 1e-3, {})
+    DamperForces(next(iter(LAWS)), effects).force(still, still, still, still, 1e-3, {})
     print(name, flush=True)
 
 
-class Bench:
+class DamperForces:
     """Predicts the damper's force for one law and one set of effects.
 
     Parameters
@@ -378,7 +378,7 @@ def forces_along(chain: Any, x: Any, v: Any, z: Any, p: Any, on: Any, out: Any) 
             out[k] += contact_force(n, isolated, stiffnesses, level, dt, 0.0, stick_force, z, p, on)
 
 
-class Along:
+class StructureForces:
     """Evaluates effects of the structure along a motion.
 
     Parameters

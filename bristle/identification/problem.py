@@ -22,7 +22,7 @@ from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
 from ..user_code.compiled import shown
-from .histories import Bench
+from .histories import DamperForces
 from .run_start import carrying_state, start_under_load
 from .search import HUBER, z_scale
 
@@ -458,7 +458,7 @@ class Problem:
 
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
-        self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
+        self._benches: dict[tuple[str, tuple[str, ...]], DamperForces] = {}
         self._sizes: dict[str, float] = {}
 
     @property
@@ -567,11 +567,11 @@ class Problem:
         value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)
         return min(max(value, declared.bounds[0]), declared.bounds[1])
 
-    def bench(self, model: Model) -> Bench:
+    def bench(self, model: Model) -> DamperForces:
         """Return what predicts a model's force, made once."""
         key = (model.law, model.effects)
         if key not in self._benches:
-            self._benches[key] = Bench(model.law, list(model.effects))
+            self._benches[key] = DamperForces(model.law, list(model.effects))
         return self._benches[key]
 
     def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:

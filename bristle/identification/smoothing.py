@@ -44,7 +44,7 @@ LUCK = 1.5
 
 
 @dataclass(frozen=True)
-class Motion:
+class SmoothedMotion:
     """A smoothed motion.
 
     `x`, `v`, `a` (n,) m, m/s, m/s2; `std` (3,) their standard deviations away from the ends;
@@ -63,7 +63,7 @@ class Motion:
 
 def smooth(
     x: Array | None, v: Array | None, dt: float, noise: tuple[float, float], jerk: float = 0.0
-) -> Motion:
+) -> SmoothedMotion:
     """Return the motion that displacement and velocity agree on.
 
     Parameters
@@ -84,7 +84,7 @@ def smooth(
     if jerk <= 0.0:
         jerk = _likeliest(samples)
     out = _smoothed(samples, jerk)
-    return Motion(
+    return SmoothedMotion(
         out.state[:, 0].copy(), out.state[:, 1].copy(), out.state[:, 2].copy(),
         np.sqrt(np.maximum(out.cov, 0.0)), jerk, np.sqrt(out.loss[:2]),
     )  # fmt: skip
@@ -142,7 +142,7 @@ def _likeliest(samples: Samples) -> float:
 
 def posterior_draws(
     n: int, dt: float, noise: tuple[float, float], jerk: float, have: tuple[bool, bool], draws: int,
-    seed: int = 0, motion: Motion | None = None,
+    seed: int = 0, motion: SmoothedMotion | None = None,
 ) -> Array:  # fmt: skip
     """Return draws (draws, n, 3) of the smoother's error of x, v, a [m, m/s, m/s2].
 
@@ -218,7 +218,11 @@ def _centre(draws: Array) -> None:
 
 
 def _left_out(
-    motion: Motion, draw: Array, noise: tuple[float, float], have: tuple[bool, bool], dt: float
+    motion: SmoothedMotion,
+    draw: Array,
+    noise: tuple[float, float],
+    have: tuple[bool, bool],
+    dt: float,
 ) -> Array:
     """Return what the smoother takes off the motion (n, 3): what it would take off its own result.
 

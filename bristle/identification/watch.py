@@ -100,7 +100,7 @@ def _measured(run: Run) -> Flags:
     return np.ones(len(run.force), dtype=bool) if run.measured is None else run.measured
 
 
-class _Told(NamedTuple):
+class _Snapshot(NamedTuple):
     """What the watcher was given of a step of a search."""
 
     model: Model
@@ -117,8 +117,8 @@ class _Series:
         self._errors: list[list[float]] = []
         self._count = 0
         self._last = float("-inf")
-        self._told: _Told | None = None
-        self._best: _Told | None = None
+        self._told: _Snapshot | None = None
+        self._best: _Snapshot | None = None
 
     def start(self) -> tuple[int, list[float]]:
         """Return the number of a new search, and where it notes its errors."""
@@ -152,7 +152,7 @@ class _Series:
             }
         )  # fmt: skip
         self._last = time.monotonic()
-        self._told = _Told(model, problem, told, cost)
+        self._told = _Snapshot(model, problem, told, cost)
         better = self._best is None or cost < self._best.cost
         if last and told["z"] is None and better:
             self._best = self._told

@@ -18,7 +18,7 @@ from ..identification.fit import intervals_of
 from ..identification.start_grid import refine
 from ..units import canonical
 from ..user_code.load import defined
-from .curve import Curve, Formula
+from .curve import Curve, CurveFormula
 from .effect_file import effect_text
 from .fit import SWEEPS, LearnedCurve
 from .rule import LEARN, LearnRule
@@ -31,7 +31,7 @@ NODES = 80
 
 
 @dataclass(frozen=True)
-class Form:
+class CurveForm:
     """A formula c + m h(s), with a scale d or without, or c + m h(s) + n k(s).
 
     `text` for readers; `columns` h and k as Python, of {s} and {d}, which a hook and numpy both
@@ -98,29 +98,29 @@ LINE = ("{s}",)
 
 _TURN = "6.283185307179586 * {s} / {d}"
 FORMS = (
-    Form("constant", "c", ()),
-    Form("line", "c + m s", LINE),
-    Form("parabola", "c + m s^2", ("{s} ** 2",)),
-    Form("quadratic drag", "c + m s |s|", ("{s} * abs({s})",)),
-    Form("cubic", "c + m s^3", ("{s} ** 3",)),
-    Form("power", "c + m sgn(s) |s|^d", ("copysign(1.0, {s}) * abs({s}) ** {d}",), _powers),
-    Form("exponential fall", "c + m exp(-|s|/d)", ("exp(-abs({s}) / {d})",), _lengths),
-    Form("bell", "c + m exp(-(s/d)^2)", ("exp(-(({s} / {d}) ** 2))",), _lengths),
-    Form("levelling off", "c + m tanh(s/d)", ("tanh({s} / {d})",), _lengths),
-    Form("hyperbola", "c + m/(1 + |s|/d)", ("1.0 / (1.0 + abs({s}) / {d})",), _lengths),
-    Form("logarithm", "c + m ln(1 + |s|/d)", ("log(1.0 + abs({s}) / {d})",), _lengths),
-    Form("threshold", "c + m/(1 + (d/s)^4)", ("{s} ** 4 / ({s} ** 4 + {d} ** 4)",), _lengths),
-    Form(
+    CurveForm("constant", "c", ()),
+    CurveForm("line", "c + m s", LINE),
+    CurveForm("parabola", "c + m s^2", ("{s} ** 2",)),
+    CurveForm("quadratic drag", "c + m s |s|", ("{s} * abs({s})",)),
+    CurveForm("cubic", "c + m s^3", ("{s} ** 3",)),
+    CurveForm("power", "c + m sgn(s) |s|^d", ("copysign(1.0, {s}) * abs({s}) ** {d}",), _powers),
+    CurveForm("exponential fall", "c + m exp(-|s|/d)", ("exp(-abs({s}) / {d})",), _lengths),
+    CurveForm("bell", "c + m exp(-(s/d)^2)", ("exp(-(({s} / {d}) ** 2))",), _lengths),
+    CurveForm("levelling off", "c + m tanh(s/d)", ("tanh({s} / {d})",), _lengths),
+    CurveForm("hyperbola", "c + m/(1 + |s|/d)", ("1.0 / (1.0 + abs({s}) / {d})",), _lengths),
+    CurveForm("logarithm", "c + m ln(1 + |s|/d)", ("log(1.0 + abs({s}) / {d})",), _lengths),
+    CurveForm("threshold", "c + m/(1 + (d/s)^4)", ("{s} ** 4 / ({s} ** 4 + {d} ** 4)",), _lengths),
+    CurveForm(
         "dead band", "c + m sgn(s) max(|s| - d, 0)",
         ("(max({s} - {d}, 0.0) + min({s} + {d}, 0.0))",), _gaps,
     ),
-    Form(
+    CurveForm(
         "contact above", "c + m max(s - d, 0)", ("max({s} - {d}, 0.0)",), _gaps, bent=True,
     ),
-    Form(
+    CurveForm(
         "contact below", "c + m min(s + d, 0)", ("min({s} + {d}, 0.0)",), _gaps, bent=True,
     ),
-    Form(
+    CurveForm(
         "ripple", "c + m sin(2 pi s/d) + n cos(2 pi s/d)", (f"sin({_TURN})", f"cos({_TURN})"),
         _pitches,
     ),
@@ -128,23 +128,23 @@ FORMS = (
 
 
 CENTRED = (
-    Form("bell", "c + m exp(-((s - s0)/d)^2)", ("exp(-(({s} / {d}) ** 2))",), _lengths,
+    CurveForm("bell", "c + m exp(-((s - s0)/d)^2)", ("exp(-(({s} / {d}) ** 2))",), _lengths,
          centred=True),
-    Form("exponential fall", "c + m exp(-|s - s0|/d)", ("exp(-abs({s}) / {d})",), _lengths,
+    CurveForm("exponential fall", "c + m exp(-|s - s0|/d)", ("exp(-abs({s}) / {d})",), _lengths,
          centred=True),
-    Form("hyperbola", "c + m/(1 + |s - s0|/d)", ("1.0 / (1.0 + abs({s}) / {d})",), _lengths,
+    CurveForm("hyperbola", "c + m/(1 + |s - s0|/d)", ("1.0 / (1.0 + abs({s}) / {d})",), _lengths,
          centred=True),
 )  # fmt: skip
 """Forms about a centre of their own, of signals whose zero is a matter of mounting or scale."""
 
 
 MAPS = (
-    Form("parabola", "c + m s (s/{top} - 1)", ("{s} * ({s} / {top} - 1.0)",)),
-    Form(
+    CurveForm("parabola", "c + m s (s/{top} - 1)", ("{s} * ({s} / {top} - 1.0)",)),
+    CurveForm(
         "power", "c + {top} (s/{top})^d - s",
         ("({top} * copysign(1.0, {s}) * abs({s} / {top}) ** {d} - {s})",), _powers, sized=False,
     ),
-    Form(
+    CurveForm(
         "levelling off", "c + {top} tanh(s/d)/tanh({top}/d) - s",
         ("({top} * tanh({s} / {d}) / tanh({top} / {d}) - {s})",), _lengths, sized=False,
     ),
@@ -172,14 +172,14 @@ FLANKS = 1.75
 _CENTRES, _SCALES = 24, 16
 
 
-class About(NamedTuple):
+class CentredFit(NamedTuple):
     """A form's values c, m, d and s0, and the weighted RMS that it leaves."""
 
     values: tuple[float, ...]
     rms: float
 
 
-def fitted_about(form: Form, s: Array, y: Array, weight: Array) -> About | None:
+def fitted_about(form: CurveForm, s: Array, y: Array, weight: Array) -> CentredFit | None:
     """Return a form at its best centre and scale; None where the curve tells no centre.
 
     Parameters
@@ -212,10 +212,10 @@ def fitted_about(form: Form, s: Array, y: Array, weight: Array) -> About | None:
     if power > len(s) - form.count() or not inside or near < NEAR or abs(centre) <= CLEAR * std:
         return None  # most humps are no bell: the form must leave no more than the values' noise
     c, m = (float(one) for one in factors(fit.x)[1])
-    return About((c, m, d, centre), float(np.sqrt(power / np.sum(weight**2))))
+    return CentredFit((c, m, d, centre), float(np.sqrt(power / np.sum(weight**2))))
 
 
-def _start(form: Form, s: Array, y: Array, weight: Array, scales: Array) -> Array:
+def _start(form: CurveForm, s: Array, y: Array, weight: Array, scales: Array) -> Array:
     """Return the logarithm of the scale and the centre, of a grid, that leave the least."""
     centres = np.linspace(s[1], s[-2], _CENTRES)
     away, share = (s - centres[:, None]).ravel(), weight**2 / np.sum(weight**2)
@@ -239,7 +239,7 @@ class ClosedForm:
     `values` in the order c, m, d, then n or s0, SI; `top` the last knot.
     """
 
-    form: Form
+    form: CurveForm
     values: tuple[float, ...]
     left: float
     top: float = 1.0
@@ -309,7 +309,7 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     return [*_about_a_centre(curve, y, weight, size, found), *found]
 
 
-def forms_for(curve: Curve) -> list[Form]:
+def forms_for(curve: Curve) -> list[CurveForm]:
     """Return the forms that a curve may have."""
     if curve.part == "command":
         return [FORMS[0], *MAPS]
@@ -318,7 +318,7 @@ def forms_for(curve: Curve) -> list[Form]:
     return [one for one in FORMS if not one.bent or curve.along == "displacement"]
 
 
-def formula_of(found: ClosedForm, curve: Curve) -> Formula:
+def formula_of(found: ClosedForm, curve: Curve) -> CurveFormula:
     """Return a closed form as an effect computes it, without the constant that a law has.
 
     What would take ever more from a building's own stiffness or friction ends with the data.
@@ -355,10 +355,10 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
         text += "".join(f" - {n}" for n, r in zip("mn", rest, strict=False) if r)
     else:
         given, g = [("c", found.values[0], unit), *given], f"p.c + {g}"
-    return Formula(g, text, tuple(given), ends, ("m",) if grows and not ends else ())
+    return CurveFormula(g, text, tuple(given), ends, ("m",) if grows and not ends else ())
 
 
-def _fitted(form: Form, curve: Curve, y: Array, weight: Array, size: float) -> ClosedForm:
+def _fitted(form: CurveForm, curve: Curve, y: Array, weight: Array, size: float) -> ClosedForm:
     """Return a form at its best scale, its constants by weighted least squares."""
     best: ClosedForm | None = None
     s, beside = np.array(curve.knots), int(curve.of_line)
@@ -478,7 +478,7 @@ class Closed:
     """A closed form in the place of a learned curve: `formula` with its fitted values, `trial`."""
 
     form: ClosedForm
-    formula: Formula
+    formula: CurveFormula
     trial: Trial
     std: dict[str, float]
 

@@ -36,7 +36,7 @@ _READ = re.compile(rf"\bq\.({'|'.join(_SIGNALS)})\b")
 
 
 @dataclass(frozen=True)
-class Place:
+class CurvePlace:
     """A site of a rig, by its name: "damper", "layer", "storey1", "storey2" ..."""
 
     name: str = DAMPER
@@ -90,14 +90,14 @@ class Place:
         return " ".join(OF_STOREY.get(word, word) for word in text.split(" "))
 
 
-AT_DAMPER = Place()
+AT_DAMPER = CurvePlace()
 """The damper, on a bench or in a building."""
 
 
 # The parts of a model that a learned curve may change, and along which signals.
 
 
-class Part(NamedTuple):
+class CurvePart(NamedTuple):
     """A part of the model that a curve may change.
 
     `hook` of an effect and the expression that it returns, `{g}` being the curve's value; `unit` of
@@ -126,44 +126,44 @@ class Part(NamedTuple):
 
 
 PARTS = {
-    "force": Part("force", "{g}", "N", "an added force", "F = F_model + g"),
-    "friction": Part(
+    "force": CurvePart("force", "{g}", "N", "an added force", "F = F_model + g"),
+    "friction": CurvePart(
         "force", "tanh(q.v / SLOW) * {g}", "N", "a friction force", "F = F_model + g sgn(v)",
         ("v",), level=True,
     ),
-    "yield": Part(
+    "yield": CurvePart(
         "yield_factor", "max(1.0 + {g}, 0.02)", "1", "a factor of the yield force",
         "yield force x (1 + g)", (), -0.98, True,
     ),
-    "viscous": Part(
+    "viscous": CurvePart(
         "viscous_factor", "max(1.0 + {g}, 0.02)", "1", "a factor of the viscous force",
         "viscous force x (1 + g)", (), -0.98, True,
     ),
-    "fluid": Part(
+    "fluid": CurvePart(
         "factor", "max(1.0 + {g}, 0.02)", "1", "a factor of the fluid's whole force",
         "force of the fluid x (1 + g)", (), -0.98, True,
     ),
-    "yield_field": Part(
+    "yield_field": CurvePart(
         "yield_factor", "max(1.0 + {g} * q.V / TOP, 0.02)", "1",
         "a factor of the yield force under command",
         "yield force x (1 + g u/u_top), u the command", ("V",), -0.98,
     ),
-    "fluid_field": Part(
+    "fluid_field": CurvePart(
         "factor", "max(1.0 + {g} * q.V / TOP, 0.02)", "1",
         "a factor of the fluid's whole force under command",
         "force of the fluid x (1 + g u/u_top), u the command", ("V",), -0.98,
     ),
-    "command": Part(
+    "command": CurvePart(
         "voltage", "max(q.V + {g}, 0.0)", "V", "a map of the command",
         "the damper sees u + g, u the command", ("V",), level=True,
     ),
-    SLIP: Part(
+    SLIP: CurvePart(
         "force", "{g}", "N", "parallel elastic-slip elements", "F = F_model + sum of curve[k] s_k",
         low=0.0, alone=True, cause=ALONG["travel"].words,
         law="-1 <= s_k <= 1\n\n    s_k is the state of a spring with a slider: x/KNOTS[k] since the"
         " last reversal, until\n    it slips (Iwan 1966, J. Appl. Mech. 33(4)).",
     ),
-    RING: Part(
+    RING: CurvePart(
         "channel", "q.value + p.share * (z.ring - q.value)", "1",
         "a resonance of what holds the load cell", "F_shown = F + share (r - F)",
         low=0.0, high=1.2, site="sensor", alone=True, cause="the frequency of the force",
@@ -183,11 +183,11 @@ PARTS_OF_LINE = {
     "friction": PARTS["friction"]._replace(
         level=False, along=("displacement", "speed", *_PAST),
     ),
-    "spring": Part(
+    "spring": CurvePart(
         "force", "max({g}, -0.98) * q.stiffness * q.x", "1", "a factor of the stiffness",
         "stiffness x (1 + g)", ("x", "stiffness"), -0.98, True, along=("speed", *_PAST),
     ),
-    "damping": Part(
+    "damping": CurvePart(
         "force", "{g} * q.v", "N.s/m", "an added damping", "F = F_model + g v", ("v",),
         level=True, along=("displacement", *_PAST),
     ),
@@ -197,7 +197,7 @@ PARTS_OF_LINE = {
 
 
 @cache
-def parts_at(place: Place) -> dict[str, Part]:
+def parts_at(place: CurvePlace) -> dict[str, CurvePart]:
     """Return the parts of the model at a place by name, as an effect acts on them there."""
     if not place.is_line:
         return PARTS
@@ -210,7 +210,7 @@ def parts_at(place: Place) -> dict[str, Part]:
     }  # fmt: skip
 
 
-def may_change(part: str, along: str, place: Place = AT_DAMPER) -> bool:
+def may_change(part: str, along: str, place: CurvePlace = AT_DAMPER) -> bool:
     """Return whether a curve along a signal may change a part there.
 
     A command's map depends on the command. What one part along a signal says already, such as a
@@ -291,12 +291,12 @@ class Curve:
         return replace(self, knots=tuple(knots.tolist()), values=tuple(values.tolist()), held=held)
 
     @property
-    def place(self) -> Place:
+    def place(self) -> CurvePlace:
         """The site of the rig where it acts."""
-        return Place(self.at)
+        return CurvePlace(self.at)
 
     @property
-    def of(self) -> Part:
+    def of(self) -> CurvePart:
         """The part of the model that it changes."""
         return parts_at(self.place)[self.part]
 
@@ -397,12 +397,12 @@ class Curve:
         return f"{self.of.words} along {self.signal.words}{faded}"
 
 
-def inside(part: Part, values: Iterable[float]) -> tuple[float, ...]:
+def inside(part: CurvePart, values: Iterable[float]) -> tuple[float, ...]:
     """Return values (k,) of a curve, none of them too near to the least one that its part takes."""
     return tuple(float(max(value, WITHIN * part.low)) for value in values)
 
 
-def signal_at(along: Along, place: Place) -> Along:
+def signal_at(along: Along, place: CurvePlace) -> Along:
     """Return a signal as it is called at a place: the displacement of a storey is its drift.
 
     The states of a building begin at zero, whatever its motion.
@@ -435,7 +435,7 @@ def followed(curve: Curve) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True)
-class Formula:
+class CurveFormula:
     """A closed form in the place of a curve's table: `g` its expression of `p`, as source.
 
     `text` for readers; `parameters` by name: value and unit; `ends` whether it keeps its value
@@ -453,7 +453,7 @@ class Formula:
 
 
 def refuse_elsewhere(
-    parts: Sequence[str], along: Sequence[str], place: Place, extra: Sequence[str] = ()
+    parts: Sequence[str], along: Sequence[str], place: CurvePlace, extra: Sequence[str] = ()
 ) -> None:
     """Refuse parts and signals that curves do not have at a place.
 

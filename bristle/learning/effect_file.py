@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from ..physics.drive import drive_named, unit_for
-from .curve import BOUND, Curve, Formula, bounds_of, followed
+from .curve import BOUND, Curve, CurveFormula, bounds_of, followed
 from .signals import FOLLOWING, GIVEN, MEMORIES, SLIP
 
 # Values as the text of a Python file: a study's name may hold quotes and backslashes.
@@ -52,7 +52,7 @@ Declared = tuple[str, float, str, str]
 """A parameter's name, value, unit and meaning."""
 
 
-def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = None) -> str:
+def effect_text(name: str, curve: Curve, origin: str, formula: CurveFormula | None = None) -> str:
     """Return the text of the effect's file of a curve.
 
     Parameters
@@ -114,7 +114,7 @@ def _listed(held: Sequence[str]) -> list[str]:
     return ["    assumed = (  # no fit moves them", *(f"        {one}" for one in rows), "    )"]
 
 
-def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
+def _hooks(curve: Curve, formula: CurveFormula | None) -> list[str]:
     """Return the lines of the hooks."""
     part = curve.of
     elsewhere = ["        if p.which != 0.0 and p.which != q.storey:", "            return 0.0"]
@@ -130,7 +130,7 @@ def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
     return lines
 
 
-def _value(curve: Curve, formula: Formula | None) -> str:
+def _value(curve: Curve, formula: CurveFormula | None) -> str:
     """Return a curve's value as source, in brackets where it is a sum that is multiplied."""
     if formula is None:
         return curve.source
@@ -173,7 +173,7 @@ def _imports(
     ]
 
 
-def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
+def _about(name: str, curve: Curve, formula: CurveFormula | None) -> list[str]:
     """Return the class's first lines and its docstring."""
     along = curve.signal.formula or curve.signal.words
     g = f"g = {formula.text if formula else 'curve(s)'},   s = {along}"
@@ -276,7 +276,7 @@ def _declared(parameters: Sequence[Declared], kept: Sequence[str] = ()) -> list[
     return lines
 
 
-def _of_formula(formula: Formula) -> list[str]:
+def _of_formula(formula: CurveFormula) -> list[str]:
     """Return the lines that declare the parameters of a closed form."""
     text = formula.text
     named = [(n, value, unit, f"{n} in g = {text}") for n, value, unit in formula.parameters]

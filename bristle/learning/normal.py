@@ -15,7 +15,7 @@ from ..identification.rig import DAMPER
 from ..identification.search import HUBER
 from ..identification.start_grid import Search
 from ..physics.tuples import Inputs
-from .curve import Place
+from .curve import CurvePlace
 from .rule import LEARN
 
 # The residual of a fitted model, with what a curve of each part of its law would add to it.
@@ -51,9 +51,9 @@ class Residual:
     at: str = DAMPER
 
     @property
-    def place(self) -> Place:
+    def place(self) -> CurvePlace:
         """The site of the rig whose model this is the residual of."""
-        return Place(self.at)
+        return CurvePlace(self.at)
 
     @property
     def coarsest_step(self) -> float:
@@ -75,7 +75,7 @@ def residual_of(problem: Problem, base: Model) -> Residual:
     sigma = _joined([noise for _, noise, _ in expected], problem.runs)
     slow = 0.03 * float(np.sqrt(np.mean(np.concatenate([run.v for run in problem.runs]) ** 2)))
     at = _site_of(problem, base)
-    columns = _columns_of_line if Place(at).is_line else _columns
+    columns = _columns_of_line if CurvePlace(at).is_line else _columns
     parts = [columns(problem, base, run, slow) for run in problem.runs]
     return Residual(
         r,

@@ -25,7 +25,7 @@ from ..identification.fit import fit_from_starts
 from ..identification.problem import Model, Problem, Run
 from ..identification.rig import DAMPER, at_site
 from ..identification.rig_fit import fit_line, joined
-from ..learning.curve import Place
+from ..learning.curve import CurvePlace
 from ..learning.signals import ALONG
 from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
@@ -299,7 +299,7 @@ def _parts(
         limits, stroke=stroke, speed=fastest / RESERVE * stroke * RESERVE / reached,
         band=(0.0, inf),
     )  # fmt: skip
-    place = Place(site)
+    place = CurvePlace(site)
     able = [name for name in ranges(there) if place.offers(ALONG[name].needs)]
     drive = drive or VOLTAGE.name
     own = coordinates_of(names, able, there, drive) or [name for name in USUAL if name in able]

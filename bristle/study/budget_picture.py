@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..comparison.panels import OneCycle, chosen_cycles
 from ..comparison.predictions import run_predictions
 from ..core.text import percent, scale
-from ..identification.error_table import Share, force_budget
+from ..identification.error_table import ForceShare, force_budget
 from ..physics.forms import shown_law
 from ..physics.laws import LAWS
 from ..view.style import BLUE, GREEN, GREY, INK, PALE, PURPLE, VERMILION, Page, look
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..identification.problem import Model, Problem
 
 Array = NDArray[np.float64]
-Budgets = dict[str, list[Share]]
+Budgets = dict[str, list[ForceShare]]
 
 _RUNS = 6
 _WIDTH, _PANELS, _BAR = 9.2, 2.7, 0.27

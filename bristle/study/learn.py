@@ -16,7 +16,7 @@ from ..diagnosis.prepared import Prepared
 from ..diagnosis.rig_runs import RigRuns, runs_of_rig
 from ..errors import StudyError
 from ..learning.closed_forms import close, closed_forms
-from ..learning.curve import Place, refuse_elsewhere
+from ..learning.curve import CurvePlace, refuse_elsewhere
 from ..learning.curve_picture import curve_png
 from ..learning.effect_file import effect_text
 from ..learning.fit import learn
@@ -67,7 +67,7 @@ def learn_effect(
         raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
     _refuse_taken(study, name)
     site, opened = _opened(study, at)
-    refuse_elsewhere(parts, along, Place(site), study.settings.beside)
+    refuse_elsewhere(parts, along, CurvePlace(site), study.settings.beside)
     found = learn(opened, name, parts=parts, along=along)
     told = site if study.settings.has_building else ""
     if found.refused or found.curve is None:

@@ -14,7 +14,7 @@ import pytest
 import bristle
 from bristle.cli import main
 from bristle.fmu.description import read_description
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
 from bristle.prediction.export import export_study
 from bristle.prediction.model_system import AGREEMENT, prediction
@@ -59,7 +59,7 @@ def bench_run(path: Path, phase: float) -> None:
     v = np.gradient(x, STEP, edge_order=2)
     a = np.gradient(v, STEP, edge_order=2)
     V = 3.0 + 2.0 * np.sin(3.0 * t + phase)
-    force = Bench("lugre", ["gas_spring"]).force(x, v, a, V, STEP, {"gas_spring.k": 80.0})
+    force = DamperForces("lugre", ["gas_spring"]).force(x, v, a, V, STEP, {"gas_spring.k": 80.0})
     rng = np.random.default_rng(3)
     columns = [t] + [c + 1e-4 * np.std(c) * rng.standard_normal(len(t)) for c in (x, v, V, force)]
     header = "time [s],displacement [m],velocity [m/s],voltage [V],force [N]"
@@ -176,7 +176,9 @@ def test_a_dampers_own_stop_and_friction_are_in_the_fmu(bench: Study) -> None:
     found = export_study(bench)
     run = prepare(bench.runs().holdout[0])
     expected = prediction(bench.model(), run)
-    plain = Bench("lugre", []).force(run.x, run.v, run.a, run.V, run.dt, bench.model().values())
+    plain = DamperForces("lugre", []).force(
+        run.x, run.v, run.a, run.V, run.dt, bench.model().values()
+    )
     assert rms(expected - plain) > 0.1 * rms(plain)
     frame = bristle.run(found.scenario)
     own = np.interp(run.dt * np.arange(len(run.x)), frame.index.to_numpy(), frame["damper.force"])
@@ -195,7 +197,9 @@ def test_an_effect_of_ones_own_is_in_the_fmu(bench: Study) -> None:
     found = export_study(study)
     run = prepare(study.runs().holdout[0])
     expected = prediction(study.model(), run)
-    plain = Bench("lugre", []).force(run.x, run.v, run.a, run.V, run.dt, study.model().values())
+    plain = DamperForces("lugre", []).force(
+        run.x, run.v, run.a, run.V, run.dt, study.model().values()
+    )
     np.testing.assert_allclose(expected - plain, 120.0 * run.x, atol=1e-9)
     shutil.rmtree(study.folder / "effects")  # the FMU carries the effect itself
     assert rms(alone(found.fmu, run, {}) - expected) < AGREEMENT * rms(expected)

@@ -17,7 +17,7 @@ from bristle.cli import main
 from bristle.errors import FmuError, RecordError, RunError
 from bristle.fmu.build import ensure
 from bristle.fmu.description import Description, Variable
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.prediction.compare_fmu import compare_fmu
 from bristle.prediction.fmu_ports import map_ports
 
@@ -35,7 +35,7 @@ def columns(seed=3, noise=0.01):
     size = 0.004 / f
     x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
     V = np.repeat([0.0, 2.0, 4.0], N // 3)
-    force = Bench("lugre", []).force(x, v, a, V, DT, {})
+    force = DamperForces("lugre", []).force(x, v, a, V, DT, {})
 
     def measured(y):
         return y + noise * np.std(y) * random.standard_normal(N)

@@ -16,7 +16,7 @@ from bristle.comparison.panels import draw_pattern, residual_map, worst_window
 from bristle.comparison.predictions import halved, run_predictions
 from bristle.data.left_out import MISSING
 from bristle.errors import RecordError
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.smoothing import posterior_draws, smooth
 
@@ -27,7 +27,7 @@ def bench(law="lugre", values=None, n=4000, count=3, noise=0.01, skip=25):
     for k in range(count):
         random = np.random.default_rng(50 + k)
         x, v, a, V = motion(n, 7 * k + 1)
-        force = Bench(law, []).force(x, v, a, V, DT, values or {})
+        force = DamperForces(law, []).force(x, v, a, V, DT, values or {})
         sizes = noise * np.std(x), noise * np.std(v), noise * np.std(force)
         noisy = [
             y + s * random.standard_normal(n) for y, s in zip((x, v, force), sizes, strict=True)

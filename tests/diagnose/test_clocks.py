@@ -14,7 +14,7 @@ from bristle.diagnosis.prepared import corrected
 from bristle.diagnosis.sensor_faults import as_json, instruments_of
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 
 STEP = 0.002  # s
@@ -39,7 +39,7 @@ def runs(rate=0.0, late=(0.0,) * 4, effect=lambda v, F: F):
         V = np.full(len(T), 2.0 * seed)
         # A force that is read at t on its own clock is that of the moment (t - late)/(1 + rate).
         x, v, a = motion((T - begin) / (1.0 + rate))
-        force = effect(v, Bench("lugre", []).force(x, v, a, V, STEP, VALUES))
+        force = effect(v, DamperForces("lugre", []).force(x, v, a, V, STEP, VALUES))
         force = force + NOISE * random.standard_normal(len(T))
         x, v, a = motion(T)
         none = np.zeros((0, len(T), 4))

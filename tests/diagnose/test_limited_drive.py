@@ -13,7 +13,7 @@ from bristle.diagnosis.command_range import limited_drive
 from bristle.diagnosis.prepared import corrected
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 
 DT, N, NOISE = 0.002, 2500, 0.05
@@ -43,7 +43,9 @@ def made(seed, command=steps, limit=None, effects=(), values=None):
     x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
     V = command(random)
     felt = limited(V, DT, *limit) if limit else V
-    force = Bench("bingham", list(effects)).force(x, v, a, felt, DT, {**LAW, **(values or {})})
+    force = DamperForces("bingham", list(effects)).force(
+        x, v, a, felt, DT, {**LAW, **(values or {})}
+    )
     force = force + NOISE * random.standard_normal(N)
     return Run(f"run_{seed}", DT, x, v, a, V, force, NOISE, np.zeros((2, N, 4)))
 

@@ -10,7 +10,7 @@ from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of_frame
 from bristle.diagnosis.effect_limits import detectable, untestable
 from bristle.diagnosis.rule import BENCH
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Model, Problem
 
@@ -31,7 +31,7 @@ def problem_of(voltage, noise=0.01, values=VALUES):
         size = 0.04 / w
         x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
         V = voltage(seed)
-        F = Bench("bingham", []).force(x, v, a, V, STEP, values)
+        F = DamperForces("bingham", []).force(x, v, a, V, STEP, values)
         columns = dict(zip(TITLES, (x, v, V, F), strict=True))
         std = {name: noise * float(np.sqrt(np.mean(y**2))) for name, y in columns.items()}
         noisy = {

@@ -19,7 +19,7 @@ from bristle.diagnosis.words import effect_words
 from bristle.errors import PhysicsError
 from bristle.fmu.model_description import unit_definitions
 from bristle.identification.fit import fit
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.start_grid import initial_guesses, refine
 from bristle.physics.effect import EFFECTS, Effect
@@ -46,7 +46,9 @@ def made(seed, temperature, labels=None):
         "f": np.exp(-YIELD * (temperature - MIDDLE)),
     }
     values = {name: value * left.get(name[0], 1.0) for name, value in LAW.items()}
-    force = Bench("bingham", []).force(x, v, a, V, DT, values) + NOISE * random.standard_normal(N)
+    force = DamperForces("bingham", []).force(
+        x, v, a, V, DT, values
+    ) + NOISE * random.standard_normal(N)
     known = {"temperature": temperature} if labels is None else labels
     return Run(f"run_{seed}", DT, x, v, a, V, force, NOISE, np.zeros((2, N, 4)), labels=known)
 

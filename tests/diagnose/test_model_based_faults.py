@@ -9,7 +9,7 @@ from bristle.diagnosis.inconsistent_runs import inconsistent_runs
 from bristle.diagnosis.model_faults import model_based_faults
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit_from_starts
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 
 DT, N, NOISE = 0.002, 3000, 0.03
@@ -26,7 +26,7 @@ def made(seed, effects=(), values=None, spoil=lambda v: v):
     angle = w[:, None] * T + phase[:, None]
     x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
     V = 3.0 + 2.0 * np.sin(2.0 * np.pi * random.uniform(0.8, 1.6) * T + random.uniform(0.0, 6.28))
-    force = Bench("bingham", list(effects)).force(x, v, a, V, DT, {**LAW, **(values or {})})
+    force = DamperForces("bingham", list(effects)).force(x, v, a, V, DT, {**LAW, **(values or {})})
     force = force + NOISE * random.standard_normal(N)
     return Run(f"run_{seed}", DT, x, v, a, spoil(V), force, NOISE, np.zeros((2, N, 4)))
 

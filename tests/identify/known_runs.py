@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Run
 from bristle.identification.smoothing import posterior_draws, smooth
 from bristle.physics.laws import LAWS
@@ -38,7 +38,7 @@ def bench_run(law, values, seed, noise=0.01):
     random = np.random.default_rng(seed)
     x, v, a = motion(seed)
     V = 2.5 * (1.0 + np.sin(2.0 * np.pi * (0.5 + 0.4 * seed) * T))
-    force = Bench(law, []).force(x, v, a, V, DT, values)
+    force = DamperForces(law, []).force(x, v, a, V, DT, values)
     sigma = [noise * np.std(y) for y in (x, v, force)]
     measured = [
         y + s * random.standard_normal(N) for y, s in zip((x, v, force), sigma, strict=True)

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 from bristle.core import jit
-from bristle.identification.histories import Bench, before_jump, compiled_history
+from bristle.identification.histories import DamperForces, before_jump, compiled_history
 from bristle.physics.damper_source import LIBRARY
 from bristle.physics.law import laws_of
 from tests.physics.rigs import force_at
@@ -25,7 +25,7 @@ def pulled(law: str, effects: list[str], V: np.ndarray, **values: float) -> np.n
     """Return the force (n,) [N] at a steady `SPEED` under a voltage (n,) [V]."""
     n = len(V)
     x, v = SPEED * DT * np.arange(n), np.full(n, SPEED)
-    return Bench(law, effects).force(x, v, np.zeros(n), V, DT, values)
+    return DamperForces(law, effects).force(x, v, np.zeros(n), V, DT, values)
 
 
 def stepped(first: float, then: float, n: int = 400) -> np.ndarray:
@@ -92,7 +92,9 @@ def test_threads_that_ask_at_once_get_one_function_and_leave_nothing_behind(tmp_
     x = np.zeros(300)
     with ThreadPoolExecutor(8) as pool:
         found = list(pool.map(lambda _: compiled_history(LIBRARY), range(32)))
-        list(pool.map(lambda name: Bench("lugre", [name]).force(x, x, x, x, DT, {}), EFFECTS))
+        list(
+            pool.map(lambda name: DamperForces("lugre", [name]).force(x, x, x, x, DT, {}), EFFECTS)
+        )
     assert len({id(one) for one in found}) == 1
     assert list(tmp_path.iterdir()) == []
 
@@ -102,7 +104,7 @@ def test_a_law_alone_has_the_force_that_it_has_among_effects_that_are_off(law: s
     t = DT * np.arange(1500)
     x, v, a = 0.01 * np.sin(9.0 * t), 0.09 * np.cos(9.0 * t), -0.81 * np.sin(9.0 * t)
     V = 2.0 + np.sin(3.0 * t) + np.where(t > 1.0, 1.5, 0.0)
-    rig = Bench(law, [])
+    rig = DamperForces(law, [])
     values = {"bristle_deflection_0": 2e-4, "deflection_0": 2e-4}
     alone = rig.force(x, v, a, V, DT, values)
     rig._history = compiled_history(LIBRARY)

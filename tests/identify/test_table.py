@@ -9,7 +9,7 @@ from bristle.errors import RecordError
 from bristle.identification import error_table
 from bristle.identification.error_table import error_table as error_table_error_table
 from bristle.identification.error_table import low_pass
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Problem, Run
 from bristle.physics.laws import law_names
 
@@ -24,7 +24,7 @@ def problem(law, values, seed=0, noise=0.01):
     size = 0.02 / w
     x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
     V = 2.5 * (1.0 + np.sin(4.0 * np.pi * T))
-    force = Bench(law, []).force(x, v, a, V, DT, values)
+    force = DamperForces(law, []).force(x, v, a, V, DT, values)
     sigma = noise * float(np.std(force))
     force = force + sigma * random.standard_normal(N)
     return Problem([Run("run", DT, x, v, a, V, force, sigma, np.zeros((0, N, 4)))])

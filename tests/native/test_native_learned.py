@@ -13,9 +13,9 @@ from both_forms import Both, Native, folder, needs_zig
 import bristle
 from bristle.cli import main
 from bristle.fmu.build import plan
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.learning.closed_forms import closed_forms, formula_of
-from bristle.learning.curve import AT_DAMPER, PARTS, Curve, Place, may_change, parts_at
+from bristle.learning.curve import AT_DAMPER, PARTS, Curve, CurvePlace, may_change, parts_at
 from bristle.learning.effect_file import effect_text
 from bristle.learning.signals import ALONG, RING, SLIP
 from bristle.native.build import build
@@ -33,7 +33,7 @@ EQUAL = 1e-12
 STEP = 0.002  # s
 
 
-def covering(place: Place) -> list[tuple[str, str]]:
+def covering(place: CurvePlace) -> list[tuple[str, str]]:
     """Return pairs of a part of the model and a signal, each part and each signal among them."""
     pairs = [
         (part, along)
@@ -112,7 +112,7 @@ def measured(path: Path, phase: float) -> None:
     x = 0.008 * np.sin(12.0 * t + phase) + 0.002 * np.sin(33.0 * t)
     v = 0.096 * np.cos(12.0 * t + phase) + 0.066 * np.cos(33.0 * t)
     V = 3.0 + 2.0 * np.sin(3.0 * t + phase)
-    force = Bench("lugre", []).force(x, v, np.gradient(v, STEP), V, STEP, {})
+    force = DamperForces("lugre", []).force(x, v, np.gradient(v, STEP), V, STEP, {})
     header = "time [s],displacement [m],velocity [m/s],voltage [V],force [N]"
     table = np.column_stack([t, x, v, V, force])
     np.savetxt(path, table, delimiter=",", header=header, comments="")

@@ -252,7 +252,7 @@ def test_fmu_and_coupled_engine_agree(tmp_path, damper: str) -> None:
 
 
 def test_compiled_and_plain_python_agree() -> None:
-    from bristle.identification.histories import Bench as Fast
+    from bristle.identification.histories import DamperForces as Fast
     from bristle.physics.laws import LAWS as CLASSES
 
     t = 0.002 * np.arange(300)

@@ -12,7 +12,7 @@ from bristle.core.jit import compiled, digest
 from bristle.engine import time_loop
 from bristle.engine.coupled import linked
 from bristle.identification import histories
-from bristle.identification.histories import Bench, force_history
+from bristle.identification.histories import DamperForces, force_history
 from bristle.physics import damper
 from bristle.physics.effect import EFFECTS, Effect
 from bristle.physics.generate import Link
@@ -89,7 +89,7 @@ def test_controllers_invert_laws_of_the_library_beside_any_damper(own: type[Effe
 def test_compiled_and_in_python_it_gives_the_same(
     own: type[Effect], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fast = Bench("bingham", ["leak"]).force(*MOTION, 0.002, {})
+    fast = DamperForces("bingham", ["leak"]).force(*MOTION, 0.002, {})
     again = leak()  # as a file that is read anew defines it
     assert again is not own
     link = damper.functions_of("bingham", ["leak"]).link
@@ -97,6 +97,6 @@ def test_compiled_and_in_python_it_gives_the_same(
         damper.SETS.of(LAWS["bingham"], own).link(damper.step)
     )
     monkeypatch.setenv("BRISTLE_JIT", "off")
-    plain = Bench("bingham", ["leak"])
+    plain = DamperForces("bingham", ["leak"])
     assert compiled(damper.step) is damper.step
     assert plain.force(*MOTION, 0.002, {}) == pytest.approx(fast, rel=1e-12)

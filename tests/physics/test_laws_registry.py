@@ -16,7 +16,7 @@ from bristle.fmu import catalogue
 from bristle.fmu.controller import invertible
 from bristle.identification.error_table import error_table
 from bristle.identification.fit import fit_from_starts
-from bristle.identification.histories import Bench as CompiledBench
+from bristle.identification.histories import DamperForces as CompiledBench
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.starts import start_models
 from bristle.model.model import new_model

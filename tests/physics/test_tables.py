@@ -14,7 +14,7 @@ from rigs import force_at
 from bristle.errors import PhysicsError, StudyError
 from bristle.fmu import catalogue
 from bristle.identification.fit import fit_from_starts
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.starts import start_models
 from bristle.model.model import new_model
@@ -111,7 +111,7 @@ def motion(count: int = 1500) -> tuple[np.ndarray, ...]:
 
 def problem(law: str, effects: list[str], values: dict[str, float]) -> Problem:
     x, v, a, V = motion()
-    force = Bench(law, effects).force(x, v, a, V, DT, values)
+    force = DamperForces(law, effects).force(x, v, a, V, DT, values)
     noisy = force + 0.01 * np.random.default_rng(3).standard_normal(len(x))
     return Problem([Run("made", DT, x, v, a, V, noisy, 0.01, np.zeros((4, len(x), 4)))])
 
@@ -292,7 +292,7 @@ def test_a_law_finds_its_quantities_at_the_voltage(law: type[Law]) -> None:
 )
 def test_python_and_numba_agree(law: Any, effect: Any, effects: list[str]) -> None:
     x, v, a, V = motion(100)
-    compiled = Bench("mapped", effects).force(x, v, a, V, DT, {"coil_lag.tau": 1e-4})
+    compiled = DamperForces("mapped", effects).force(x, v, a, V, DT, {"coil_lag.tau": 1e-4})
     for k in (0, 40, 99):
         if effects == ["coil_lag"] and k:
             continue  # it lags

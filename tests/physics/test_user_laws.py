@@ -13,7 +13,7 @@ from bristle.cli import main
 from bristle.errors import BuildError, PhysicsError
 from bristle.fmu import build, catalogue
 from bristle.fmu.controller import invertible
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.physics import damper
 from bristle.physics.command import Monotone
 from bristle.physics.effect import EFFECTS, effects_of
@@ -293,7 +293,7 @@ def test_compiled_it_is_what_python_gives(tmp_path: Path) -> None:
     load.load_file(written(tmp_path), "law")
     t = 0.002 * np.arange(100)
     x, v = 0.006 * np.sin(9.0 * t), 0.054 * np.cos(9.0 * t)
-    force = Bench("rubbing", []).force(x, v, 0.0 * v, 4.0 + 0.0 * v, 0.002, {})
+    force = DamperForces("rubbing", []).force(x, v, 0.0 * v, 4.0 + 0.0 * v, 0.002, {})
     expected = 4.62 * np.tanh(v / 0.02) + 15.0 * v + 60.0 * x
     np.testing.assert_allclose(force, expected, rtol=1e-12, atol=1e-12)
 

@@ -12,7 +12,7 @@ import pytest
 import bristle
 from bristle.cli import main
 from bristle.errors import StudyError
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
 from bristle.model.model import new_model
 from bristle.model.model_file import read_model
@@ -39,7 +39,7 @@ def frame(seed: int, volts: float | np.ndarray, law: str = LAW) -> pd.DataFrame:
     size = 0.04 / w
     x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
     V = np.zeros(N) + volts
-    force = Bench(law, []).force(x, v, a, V, DT, TRUTH)
+    force = DamperForces(law, []).force(x, v, a, V, DT, TRUTH)
     columns = {"displacement [m]": x, "velocity [m/s]": v, "force [N]": force}
     noisy = {n: y + 5e-3 * np.std(y) * random.standard_normal(N) for n, y in columns.items()}
     return pd.DataFrame({"time [s]": T, "voltage [V]": V, **noisy})

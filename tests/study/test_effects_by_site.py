@@ -13,7 +13,7 @@ from bristle.diagnosis.effect_limits import untestable
 from bristle.diagnosis.trials import joinable
 from bristle.errors import StudyError
 from bristle.identification.building_sites import StructureProblem, structure_run
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 from bristle.identification.rig import Rig, Site, at_site
 from bristle.identification.rig_fit import fit_site
@@ -42,7 +42,7 @@ def motion(phase: float, size: float = 0.009, samples: int = 1500):
 
 def bench_run(effects, values, phase: float = 0.0, noise: float = 0.03) -> Run:
     x, v, a, V = motion(phase)
-    force = Bench("lugre", list(effects)).force(x, v, a, V, DT, values)
+    force = DamperForces("lugre", list(effects)).force(x, v, a, V, DT, values)
     force = force + noise * np.random.default_rng(1).standard_normal(len(x))
     return Run("run", DT, x, v, a, V, force, noise, np.zeros((1, len(x), 4)))
 
@@ -112,7 +112,7 @@ def test_each_stop_acts_at_its_site_under_its_plain_name() -> None:
     (run,) = problem.runs
     x, v, a, V = motion(0.0)
     own = {name.replace("@damper", ""): value for name, value in list(VALUES.items())[3:]}
-    expected = Bench("lugre", ["end_stop"]).force(x, v, a, V, DT, own)
+    expected = DamperForces("lugre", ["end_stop"]).force(x, v, a, V, DT, own)
     damper = at_site(model, "damper", sites)
     np.testing.assert_allclose(problem.predict(damper, run), expected, atol=1e-9)
     # Of a reconstructed force both are a part.

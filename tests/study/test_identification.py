@@ -14,7 +14,7 @@ from bristle.cli import identify as command
 from bristle.cli import main
 from bristle.errors import RecordError, StudyError
 from bristle.identification.error import ForceError
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.study.api import identify
 from bristle.study.identify import identify_study
 from bristle.study.steps import create_study
@@ -45,7 +45,7 @@ def bench_frame(seed, force=1.0, speed=1.0, length=1.0, volts=None, law="bingham
             "sigma_b": 20.0 * force / speed, "v_n": 0.02 * speed, "a_0": 500.0 / length,
         },
     }[law]  # fmt: skip
-    F = Bench(law, []).force(x, v, a, V, DT, values)
+    F = DamperForces(law, []).force(x, v, a, V, DT, values)
     columns = {"displacement": x, "velocity": v, "voltage": V, "force": F}
     noisy = {name: y + noise * np.std(y) * random.standard_normal(N) for name, y in columns.items()}
     return pd.DataFrame({"time": T, **noisy}), values

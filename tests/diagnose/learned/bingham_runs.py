@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Problem, Run
 
 STEP = 0.002  # s
@@ -24,7 +24,7 @@ def runs(hidden=lambda x, v, V, F: F):
         size = 0.05 / w
         x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
         V = np.repeat(random.choice([0.0, 3.0, 6.0], 12), len(T) // 12)
-        force = hidden(x, v, V, Bench("bingham", []).force(x, v, a, V, STEP, VALUES))
+        force = hidden(x, v, V, DamperForces("bingham", []).force(x, v, a, V, STEP, VALUES))
         force = force + NOISE * random.standard_normal(len(T))
         out.append(Run(f"run{seed}", STEP, x, v, a, V, force, NOISE, NOWHERE))
     return Problem(out)

@@ -10,7 +10,7 @@ import pytest
 from bristle.identification.building_sites import StructureProblem, structure_run
 from bristle.identification.rig_fit import fit_line
 from bristle.learning.closed_forms import closed_forms, formula_of, in_words
-from bristle.learning.curve import Curve, Place, may_change, parts_at
+from bristle.learning.curve import Curve, CurvePlace, may_change, parts_at
 from bristle.learning.effect_file import effect_text
 from bristle.learning.normal import Normal, residual_of
 from bristle.learning.screen import promises
@@ -22,7 +22,7 @@ from bristle.user_code.load import defined
 
 STEP, NOISE = 0.004, 0.03  # s, N
 T = STEP * np.arange(1500)
-LAYER, STOREY = Place("layer"), Place("storey2")
+LAYER, STOREY = CurvePlace("layer"), CurvePlace("storey2")
 MEMORY = {"tau": 0.2, "way": 0.004, "early": 0.02}
 
 

@@ -8,7 +8,7 @@ from scipy.signal import lsim
 from test_screen import STEP, VALUES, T, runs
 
 from bristle.identification.fit import fit
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, shown_force
 from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
@@ -47,7 +47,7 @@ def test_the_steps_are_those_of_another_solver():
 def test_the_effect_s_file_does_what_the_scan_looked_for():
     x, v, V = 0.004 * np.sin(18.0 * T), 0.072 * np.cos(18.0 * T), 0.0 * T
     given = (x, v, np.gradient(v, STEP), V, STEP)
-    force = Bench("bingham", []).force(*given, VALUES)
+    force = DamperForces("bingham", []).force(*given, VALUES)
     with defined({"learned_1": effect_text("learned_1", MODE, "a test")}):
         shown = shown_force(("learned_1",), VALUES, force, STEP)
     rung = force + SHARE * ringing(force, STEP, FREQUENCY, DAMPING)

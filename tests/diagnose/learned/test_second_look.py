@@ -10,7 +10,7 @@ import pytest
 from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import Trial, judge
 from bristle.identification.fit import fit
-from bristle.identification.histories import Bench
+from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Model, Problem, Run
 from bristle.learning import fit as learned_fit
 from bristle.learning.closed_forms import closed_forms
@@ -39,7 +39,7 @@ def sweeps(hidden):
         v = np.gradient(x, STEP)
         a = np.gradient(v, STEP)
         V = np.array([0.0, 2.7, 5.3, 8.0, 5.3, 2.7])[(T / 0.28).astype(int) % 6]
-        force = hidden(x, Bench("bingham", []).force(x, v, a, V, STEP, VALUES))
+        force = hidden(x, DamperForces("bingham", []).force(x, v, a, V, STEP, VALUES))
         force = force + NOISE * np.random.default_rng(number).standard_normal(len(T))
         out.append(Run(f"sweep{number}", STEP, x, v, a, V, force, NOISE, NOWHERE))
     return Problem(out)
