@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bristle.data.measurement import Measurement
 from bristle.diagnosis import Diagnosis, diagnose_rig
 from bristle.diagnosis.site import try_effect
-from bristle.identification.building_sites import StructureProblem
+from bristle.identification.building_sites import StructurePair
 from bristle.identification.building_sites import structure_problems as problems
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.problem import Model
@@ -27,7 +27,6 @@ from .cases import Recorded
 from .subject import measurements, packed
 
 Array = NDArray[np.float64]
-Pair = tuple[StructureProblem, StructureProblem]
 
 
 def file_of(case: Recorded) -> Building:
@@ -115,7 +114,7 @@ def with_noise(measurement: Measurement, spread: dict[str, float]) -> Measuremen
     return replace(measurement, noise={name: float(value) for name, value in spread.items()})
 
 
-def fitted(name: str, law: str, site: str, pair: Pair) -> Model:
+def fitted(name: str, law: str, site: str, pair: StructurePair) -> Model:
     """Return a site's model with one effect, fitted to its training runs."""
     train, held = pair
     if site == "damper":

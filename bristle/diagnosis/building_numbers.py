@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..identification.building_motion import Response
-from ..identification.building_sites import StructureProblem, damper_run, problems_of
+from ..identification.building_sites import StructurePair, StructureProblem, damper_run, problems_of
 from ..identification.problem import Model
 from ..identification.rig_fit import fit_line, line_columns
 from ..identification.search import HUBER
@@ -28,8 +28,6 @@ from .trials import judge
 
 DEVIATIONS = 3.0
 """Standard deviations of a mass that the doubt about it amounts to."""
-
-Pair = tuple[StructureProblem, StructureProblem]
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class Shaken:
         hidden = run.damped and not self.measured and run.device.crosses(0)
         return run.device.upper + 1 if hidden else 0
 
-    def lines(self, building: Building) -> dict[str, Pair]:
+    def lines(self, building: Building) -> dict[str, StructurePair]:
         """Return the sites whose model is a line, with a building's masses."""
         found = problems_of(self.train, self.holdout, building, self.law, self.straight)
         return {site: pair for site, pair in found.items() if site != "damper"}
@@ -113,7 +111,7 @@ def text_of_masses(before: Building, after: Building, measured: bool = True) -> 
     ]
 
 
-def _excess(lines: Mapping[str, Pair], rule: DecisionRule) -> float:
+def _excess(lines: Mapping[str, StructurePair], rule: DecisionRule) -> float:
     """Return what lines leave beyond noise on held-out runs, summed over the sites."""
     total = 0.0
     for site, (train, held_out) in lines.items():
@@ -123,7 +121,7 @@ def _excess(lines: Mapping[str, Pair], rule: DecisionRule) -> float:
 
 
 def _shift(
-    shaken: Shaken, building: Building, lines: Mapping[str, Pair], rule: DecisionRule
+    shaken: Shaken, building: Building, lines: Mapping[str, StructurePair], rule: DecisionRule
 ) -> Array:
     """Return by which share (n,) each mass is to move: least squares, with what the file knows."""
     n = building.size

@@ -18,7 +18,7 @@ from ..data.checks.runs import tells_a_bend
 from ..data.cut_off import derived_velocity
 from ..data.measurement import Measurement
 from ..identification.building_motion import responses
-from ..identification.building_sites import ANY_LAW, StructureProblem, problems_of
+from ..identification.building_sites import ANY_LAW, StructurePair, StructureProblem, problems_of
 from ..identification.fit import fit_from_starts
 from ..identification.problem import Model, Problem
 from ..identification.rig import DAMPER, at_site, bench_rig, corrected_for_delay, linear_storeys
@@ -170,8 +170,6 @@ def _across(run: Measurement, upper: str, lower: str) -> Measurement:
     return replace(run, channels=channels, noise=noise)
 
 
-Pair = tuple[StructureProblem, StructureProblem]
-
 OF_STOREY = (
     "The damper's force is what a storey carries beside the spring that the building's file has "
     "there: what is found at the damper may be the storey's own."
@@ -308,7 +306,7 @@ class BuildingRuns:
         self._problems = self._made(self._building)
         self._notes: list[str] = []
 
-    def _made(self, building: Building) -> dict[str, Pair]:
+    def _made(self, building: Building) -> dict[str, StructurePair]:
         law = ANY_LAW if self._any_law else self._present.law
         return problems_of(self._train, self._holdout, building, law, self._straight)
 
@@ -414,7 +412,7 @@ class BuildingRuns:
         return {site: pair[0] for site, pair in made.items()}
 
     @property
-    def damper(self) -> Pair | None:
+    def damper(self) -> StructurePair | None:
         """The damper's runs for training and held out, None where no damper was measured."""
         return self._problems.get(DAMPER)
 
@@ -467,13 +465,15 @@ class BuildingRuns:
         return VerdictContext(force, self._sensors, self._noise, notes, beside_layer=beside)
 
 
-def _suits(suited: Pair, given: Pair, damper: Model, rule: DecisionRule = BENCH) -> bool:
+def _suits(
+    suited: StructurePair, given: StructurePair, damper: Model, rule: DecisionRule = BENCH
+) -> bool:
     """Return whether moved numbers of a building explain what the file's leave, held-out runs too.
 
     What an effect does they may follow in part; then they are the file's still.
     """
 
-    def left(pair: Pair) -> float:
+    def left(pair: StructurePair) -> float:
         base = fit_damper(pair[0], damper)
         return rule.excess(judge(base.model, *pair).z)
 

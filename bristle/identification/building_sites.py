@@ -175,6 +175,10 @@ class StructureProblem(Problem):
         return force if seen is run else force[run.keep]
 
 
+StructurePair = tuple[StructureProblem, StructureProblem]
+"""The runs of a site for training and those held out."""
+
+
 def structure_run(
     name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
     draws: Array, keep: Flags | None = None, drawn: Array | None = None,
@@ -429,7 +433,7 @@ def _error(response: Response, level: int) -> Array:
 
 def structure_problems(
     train: list[Measurement], holdout: list[Measurement], building: Building, law: str = DEFAULT
-) -> dict[str, tuple[StructureProblem, StructureProblem]]:
+) -> dict[str, StructurePair]:
     """Return the problems of a building's runs, each for training and held-out runs.
 
     Parameters
@@ -458,7 +462,7 @@ def structure_problems(
 def problems_of(
     train: list[Response], holdout: list[Response], building: Building, law: str = DEFAULT,
     linear_storeys: bool = True,
-) -> dict[str, tuple[StructureProblem, StructureProblem]]:  # fmt: skip
+) -> dict[str, StructurePair]:  # fmt: skip
     """Return the problems of responses; see `structure_problems`.
 
     Parameters

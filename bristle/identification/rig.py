@@ -20,7 +20,7 @@ from ..physics.building import Building, with_damper
 from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from ..physics.laws import law_of_part
 from .building_motion import Response, responses
-from .building_sites import StructureProblem, blind_at_rest, device_moves, problems_of
+from .building_sites import StructurePair, blind_at_rest, device_moves, problems_of
 from .error import refuse_empty
 from .prepare import prepare
 from .problem import Model, Problem, Run
@@ -359,7 +359,7 @@ class _BuildingSites:
         return {name: building_site(name, pair, law) for name, pair in problems.items()}
 
 
-def building_site(name: str, pair: tuple[StructureProblem, StructureProblem], law: str) -> Site:
+def building_site(name: str, pair: StructurePair, law: str) -> Site:
     """Return a site of a building from its runs of both roles."""
     quantity = f"shear of storey {name.removeprefix('storey')}"
     if name == DAMPER:
