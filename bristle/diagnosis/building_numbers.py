@@ -98,14 +98,14 @@ def text_of_masses(before: Building, after: Building, measured: bool = True) -> 
         return []
     names = before.levels()
     share = [after.M[i][i] / before.M[i][i] - 1.0 for i in range(before.size)]
-    told = ", ".join(f"{name} {one:+.1%}" for name, one in zip(names, share, strict=True))
+    changes = ", ".join(f"{name} {one:+.1%}" for name, one in zip(names, share, strict=True))
     if not measured:
         return [
-            f"Equilibrium requires other masses than those in the building's file: {told}, with "
+            f"Equilibrium requires other masses than those in the building's file: {changes}, with "
             "their sum kept, which no run without a measured force shows. Weigh the building."
         ]
     return [
-        f"Equilibrium requires other masses than those in the building's file: {told}. A load "
+        f"Equilibrium requires other masses than those in the building's file: {changes}. A load "
         "cell whose gain is wrong by that much would look the same. Weigh the building, or check "
         "the cell."
     ]

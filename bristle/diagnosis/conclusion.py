@@ -83,7 +83,13 @@ def conclude(findings: Mapping[str, SiteDiagnosis], context: VerdictContext) -> 
         sites |= dict.fromkeys(shown, "sensor")
     effects = tuple(dict.fromkeys([*named, *rivals]))
     unknown = next((part for part in parts if part.kind == "unknown"), None)
-    reasons = [*_told(parts, kind, context), *(_without_load_cell(a) for a in alike.values())]
+    reasons = [
+        *_reasons(parts, kind),
+        *filter(None, map(low_pass_text, parts)),
+        *(text for part in parts for text in effect_words(part)),
+        *context.notes,
+        *map(_without_load_cell, alike.values()),
+    ]
     if kind == "unknown" and not context.driven:
         reasons.append(NOT_DRIVEN)
     return Diagnosis(
@@ -117,16 +123,6 @@ def _sensors(findings: Mapping[str, SiteDiagnosis], context: VerdictContext) -> 
     again = {(one.channel, one.kind) for one in renewed}
     first = [one for one in context.sensors if (one.channel, one.kind) not in again]
     return (*first, *_of_load_cell(findings), *renewed)
-
-
-def _told(parts: Sequence[SiteDiagnosis], kind: str, context: VerdictContext) -> list[str]:
-    """Return why the verdict is what it is, and what else is to be said of sites and runs."""
-    return [
-        *_reasons(parts, kind),
-        *filter(None, map(low_pass_text, parts)),
-        *(text for part in parts for text in effect_words(part)),
-        *context.notes,
-    ]
 
 
 def _after_the_force(found: SiteDiagnosis, damper: SiteDiagnosis | None) -> SiteDiagnosis:
@@ -187,8 +183,8 @@ def _reasons(parts: Sequence[SiteDiagnosis], kind: str) -> list[str]:
         out = [f"The error on held-out runs is {low:.2f} to {high:.2f} {NOISE} {sites}."]
         parts = [part for part in parts if part.z_before > BENCH.clean]
     else:
-        told = [part for part in parts if part.kind == "none" and part.reasons]
-        little = [part for part in told if part.reasons[0].startswith(LITTLE)]
+        in_words = [part for part in parts if part.kind == "none" and part.reasons]
+        little = [part for part in in_words if part.reasons[0].startswith(LITTLE)]
         out, parts = [], [*(part for part in parts if part.kind != "none"), *little]
     return out + [words.sited(part.site, " ".join(part.reasons)) for part in parts if part.reasons]
 

@@ -59,10 +59,10 @@ def _with_labels(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     if found.kind == "none" or not found.noise_known or not varying(_known(runs)):
         return found
     predictions = run_predictions(prepared.problem.of(runs), prepared.before.model)
-    told = label_sentence(label_errors(predictions))
-    if not told:
+    sentence = label_sentence(label_errors(predictions))
+    if not sentence:
         return found
-    text = f"Of the present model: {told[:1].lower()}{told[1:]}"
+    text = f"Of the present model: {sentence[:1].lower()}{sentence[1:]}"
     return replace(found, reasons=(*found.reasons, text))
 
 
@@ -80,8 +80,8 @@ def _with_limits(found: SiteDiagnosis, prepared: Prepared, profile: bool) -> Sit
     if found.kind == "ambiguous" and prepared.scope.choose_motion:
         members = [t.model for t in found.trials if set(t.effects) & set(found.effects)]
         experiment = separating(members, prepared.problem)
-    seen = visible if found.noise_known else float("nan")
-    found = replace(found, detectable=seen, untestable=tuple(hidden), experiment=experiment)
+    least = visible if found.noise_known else float("nan")
+    found = replace(found, detectable=least, untestable=tuple(hidden), experiment=experiment)
     return replace(found, limits=_limits(found, prepared, profile))
 
 

@@ -162,11 +162,11 @@ def _contrast(rivals: Sequence[_Rival], run: Run) -> float:
     The rival may move its parameters as far as the runs at hand allow: a difference that a refit
     absorbs separates nothing.
     """
-    seen = [rival.on(run) for rival in rivals]
+    shown = [rival.on(run) for rival in rivals]
     least = np.inf
-    for j, (own, J) in enumerate(seen):
+    for j, (own, J) in enumerate(shown):
         normal = J.T @ J + rivals[j].information
-        for i, (other, _) in enumerate(seen):
+        for i, (other, _) in enumerate(shown):
             if i != j:
                 apart = other - own
                 gradient = J.T @ apart

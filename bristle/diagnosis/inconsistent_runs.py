@@ -73,8 +73,8 @@ def odd_run(
         one = train.of([run])
         if robust_z(one, fitted) <= rule.misfit:
             continue
-        if told := other_zero(fitted, one, rule) or other_gain(fitted, one, rule):
-            return f"{called} explains all runs but {run.name}. {told} Else {LEFT_OUT}."
+        if text := other_zero(fitted, one, rule) or other_gain(fitted, one, rule):
+            return f"{called} explains all runs but {run.name}. {text} Else {LEFT_OUT}."
     return ""
 
 
@@ -165,17 +165,17 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     kind = kind_of(found.kind, before, found.after, rule)
     runs = prepared.searched, prepared.held_out, rule
     if found.kind == kind == "unknown":
-        told = groups(before.model, *runs, prepared.scope.restart)
-        return replace(found, kind="insufficient", reasons=(told,)) if told else found
+        text = groups(before.model, *runs, prepared.scope.restart)
+        return replace(found, kind="insufficient", reasons=(text,)) if text else found
     if found.kind == "unknown":
         differ = HELD_OUT_DIFFER.format(force=force_in(prepared.held_out, found.site))
         worst = inconsistent_runs(before.model, *runs, at_damper)
-        told = " ".join(filter(None, [*found.reasons, differ, worst]))
-        return replace(found, kind=kind, reasons=(told,))
+        text = " ".join(filter(None, [*found.reasons, differ, worst]))
+        return replace(found, kind=kind, reasons=(text,))
     if kind == found.kind:
         return found
-    told = inconsistent_runs(found.after.model, prepared.problem, *runs[1:], at_damper)
-    return replace(found, kind=kind, reasons=(told,))
+    text = inconsistent_runs(found.after.model, prepared.problem, *runs[1:], at_damper)
+    return replace(found, kind=kind, reasons=(text,))
 
 
 def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
@@ -191,9 +191,9 @@ def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """
     for trial, added in _to_be_explained(found, prepared):
         called = f"The model with {' and '.join(added)}" if added else "One model"
-        told = odd_run(trial.model, prepared.searched, prepared.held_out, prepared.rule, called)
-        if told:
-            return _with_reason(found, trial, told)
+        text = odd_run(trial.model, prepared.searched, prepared.held_out, prepared.rule, called)
+        if text:
+            return _with_reason(found, trial, text)
     return found
 
 
@@ -210,9 +210,9 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     for trial, added in _to_be_explained(found, prepared):
         clocks = clock_faults(trial, prepared.problem, prepared.held_out) if added else None
         if clocks is not None:
-            told = " ".join(fault.text for fault in clocks.faults)
-            seen = f"Told from {force_in(prepared.problem)}."
-            return _with_reason(found, trial, f"With {' and '.join(added)}: {told} {seen}")
+            text = " ".join(fault.text for fault in clocks.faults)
+            where = f"Told from {force_in(prepared.problem)}."
+            return _with_reason(found, trial, f"With {' and '.join(added)}: {text} {where}")
     return found
 
 
@@ -231,7 +231,7 @@ def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Tri
     return [(one, [name for name in one.effects if name not in own]) for one in trials.values()]
 
 
-def _with_reason(found: SiteDiagnosis, trial: Trial, told: str) -> SiteDiagnosis:
+def _with_reason(found: SiteDiagnosis, trial: Trial, text: str) -> SiteDiagnosis:
     """Return a finding with what is wrong in a run, which is to be set right first.
 
     Where the trial has the effects of the finding, they stand: what remains is no other form.
@@ -239,8 +239,8 @@ def _with_reason(found: SiteDiagnosis, trial: Trial, told: str) -> SiteDiagnosis
     assert found.after is not None
     if trial.effects == found.after.effects and found.effects:
         kept = (one for one in found.reasons if one != OTHER_FORM)
-        return replace(found, reasons=(*kept, told))
-    return replace(found, kind="insufficient", effects=(), reasons=(told,))
+        return replace(found, reasons=(*kept, text))
+    return replace(found, kind="insufficient", effects=(), reasons=(text,))
 
 
 def kind_of(kind: str, before: Trial, best: Trial, rule: DecisionRule = BENCH) -> str:

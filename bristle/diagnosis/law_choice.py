@@ -174,10 +174,10 @@ def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
 
 def search(
     rows: Sequence[LawTrial],
-    look: Callable[[LawTrial, bool], LawAndEffects],
+    lacking: Callable[[LawTrial, bool], LawAndEffects],
     rule: DecisionRule = BENCH,
 ) -> list[LawAndEffects]:
-    """Return the pairs that decide; `look` searches the effects that a law lacks.
+    """Return the pairs that decide; `lacking` searches the effects that a law lacks.
 
     Where noise is all that the best law leaves, the simplest that it does not surpass comes first:
     if that lacks nothing and contains no effect, no other is searched. Then come the simpler ones
@@ -189,12 +189,12 @@ def search(
     Parameters
     ----------
     rows : the laws tried
-    look : called with a row, and whether to try two effects; returns what its law lacks
+    lacking : called with a row, and whether to try two effects; returns what its law lacks
     rule : the numbers that decide
     """
     first, begun = simplest(rows, rule), list[LawAndEffects]()
     if first.trial.z <= rule.complete:
-        begun.append(look(first, True))
+        begun.append(lacking(first, True))
         if begun[0].finding.kind == "none" and not first.contains:
             return begun
     searched = {pair.row.law for pair in begun}
@@ -202,12 +202,12 @@ def search(
     for pairs in (False, True):
         found = list(begun)
         for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
-            if _worth_a_look(row, found, rule):
-                found.append(look(row, pairs))
+            if _could_be_simpler(row, found, rule):
+                found.append(lacking(row, pairs))
         if not pairs and not _explained(found, rule):
             # One law's missing effect may be what another law has: it then fits better alone.
             passed = _best_passed_over(rows, found)
-            found += [look(row, pairs) for row in passed]
+            found += [lacking(row, pairs) for row in passed]
             others += passed
         if _explained(found, rule):
             break
@@ -226,7 +226,7 @@ def _best_passed_over(rows: Sequence[LawTrial], found: Sequence[LawAndEffects]) 
     return sorted(left, key=lambda row: row.trial.z)[:1]
 
 
-def _worth_a_look(row: LawTrial, found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
+def _could_be_simpler(row: LawTrial, found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
     """Return whether a law, with an effect, could be simpler than what explains the runs."""
     known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
     return not known or min(known) > _least_with_effect(row)

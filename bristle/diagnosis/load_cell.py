@@ -105,8 +105,8 @@ def _search_cell(
     own, other = problem(value, train), problem(value, holdout)
     base = fit_line(own, law)
     after = judge(base.model, own, other)
-    seen = detectable(other, other.expectation(base.model), SITE)
-    finding = SiteDiagnosis("force", "none", (), 0.0, after.z, 0.0, seen, "", base.model)
+    least = detectable(other, other.expectation(base.model), SITE)
+    finding = SiteDiagnosis("force", "none", (), 0.0, after.z, 0.0, least, "", base.model)
     delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
     return after.z, delay, gain, finding
 

@@ -201,20 +201,20 @@ def with_samples(runs: Sequence[Measurement]) -> list[Measurement]:
 
 def too_few(role: str, runs: Sequence[Measurement]) -> str:
     """Return the sentence that no run of a role has samples enough: where, why, what to do."""
-    told, ways = [], dict[str, None]()
+    texts, ways = [], dict[str, None]()
     for run in runs:
         worst = min(run.channels, key=lambda name: np.count_nonzero(run.valid(name)))
         here = [worst] if np.count_nonzero(run.valid(worst)) < SHORTEST else list(run.channels)
         counts = {why: int(flags.sum()) for why, flags in run.left_out(*here).items()}
         left = np.count_nonzero(run.valid(*here))
         why = ", ".join(f"{count:,} {why}" for why, count in counts.items())
-        told.append(
+        texts.append(
             f"{run.name}: of {', '.join(here)} {left:,} of {len(run.time):,} samples can be used "
             f"({why})"
         )
         ways |= dict.fromkeys(WAYS_OUT[why] for why in counts)
-    more = [f"and {len(told) - TOLD} more runs"] if len(told) > TOLD else []
-    where = "; ".join([*told[:TOLD], *more])
+    more = [f"and {len(texts) - TOLD} more runs"] if len(texts) > TOLD else []
+    where = "; ".join([*texts[:TOLD], *more])
     return (
         f"No run {role} has the {SHORTEST} samples that a fit needs. {where}. To change it: "
         f"{'; '.join(ways)}."

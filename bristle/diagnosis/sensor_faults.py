@@ -229,11 +229,11 @@ def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> Finding:
             either="displacement",
         )
     channel = "velocity" if power < 0.0 else "displacement"
-    seen = "speed up" if power < 0.0 else "resist"
+    verb = "speed up" if power < 0.0 else "resist"
     return Finding(
         "sign",
         "warning",
-        f"{begin}the force seems to {seen} the velocity, so {channel} is reversed.",
+        f"{begin}the force seems to {verb} the velocity, so {channel} is reversed.",
         channel=channel,
         value=-1.0,
         std=0.0,

@@ -105,12 +105,12 @@ def effect_text(
     values : by parameter the value, its standard deviation if one is known, and the unit
     drive : what commands the damper
     """
-    told = []
+    parts = []
     for key, (value, std, unit) in values.items():
         text, half = with_interval(value, std)
         spread = "" if half == "-" else f" {half}"
-        told.append(f"{key} = {text}{spread}" + ("" if unit == "1" else f" {unit}"))
-    sizes = f" {', '.join(told)} (95 %)." if told else ""
+        parts.append(f"{key} = {text}{spread}" + ("" if unit == "1" else f" {unit}"))
+    sizes = f" {', '.join(parts)} (95 %)." if parts else ""
     return about(name, drive) + sizes
 
 
@@ -172,9 +172,9 @@ def _tables(verdict: Verdict) -> list[Block]:
         blocks.append(Table(LIMITS, limits, (2, 3), title, note=note))
     if hidden := untestable(verdict):
         drive, rows = drive_of(verdict), []
-        for told, name in zip(hidden, map(str, verdict["untestable"]), strict=True):
+        for effect, name in zip(hidden, map(str, verdict["untestable"]), strict=True):
             expect = text_for(EFFECTS[name].expect, drive) if name in EFFECTS else ""
-            rows.append([told, about(name, drive), expect])
+            rows.append([effect, about(name, drive), expect])
         header = ("effect", "what it does", "what it would look like")
         note = "They may be present: these runs do not excite them, or the model hides them."
         blocks.append(Table(header, rows, title="Not testable with these runs", note=note))

@@ -237,7 +237,7 @@ def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
     return [f"The remaining error may depend on {name}, but that may be chance."]
 
 
-def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
+def fault_texts(verdict: Verdict, already: str = "") -> list[str]:
     """Return the sentences of sensors' faults; runs with the same fault are told in one text.
 
     The last one says where the verdict is on data with the faults set right.
@@ -245,14 +245,14 @@ def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
     Parameters
     ----------
     verdict : the content of verdict.json
-    told : what is said already; faults whose sentence is in it are left out
+    already : what is said already; faults whose sentence is in it are left out
     """
     alike: dict[tuple[str, ...], list[Mapping[str, Any]]] = defaultdict(list)
     faults = verdict.get("sensors") or []
-    for k, fault in enumerate(one for one in faults if _words(one) not in told):
+    for k, fault in enumerate(one for one in faults if _words(one) not in already):
         alone = () if fault.get("run") else (str(k),)
         alike[fault["channel"], fault["fault"], *alone].append(fault)
-    texts = [_told(*faults) for faults in alike.values()]
+    texts = [_fault_text(*faults) for faults in alike.values()]
     if any(map(_is_set_right, faults)):
         texts.append("The verdict and its numbers are for the runs with that corrected.")
     return texts
@@ -265,15 +265,15 @@ def _is_set_right(fault: Mapping[str, Any]) -> bool:
     return not effect and kind not in ("clipping", "unrelated")
 
 
-def _told(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
+def _fault_text(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
     """Return the sentence of a fault, and in which other runs it is."""
     same = joined([f"{fault['run']} ({_size(fault)})" for fault in others])
     return f"{_words(first)} The same in {same}." if others else _words(first)
 
 
 def _words(fault: Mapping[str, Any]) -> str:
-    told = str(fault.get("words") or "")
-    return told or f"Sensor: {fault['fault']} of {fault['channel']}, {_size(fault)}."
+    text = str(fault.get("words") or "")
+    return text or f"Sensor: {fault['fault']} of {fault['channel']}, {_size(fault)}."
 
 
 FAULTS = ("channel", "fault", "value", "run")
@@ -375,8 +375,8 @@ def separating(verdict: Verdict) -> str:
     """Return the experiment that would distinguish alternatives, "" where none is named."""
     found = verdict.get("separate_by")
     if isinstance(found, Mapping):
-        told = found.get("words") or found.get("text")
-        return str(told or ", ".join(f"{key}: {value}" for key, value in found.items()))
+        text = found.get("words") or found.get("text")
+        return str(text or ", ".join(f"{key}: {value}" for key, value in found.items()))
     return str(found or "")
 
 

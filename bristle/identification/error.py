@@ -89,8 +89,8 @@ class ForceError:
         """
         rms, share = self.headline
         size = size if size is not None else self.signal_all
-        told = f" ({percent(share)})" if isfinite(share) else ""
-        return f"{quantity(rms, unit, 4, size)}{told}"
+        relative = f" ({percent(share)})" if isfinite(share) else ""
+        return f"{quantity(rms, unit, 4, size)}{relative}"
 
     def counted(self) -> str:
         """Return how many samples are left out and why; "" where none is."""
@@ -109,22 +109,22 @@ class ForceError:
         ----------
         unit, size : as of `text`
         """
-        told = self.counted()
+        text = self.counted()
         every = "all samples" if self.valued == self.total else "all that hold a value"
-        if not told or self.share_left_out <= MENTIONED:
-            return [f"{told}."] if told else []
+        if not text or self.share_left_out <= MENTIONED:
+            return [f"{text}."] if text else []
         most = max(self.left_out, key=lambda reason: self.left_out[reason])
         size = size if size is not None else self.signal_all
         if self.over_all:
             few = f"{quantity(self.rms, unit, 4, size)} ({percent(self.share)})"
-            told += f". So the error is that over {every}; over the {self.samples:,} that are left "
-            told += f"it is {few if self.samples else 'unknown'}"
+            text += f". So the error is that over {every}; over the {self.samples:,} that are left "
+            text += f"it is {few if self.samples else 'unknown'}"
         elif self.valued > self.samples:
             over = f"{quantity(self.rms_all, unit, 4, size)} ({percent(self.share_all)})"
-            told += f". Over {every} the error is {over}"
+            text += f". Over {every} the error is {over}"
         if self.share_left_out > TOO_MANY:
-            return [f"Warning: {told}. To change it: {WAYS_OUT[most]}."]
-        return [f"{told}."]
+            return [f"Warning: {text}. To change it: {WAYS_OUT[most]}."]
+        return [f"{text}."]
 
     def as_dict(self) -> dict[str, Any]:
         """Return what JSON holds: `rms` and `share` are the error that is told."""

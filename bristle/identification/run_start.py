@@ -141,9 +141,9 @@ def under_load_text(loads: Mapping[str, float]) -> str:
     """
     if not loads:
         return ""
-    told = ", ".join(f"{name} ({quantity(load, 'N')})" for name, load in loads.items())
+    begun = ", ".join(f"{name} ({quantity(load, 'N')})" for name, load in loads.items())
     one = len(loads) == 1
     return (
-        f"{told} begin{'s' * one} at rest under load: the state of the model that carries a force "
+        f"{begun} begin{'s' * one} at rest under load: the state of the model that carries a force "
         "at rest begins where it gives the measured one."
     )

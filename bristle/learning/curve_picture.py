@@ -56,18 +56,18 @@ def draw_curve(
     with look():
         where = f" at {site_name(curve.at)}" if curve.place.is_line else ""
         heading = f"{found.name}: {curve.words()}{where}"
-        said = (
+        caption = (
             f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with it"
         )
-        said += f", {short_z(closed.trial.z)} with the formula." if closed is not None else "."
+        caption += f", {short_z(closed.trial.z)} with the formula." if closed is not None else "."
         if curve.across:
-            said += (
+            caption += (
                 " The bands are 95 % intervals. A hollow point continues those beside it: hardly a "
                 "sample is near."
             )
         elif curve.part != RING:
-            said += " The band is the 95 % interval of each value."
-        page = Page(8.0, 3.6, heading, said)
+            caption += " The band is the 95 % interval of each value."
+        page = Page(8.0, 3.6, heading, caption)
         right = 1.6 if curve.across else 0.4
         top = 0.3 if curve.across or curve.part == RING else 0.6  # a legend stands there
         grid = page.grid(1, 1, top=top, bottom=0.55, left=0.75, right=right)

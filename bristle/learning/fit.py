@@ -183,8 +183,8 @@ def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRul
         why = "does not lower the error on held-out runs beyond chance"
     elif _explained(before, best, rule) < learning.worth:
         why = "explains too little of the error on held-out runs"
-    told = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
-    return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""
+    numbers = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
+    return f"The best curve, {best.curve.words()}, {why} {numbers}." if why else ""
 
 
 def _fitted(chosen: Sequence[Promise], name: str, base: Model, prepared: Prepared) -> list[Fitted]:

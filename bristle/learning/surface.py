@@ -141,8 +141,8 @@ def _promise(
     residual, kind = known.residual, _empty(known.residual, part, pair, knots, levels)
     hats = products(hats_at(pair.x, knots), hats_at(pair.y, levels))
     column = residual.parts[part]
-    told, own = _felt(hats, residual.weight, column)
-    weak = np.flatnonzero((told < FEW) | (own < WEAK * np.mean(own)))
+    count, own = _felt(hats, residual.weight, column)
+    weak = np.flatnonzero((count < FEW) | (own < WEAK * np.mean(own)))
     if len(weak) > len(own) // 2:
         return None
     zero = [int(np.argmax(own))] if kind.of.level else []
@@ -174,11 +174,11 @@ def _felt(hats: Hats, weight: Array, column: Array) -> tuple[Array, Array]:
 
     A sample at which the part does nothing, such as a friction at rest, feels no knot.
     """
-    told, own = np.zeros(hats.knots), np.zeros(hats.knots)
+    count, own = np.zeros(hats.knots), np.zeros(hats.knots)
     for at, share in zip(hats.at.T, hats.share.T, strict=True):
-        told += np.bincount(at, share * weight * (column != 0.0), hats.knots)
+        count += np.bincount(at, share * weight * (column != 0.0), hats.knots)
         own += np.bincount(at, weight * (share * column) ** 2, hats.knots)
-    return told, own
+    return count, own
 
 
 def _resolved(known: Normal, promise: Promise, pair: _Pair) -> Promise:
