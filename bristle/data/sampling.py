@@ -294,7 +294,8 @@ def _in_order(
         k = int(back[0])
         raise RecordError(
             f"{name}, {place} {lines[k + 1]}: time goes back, from {time[k]:.9g} s to "
-            f"{time[k + 1]:.9g} s. If the file holds several runs, --split restart cuts it there."
+            f"{time[k + 1]:.9g} s. If the file holds several runs, --split restart cuts it there; "
+            "if a counter begins again there, --step S, the sampling step in s, takes its place."
         )
     double = np.flatnonzero(spacing == 0.0)
     if not len(double):

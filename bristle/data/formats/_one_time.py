@@ -17,7 +17,7 @@ from ..sampling import between, covered
 
 AnyArray: TypeAlias = NDArray[Any]
 
-_SAME = 0.02
+SAME = 0.02
 """Share of the step by which samples may be apart and are taken as simultaneous."""
 
 
@@ -76,7 +76,7 @@ def on_one_time(series: Sequence[Series], name: str) -> Joined:
     fastest = min(one.step for one in series) * (1.0 + 1e-3)
     chosen = max((one for one in series if one.step <= fastest), key=lambda one: len(one.data))
     begin, end = overlap(series)
-    slack = _SAME * chosen.step
+    slack = SAME * chosen.step
     kept = (chosen.time >= begin - slack) & (chosen.time <= end + slack)
     if int(kept.sum()) < SHORTEST:
         where = "; ".join(_where(one) for one in series[:4])
@@ -117,9 +117,9 @@ def _at(one: Series, time: Array) -> tuple[dict[str, AnyArray], bool]:
     nearer = np.abs(one.time[before] - time) < np.abs(one.time[places] - time)
     places = np.where(nearer, before, places)
     step = min(one.step, float(np.median(np.diff(time))))
-    if np.max(np.abs(one.time[places] - time)) <= _SAME * step:
+    if np.max(np.abs(one.time[places] - time)) <= SAME * step:
         return {key: array[places] for key, array in one.data.items()}, False
-    last = np.clip(np.searchsorted(one.time, time + _SAME * step, "right") - 1, 0, None)
+    last = np.clip(np.searchsorted(one.time, time + SAME * step, "right") - 1, 0, None)
     return {
         key: _interpolated(one, array, time) if array.dtype.kind in "fiub" else array[last]
         for key, array in one.data.items()
@@ -145,7 +145,7 @@ def _notes_on(one: Series, chosen: Series, interpolated: bool) -> list[str]:
     several = len(one.data) > 1
     told = []
     late = one.time[0] - chosen.time[0]
-    if abs(late) > _SAME * chosen.step:
+    if abs(late) > SAME * chosen.step:
         order = "later" if late > 0 else "earlier"
         told.append(f"begin{'s' * (not several)} {_ms(abs(late))} {order} than {others}")
     if abs(one.step - chosen.step) > 1e-3 * chosen.step:

@@ -38,6 +38,7 @@ _VALUES = ("data", "values", "value", "samples", "signal", "y")
 _UNITS = ("unit", "units")
 _TELLS_NAMES = re.compile(r"name|label|header|channel|column|title|signal", re.IGNORECASE)
 _TELLS_UNITS = re.compile(r"unit|einheit", re.IGNORECASE)
+TELLS_SCALE = re.compile(r"scal(?:e|ing)|factor|sensitivity|lsb", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,6 +354,7 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
                 f"{long[one]} is a {node.what} object of MATLAB, which is not read: save its "
                 "vectors, as in x = ts.Data"
             )
+    _note_counts(found, fields, long)
     own: dict[int, dict[str, AnyArray]] = {}
     for one, array in vectors.items():
         if _is_time_name(names[one]) and len(array) not in own and _rises(array):
@@ -375,6 +377,20 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
             _structure(found, long[one], node)
         elif isinstance(node, list) and not _texts(node):
             _list(found, long[one], node)
+
+
+def _note_counts(found: _Found, fields: Mapping[str, Node], names: Mapping[str, str]) -> None:
+    """Note whole numbers beside which a scale stands: nothing tells that they are its counts."""
+    leaves = {key: node for key, node in fields.items() if isinstance(node, Leaf)}
+    scales = [key for key in leaves if TELLS_SCALE.search(key)]
+    for key, leaf in leaves.items():
+        beside = [*filter(TELLS_SCALE.search, leaf.about), *scales]
+        whole = leaf.array.dtype.kind in "iu" and leaf.array.size > 1
+        if whole and beside and key not in scales and not _is_time_name(key):
+            found.remarks.append(
+                f"{names[key]} holds {leaf.array.dtype}, and {listed(beside)} beside it is not "
+                f"applied: expected values in a unit, such as {names[key]} * {beside[0]}"
+            )
 
 
 def _structure(found: _Found, key: str, node: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import RecordError
 from ..table import Table
 from . import library
-from ._tree import TELL_TIME, Bare, Leaf, Node, Unread, table_of
+from ._tree import TELL_TIME, TELLS_SCALE, Bare, Leaf, Node, Unread, table_of
 
 _MARK = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT")
@@ -88,11 +88,11 @@ def _node(item: Any, file: Any, h5py: Any) -> Node | None:
 
 
 def _times(item: Any) -> dict[str, float]:
-    """Return the attributes that are numbers and tell a sampling step, a rate or a start."""
+    """Return the attributes that are numbers and tell a step, a rate, a start or a scale."""
     return {
         key: float(np.ravel(value)[0])
         for key, value in item.attrs.items()
-        if key.lower() in TELL_TIME
+        if (key.lower() in TELL_TIME or TELLS_SCALE.search(key))
         and np.size(value) == 1
         and np.asarray(value).dtype.kind in "fiu"
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..channels import quantity_of_unit
 from ..table import Table, from_arrays
 from ..titles import unit_or_none
 from . import library
-from ._one_time import AnyArray, Series, by_length, on_one_time, overlap, unset_step
+from ._one_time import SAME, AnyArray, Series, by_length, on_one_time, overlap, unset_step
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
 _UNSET = np.datetime64("1904-01-02")
@@ -68,6 +69,7 @@ def read(content: bytes, name: str) -> Table:
     zero = min(_instants(groups), default=None)
     clocks = {key: _series(channels, zero) for key, channels in groups.items()}
     beside, remarks = _beside(groups, clocks, chosen)
+    remarks += [one for key in (chosen, *beside) for one in clocks[key].remarks]
     remarks += _assumed({k: one for key in (chosen, *beside) for k, one in groups[key].items()})
     return _table([chosen, *beside], groups, clocks, name, remarks)
 
@@ -87,12 +89,13 @@ Channels = dict[str, _Channel]
 
 class _Clocks(NamedTuple):
     """A group's channels by their times; `untimed` has none; `made` from waveforms; `times` are
-    channels themselves."""
+    channels themselves; `remarks` say what was taken for which."""
 
     series: list[Series]
     untimed: dict[str, AnyArray]
     made: bool
     times: list[str]
+    remarks: list[str]
 
 
 def _channels(group: Any, of_file: Mapping[str, Any]) -> Channels:
@@ -141,13 +144,15 @@ def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
     nobody set; what began later than it is later by that.
     """
     times = [key for key, one in channels.items() if _is_time(key, one.array, one.unit)]
+    remarks: list[str] = []
+    ahead = _times_of(channels, times, zero, remarks)
     found: dict[Any, Series] = {}
     untimed: dict[str, AnyArray] = {}
     made = False
     starts = [one.start for one in channels.values() if one.start is not None]
     for key, one in channels.items():
         size = len(one.array)
-        own = next((other for other in times if len(channels[other].array) == size), None)
+        own = ahead.get(key)
         if own is not None:
             late = 0.0 if key == own else _late(one, own, channels)
             clock: Any = own, late
@@ -168,7 +173,45 @@ def _series(channels: Channels, zero: np.datetime64 | None) -> _Clocks:
         else:
             untimed[key] = one.array
     series, untimed = by_length(untimed, list(found.values()))
-    return _Clocks(series, untimed, made, times)
+    return _Clocks(series, untimed, made, times, remarks)
+
+
+def _times_of(
+    channels: Channels, times: list[str], zero: np.datetime64 | None, remarks: list[str]
+) -> dict[str, str]:
+    """Return the time of each channel that has one of its length: the first one of that length.
+
+    Where each of several stands ahead of channels, and they tell different times of one record, it
+    is that of the channels behind it.
+    """
+    out: dict[str, str] = {}
+    for size in {len(channels[key].array) for key in times}:
+        own = [key for key, one in channels.items() if len(one.array) == size]
+        able = [key for key in own if key in times]
+        if _differ([_time_in(channels[key], zero) for key in able]):
+            leads = [k for k, after in pairwise([*own, able[0]]) if {k, after} & {*able} == {k}]
+            if own[0] != able[0] or leads != able:
+                remarks.append(
+                    f"{listed(able)} tell different times, and {able[0]} is taken for all "
+                    "channels: expected each of them ahead of its own channels"
+                )
+                able = able[:1]
+        else:
+            able = able[:1]
+        last = able[0]
+        for key in own:
+            last = out[key] = key if key in able else last
+    return out
+
+
+def _differ(times: list[Array | None]) -> bool:
+    """Return whether times (n,) s of one length are those of one record, and not the same."""
+    series = [Series(time, {}) for time in times if time is not None]
+    if len(series) < max(len(times), 2):
+        return False
+    (begin, end), first = overlap(series), series[0]
+    apart = max(float(np.max(np.abs(one.time - first.time))) for one in series)
+    return apart > SAME * first.step and end - begin >= _SHARED * float(np.ptp(first.time))
 
 
 def _late(one: _Channel, own: str, channels: Channels) -> float:

@@ -206,3 +206,18 @@ def test_units_that_stand_beside_vectors(tmp_path: Path, content: dict[str, Any]
     savemat(tmp_path / "run.mat", content)
     found = {one.channel: one.unit for one in guess_channels(read_table(tmp_path / "run.mat"))}
     assert found == {"time": "s", "displacement": "mm", "force": "kN"}
+
+
+@pytest.mark.parametrize("ending", ["mat", "h5"])
+def test_counts_beside_a_scale_are_told(tmp_path: Path, capsys, ending: str) -> None:
+    file, counts = tmp_path / f"run.{ending}", np.round(F / 0.05).astype(np.int16)
+    if ending == "mat":
+        savemat(file, {"t": T, "disp_mm": X, "force_N": counts, "scale": 0.05})
+    else:
+        with h5py.File(file, "w") as out:
+            out.update({"t": T, "disp_mm": X, "force_N": counts})
+            out["force_N"].attrs["scale"] = 0.05
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert f"run.{ending}: force_N holds int16, and scale beside it is not applied" in said
+    assert "expected values in a unit, such as force_N * scale" in said

@@ -262,3 +262,38 @@ def test_attributes_of_hdf5_tell_the_time_of_a_channel(tmp_path, of_force, step,
     run = measured(tmp_path / "run.h5", 5e-2 if step > 0.002 else 1e-6)
     assert run.step == pytest.approx(0.002)
     assert run.time[0] == pytest.approx(start)
+
+
+def timed(name: str, t: np.ndarray) -> ChannelObject:
+    return ChannelObject("log", name, t, properties={"unit_string": "s"})
+
+
+def test_two_times_in_a_group_count_for_the_channels_behind_each(tmp_path: Path, capsys) -> None:
+    early = 0.002 * np.arange(3000)
+    late = early + 0.3
+    x = ChannelObject("log", "displacement", path(early), properties={"unit_string": "mm"})
+    f = ChannelObject("log", "force", force(late), properties={"unit_string": "N"})
+    first, second = timed("Time1", early), timed("Time2", late)
+    run = measured(tdms(tmp_path / "run.tdms", first, x, second, f))
+    assert len(run.time) == 3000 - 150
+    # Where their order does not tell it, it is said.
+    file = tdms(tmp_path / "front.tdms", first, second, x, f)
+    assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "front.tdms: Time1, Time2 tell different times, and Time1 is taken for all" in said
+    assert "expected each of them ahead of its own channels" in said
+
+
+def test_a_counter_that_begins_again_is_refused_with_the_way_out(tmp_path: Path, capsys) -> None:
+    t = 0.004 * np.arange(2000)
+    columns = np.column_stack([(4 * np.arange(2000)) % 4096, path(t), force(t)])
+    file = tmp_path / "run.csv"
+    np.savetxt(file, columns, delimiter=",", header="time [ms],disp [mm],force [N]", comments="")
+    new = ["study", "new", str(tmp_path / "s"), "--data", str(file)]
+    assert main(new) == 2
+    said = capsys.readouterr().err
+    assert "run.csv, line 1026: time goes back, from 4.092 s to 0 s" in said
+    assert "--step S, the sampling step in s, takes its place" in said
+    assert main([*new, "--step", "0.004"]) == 0
+    (run,) = Study(tmp_path / "s").read()
+    assert run.step == pytest.approx(0.004)
