@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -90,10 +91,14 @@ class _Found:
         for name in names:
             if name not in taken:
                 return name
-        number = 2
-        while f"{names[-1]} ({number})" in taken:
-            number += 1
-        return f"{names[-1]} ({number})"
+        return next(name for k in count(2) if (name := f"{names[-1]} ({k})") not in taken)
+
+    def named(self, unit: str, *names: str) -> str:
+        """Return such a name, and keep the unit of the channel, where the text is one."""
+        name, known = self.free(*names), unit_or_none(unit)
+        if known is not None:
+            self.units[name] = known.name
+        return name
 
 
 def table_of(tree: Mapping[str, Node], name: str) -> Table:
@@ -345,8 +350,8 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     long = {one: f"{key}.{name}" if key else name for one, name in names.items()}
     vectors = {one: array for one, node in fields.items() if (array := _vector(node)) is not None}
     for one, node in fields.items():
-        if isinstance(node, Leaf) and node.array.size == 1 and node.array.dtype.kind in "fiu":
-            found.scalars[long[one]] = float(node.array.ravel()[0])
+        if (value := _scalar(node)) is not None:
+            found.scalars[long[one]] = value
         elif isinstance(node, Leaf):
             found.scalars |= {f"{long[one]}.{name}": v for name, v in node.about.items()}
         elif isinstance(node, Unread):
@@ -356,19 +361,18 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
             )
     _note_counts(found, fields, long)
     own: dict[int, dict[str, AnyArray]] = {}
+    added = []
     for one, array in vectors.items():
+        called = found.named(_unit_beside(fields, one), paths[one], long[one])
         if _is_time_name(names[one]) and len(array) not in own and _rises(array):
             own[len(array)] = {}
-            found.clocks.append((found.free(paths[one], long[one]), array, own[len(array)]))
-            _note_unit(found, found.clocks[-1][0], _unit_beside(fields, one))
-            continue
-        called = found.free(paths[one], long[one])
-        found.loose[called] = array
-        _note_unit(found, called, _unit_beside(fields, one))
-    for array_name in [name for name in found.loose if name in {*paths.values(), *long.values()}]:
-        size = len(found.loose[array_name])
-        if size in own and any(found.loose[array_name] is one for one in vectors.values()):
-            own[size][array_name] = found.loose.pop(array_name)
+            found.clocks.append((called, array, own[len(array)]))
+        else:
+            found.loose[called] = array
+            added.append(called)
+    for name in added:
+        if (beside := own.get(len(found.loose[name]))) is not None:
+            beside[name] = found.loose.pop(name)
     timed = bool(own) or any(_short(one) in (*_STEPS, *_RATES) for one in found.scalars)
     for one, node in fields.items():
         if isinstance(node, Leaf) and one not in vectors and node.array.size > 1:
@@ -438,14 +442,10 @@ def _add_simulink(found: _Found, key: str, node: dict[str, Any], signals: Any) -
             called = text if text not in data else f"{place}.{text}"
             data[found.free(called, f"{place}.{text}")] = column
     time = _vector(_get(node, ("time",)))
-    if time is None or not _rises(time):
-        found.loose |= data
-        return True
-    called = found.free(f"{key}.time")
-    alike = {name: one for name, one in data.items() if len(one) == len(time)}
-    found.clocks.append((called, time, alike))
-    found.units[called] = "s"
-    found.loose |= {name: one for name, one in data.items() if name not in alike}
+    if time is not None and _rises(time):
+        alike = {name: data.pop(name) for name, one in [*data.items()] if len(one) == len(time)}
+        found.clocks.append((found.named("s", f"{key}.time"), time, alike))
+    found.loose |= data
     return True
 
 
@@ -472,8 +472,8 @@ def _add_dspace(found: _Found, key: str, node: Mapping[str, Any]) -> None:
     clocks: list[dict[str, AnyArray] | None] = []
     for number, x in enumerate(xs, 1):
         text, array, unit = _name_and_data(x)  # type: ignore[misc]  # see _named_all
-        called = found.free(f"{key}.X.{text}" if len(xs) == 1 else f"{key}.X({number}).{text}")
-        _note_unit(found, called, unit or "s")
+        place = f"{key}.X.{text}" if len(xs) == 1 else f"{key}.X({number}).{text}"
+        called = found.named(unit or "s", place)
         clocks.append({} if _rises(array) else None)
         if (own := clocks[-1]) is not None:
             found.clocks.append((called, array, own))
@@ -481,8 +481,8 @@ def _add_dspace(found: _Found, key: str, node: Mapping[str, Any]) -> None:
             found.loose[called] = array
     for number, y in enumerate(ys, 1):
         text, array, unit = _name_and_data(y)  # type: ignore[misc]  # see _named_all
-        called = found.free(f"{key}.Y({number}).{text}" if len(ys) > 1 else f"{key}.Y.{text}")
-        _note_unit(found, called, unit)
+        place = f"{key}.Y({number}).{text}" if len(ys) > 1 else f"{key}.Y.{text}"
+        called = found.named(unit, place)
         index = _get(y, ("xindex",))
         at = int(index.array.ravel()[0]) - 1 if isinstance(index, Leaf) and index.array.size else 0
         clock = clocks[at] if 0 <= at < len(clocks) else None
@@ -497,13 +497,13 @@ def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
     """Add one signal with its name, or with its own time."""
     named = _name_and_data(node)
     vectors = {one: array for one, v in node.items() if (array := _vector(v)) is not None}
-    for one, leaf in node.items():
-        if isinstance(leaf, Leaf) and leaf.array.size == 1 and leaf.array.dtype.kind in "fiu":
-            found.scalars[f"{key}.{one}"] = float(leaf.array.ravel()[0])
+    found.scalars |= {
+        f"{key}.{one}": v for one, leaf in node.items() if (v := _scalar(leaf)) is not None
+    }
     timed = next((one for one in vectors if _is_time_name(one)), None)
     if named is not None:
         text, array, unit = named
-        called = found.free(f"{key}.{text}")
+        names = [f"{key}.{text}"]
     else:
         value = next((one for one in vectors if one != timed), None)
         if value is None:
@@ -511,8 +511,8 @@ def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
             return
         array, unit = vectors[value], _unit_of(node) or node[value].unit
         short = value if isinstance(node, Bare) else f"{key}.{value}"
-        called = found.free(key if value.lower() in _VALUES else short, f"{key}.{value}")
-    _note_unit(found, called, unit)
+        names = [key if value.lower() in _VALUES else short, f"{key}.{value}"]
+    called = found.named(unit, *names)
     time = vectors.get(timed or "")
     if time is not None and len(time) == len(array):
         there = np.isfinite(time)
@@ -555,9 +555,8 @@ def _matrix(
         while name in called:
             name = f"{name} ({k + 1})"
         called.append(name)
-        _note_unit(found, name, units[k] if units else "")
-        if not units:
-            _note_unit(found, name, node.unit)
+        if (unit := unit_or_none(units[k] if units else node.unit)) is not None:
+            found.units[name] = unit.name
     data = dict(zip(called, columns, strict=True))
     by_name = next((name for name in called if _is_time_name(name) and _rises(data[name])), None)
     time = by_name or (called[0] if first_rises else None)
@@ -599,6 +598,13 @@ def _columns(array: AnyArray) -> Iterator[AnyArray]:
         yield array
     else:
         yield from array.T if array.shape[0] >= array.shape[1] else array
+
+
+def _scalar(node: object) -> float | None:
+    """Return the number of a node that is a single one, None where it is none."""
+    if not isinstance(node, Leaf) or node.array.dtype.kind not in "fiu" or node.array.size != 1:
+        return None
+    return float(node.array.ravel()[0])
 
 
 def _vector(node: object) -> AnyArray | None:
@@ -665,10 +671,3 @@ def _unit_of(node: Mapping[str, Any]) -> str:
     info = _get(node, ("datainfo",))
     texts = (_get(one, _UNITS) for one in (node, info) if isinstance(one, dict))
     return next((text for text in texts if isinstance(text, str)), "")
-
-
-def _note_unit(found: _Found, key: str, text: str) -> None:
-    """Keep the unit of a channel, where the text is one."""
-    unit = unit_or_none(text)
-    if unit is not None:
-        found.units[key] = unit.name

@@ -37,10 +37,7 @@ _MERGED = re.compile(rb'<mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
 _CELL = re.compile(rb"<c [^>]*[^>/]>.*?</c>", re.DOTALL)
 _ANY_FORMULA = re.compile(rb"<f[ >/]")
 _VALUE = re.compile(rb"<v(?: [^>/]*)?>[^<]")
-_LETTERS = re.compile(rb'r="([A-Z]+)\d+"')
-_STYLE = re.compile(rb'\bs="(\d+)"')
-_PERCENT = {9, 10}  # numbers of the formats 0% and 0.00% in every workbook
-_OWN_FORMATS = 164  # number of the first format that a workbook defines itself
+_QUOTED = re.compile(r'"[^"]*"|\\.')  # what a number's format writes as it stands
 _PLACE = re.compile(rb'r="([A-Z]+\d+)"')
 
 
@@ -68,12 +65,16 @@ def read(content: bytes, name: str) -> Table:
     """
     openpyxl = library("openpyxl", name, "an Excel workbook")
     try:
-        _refuse_large(content, name)
-        macros = _has_macros(content)
-        book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
-        sheets = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
-        texts = [(sheet, _text(sheet)) for sheet in sheets]
-        parts, shares = _parts(content, book), _percent_styles(book)
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            _refuse_large(archive, name)
+            macros = any(one.endswith("vbaProject.bin") for one in archive.namelist())
+            book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+            # The library's fast way tells less than the XML of a sheet.
+            read = [
+                _Sheet(one.title, archive.read(one._worksheet_path.lstrip("/")), _text(one),
+                       f'{name}, sheet "{one.title}"')
+                for one in book.worksheets if one.sheet_state == "visible"
+            ]  # fmt: skip
     # A damaged file surfaces as any of these from the library's own parsing.
     except (
         zipfile.BadZipFile, ElementTree.ParseError, ValueError, KeyError, TypeError, OSError,
@@ -81,15 +82,14 @@ def read(content: bytes, name: str) -> Table:
     ) as error:  # fmt: skip
         raise RecordError(f"{name}: no Excel workbook, or damaged ({error}).") from None
     notes = ["the workbook holds macros, which are not run"] if macros else []
-    read = [
-        _Sheet(one.title, parts.get(one.title, b""), text, f'{name}, sheet "{one.title}"')
-        for one, text in texts
-    ]
     sheet, table, others = _chosen(read, name)
     _refuse_without_values(sheet.part, sheet.where)
     lines = ["", *delimited.lines_of(sheet.text)]
-    _refuse_merged(sheet.part, table, lines[1 : int(table.lines[0])], sheet.where)
-    table = _in_percent(table, _percent_columns(sheet.part, int(table.lines[0]), shares))
+    first = int(table.lines[0])
+    _refuse_merged(sheet.part, table, lines[1:first], sheet.where)
+    cells = next(book[sheet.title].iter_rows(min_row=first, max_row=first))
+    forms = [_QUOTED.sub("", cell.number_format or "") for cell in cells]
+    table = _in_percent(table, {k for k, form in enumerate(forms) if "%" in form})
     hidden = [one.title for one in book.worksheets if one.sheet_state != "visible"]
     others += [f'"{title}" (hidden)' for title in hidden]
     return _with_notes(table, sheet.part, notes, others, sheet.title)
@@ -170,60 +170,13 @@ def _with_notes(table: Table, part: bytes, notes: list[str], others: list[str], 
     )
 
 
-def _refuse_large(content: bytes, name: str) -> None:
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        size = sum(one.file_size for one in archive.infolist())
+def _refuse_large(archive: zipfile.ZipFile, name: str) -> None:
+    size = sum(one.file_size for one in archive.infolist())
     if size > LARGEST:
         raise RecordError(
             f"{name}: {size / 1024**2:.0f} MB unpacked are more than the limit of "
             f"{LARGEST // 1024**2} MB. Save the sheet as CSV, or cut it."
         )
-
-
-def _has_macros(content: bytes) -> bool:
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        return any(one.endswith("vbaProject.bin") for one in archive.namelist())
-
-
-def _parts(content: bytes, book: Any) -> dict[str, bytes]:
-    """Return the XML of the sheets by their titles: the library's fast way tells less."""
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        return {
-            sheet.title: archive.read(sheet._worksheet_path.lstrip("/"))
-            for sheet in book.worksheets
-        }
-
-
-def _percent_styles(book: Any) -> set[int]:
-    """Return the styles of cells that show their value in per cent: 0.5 as 50 %."""
-    own = {
-        _OWN_FORMATS + k
-        for k, form in enumerate(book._number_formats)
-        if "%" in re.sub(r'"[^"]*"|\\.', "", form)
-    }
-    return {k for k, style in enumerate(book._cell_styles) if style.numFmtId in _PERCENT | own}
-
-
-def _percent_columns(part: bytes, first: int, styles: set[int]) -> set[int]:
-    """Return the columns, from 0, whose cell in the first row of numbers is shown in per cent."""
-    if not styles:
-        return set()
-    row = re.search(rb'<row [^>]*r="%d".*?</row>' % first, part, re.DOTALL)
-    cells = re.findall(rb"<c ([^>]*)>", row.group()) if row else []
-    found = set()
-    for cell in cells:
-        place, style = _LETTERS.search(cell), _STYLE.search(cell)
-        if place and style and int(style.group(1)) in styles:
-            found.add(_column_index(place.group(1).decode()))
-    return found
-
-
-def _column_index(letters: str) -> int:
-    """Return the index from 0 of a column by its letters: A, B, ..., Z, AA."""
-    number = 0
-    for letter in letters:
-        number = 26 * number + ord(letter) - ord("A") + 1
-    return number - 1
 
 
 def _in_percent(table: Table, shown: set[int]) -> Table:

@@ -8,6 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.text import listed
 from ...units import parse
 from ..channels import DRIVE
 from ..columns import Column
@@ -38,16 +39,10 @@ def bench_guesses(search: Search, candidates: list[Candidate]) -> dict[str, Cand
 
 def _best(fitting: list[Candidate]) -> Candidate:
     best = max(fitting, key=lambda one: one.rank)
-    rivals = [one.column.text for one in fitting if one.rank == best.rank and one is not best]
+    rivals = [f'"{c.column.text}"' for c in fitting if c.rank == best.rank and c is not best]
     if rivals:
-        best = replace(best, doubt=joined(f"so could be {_listed(rivals)}", best.doubt))
+        best = replace(best, doubt=joined(f"so could be {listed(rivals, _SHOWN)}", best.doubt))
     return best
-
-
-def _listed(texts: list[str]) -> str:
-    """Return titles in quotation marks, the first few of many."""
-    shown = ", ".join(f'"{text}"' for text in texts[:_SHOWN])
-    return shown if len(texts) <= _SHOWN else f"{shown} and {len(texts) - _SHOWN} more"
 
 
 def _best_force(search: Search, forces: list[Candidate], chosen: dict[str, Candidate]) -> Candidate:
@@ -67,16 +62,16 @@ def _best_force(search: Search, forces: list[Candidate], chosen: dict[str, Candi
         best = by_power
     by_power = max(forces, key=lambda one: abs(share[one.column.text]))
     rest = [one for one in forces if one is not best]
-    others = ", ".join(
-        f'"{one.column.text}" {abs(share[one.column.text]):.2f}' for one in rest[:_SHOWN]
-    ) + (f" and {len(rest) - _SHOWN} more" if len(rest) > _SHOWN else "")
+    others = listed(
+        [f'"{one.column.text}" {abs(share[one.column.text]):.2f}' for one in rest], _SHOWN
+    )
     own = abs(share[best.column.text])
     reason = f"{best.reason}; its share of dissipated power is {own:.2f}"
-    alike = [one.column.text for one in rest if one.rank == best.rank
+    alike = [f'"{one.column.text}"' for one in rest if one.rank == best.rank
              and abs(abs(share[one.column.text]) - own) < _ALIKE]  # fmt: skip
     doubt = ""
     if alike:
-        doubt = f"so could be {_listed(alike)}; --channel force=COLUMN says which"
+        doubt = f"so could be {listed(alike, _SHOWN)}; --channel force=COLUMN says which"
     if by_power is not best and abs(share[by_power.column.text]) > 0.1:
         doubt = f'"{by_power.column.text}" dissipates more'
     return replace(best, reason=f"{reason} ({others})", doubt=doubt)
