@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ..errors import PhysicsError, UnitError
+from ..errors import PhysicsError
 from ..physics.motion_file import number, shortened
 from ..units import Unit
 from ..units import parse as parse_unit
@@ -174,9 +174,7 @@ def _unit(titles: list[str], name: str) -> Unit:
 
 def _read_unit(spelled: str, where: str) -> Unit:
     """Return a unit spelled as it should be, or in capitals as title lines are."""
-    for text in (spelled, spelled.lower(), spelled.capitalize()):
-        try:
-            return parse_unit(text)
-        except UnitError:
-            continue
-    raise PhysicsError(f'{where}: the unit "{spelled}" is not known. AT2 has G, or CM/S2.')
+    found = map(unit_or_none, (spelled, spelled.lower(), spelled.capitalize()))
+    if (unit := next(filter(None, found), None)) is None:
+        raise PhysicsError(f'{where}: the unit "{spelled}" is not known. AT2 has G, or CM/S2.')
+    return unit

@@ -56,11 +56,17 @@ def derivative_relation(x: Array, y: Array, step: float) -> Relation | None:
 
 def band(y: Array, step: float) -> float:
     """Return the cut-off [Hz] that keeps what moves: 99 % of a channel's power, 18 Hz at least."""
+    if np.ptp(y) == 0.0:
+        return CUT_OFF
+    return min(max(CUT_OFF, 1.5 * top_of(y, step, 0.99)), 0.4 / step)
+
+
+def top_of(y: Array, step: float, share: float) -> float:
+    """Return the frequency [Hz] below which a share of a channel's power lies."""
     total = np.cumsum(power_spectrum(y))
     if total[-1] <= 0.0:
-        return CUT_OFF
-    top = np.fft.rfftfreq(len(y), step)[int(np.searchsorted(total, 0.99 * total[-1]))]
-    return float(min(max(CUT_OFF, 1.5 * top), 0.4 / step))
+        return 0.0
+    return float(np.fft.rfftfreq(len(y), step)[int(np.searchsorted(total, share * total[-1]))])
 
 
 def power_spectrum(y: Array) -> Array:

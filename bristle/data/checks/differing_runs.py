@@ -49,6 +49,9 @@ _LIKE = 0.35  # share of a gain's logarithm within which a channel's noise was s
 _MOTION_GAIN = 0.03  # least share by which the gain between two channels of motion must be off
 
 
+_CORRECT = f"Give the run a correction, or {LEFT_OUT}."
+
+
 def check_differing_runs(runs: Sequence[Measurement]) -> Iterator[Finding]:
     """Yield a finding for each run whose gain, zero or sign differs from those of the others.
 
@@ -92,17 +95,11 @@ def _motion(runs: Sequence[Measurement]) -> Iterator[Finding]:
         elif abs(size) > max(_MOTION_GAIN, PARTS * scatter, PARTS * error):
             yield _of_motion(run, ratio, runs)
         if abs(zero) > max(ZERO, SCATTER * _scatter(apart)):
-            yield Finding(
-                "run zero",
-                "warning",
+            text = (
                 f"velocity shows {plain(float(zero) * rms)} m/s more than in the other runs: its "
-                "mean is not the way that the displacement went.",
-                f"Give the run a correction, or {LEFT_OUT}.",
-                run.name,
-                "velocity",
-                abs(float(zero)),
-                (Correction("velocity", "bias", float(zero) * rms),),
+                "mean is not the way that the displacement went."
             )
+            yield _of_zero(run, "velocity", text, float(zero), rms)
 
 
 def _velocity_zero(run: Measurement) -> float:
@@ -113,19 +110,15 @@ def _velocity_zero(run: Measurement) -> float:
 
 def _turned(run: Measurement) -> Finding:
     """Return the finding that displacement and velocity of a run have opposite signs."""
-    turned = "velocity"
-    if run.has("force") and float(np.mean(run["force"] * run["velocity"])) > 0.0:
-        turned = "displacement"
+    resists = run.has("force") and float(np.mean(run["force"] * run["velocity"])) > 0.0
+    return _of_sign(run, "displacement" if resists else "velocity")
+
+
+def _of_sign(run: Measurement, channel: str) -> Finding:
     return Finding(
-        "run sign",
-        "error",
-        f"{turned} has the opposite sign of that in the other runs.",
-        f"Give the run a correction, or {LEFT_OUT}.",
-        run.name,
-        turned,
-        1.0,
-        (Correction(turned, "sign", -1.0),),
-    )
+        "run sign", "error", f"{channel} has the opposite sign of that in the other runs.",
+        _CORRECT, run.name, channel, 1.0, (Correction(channel, "sign", -1.0),),
+    )  # fmt: skip
 
 
 def _of_motion(run: Measurement, ratio: float, runs: Sequence[Measurement]) -> Finding:
@@ -145,7 +138,7 @@ def _of_motion(run: Measurement, ratio: float, runs: Sequence[Measurement]) -> F
     return Finding(
         "run gain", "warning",
         f"{text}; by its noise, {channel} shows {plain(value, 4)} times what it should.",
-        f"Give the run a correction, or {LEFT_OUT}.", run.name, channel, abs(log(ratio)),
+        _CORRECT, run.name, channel, abs(log(ratio)),
         (Correction(channel, "gain", value),),
     )  # fmt: skip
 
@@ -207,7 +200,12 @@ def _forces(runs: Sequence[Measurement]) -> Iterator[Finding]:
             ZERO, SCATTER * _scatter(zeros[sound]), PARTS * float(found.zero_error[k]) / rms
         )
         if abs(zero) > least:
-            yield _of_zero(run, zero * rms, abs(zero), rms)
+            text = (
+                f"force shows {quantity(zero * rms, 'N', 3, rms)} more than in the other runs, "
+                "whatever the motion and the command: the load cell was not set to zero, or a "
+                "preload acted."
+            )
+            yield _of_zero(run, "force", text, zero, rms)
 
 
 def _apart(found: RunForces, rms: float, sound: Sequence[int] | None = None) -> tuple[Array, Array]:
@@ -219,11 +217,7 @@ def _apart(found: RunForces, rms: float, sound: Sequence[int] | None = None) -> 
 
 def _of_gain(run: Measurement, gain: float) -> Finding:
     if gain < 0.0 and 0.8 < -gain < 1.25:
-        return Finding(
-            "run sign", "error", "force has the opposite sign of that in the other runs.",
-            f"Give the run a correction, or {LEFT_OUT}.", run.name, "force", 1.0,
-            (Correction("force", "sign", -1.0),),
-        )  # fmt: skip
+        return _of_sign(run, "force")
     turned = (Correction("force", "sign", -1.0),) if gain < 0.0 else ()
     corrections = (*turned, Correction("force", "gain", abs(gain)))
     return Finding(
@@ -235,14 +229,10 @@ def _of_gain(run: Measurement, gain: float) -> Finding:
     )  # fmt: skip
 
 
-def _of_zero(run: Measurement, zero: float, share: float, rms: float) -> Finding:
-    return Finding(
-        "run zero", "warning",
-        f"force shows {quantity(zero, 'N', 3, rms)} more than in the other runs, whatever the "
-        "motion and the command: the load cell was not set to zero, or a preload acted.",
-        f"Give the run a correction, or {LEFT_OUT}.", run.name, "force", share,
-        (Correction("force", "bias", zero),),
-    )  # fmt: skip
+def _of_zero(run: Measurement, channel: str, text: str, share: float, rms: float) -> Finding:
+    """Return the finding of a channel's zero, off by a share of its RMS in all runs."""
+    fix = Correction(channel, "bias", share * rms)
+    return Finding("run zero", "warning", text, _CORRECT, run.name, channel, abs(share), (fix,))
 
 
 def _scatter(values: Array) -> float:

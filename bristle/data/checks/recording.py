@@ -15,7 +15,7 @@ from ..channels import DRIVE
 from ..corrections import BETA, Correction, amplitude_of, drifting_amplitude, without_slow
 from ..measurement import Measurement
 from ..noise import is_switched
-from ..relation import power_spectrum
+from ..relation import power_spectrum, top_of
 
 # A channel that was interpolated to a faster rate before it was stored: it is straight in pieces.
 #
@@ -126,7 +126,7 @@ def moving_average(y: Array, step: float) -> MovingAverage | None:
     if len(y) < MIN_AVERAGED or float(np.ptp(y)) == 0.0 or is_switched(y):
         return None
     frequency, level = _points(y)  # in samples^-1
-    inside = frequency > _start_of(y)
+    inside = frequency > _START * top_of(y, 1.0, _BAND)
     if np.count_nonzero(inside) < 2 * _POINTS:
         return None
     frequency, level = frequency[inside], level[inside]
@@ -175,13 +175,6 @@ def _points(y: Array) -> tuple[Array, Array]:
     groups = np.log(power[: count * _BINS]).reshape(count, _BINS)
     at = (np.arange(count) * _BINS + 0.5 * (_BINS - 1)) / len(y)
     return at, np.quantile(groups, _QUANTILE, axis=1)
-
-
-def _start_of(y: Array) -> float:
-    """Return the frequency [1/sample] from which on a spectrum has a simple shape."""
-    power = power_spectrum(y)
-    total = np.cumsum(power)
-    return _START * float(np.searchsorted(total, _BAND * total[-1])) / len(y)
 
 
 def _scaled(frequency: Array) -> Array:
@@ -367,7 +360,7 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
     able = {name: y for name, y in channels.items() if _is_able(y)}
     spectra = {name: _spectrum(_cut_down(y, step), step) for name, y in able.items()}
     drivers = [name for name, y in able.items() if _moves(name) or _commands(name, y)]
-    top = max((_band_top(able[name], step) for name in able if _moves(name)), default=0.0)
+    top = max((top_of(able[name], step, _BAND) for name in able if _moves(name)), default=0.0)
     periods = [f for name in drivers if (f := _period(_spectrum(able[name], step)))]
     out: list[SpectralLine] = []
     for name, spectrum in spectra.items():
@@ -452,13 +445,6 @@ def _spectrum(y: Array, step: float) -> _Spectrum:
         size,
         np.asarray(np.maximum(level, least), dtype=float),
     )
-
-
-def _band_top(y: Array, step: float) -> float:
-    """Return the frequency [Hz] below which 99.5 % of the power of a motion's rate lies."""
-    power = power_spectrum(y)
-    total = np.cumsum(power)
-    return float(np.fft.rfftfreq(len(y), step)[int(np.searchsorted(total, 0.995 * total[-1]))])
 
 
 def _period(spectrum: _Spectrum) -> float:

@@ -14,6 +14,7 @@ from ...core.text import plain, quantity
 from ...physics.drive import DRIVES
 from ..measurement import Measurement
 from ..noise import is_switched
+from ..relation import top_of
 from ..tone import label_doubt, tone_of
 from .motion import velocity_of_run
 
@@ -103,13 +104,7 @@ def drive_levels(values: Array, step: float, noise: float) -> tuple[tuple[float,
 
 def power_band(velocity: Array, step: float) -> tuple[float, float]:
     """Return the frequencies [Hz] between which 90 % of the velocity's power lies."""
-    centred = (velocity - velocity.mean()) * np.hanning(len(velocity))
-    total = np.cumsum(np.abs(np.fft.rfft(centred)) ** 2)
-    if total[-1] <= 0.0:
-        return 0.0, 0.0
-    low, high = np.searchsorted(total / total[-1], (0.05, 0.95))
-    frequency = np.fft.rfftfreq(len(velocity), step)
-    return float(frequency[low]), float(frequency[high])
+    return top_of(velocity, step, 0.05), top_of(velocity, step, 0.95)
 
 
 def cycles(velocity: Array) -> float:
@@ -204,11 +199,7 @@ def _moving_drive(runs: list[Excitation], name: str, unit: str) -> Iterator[Find
 
 def _distinct(levels: list[float]) -> list[float]:
     """Return sorted levels without those within 3 % of the largest of the one before."""
-    out: list[float] = []
-    for level in levels:
-        if not out or level - out[-1] > 0.03 * max(map(abs, levels)):
-            out.append(level)
-    return out
+    return [group[0] for group in _grouped(levels, 0.03)]
 
 
 def _beyond(train: list[Excitation], holdout: list[Excitation], parts: bool) -> Iterator[Finding]:
@@ -348,7 +339,8 @@ def command_levels(runs: Sequence[Measurement]) -> list[float] | None:
         return []
     if not all(found):
         return None
-    return _merged(sorted(level for one in found for level, _ in one))
+    groups = _grouped(sorted(level for one in found for level, _ in one), _APART)
+    return [float(np.mean(group)) for group in groups]
 
 
 def tells_a_bend(runs: Sequence[Measurement]) -> bool:
@@ -357,13 +349,12 @@ def tells_a_bend(runs: Sequence[Measurement]) -> bool:
     return levels is None or len(levels) >= LEAST_LEVELS
 
 
-def _merged(levels: list[float]) -> list[float]:
-    """Return levels that differ, each the mean of those that are nearly one."""
-    apart = _APART * max(map(abs, levels))
-    groups: list[list[float]] = [[levels[0]]]
-    for level in levels[1:]:
-        if level - groups[-1][0] > apart:
-            groups.append([level])
-        else:
+def _grouped(levels: Sequence[float], apart: float) -> list[list[float]]:
+    """Return sorted levels in groups, each within a share of the largest from its first one."""
+    groups: list[list[float]] = []
+    for level in levels:
+        if groups and level - groups[-1][0] <= apart * max(map(abs, levels)):
             groups[-1].append(level)
-    return [float(np.mean(group)) for group in groups]
+        else:
+            groups.append([level])
+    return groups
