@@ -259,7 +259,7 @@ def of_a_drive(name: str) -> bool:
 
 def quantity_of_unit(unit: str | None) -> str | None:
     """Return the quantity that a unit alone tells, None if it tells none."""
-    if unit is None:
+    if not unit:
         return None
     dimension = parse(unit).dimension
     if parse(unit).name == PLAIN["duty"]:
@@ -274,7 +274,7 @@ def _quantity(words: list[str], unit: str | None) -> str | None:
     by_unit = quantity_of_unit(unit)
     found = [_BY_WORD[word] for word in words if word in _BY_WORD]
     for word in words:
-        if word in _SINGLE and (by_unit in _SINGLE[word] or unit is None):
+        if word in _SINGLE and (by_unit in _SINGLE[word] or not unit):
             found.insert(0, by_unit or _SINGLE[word][0])
     if "drift" in found or by_unit in found:
         return "drift" if "drift" in found else by_unit

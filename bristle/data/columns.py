@@ -40,6 +40,11 @@ class Column:
     written: str = ""
     doubt: str = ""
 
+    @property
+    def stated(self) -> str:
+        """The name of its unit, "" where it has none."""
+        return self.unit.name if self.unit else ""
+
     def is_a(self, dimension: tuple[int, ...], *names: str) -> bool:
         """Return whether the unit has that dimension and the name is one of those, if any."""
         if self.unit is None or self.unit.dimension != dimension:

@@ -157,9 +157,8 @@ def found_in(table: Table, used: Iterable[str], names: Iterable[str]) -> dict[st
 
 def _is_electric(column: Column) -> bool:
     """Return whether a column is in volts or amperes, or in mV/V as of a bridge."""
-    unit = column.unit.name if column.unit else ""
-    return unit.endswith("V/V") or any(
-        same_dimension(unit, PLAIN[name]) for name in ("voltage", "current")
+    return column.stated.endswith("V/V") or any(
+        same_dimension(column.stated, PLAIN[name]) for name in ("voltage", "current")
     )
 
 
@@ -183,8 +182,7 @@ def raw_signals(table: Table) -> dict[str, str]:
 
 
 def _is_command_or_time(column: Column) -> bool:
-    unit = column.unit.name if column.unit else ""
-    return any(same_dimension(unit, PLAIN[name]) for name in (*DRIVE, "time"))
+    return any(same_dimension(column.stated, PLAIN[name]) for name in (*DRIVE, "time"))
 
 
 def _is_sensed(column: Column) -> bool:

@@ -435,7 +435,7 @@ def _in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
             f"{table.not_numeric[column.text]}. Correct the file, or leave the field "
             "empty where a value is missing."
         )
-    unit = spec.unit or (column.unit.name if column.unit else "")
+    unit = spec.unit or column.stated
     if not unit:
         raise RecordError(
             f'{table.source}: column "{column.text}" ({channel}) has no unit. Say '
@@ -468,7 +468,7 @@ def _noise(
         spec = channels[channel]
         if spec.noise is not None:
             column = table.find(spec.column)
-            unit = spec.unit or (column.unit.name if column.unit else "")
+            unit = spec.unit or column.stated
             given = spec.noise * conversion(unit, channel_unit(channel))[0]
             noise[channel] = given / gain_of(corrections, channel)
             facts[channel] = None

@@ -97,10 +97,8 @@ def _values(table: Table, channel: str, channels: Mapping[str, ChannelSpec]) -> 
 
 def _seconds(table: Table, spec: ChannelSpec | None) -> float:
     """Return how many seconds one in the column of the time is."""
-    unit = spec.unit if spec is not None else ""
-    if spec is not None and not unit and (own := table.find(spec.column).unit) is not None:
-        unit = own.name
-    return conversion(unit or "s", "s")[0]
+    stated = (spec.unit or table.find(spec.column).stated) if spec is not None else ""
+    return conversion(stated or "s", "s")[0]
 
 
 def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> Indices:

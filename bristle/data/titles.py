@@ -186,7 +186,7 @@ def _fit(names: Sequence[str], units: Sequence[str]) -> int:
 def _score(names: Sequence[str]) -> int:
     """Return how much titles tell: a quantity counts, and so does a unit."""
     columns = [title(0, name) for name in names]
-    known = [meaning(one.name, one.unit.name if one.unit else None) for one in columns]
+    known = [meaning(one.name, one.stated) for one in columns]
     return sum(one is not None for one in known) + sum(one.unit is not None for one in columns)
 
 

@@ -228,13 +228,20 @@ def _header(
         for fields in [_title_fields(line, layout, wide)]
     ]
     fitting = [(k, fields) for k, fields in rows if len(fields) == wide]
-    last = rows[-1] if rows else None
-    if last and last not in fitting and len(layout.split(last[1][0])) == 1 and not fitting:
-        last = None
+    block = fitting[-1:]
+    if fitting and fitting[-1] == rows[-1]:
+        block = _last_block(fitting, above)
+    for line in reversed([] if fitting else above[-HEADER:]):
+        fields = _title_fields(line.strip().lstrip("#% "), layout, wide)
+        if not is_comment(line) or len(fields) != wide:
+            break
+        block.insert(0, (0, fields))
+    if not block:
+        notes.append("no titles: columns are called column 1, column 2, ... and have no units")
+        return titles([""] * wide)
+    at, of_units = title_rows([fields for _, fields in block])
+    k, names = block[at]
     if fitting:
-        block = _last_block(fitting, above) if fitting[-1] == last else fitting[-1:]
-        at, of_units = title_rows([fields for _, fields in block])
-        k, names = block[at]
         if sum(state_of(one, layout.comma) == "number" for one in names) > wide / 2:
             raise RecordError(
                 f'{name}, line {k + 1}: "{shortened(above[k].strip())}" is neither titles nor a '
@@ -249,20 +256,8 @@ def _header(
             for row, (line, _) in enumerate(block)
             if row not in (at, of_units) and row > min(at, at if of_units is None else of_units)
         ]
-        rest = [fields for row, (_, fields) in enumerate(block) if row != at]
-        return titles(names, None if of_units is None else block[of_units][1], rest)
-    in_comment: list[list[str]] = []
-    for line in reversed(above[-HEADER:]):
-        fields = _title_fields(line.strip().lstrip("#% "), layout, wide)
-        if not is_comment(line) or len(fields) != wide:
-            break
-        in_comment.insert(0, fields)
-    if in_comment:
-        at, of_units = title_rows(in_comment)
-        rest = [fields for row, fields in enumerate(in_comment) if row != at]
-        return titles(in_comment[at], None if of_units is None else in_comment[of_units], rest)
-    notes.append("no titles: columns are called column 1, column 2, ... and have no units")
-    return titles([""] * wide)
+    rest = [fields for row, (_, fields) in enumerate(block) if row != at]
+    return titles(names, None if of_units is None else block[of_units][1], rest)
 
 
 def _last_block(rows: list[tuple[int, list[str]]], above: list[str]) -> list[tuple[int, list[str]]]:

@@ -142,9 +142,8 @@ def _worth(table: Table) -> tuple[bool, int, bool]:
     whether it has more than a few rows."""
     found = set()
     for column in table.columns:
-        unit = column.unit.name if column.unit else None
-        meant = meaning(column.name, unit)
-        found.add(meant.quantity if meant is not None else quantity_of_unit(unit))
+        meant = meaning(column.name, column.stated)
+        found.add(meant.quantity if meant is not None else quantity_of_unit(column.stated))
     return table.rows >= SHORTEST, len(found & _OF_A_RUN), table.rows >= ROWS
 
 

@@ -123,7 +123,7 @@ def device_guesses(table: Table, devices: list[str]) -> list[Guess]:
         name = column.name.rpartition(".")[2].lower()
         of_device = device_channel(name)
         if of_device and of_device[0] in devices and name not in found:
-            unit = column.unit.name if column.unit else ""
+            unit = column.stated
             found[name] = Guess(name, column.text, unit, 1, "its name")
     return list(found.values())
 
@@ -159,9 +159,9 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
             continue
         spacing = np.diff(good)
         rising = float(np.mean(spacing > 0.0)) > 0.98
-        unit = column.unit.name if column.unit else ""
-        timed = quantity_of_unit(unit) == "time" if unit else False
-        meant = meaning(column.name, unit or None)
+        unit = column.stated
+        timed = quantity_of_unit(unit) == "time"
+        meant = meaning(column.name, unit)
         named = meant is not None and meant.quantity == "time"
         if not (named or (timed and rising) or (rising and column.index == 0 and not unit)):
             continue

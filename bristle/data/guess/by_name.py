@@ -63,14 +63,14 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
         return None
     if not finite.any():
         return None
-    unit = column.unit.name if column.unit else ""
+    unit = column.stated
     exact = column.name.rpartition(".")[2].lower()
     if is_channel(exact) and exact != "time":
         fits = unit and quantity_of_unit(unit) == quantity_of_unit(channel_unit(exact))
         if fits or not unit:
             return Candidate(column, exact, unit, 5, "its name")
-    meant = meaning(column.name, unit or None)
-    by_unit = quantity_of_unit(unit) if unit else None
+    meant = meaning(column.name, unit)
+    by_unit = quantity_of_unit(unit)
     if meant is None:
         if by_unit in (None, "time", "duty"):  # a share in per cent can be one of anything
             return None
