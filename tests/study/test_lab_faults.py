@@ -126,7 +126,7 @@ def test_the_finding_says_where_the_line_is_from():
     assert (found.kind, found.channel, found.run) == ("lines", "force", "run_1")
     assert "a line at 50 Hz of 3." in found.text
     assert "the mains of 50 Hz" in found.text
-    assert found.corrections[0][:2] == ("force", "line")
+    assert found.fixes[0][:2] == ("force", "line")
 
 
 # -- moving averages
@@ -178,7 +178,7 @@ def test_a_run_that_was_scaled_or_turned_is_named(channel, fault, value):
 
     (found,) = differing(change)
     assert (found.run, found.channel) == ("run_2", channel)
-    (correction,) = found.corrections
+    (correction,) = found.fixes
     assert correction[:2] == (channel, fault)
     assert correction.value == pytest.approx(value, rel=0.03)
 
@@ -190,7 +190,7 @@ def test_a_run_with_another_zero_is_named(channel, size):
 
     (found,) = differing(change)
     assert (found.run, found.channel, found.kind) == ("run_2", channel, "run zero")
-    assert found.corrections[0].value == pytest.approx(size, rel=0.1)
+    assert found.fixes[0].value == pytest.approx(size, rel=0.1)
 
 
 def test_runs_of_one_rig_do_not_differ_and_three_are_too_few():
