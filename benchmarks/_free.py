@@ -21,12 +21,13 @@ from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import judge
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem, has_offset, zero_of
+from bristle.identification.problem import Problem, has_offset, zero_of
 from bristle.identification.rig import DAMPER, Site
 from bristle.identification.rig_fit import fit_site
 from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
 from bristle.learning.fit import learn
+from bristle.model.model import Model
 from bristle.physics.laws import DEFAULT
 from bristle.study.auto import MOST_EFFECTS, gaining
 from bristle.study.identify import FitTask

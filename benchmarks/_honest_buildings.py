@@ -23,7 +23,7 @@ import numpy as np
 
 from bristle.data.measurement import Measurement
 from bristle.diagnosis import diagnose_rig
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
 from tests.independent.effects import LIBRARY, forms
 from tests.independent.rigs import LAWS, draw_rig

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bristle.data.measurement import read_measurements
-from bristle.identification.problem import Model, Problem, steady, without
+from bristle.identification.problem import Problem, steady, without
 from bristle.identification.rig import DAMPER, ROLES, Site, bench_rig
 from bristle.identification.rig_fit import fit_site
 from bristle.identification.start_grid import Search
 from bristle.identification.starts import start_models
+from bristle.model.model import Model
 from bristle.physics.laws import base_and_variant, law_names
 
 from . import _measured

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from collections import Counter
 
-from bristle.identification.problem import Model
 from bristle.identification.rig import DAMPER, bench_rig
 from bristle.identification.rig_fit import fit_site
+from bristle.model.model import Model
 
 from ._answers import Answer, Answers, ask
 from ._blind import cases, score

@@ -20,7 +20,8 @@ from bristle.diagnosis.trials import Trial
 from bristle.identification.building_fit import equilibrium, identify_structure
 from bristle.identification.error_table import error_table
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
+from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
 
 Array = NDArray[np.float64]

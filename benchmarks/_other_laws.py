@@ -14,8 +14,9 @@ import numpy as np
 from bristle.data.measurement import Measurement
 from bristle.diagnosis.trials import joinable
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.identification.start_grid import Search, initial_guesses
+from bristle.model.model import Model
 from bristle.physics.effect import effects_of
 
 from .laws import recorded, truth_of

@@ -31,7 +31,8 @@ from bristle.core.text import plain
 from bristle.data.measurement import measurements_of_frame
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 from bristle.physics import damper
 from bristle.physics.law import Law, Shape, forget_law
 from bristle.physics.parameter import Parameter

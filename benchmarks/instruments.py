@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from bristle.diagnosis import diagnose, diagnose_rig
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.physics.building import Building
 from bristle.physics.effect import EFFECTS
 from tests.independent.rigs import LAWS

@@ -45,8 +45,8 @@ from bristle.diagnosis.load_cell import low_pass_text
 from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.site import diagnose_damper
-from bristle.identification.problem import Model
 from bristle.identification.rig import DAMPER
+from bristle.model.model import Model
 from tests.independent.generate import Case
 from tests.independent.rigs import Rig
 from tests.independent.specimen import Specimen

@@ -23,7 +23,7 @@ from time import perf_counter
 from bristle.diagnosis.joint_search import diagnose_laws
 from bristle.diagnosis.law_choice import LawAndEffects
 from bristle.diagnosis.sensor_faults import instruments_of
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.physics.forms import split_form
 
 from ._answers import Answer, Answers, ask

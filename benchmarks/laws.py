@@ -26,7 +26,8 @@ from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
+from bristle.model.model import Model
 from bristle.physics.laws import LAWS, laws_of
 
 from ._rows import Row

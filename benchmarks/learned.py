@@ -30,12 +30,12 @@ import numpy as np
 from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.rig_runs import BenchRuns, BuildingRuns
 from bristle.diagnosis.trials import Trial
-from bristle.identification.problem import Model
 from bristle.identification.rig import DAMPER
 from bristle.learning.closed_forms import close, closed_forms, name_of
 from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
 from bristle.learning.fit import LearnedCurve, learn
+from bristle.model.model import Model
 from bristle.user_code.load import defined
 
 from ._answers import Answer, Answers, ask

@@ -26,9 +26,10 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.trials import joinable, judge
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.rig import DAMPER
 from bristle.identification.start_grid import refine
+from bristle.model.model import Model
 
 from ._answers import Answer, Answers, ask
 from ._blind import cases

@@ -33,8 +33,8 @@ from bristle.diagnosis.trials import joinable
 from bristle.examples.make import Choice
 from bristle.examples.perform import perform_plan
 from bristle.identification.fit import intervals_of
-from bristle.identification.problem import Model
 from bristle.identification.rig import DAMPER
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.planning.folder import PlannedRun
 from bristle.study.learn import learn_effect

@@ -25,7 +25,6 @@ from bristle.model.model_file import read_model
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
 from bristle.study.history import Step
-from bristle.study.identify import as_model
 from bristle.study.steps import comparer
 from bristle.study.study import Study
 from bristle.view.style import BLUE, FLOOR, GREEN, GREY, INK, VERMILION, Page, look
@@ -72,7 +71,7 @@ def draw(folder: Path, target: Path) -> Path:
 
 def _prediction(study: Study, against: Any, number: int) -> RunPrediction:
     """Return the drawn run with what the model of a step predicts."""
-    model = as_model(read_model(study.history.model_file(number), study.folder))
+    model = read_model(study.history.model_file(number), study.folder)
     return next(one for one in against.predictions(model) if one.name == RUN)
 
 

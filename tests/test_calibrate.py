@@ -29,7 +29,7 @@ from bristle.diagnosis.rule import (
     DecisionRule,
 )
 from bristle.diagnosis.trials import Trial
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 
 N = 5000
 NOISE = np.random.default_rng(5).standard_normal(N) ** 2

@@ -10,7 +10,8 @@ import pytest
 
 from benchmarks import _floor, _free, _reach, boucwen
 from benchmarks._measured import Row
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 
 DT = 0.01
 

@@ -9,7 +9,7 @@ import pytest
 
 import bristle
 from bristle.core.text import shown
-from bristle.model.model import StudyModel, Value
+from bristle.model.model import Fact, Model
 
 RESULTS = (
     "Comparison", "DesignResult", "Diagnosis", "Ensemble", "Identified", "Measurement", "Plan",
@@ -18,7 +18,7 @@ RESULTS = (
 OTHERS = (
     ("controller_comparison.result", "ControllerComparison"), ("optimal_control.limit", "Limit"),
     ("learning.result", "LearnedEffect"), ("study.data_check", "DataCheck"),
-    ("model.model", "StudyModel"),
+    ("model.model", "Model"),
 )  # fmt: skip
 
 
@@ -36,10 +36,10 @@ def test_so_have_results_that_are_not_imported_by_name(module, name):
 
 
 def test_a_model_is_shown_with_its_parameters_and_units():
-    value = Value(value=1.25, unit="N", low=0.0, high=9.0, free=True, std=None, origin="assumed")
-    model = StudyModel("bingham", {"f_c": value}, {"gas_spring": {"k": value}})
+    facts = {"f_c": Fact(1.25, "N", 0.0, 9.0), "gas_spring.k": Fact(2.5, "N/m", 0.0, 9.0)}
+    model = Model("bingham", ("gas_spring",)).with_facts(facts)
     assert repr(model) == (
-        "<StudyModel: bingham + gas_spring>\n  f_c = 1.25 N\n  gas_spring.k = 1.25 N"
+        "<Model: bingham + gas_spring>\n  f_c = 1.25 N\n  gas_spring.k = 2.5 N/m"
     )
 
 

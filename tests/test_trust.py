@@ -211,7 +211,7 @@ def test_the_report_shows_the_effects_values_and_says_why_nothing_is_compared(
     assert "seal.f_s" in page
     assert "has not run here before" in page
     assert not marker.exists()
-    assert Study(mailed).model(to_show=True).values()["seal.f_s"] == 0.3
+    assert Study(mailed).model(to_show=True).values["seal.f_s"] == 0.3
 
 
 @pytest.mark.parametrize("line", ["check", "run"])

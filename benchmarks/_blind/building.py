@@ -15,9 +15,9 @@ from bristle.diagnosis.site import try_effect
 from bristle.identification.building_sites import StructurePair
 from bristle.identification.building_sites import structure_problems as problems
 from bristle.identification.fit import fit_from_starts
-from bristle.identification.problem import Model
 from bristle.identification.rig_fit import fit_line
 from bristle.identification.start_grid import refine
+from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import law_of_part

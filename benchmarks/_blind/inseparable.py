@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from bristle.diagnosis.trials import short_search
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.start_grid import SearchContext, ranked_guesses, refine
+from bristle.model.model import Model
 
 from . import cases, separate, subject
 from .cases import Recorded

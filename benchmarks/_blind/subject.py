@@ -12,8 +12,9 @@ from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.diagnosis import Diagnosis, diagnose
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.identification.search import z_scale
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 

@@ -28,8 +28,8 @@ from bristle.diagnosis.sensor_faults import instruments_of
 from bristle.diagnosis.site import Trials, diagnose_line, is_organised, prepare_line
 from bristle.diagnosis.trials import BLOCK, Trial, parts_of
 from bristle.identification.building_sites import structure_problems
-from bristle.identification.problem import Model
 from bristle.identification.rig import DAMPER
+from bristle.model.model import Model
 
 from .varied import variants
 

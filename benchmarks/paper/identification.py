@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.identification.error_table import CUTOFF, LawError, error_table, low_pass
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 from bristle.view.style import BLUE, GREY, INK, RECONSTRUCTED, VERMILION, Page, label, zero_lines
 
 from .runs import Drawing, Runs

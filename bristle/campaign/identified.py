@@ -21,7 +21,7 @@ from ..core.files import read_json
 from ..core.text import command, unknown
 from ..errors import EnsembleError
 from ..model.draws import OpenEffect, has_covariance, joint_errors, left_open
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..model.model_file import read_model
 from ..physics.effect import EFFECTS, plain_name
 from ..system.scenario import Scenario
@@ -199,7 +199,7 @@ def read_identified(
     )  # fmt: skip
 
 
-def _model_of(table: Mapping[str, Any], beside: Path) -> tuple[Path, StudyModel]:
+def _model_of(table: Mapping[str, Any], beside: Path) -> tuple[Path, Model]:
     """Return the folder of the study that a table names, and its model."""
     if not table["model"]:
         words = 'model is missing: expected the folder of a study, as in model = "my_rig".'
@@ -209,20 +209,21 @@ def _model_of(table: Mapping[str, Any], beside: Path) -> tuple[Path, StudyModel]
     return folder, read_model(folder / "model.toml" if path.is_dir() else path)
 
 
-def _fixed(model: StudyModel, places: Places) -> dict[str, Value]:
+def _fixed(model: Model, places: Places) -> dict[str, Value]:
     """Return all values of a model, and the switches of its effects, by a scenario's names.
 
     Not what follows a channel of the runs: the damper has it as an input.
     """
-    values = model.values()
-    found: dict[str, Value] = {places.of(name): values[name] for name in model.parameters}
-    for effect, own in model.effects.items():
-        given = [f"{effect}.{n}" for n in own if n not in EFFECTS[effect].channels]
-        found |= places.of_effect(effect, {name: values[name] for name in given})
+    values = model.values
+    found: dict[str, Value] = {places.of(name): values[name] for name in values if "." not in name}
+    for effect in model.effects:
+        channels = {f"{effect}.{name}" for name in EFFECTS[effect].channels}
+        own = {n: v for n, v in values.items() if n.startswith(f"{effect}.") and n not in channels}
+        found |= places.of_effect(effect, own)
     return found
 
 
-def _refuse_others(fixed: Mapping[str, Value], base: Scenario, model: StudyModel) -> None:
+def _refuse_others(fixed: Mapping[str, Value], base: Scenario, model: Model) -> None:
     """Refuse a scenario whose components lack the model's parameters."""
     there = {one.name: one for one in base.components}
     for full in fixed:
@@ -236,7 +237,7 @@ def _refuse_others(fixed: Mapping[str, Value], base: Scenario, model: StudyModel
             )
 
 
-def _left(folder: Path, model: StudyModel) -> tuple[list[OpenEffect], list[str]]:
+def _left(folder: Path, model: Model) -> tuple[list[OpenEffect], list[str]]:
     """Return what the verdict beside a model does not exclude."""
     path = folder / "verdict.json"
     return left_open(read_json(path) if path.is_file() else None, model, folder)

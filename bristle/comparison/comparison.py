@@ -8,9 +8,10 @@ from dataclasses import replace
 from ..core.arrays import Array
 from ..errors import RecordError
 from ..identification.fit import Fit
-from ..identification.problem import Model, Problem
+from ..identification.problem import Problem
 from ..identification.rig import DAMPER, Rig
 from ..identification.rig_fit import SiteModel, SiteModels, site_models
+from ..model.model import Model
 from ..physics.drive import DRIVES
 from .conditions import label_errors, regimes
 from .misfit import (

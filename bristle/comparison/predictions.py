@@ -17,7 +17,8 @@ from ..data.decimate import between
 from ..data.left_out import MISSING, SETTLING
 from ..identification.building_sites import StructureRun
 from ..identification.error import ForceError, error_of, errors_by_run
-from ..identification.problem import LOST, Model, Problem, Run, over_noise
+from ..identification.problem import LOST, Problem, Run, over_noise
+from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE
 
 # The coordinates along which a residual may be organised, and the bins of each.

@@ -22,7 +22,7 @@ from ..errors import DesignError, ScenarioError, not_usable
 from ..fmu import catalogue
 from ..fmu.controller import MEASURED
 from ..fmu.description import Description, read_description
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..model.model_file import read_model
 from ..physics.building import PAPER, Building, Device, Ports, frequencies, paper_building
 from ..physics.drive import DRIVES, VOLTAGE, Drive
@@ -407,7 +407,7 @@ def _from_model(choice: Choice, path: Path, folder: Folder) -> Damper:
     )  # fmt: skip
 
 
-def _model_notes(model: StudyModel, name: str) -> Iterable[str]:
+def _model_notes(model: Model, name: str) -> Iterable[str]:
     if model.drive != VOLTAGE.name:
         unit = DRIVES[model.drive].unit
         yield (

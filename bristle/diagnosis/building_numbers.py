@@ -17,10 +17,10 @@ import numpy as np
 from ..core.arrays import Array
 from ..identification.building_motion import Response
 from ..identification.building_sites import StructurePair, StructureProblem, damper_run, problems_of
-from ..identification.problem import Model
 from ..identification.rig_fit import fit_line, line_columns
 from ..identification.search import HUBER
 from ..identification.start_grid import Search
+from ..model.model import Model
 from ..physics.building import Building
 from ..physics.laws import LAWS, law_of_part
 from .rule import BENCH, SITE, DecisionRule

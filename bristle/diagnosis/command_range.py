@@ -16,9 +16,10 @@ from ..core.arrays import Array
 from ..core.finding import Finding
 from ..core.text import plain, quantity
 from ..data.corrections import LIMITS, limited
-from ..identification.problem import Expected, Model, Problem, Run, residuals
+from ..identification.problem import Expected, Problem, Run, residuals
 from ..identification.search import HUBER, descend, loss, mean_loss
 from ..identification.start_grid import Search, refine
+from ..model.model import Model
 from ..physics.drive import DRIVES
 from .model_faults import ModelBasedFaults, explains, has_rival, promise
 from .rule import LIMITED, DecisionRule

@@ -10,9 +10,10 @@ from ..comparison.predictions import run_predictions
 from ..data.channels import Labels, varying
 from ..data.measurement import Measurement
 from ..identification.fit import intervals_of, multistart_refit
-from ..identification.problem import Model, Run
+from ..identification.problem import Run
 from ..identification.rig import DAMPER
 from ..identification.start_grid import is_rough
+from ..model.model import Model
 from ..physics.building import Building
 from ..physics.effect import exclude
 from ..physics.laws import DEFAULT
@@ -160,7 +161,7 @@ def diagnose(
     effects : the effects that the model has already
     values : its parameters where they were identified before, by name in SI; else they are
         identified here
-    fixed, limits : parameters that stay as they are, and a user's bounds; see `identify.Model`
+    fixed, limits : parameters that stay as they are, and a user's bounds; see `model.Model`
     progress : called with a sentence at each stage
 
     Raises

@@ -15,9 +15,10 @@ import numpy as np
 from ..comparison.predictions import rms
 from ..core.arrays import Array
 from ..core.progress import Count
-from ..identification.problem import Expected, Model, Problem, absorbed, residuals, steady
+from ..identification.problem import Expected, Problem, absorbed, residuals, steady
 from ..identification.search import in_threads, loss
 from ..identification.start_grid import Search, initial_guesses, refine
+from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of
 from .effect_size import (
     ONE_SIDED,

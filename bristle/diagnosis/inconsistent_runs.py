@@ -13,9 +13,10 @@ from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identification.building_sites import StructureProblem
 from ..identification.fit import fit, fit_from_starts
-from ..identification.problem import Model, Problem, Run, in_noises, residuals, robust_z
+from ..identification.problem import Problem, Run, in_noises, residuals, robust_z
 from ..identification.rig import DAMPER
 from ..identification.search import z_scale
+from ..model.model import Model
 from .clocks import clock_faults
 from .decision import OTHER_FORM, force_in
 from .prepared import Prepared

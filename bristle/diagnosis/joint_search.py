@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..identification.problem import Model, Problem
+from ..identification.problem import Problem
 from ..identification.rig import DAMPER
+from ..model.model import Model
 from ..physics.building import Building
 from .conclusion import conclude, insufficient
 from .diagnosis import diagnose_lines, settled, with_evidence

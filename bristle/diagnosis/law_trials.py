@@ -12,11 +12,12 @@ from scipy.stats import t as student
 from ..core.progress import Count
 from ..core.text import short_z
 from ..identification.error import ForceError, force_error
-from ..identification.problem import Model, Problem, steady, without
+from ..identification.problem import Problem, steady, without
 from ..identification.search import in_threads, z_scale
 from ..identification.start_grid import Search, refine
 from ..identification.starts import start_models
 from ..identification.watch import LAW, series
+from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
 from ..physics.laws import base_and_variant, law_names

@@ -16,9 +16,10 @@ from ..core.arrays import Array
 from ..core.finding import Finding
 from ..core.text import quantity
 from ..data.left_out import MISSING, merged
-from ..identification.problem import Model, Problem, Run, residuals, steady
+from ..identification.problem import Problem, Run, residuals, steady
 from ..identification.search import HUBER_AT_ONE, in_threads, losses, mean_loss
 from ..identification.start_grid import SearchContext, ranked_guesses, refine
+from ..model.model import Model
 from ..physics.effect import EFFECTS, Effect, effects_of
 from .rule import DRIVE, DecisionRule
 from .trials import Trial, joinable, judge, short_search

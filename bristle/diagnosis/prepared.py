@@ -17,8 +17,9 @@ from ..data.left_out import WAYS_OUT
 from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..identification.prepare import SHORTEST
-from ..identification.problem import Model, Problem, Run
+from ..identification.problem import Problem, Run
 from ..identification.rig import Seeds
+from ..model.model import Model
 from ..physics.effect import effects_of
 from .decision import TOLD, in_runs
 from .effect_size import SizeSearch

@@ -20,10 +20,11 @@ from ..data.measurement import Measurement
 from ..identification.building_motion import responses
 from ..identification.building_sites import ANY_LAW, StructurePair, StructureProblem, problems_of
 from ..identification.fit import fit_from_starts
-from ..identification.problem import Model, Problem
+from ..identification.problem import Problem
 from ..identification.rig import DAMPER, at_site, bench_rig, corrected_for_delay, linear_storeys
 from ..identification.rig_fit import fit_damper
 from ..identification.start_grid import refine
+from ..model.model import Model
 from ..physics.building import GROUND, Building, with_damper
 from .building_numbers import (
     Shaken,
@@ -297,7 +298,7 @@ class BuildingRuns:
         self._velocities = moves_measured([*right[0], *right[1]], building)
         say("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)
-        found, self._present = corrected_for_delay(found, present)
+        found, self._present = corrected_for_delay(found, replace(present, law=present.base_law))
         self._train, self._holdout = found[: len(right[0])], found[len(right[0]) :]
         self._straight = linear_storeys(self._present.effects)
         shaken = Shaken(self._train, self._holdout, self._present.law, self._straight)
@@ -521,7 +522,8 @@ class BenchRuns:
         identified: bool = False,
         say: Progress = silent,
     ) -> None:
-        self._present, self._identified, self._say = present, identified, say
+        self._present = replace(present, law=present.base_law)
+        self._identified, self._say = identified, say
         recorded = [*train, *holdout]
         self.bends = tells_a_bend(train)
         self._driven = any(run.has(name) for run in recorded for name in DRIVE)

@@ -16,11 +16,12 @@ from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit
-from ..identification.problem import Model, Problem, Run, has_offset, zero_of
+from ..identification.problem import Problem, Run, has_offset, zero_of
 from ..identification.rig import acts_at
 from ..identification.rig_fit import fit_damper, fit_line, joined
 from ..identification.search import in_threads
 from ..identification.start_grid import refine
+from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
 from .decision import (

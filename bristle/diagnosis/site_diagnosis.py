@@ -10,8 +10,8 @@ import numpy as np
 
 from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
-from ..identification.problem import Model
 from ..identification.rig import DAMPER
+from ..model.model import Model
 from .decision import Decision
 from .effect_limits import EffectLimit
 from .experiments import Experiment

@@ -10,15 +10,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.progress import Count
 from ..identification.error import ForceError, errors_by_run, force_error, pooled
-from ..identification.problem import (
-    EXPLAINS,
-    Expected,
-    Model,
-    Problem,
-    excess_of,
-    in_noises,
-    residuals,
-)
+from ..identification.problem import EXPLAINS, Expected, Problem, excess_of, in_noises, residuals
 from ..identification.search import in_threads, loss, losses, mean_loss, z_of, z_scale
 from ..identification.start_grid import (
     Candidate,
@@ -28,6 +20,7 @@ from ..identification.start_grid import (
     ranked_guesses,
     refine,
 )
+from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of, exclude
 from .rule import BENCH
 

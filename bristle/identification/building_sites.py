@@ -22,6 +22,7 @@ from ..core.arrays import Array, Flags, Indices
 from ..data.left_out import occurring
 from ..data.measurement import Measurement
 from ..errors import RecordError
+from ..model.model import Model
 from ..physics.building import GROUND, Building
 from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS, effects_of
@@ -30,7 +31,7 @@ from ..physics.tuples import Inputs
 from .building_motion import Response, responses, shear
 from .equilibrium import reconstructed
 from .histories import StructureForces
-from .problem import Model, Problem, Run, absorbed, of_one_site
+from .problem import Problem, Run, absorbed, of_one_site
 
 SLIDING = 3.0
 """Where dry friction may act, slower samples than so many standard deviations are left out: the

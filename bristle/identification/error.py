@@ -19,7 +19,8 @@ from ..core.arrays import Array, Flags
 from ..core.text import percent, quantity
 from ..data.left_out import LOADED, NO_VALUE, SETTLING, WAYS_OUT, any_of
 from ..errors import RecordError
-from .problem import Model, Problem, Run, has_offset, zero_of
+from ..model.model import Model
+from .problem import Problem, Run, has_offset, zero_of
 
 MENTIONED = 0.02
 """Share of samples left out above which the error over all samples is told as well."""

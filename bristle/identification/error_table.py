@@ -19,9 +19,10 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.progress import Count
 from ..errors import RecordError
+from ..model.model import Model
 from ..physics.laws import base_and_variant, law_names
 from .error import ForceError, force_error
-from .problem import Model, Problem, Run, steady, without
+from .problem import Problem, Run, steady, without
 from .search import descend, in_threads
 from .start_grid import Search
 from .starts import start_models

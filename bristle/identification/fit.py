@@ -15,18 +15,10 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.progress import Count, tell
+from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
-from .problem import (
-    BLOCK,
-    Expected,
-    Model,
-    Problem,
-    drawn_noise,
-    parameter,
-    steady,
-    without,
-)
+from .problem import BLOCK, Expected, Problem, drawn_noise, steady, without
 from .search import HUBER_AT_ONE, in_threads, loss, mean_loss
 from .start_grid import Search
 from .starts import start_models

@@ -17,10 +17,10 @@ from ..data.extra_channels import Extra
 from ..data.left_out import any_of
 from ..data.measurement import Measurement
 from ..errors import RecordError
+from ..model.model import Model, parameter
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
-from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
-from ..physics.laws import LAWS, Law
-from ..physics.parameter import CHOICES, Parameter
+from ..physics.effect import AT, EFFECTS, Effect, effects_of
+from ..physics.laws import LAWS
 from ..user_code.compiled import shown
 from .histories import DamperForces
 from .run_start import carrying_state, start_under_load
@@ -214,8 +214,8 @@ def tracks_of(effects: Iterable[str], extra: Mapping[str, Extra], run: str) -> d
         If the run lacks a channel, or has it in another unit.
     """
     out = {}
-    for parameter, channel in following(effects).items():
-        name, _, own = parameter.partition(".")
+    for key, channel in following(effects).items():
+        name, _, own = key.partition(".")
         if channel not in extra:
             raise RecordError(
                 f"{run}: the effect {name} follows the channel {channel}, which this run does not "
@@ -227,7 +227,7 @@ def tracks_of(effects: Iterable[str], extra: Mapping[str, Extra], run: str) -> d
                 f"{run}: {channel} is in {extra[channel].unit}, and the effect {name} follows it "
                 f"in {unit}: the unit in [extra.{channel}] of study.toml has changed."
             )
-        out[parameter] = extra[channel].values
+        out[key] = extra[channel].values
     return out
 
 
@@ -382,68 +382,6 @@ class Run:
         return self
 
 
-@dataclass(frozen=True)
-class Model:
-    """A law with effects and the values of their parameters by name, in SI.
-
-    `fixed` names parameters that a fit leaves alone; `limits` are a user's bounds by name, inside
-    of what is physical.
-    """
-
-    law: str
-    effects: tuple[str, ...] = ()
-    values: dict[str, float] = field(default_factory=dict)
-    fixed: tuple[str, ...] = ()
-    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
-
-    def free(self) -> list[str]:
-        """Return the names of the parameters that a fit moves."""
-        fixed_of_law = self.law_class.fixed()
-        names = [name for name in self.law_class.parameters if name not in fixed_of_law]
-        for effect in self.effects:
-            joined = EFFECTS[effect]
-            idle = () if self.law_class.has("bristle") else joined.bristles
-            fixed = (*CHOICES, *joined.assumed, *idle)
-            names += [f"{effect}.{name}" for name in joined.parameters if name not in fixed]
-        out = {*self.fixed, *self.law_class.idle(self.values)}
-        return [name for name in names if name not in out]
-
-    @property
-    def law_class(self) -> type[Law]:
-        """The law's class."""
-        return LAWS[self.law]
-
-    def only(self, effects: tuple[str, ...]) -> Model:
-        """Return the model with these of its effects alone, and what is given of them."""
-
-        def of(name: str) -> bool:
-            return "." not in name or name.partition(".")[0] in effects
-
-        return replace(
-            self, effects=effects, values={n: v for n, v in self.values.items() if of(n)},
-            fixed=tuple(filter(of, self.fixed)),
-            limits={n: v for n, v in self.limits.items() if of(n)},
-        )  # fmt: skip
-
-    def value(self, name: str) -> float:
-        """Return a parameter's value, its default where none is given."""
-        return float(self.values.get(name, parameter(self.law, name).value))
-
-    def bounds(self, name: str) -> tuple[float, float]:
-        """Return the bounds of a parameter [SI]: the user's, else those of what is physical."""
-        low, high = parameter(self.law, name).bounds
-        own = self.limits.get(name, (low, high))
-        return max(low, own[0]), min(high, own[1])
-
-
-def parameter(law: str, name: str) -> Parameter:
-    """Return the declaration of a law's or effect's parameter."""
-    if "." in name:
-        effect, own = name.split(".", 1)
-        return EFFECTS[effect].parameters[own]
-    return LAWS[law].parameters[name]
-
-
 class Problem:
     """Runs held against a model: predictions, and the noise that a true model would show."""
 
@@ -571,7 +509,7 @@ class Problem:
         """Return what predicts a model's force, made once."""
         key = (model.law, model.effects)
         if key not in self._benches:
-            self._benches[key] = DamperForces(model.law, list(model.effects))
+            self._benches[key] = DamperForces(model.base_law, list(model.effects))
         return self._benches[key]
 
     def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
@@ -596,7 +534,8 @@ class Problem:
             return float(np.mean(self._force(begun, part)[late]))
 
         load, stroke = float(np.mean(part.force[late])), float(np.ptp(run.x))
-        return start_under_load(carrying_state(model.law, model.effects), load, stroke, settled)
+        state = carrying_state(model.base_law, model.effects)
+        return start_under_load(state, load, stroke, settled)
 
     def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, its states beginning as the model says."""
@@ -695,13 +634,8 @@ def of_one_site(model: Model, effects: tuple[str, ...]) -> Model:
     So the functions of a site name them.
     """
     if not any(AT in name for name in model.effects):
-        return replace(model, effects=effects)
-    values = {
-        plain_name(name): value
-        for name, value in model.values.items()
-        if "." not in name or name.partition(".")[0] in effects
-    }
-    return replace(model, effects=tuple(map(plain_name, effects)), values=values)
+        return replace(model, effects=effects)  # what is given of others does no harm
+    return model.only(effects).by_plain_names()
 
 
 def without(model: Model, names: tuple[str, ...]) -> Model:

@@ -16,6 +16,7 @@ import numpy as np
 from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..errors import StudyError
+from ..model.model import Model
 from ..physics.building import Building, with_damper
 from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from ..physics.laws import law_of_part
@@ -23,7 +24,7 @@ from .building_motion import Response, responses
 from .building_sites import StructurePair, blind_at_rest, device_moves, problems_of
 from .error import refuse_empty
 from .prepare import prepare
-from .problem import Model, Problem, Run
+from .problem import Problem, Run
 from .search import in_threads
 
 # At which site of a building each effect of a model acts, and what a late load cell does to it.
@@ -39,18 +40,8 @@ def at_site(model: Model, site: str, sites: Container[str]) -> Model:
     sites : all sites that the runs show; without "layer" its effects are part of the damper's force
     """
     effects = tuple(name for name in model.effects if acts_at(name, model, site, sites))
-    law = model.law
-    if site != "damper":
-        law = law_of_part(site).name
-    own = {n: v for n, v in model.values.items() if _belongs(n, effects, site)}
-    limits = {n: v for n, v in model.limits.items() if _belongs(n, effects, site)}
-    fixed = tuple(n for n in model.fixed if _belongs(n, effects, site))
-    return Model(law, effects, own, fixed, limits)
-
-
-def _belongs(name: str, effects: tuple[str, ...], site: str) -> bool:
-    effect, dot, _ = name.partition(".")
-    return effect in effects if dot else site == "damper"
+    law = model.base_law if site == DAMPER else law_of_part(site).name
+    return replace(model.only(effects, law=site == DAMPER), law=law)
 
 
 def acts_at(name: str, model: Model, site: str, sites: Container[str]) -> bool:
@@ -260,12 +251,12 @@ def _refuse_on_bench(model: Model) -> None:
             f"{', '.join(sited)}: on a bench all is at the damper, and the plain name is right: "
             f"{', '.join(map(plain_name, sited))}."
         )
-    able = {effect.name for effect in effects_of(DAMPER, model.law)}
+    able = {effect.name for effect in effects_of(DAMPER, model.base_law)}
     unfit = [
         name for name, effect in effects.items() if DAMPER in effect.sites and name not in able
     ]
     if unfit:
-        raise StudyError(f"{', '.join(unfit)} cannot join the law {model.law}.")
+        raise StudyError(f"{', '.join(unfit)} cannot join the law {model.base_law}.")
 
 
 def bench_rig(
@@ -342,12 +333,12 @@ class _BuildingSites:
 
     def __call__(self, model: Model) -> dict[str, Site]:
         straight, late = linear_storeys(model.effects), lateness(model)
-        key = (model.law, straight, late)
+        key = (model.base_law, straight, late)
         if key not in self._made:
-            plain = self._sites(self._found, model.law, straight)
+            plain = self._sites(self._found, model.base_law, straight)
             if late and "layer" in plain:  # equilibrium needs the force of the same instant
                 corrected = corrected_for_delay(self._found, model)[0]
-                right = self._sites(corrected, model.law, straight)
+                right = self._sites(corrected, model.base_law, straight)
                 plain = {name: plain[name] if name == DAMPER else right[name] for name in plain}
             self._made[key] = plain
         return self._made[key]

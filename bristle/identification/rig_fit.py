@@ -12,6 +12,7 @@ from scipy.optimize import lsq_linear
 from ..core.arrays import Array
 from ..core.text import plain
 from ..errors import RecordError
+from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, Law
 from ..physics.tuples import Inputs
@@ -19,7 +20,7 @@ from .building_sites import StructureProblem, StructureRun, thinned
 from .error import ForceError, errors_by_run, pooled
 from .error_table import error_rms, force_rms
 from .fit import Fit, fit, fit_from_starts
-from .problem import Model, Problem, Run, excess_of, z_if_known
+from .problem import Problem, Run, excess_of, z_if_known
 from .rig import DAMPER, ROLES, Rig, Site, at_site
 from .start_grid import initial_guesses, refine
 from .watch import MODEL, series
@@ -317,10 +318,12 @@ class RigFit:
         else:
             values.update({n: v for n, v in damper.model.values.items() if n not in std})
             lost = list(dict.fromkeys([*damper.unidentified, *lost]))
+        covariance = self._covariance(list(std))
         return Fit(
-            replace(model, values=values), std, max(f.cost for f in self.fits.values()),
-            tuple(lost), starts=damper.starts if damper else 1,
-            agreed=damper.agreed if damper else 1, covariance=self._covariance(list(std)),
+            model.identified(values, std, lost, covariance), std,
+            max(f.cost for f in self.fits.values()), tuple(lost),
+            starts=damper.starts if damper else 1, agreed=damper.agreed if damper else 1,
+            covariance=covariance,
         )  # fmt: skip
 
     def _telling(self, name: str) -> list[Fit]:

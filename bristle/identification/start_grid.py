@@ -10,9 +10,10 @@ from threading import Lock
 import numpy as np
 
 from ..core.arrays import Array
+from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS, Sizes
 from ..physics.laws import LAWS
-from .problem import Expected, Model, Problem, parameter, residuals
+from .problem import Expected, Problem, residuals
 from .search import HUBER, Descent, descend, jacobian, loss, mean_loss
 from .watch import watched
 

@@ -15,8 +15,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ..core.arrays import Array
+from ..model.model import Model
 from ..physics.law import Shape
-from .problem import Model, Problem
+from .problem import Problem
 
 _NEAR_REST = 3.0  # errors of the velocity within which a sign law tells nothing
 _AT_LEAST = 1e-3  # of the typical size: what a start gives a parameter that came out as zero

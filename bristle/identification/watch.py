@@ -19,10 +19,11 @@ import numpy as np
 from ..core.arrays import Array, Flags
 from ..core.progress import Watcher, watcher
 from ..data.cycles import by_level, cycles
+from ..model.model import Model, parameter
 from ..physics.drive import DRIVES
 from .building_sites import StructureRun
 from .error import force_error
-from .problem import Expected, Model, Problem, Run, in_noises, parameter
+from .problem import Expected, Problem, Run, in_noises
 from .search import Accepted, z_of, z_scale
 
 MODEL, LAW = "model", "law"

@@ -11,9 +11,10 @@ from ..diagnosis.prepared import Prepared
 from ..diagnosis.rule import DecisionRule
 from ..diagnosis.trials import Trial, judge
 from ..identification.fit import intervals_of
-from ..identification.problem import Model, Problem, robust_z
+from ..identification.problem import Problem, robust_z
 from ..identification.search import in_threads
 from ..identification.start_grid import refine
+from ..model.model import Model
 from ..user_code.load import defined
 from .curve import Curve
 from .effect_file import effect_text

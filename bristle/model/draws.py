@@ -21,8 +21,7 @@ from ..core.text import command
 from ..errors import StudyError
 from ..physics.effect import EFFECTS, exclude
 from ..physics.forms import joined_form
-from ..units import convert
-from .model import StudyModel
+from .model import Model
 
 POINT = 1.96
 """Standard deviations of a normal size at its limit: 95 % are smaller, whatever their sign."""
@@ -94,7 +93,7 @@ class OpenEffect:
             return self.limit * part
         return self.limit / abs(part) if part else most
 
-    def joined(self, model: StudyModel, part: float) -> StudyModel:
+    def joined(self, model: Model, part: float) -> Model:
         """Return a model with the effect at a size over its limit, its own parameters moved.
 
         Parameters
@@ -102,14 +101,12 @@ class OpenEffect:
         model : whose parameters may be draws
         part : the size over the limit
         """
-        flat, values = model.flat(), model.values()
         out = model.with_effect(self.name)
         new = {f"{self.name}.{name}": value for name, value in self.own(part).items()}
         for name, by in self.moved.items():
-            if name in flat and flat[name].free:
-                unit, own = model.declared(name).unit, flat[name]
-                low, high = (convert(end, own.unit, unit) for end in (own.low, own.high))
-                new[name] = min(max(values[name] + by * part, low), high)
+            if name in model.values and name not in model.fixed:
+                low, high = model.bounds(name)
+                new[name] = min(max(model.value(name) + by * part, low), high)
         return out.with_values(new, origin="assumed")
 
 
@@ -159,7 +156,7 @@ class LeftOpen(NamedTuple):
         return said
 
 
-def open_effects(verdict: Mapping[str, Any], model: StudyModel) -> LeftOpen:
+def open_effects(verdict: Mapping[str, Any], model: Model) -> LeftOpen:
     """Return the effects that a verdict's runs do not exclude.
 
     Parameters
@@ -193,7 +190,7 @@ def open_effects(verdict: Mapping[str, Any], model: StudyModel) -> LeftOpen:
 
 
 def left_open(
-    verdict: Mapping[str, Any] | None, model: StudyModel, folder: Path
+    verdict: Mapping[str, Any] | None, model: Model, folder: Path
 ) -> tuple[list[OpenEffect], list[str]]:
     """Return the effects that a study's verdict does not exclude, and notes on the others.
 
@@ -320,23 +317,18 @@ class JointErrors:
         return dict(zip(self.names, drawn.tolist(), strict=True))
 
 
-def joint_errors(model: StudyModel) -> JointErrors:
+def joint_errors(model: Model) -> JointErrors:
     """Return the errors of a model's identified parameters, by their joint covariance."""
     names, covariance = model.covariance()
-    flat, best = model.flat(), model.values()
-    own = [(flat[name], model.declared(name).unit) for name in names]
-    low, high = (
-        np.array([convert(getattr(value, end), value.unit, unit) for value, unit in own])
-        for end in ("low", "high")
-    )
+    low, high = np.array([model.bounds(name) for name in names]).reshape(-1, 2).T
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     # Parameters differ by many orders of magnitude: the root is taken of their correlation.
     power, shapes = np.linalg.eigh(covariance / np.outer(scale, scale))
     root = scale[:, None] * shapes * np.sqrt(np.maximum(power, 0.0))
-    return JointErrors(names, np.array([best[name] for name in names]), root, low, high)
+    return JointErrors(names, np.array([model.value(name) for name in names]), root, low, high)
 
 
-def drawn_models(model: StudyModel, count: int, generator: np.random.Generator) -> list[StudyModel]:
+def drawn_models(model: Model, count: int, generator: np.random.Generator) -> list[Model]:
     """Return the model with values drawn from the joint covariance of their errors.
 
     Parameters
@@ -350,7 +342,7 @@ def drawn_models(model: StudyModel, count: int, generator: np.random.Generator) 
     return [model.with_values(errors.values(row)) for row in normal]
 
 
-def has_covariance(model: StudyModel) -> bool:
+def has_covariance(model: Model) -> bool:
     """Return whether a model says how the errors of its identified parameters go together."""
     names = model.uncertain()
     return len(names) == 1 or (len(names) > 1 and model.correlation is not None)

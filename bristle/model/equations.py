@@ -11,7 +11,7 @@ from ..physics.drive import VOLTAGE, drive_named
 from ..physics.effect import EFFECTS, plain_name
 from ..physics.laws import LAWS, base_and_variant
 from ..units import convert
-from .model import StudyModel
+from .model import Model
 
 _COMMAND = re.compile(r"\bV(?=(_felt)?\b)")
 """The command in formulas, which are declared for a voltage; `V_felt` is what reaches the fluid."""
@@ -59,7 +59,7 @@ def formulas(docstring: str) -> list[str]:
     return [piece for piece in pieces if "=" in piece]
 
 
-def equations(model: StudyModel) -> list[Equation]:
+def equations(model: Model) -> list[Equation]:
     """Return the equations of a damper's law and of its effects, with the model's numbers.
 
     Not those of a law in another form than its own, whose formula would be another one: of a chosen
@@ -68,14 +68,14 @@ def equations(model: StudyModel) -> list[Equation]:
     if model.only_shown:
         return []
     law = LAWS[model.law] if model.law in LAWS else base_and_variant(model.law)[0]
-    values, flat = model.values(), model.flat()
+    values, facts = model.values, model.facts
     texts: dict[str, tuple[str, str]] = {}
-    for name, value in flat.items():
-        std = value.std
-        unit = model.declared(name).unit
-        if std is not None and value.unit != unit:
-            std = convert(value.value + std, value.unit, unit) - values[name]
-        texts[name] = with_interval(values[name], std)
+    for name, value in values.items():
+        fact, unit = facts[name], model.declared(name).unit
+        std = fact.std
+        if std is not None and fact.unit != unit:
+            std = convert(fact.value + std, fact.unit, unit) - value
+        texts[name] = with_interval(value, std)
     out: list[Equation] = []
     if not law.form and law.site == "damper" and not law.idle(values):
         own = {name: text for name, text in texts.items() if "." not in name}
@@ -100,7 +100,7 @@ def _without_zero(formula: str) -> str:
     return _NOTHING.sub(lambda match: match[1] or "", formula)
 
 
-def symbols(model: StudyModel, told: Sequence[Equation]) -> str:
+def symbols(model: Model, told: Sequence[Equation]) -> str:
     """Return the sentence about units; it says what the command's symbol is, but for a voltage."""
     drive = drive_named(model.drive)
     named = drive != VOLTAGE and any(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..core.arrays import Array
 from ..core.config import Document, Key, Spec
@@ -14,8 +16,8 @@ from ..core.text import shown
 from ..core.toml_lines import KeyPath
 from ..errors import TrustError, UnitError
 from ..physics.drive import DRIVES, VOLTAGE, declared_for, unit_for
-from ..physics.effect import EFFECTS, plain_name
-from ..physics.laws import DEFAULT, base_and_variant
+from ..physics.effect import AT, EFFECTS, plain_name
+from ..physics.laws import DEFAULT, Law, base_and_variant
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..units import canonical, convert
 from ..user_code.load import waiting
@@ -33,8 +35,11 @@ VALUE = Spec({
 
 
 @dataclass(frozen=True)
-class Value:
-    """A parameter: `value`, `low`, `high`, `std` in `unit`; whether a fit moves it; its origin."""
+class Fact:
+    """A parameter as a model.toml has it: its numbers in `unit`, as they were typed.
+
+    `value`, `low`, `high` and `std`; whether a fit moves it; its origin.
+    """
 
     value: float
     unit: str
@@ -55,7 +60,7 @@ def waiting_law(folder: Path, law: str) -> TrustError | None:
     return None
 
 
-def as_written(document: Document, keys: KeyPath, given: Mapping[str, Any]) -> dict[str, Value]:
+def as_written(document: Document, keys: KeyPath, given: Mapping[str, Any]) -> dict[str, Fact]:
     """Return values as the file has them, without knowing the law or effect that they belong to."""
     out = {}
     for own, entry in given.items():
@@ -70,7 +75,7 @@ def as_written(document: Document, keys: KeyPath, given: Mapping[str, Any]) -> d
         value = found["value"]
         low, high = (value if found[key] is None else found[key] for key in ("low", "high"))
         free = found["free"] is not False
-        out[own] = Value(value, unit, low, high, free, found["std"], found["origin"])
+        out[own] = Fact(value, unit, low, high, free, found["std"], found["origin"])
     return out
 
 
@@ -101,7 +106,7 @@ def table_names(law: str, effect: str = "") -> dict[str, tuple[str, ...]]:
     return {name: fields[name] for name in owner.tables}
 
 
-def defaults_of(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str, Value]:
+def defaults_of(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str, Fact]:
     """Return the parameters of an effect, or of a law, at their defaults."""
     if effect:
         fixed: tuple[str, ...] = (*CHOICES, *EFFECTS[effect].assumed)
@@ -109,102 +114,197 @@ def defaults_of(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[s
         base, variant = base_and_variant(law)
         fixed = (*base.fixed(), *variant.idle)
     return {
-        name: Value(p.value, p.unit, *p.bounds, free=name not in fixed)
+        name: Fact(p.value, p.unit, *p.bounds, free=name not in fixed)
         for name, p in declared_of(law, effect, drive).items()
     }
 
 
-@dataclass(frozen=True)
-class StudyModel:
-    """The content of a model.toml; all parameters of the law and its effects are there.
+def parameter(law: str, name: str) -> Parameter:
+    """Return the declaration of a law's or effect's parameter, for a voltage as the command."""
+    effect, _, own = name.rpartition(".")
+    if effect:
+        return EFFECTS[effect].parameters[own]
+    base, variant = base_and_variant(law)
+    declared = base.parameters[own]
+    return declared._replace(value=variant.values[own]) if own in variant.values else declared
 
-    `parameters` of the law by name; `effects` name to parameters; `building` the file of the
-    structure, relative to the study, "" on a bench; `only_shown` the effects, and the law, whose
-    code must not run yet: the model can be shown, not used; `correlation` of the identified
-    parameters' errors, None where none was stored; `drive` is the channel that commands the damper,
-    on whose unit those of parameters depend.
+
+@dataclass(frozen=True)
+class Model:
+    """A damper's law with effects, and their parameters by the names of FMUs: "gas_spring.k".
+
+    Attributes
+    ----------
+    law : str
+        As a model.toml names it, in a variant ("bingham_standard") or a form ("lugre[quadratic]").
+    effects : tuple of str
+        Their names.
+    values : dict
+        In SI; what is missing is at its default. A search replaces these alone.
+    fixed : tuple of str
+        Parameters that a fit leaves alone.
+    limits : dict
+        A user's bounds (low, high) in SI, inside of what is physical.
+    facts : dict
+        What a model.toml tells: units, standard deviations, origins, and numbers as typed. There
+        are none of a model that a search made of a law's name.
+    correlation : Correlation, optional
+        Of the identified parameters' errors, None where none was stored.
+    drive : str
+        The channel that commands the damper, on whose unit those of parameters depend.
+    building : str
+        The file of the structure, relative to the study; "" on a bench.
+    only_shown : tuple of str
+        The effects, and the law, whose code must not run yet: the model can be shown, not used.
     """
 
     law: str
-    parameters: dict[str, Value]
-    effects: dict[str, dict[str, Value]] = field(default_factory=dict)
-    building: str = ""
-    only_shown: tuple[str, ...] = ()
+    effects: tuple[str, ...] = ()
+    values: dict[str, float] = field(default_factory=dict)
+    fixed: tuple[str, ...] = ()
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    facts: dict[str, Fact] = field(default_factory=dict)
     correlation: Correlation | None = None
     drive: str = VOLTAGE.name
+    building: str = ""
+    only_shown: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         values = (
-            f"{name} = {value.value:.6g}" + (f" {value.unit}" if value.unit != "1" else "")
-            for name, value in self.flat().items()
+            f"{name} = {fact.value:.6g}" + (f" {fact.unit}" if fact.unit != "1" else "")
+            for name, fact in self.written().items()
         )
         return shown(self, " + ".join([self.law, *self.effects]), values)
 
     @property
+    def law_class(self) -> type[Law]:
+        """The law's class, that of the law itself where it is a variant."""
+        return base_and_variant(self.law)[0]
+
+    @property
     def base_law(self) -> str:
         """The law without its variant: "bingham" of "bingham_standard"."""
-        return base_and_variant(self.law)[0].name
-
-    def flat(self) -> dict[str, Value]:
-        """Return all parameters by the names of FMUs: "f_c", "gas_spring.k"."""
-        out = dict(self.parameters)
-        for effect, values in self.effects.items():
-            out.update({f"{effect}.{name}": value for name, value in values.items()})
-        return out
-
-    def values(self) -> dict[str, float]:
-        """Return all values in SI by the names of FMUs."""
-        return {
-            name: convert(value.value, value.unit, self.declared(name).unit)
-            for name, value in self.flat().items()
-        }
+        return self.law_class.name
 
     def free(self) -> list[str]:
-        """Return the names of the parameters that a fit may move."""
-        return [name for name, value in self.flat().items() if value.free]
+        """Return the names of the parameters that a fit moves."""
+        law = self.law_class
+        fixed_of_law = law.fixed()
+        names = [name for name in law.parameters if name not in fixed_of_law]
+        for effect in self.effects:
+            joined = EFFECTS[effect]
+            idle = () if law.has("bristle") else joined.bristles
+            fixed = (*CHOICES, *joined.assumed, *idle)
+            names += [f"{effect}.{name}" for name in joined.parameters if name not in fixed]
+        out = {*self.fixed, *law.idle(self.values)}
+        return [name for name in names if name not in out]
+
+    def value(self, name: str) -> float:
+        """Return a parameter's value [SI], its default where none is given."""
+        given = self.values.get(name)
+        return float(parameter(self.law, name).value if given is None else given)
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Return the bounds of a parameter [SI]: the user's, else those of what is physical."""
+        low, high = parameter(self.law, name).bounds
+        own = self.limits.get(name, (low, high))
+        return max(low, own[0]), min(high, own[1])
 
     def declared(self, name: str) -> Parameter:
-        """Return the declaration of a parameter: default, SI unit, bounds, text.
+        """Return the declaration of a parameter for the model's drive: default, unit, bounds, text.
 
         Of an effect or law that is only shown the file tells what there is.
         """
-        effect, _, own = name.rpartition(".")
-        if (effect or self.law) in self.only_shown:
-            value = self.effects[effect][own] if effect else self.parameters[own]
-            return Parameter(value.value, value.unit, (value.low, value.high), "")
-        return declared_of(self.law, effect, self.drive)[own]
+        if (name.rpartition(".")[0] or self.law) in self.only_shown:
+            fact = self.facts[name]
+            return Parameter(fact.value, fact.unit, (fact.low, fact.high), "")
+        declared = parameter(self.law, name)
+        if self.drive == VOLTAGE.name:
+            return declared
+        return declared_for(declared, DRIVES[self.drive])
+
+    # What a model.toml tells, and how a model follows from it.
+
+    def written(self) -> dict[str, Fact]:
+        """Return all parameters as a model.toml has them, numbers as typed where they still are."""
+        return {name: self._written(name) for name in self.facts or self.values}
+
+    def _written(self, name: str) -> Fact:
+        declared = self.declared(name)
+        unit = declared.unit
+        fact = self.facts.get(name) or Fact(declared.value, unit, *declared.bounds)
+
+        def typed(number: float, before: float) -> float:
+            same = convert(before, fact.unit, unit) == number
+            return before if same else convert(number, unit, fact.unit)
+
+        low, high = self.limits.get(name, declared.bounds)
+        return replace(
+            fact, value=typed(self.value(name), fact.value), low=typed(low, fact.low),
+            high=typed(high, fact.high), free=name not in self.fixed,
+        )  # fmt: skip
+
+    def with_facts(self, facts: Mapping[str, Fact]) -> Model:
+        """Return the model with parameters as a model.toml has them."""
+        made = replace(self, facts={**self.facts, **facts})
+        values, limits = dict(self.values), dict(self.limits)
+        for name, fact in facts.items():
+            unit = made.declared(name).unit
+            values[name], low, high = (
+                convert(number, fact.unit, unit) for number in (fact.value, fact.low, fact.high)
+            )
+            limits[name] = low, high
+        held = (name for name, fact in facts.items() if not fact.free)
+        fixed = (*(name for name in self.fixed if name not in facts), *held)
+        return replace(made, values=values, limits=limits, fixed=fixed)
 
     def with_values(
         self,
         values: Mapping[str, float],
         std: Mapping[str, float] | None = None,
         origin: str = "identified",
-    ) -> StudyModel:
-        """Return the model with values in SI, and their standard deviations, put in its units."""
-        std = std or {}
-        flat = self.flat()
+    ) -> Model:
+        """Return the model with values in SI, and their standard deviations, as facts."""
+        facts = {}
         for name, value in values.items():
-            unit = self.declared(name).unit
-            own = flat[name].unit
-            spread = convert(std[name], unit, own) if name in std else None
-            flat[name] = replace(
-                flat[name], value=convert(value, unit, own), std=spread, origin=origin
-            )
+            before, unit = self._written(name), self.declared(name).unit
+            spread = convert(std[name], unit, before.unit) if std and name in std else None
+            # Through the file's unit: it reads back as the same number.
+            value = convert(value, unit, before.unit)
+            facts[name] = replace(before, value=value, std=spread, origin=origin)
         # Errors of other values say nothing of these.
-        kept = (
-            self.correlation.of([n for n in flat if n not in values]) if self.correlation else None
-        )
-        return replace(
-            self,
-            parameters={name: flat[name] for name in self.parameters},
-            effects={
-                effect: {own: flat[f"{effect}.{own}"] for own in named}
-                for effect, named in self.effects.items()
-            },
-            correlation=kept,
-        )
+        others = [name for name in self.facts if name not in values]
+        correlation = self.correlation.of(others) if self.correlation else None
+        return replace(self.with_facts(facts), correlation=correlation)
 
-    def with_covariance(self, names: Sequence[str], covariance: Array) -> StudyModel:
+    def identified(
+        self, values: Mapping[str, float], std: Mapping[str, float], lost: Sequence[str],
+        covariance: Array,
+    ) -> Model:  # fmt: skip
+        """Return the model as its identification leaves it.
+
+        Parameters
+        ----------
+        values : in SI
+        std : of those that were searched [SI]
+        lost : which of them the data do not identify, and others that they say nothing of
+        covariance : (p, p) of the errors of `std`
+        """
+
+        def inside(names: Sequence[str]) -> dict[str, float]:
+            """Return values that rounding has not put outside of their bounds."""
+            given = {name: values.get(name, self.value(name)) for name in names}
+            return {n: float(np.clip(v, *self.bounds(n))) for n, v in given.items()}
+
+        told = [name for name in std if name not in lost]
+        silent = [name for name in lost if name not in self.fixed]
+        found = self.with_values(inside(told), std).with_values(inside(silent), origin="assumed")
+        index = [list(std).index(name) for name in told]
+        if not told:
+            return found
+        return found.with_covariance(told, covariance[np.ix_(index, index)])
+
+    def with_covariance(self, names: Sequence[str], covariance: Array) -> Model:
         """Return the model with how the errors of these parameters go together.
 
         Parameters
@@ -216,18 +316,54 @@ class StudyModel:
 
     def uncertain(self) -> list[str]:
         """Return the names of the parameters that have a standard deviation."""
-        return [n for n, v in self.flat().items() if v.std is not None and isfinite(v.std)]
+        return [n for n, f in self.facts.items() if f.std is not None and isfinite(f.std)]
 
     def covariance(self) -> tuple[tuple[str, ...], Array]:
         """Return the identified parameters and the covariance (p, p) of their errors in SI.
 
         Without a stored correlation errors count as independent.
         """
-        names, flat = self.uncertain(), self.flat()
-        own = [(flat[name].std or 0.0, flat[name].unit, self.declared(name).unit) for name in names]
-        return tuple(names), covariance_of(names, [convert(*one) for one in own], self.correlation)
+        names, facts = self.uncertain(), self.facts
+        std = [
+            convert(facts[name].std or 0.0, facts[name].unit, self.declared(name).unit)
+            for name in names
+        ]
+        return tuple(names), covariance_of(names, std, self.correlation)
 
-    def at(self, site: str, bench: bool) -> StudyModel:
+    # Other effects, another law, another command.
+
+    def only(self, effects: Sequence[str], law: bool = True) -> Model:
+        """Return the model with these of its effects alone, and what is given of them.
+
+        Parameters
+        ----------
+        effects : their names
+        law : whether what is given of the law's parameters stays
+        """
+
+        def kept(name: str) -> str:
+            effect = name.rpartition(".")[0]
+            return name if (effect in effects if effect else law) else ""
+
+        return replace(self._named(kept), effects=tuple(effects))
+
+    def by_plain_names(self) -> Model:
+        """Return the model of one site, whose effects have their plain names there."""
+        if not any(AT in name for name in self.effects):
+            return self
+        return replace(self._named(plain_name), effects=tuple(map(plain_name, self.effects)))
+
+    def _named(self, as_name: Callable[[str], str]) -> Model:
+        """Return the model with parameters by other names; "" leaves one out."""
+        fixed = tuple(new for name in self.fixed if (new := as_name(name)))
+        return replace(
+            self, values={new: v for name, v in self.values.items() if (new := as_name(name))},
+            fixed=fixed,
+            limits={new: v for name, v in self.limits.items() if (new := as_name(name))},
+            facts={new: v for name, v in self.facts.items() if (new := as_name(name))},
+        )  # fmt: skip
+
+    def at(self, site: str, bench: bool) -> Model:
         """Return the model with the effects of one site alone, by their plain names.
 
         Parameters
@@ -236,14 +372,19 @@ class StudyModel:
         bench : whether the model is of a damper on a bench, whose effects are all the damper's
         """
         own = [name for name in self.effects if _site_of(name, bench) == site]
-        return replace(self, effects={plain_name(name): self.effects[name] for name in own})
+        return self.only(own).by_plain_names()
 
-    def with_effect(self, effect: str) -> StudyModel:
+    def with_effect(self, effect: str) -> Model:
         """Return the model with one more effect, its parameters at their defaults."""
-        added = defaults_of("", effect, self.drive)
-        return replace(self, effects={**self.effects, effect: added})
+        added = {f"{effect}.{own}": f for own, f in defaults_of("", effect, self.drive).items()}
+        return replace(self, effects=(*self.effects, effect)).with_facts(added)
 
-    def with_drive(self, drive: str) -> StudyModel:
+    def with_law(self, law: str, effects: Sequence[str]) -> Model:
+        """Return the model with another law at its defaults, and with these of its effects."""
+        new, own = new_model(law, (), self.building, self.drive), self.only(effects, law=False)
+        return replace(new, effects=own.effects).with_facts(own.written())
+
+    def with_drive(self, drive: str) -> Model:
         """Return the model for another command: the same numbers, per ampere in place of per volt.
 
         Parameters
@@ -253,19 +394,11 @@ class StudyModel:
         if drive == self.drive:
             return self
         old = DRIVES[self.drive].unit
-
-        def in_unit(value: Value) -> Value:
-            return replace(value, unit=unit_for(value.unit, DRIVES[drive], old))
-
-        return replace(
-            self,
-            drive=drive,
-            parameters={name: in_unit(value) for name, value in self.parameters.items()},
-            effects={
-                effect: {name: in_unit(value) for name, value in values.items()}
-                for effect, values in self.effects.items()
-            },
-        )
+        facts = {
+            name: replace(fact, unit=unit_for(fact.unit, DRIVES[drive], old))
+            for name, fact in self.facts.items()
+        }
+        return replace(self, drive=drive, facts=facts)
 
 
 def _site_of(name: str, bench: bool) -> str:
@@ -278,7 +411,7 @@ def new_model(
     effects: tuple[str, ...] = (),
     building: str = "",
     drive: str = VOLTAGE.name,
-) -> StudyModel:
+) -> Model:
     """Return a model with every parameter at its default.
 
     Parameters
@@ -287,7 +420,8 @@ def new_model(
     building : file of the structure, relative to the study; "" on a bench
     drive : the channel that commands the damper
     """
-    model = StudyModel(law, defaults_of(law, "", drive), {}, building, drive=drive)
+    bare = Model(law, drive=drive, building=building)
+    model = bare.with_facts(defaults_of(law, "", drive))
     for effect in effects:
         model = model.with_effect(effect)
     return model

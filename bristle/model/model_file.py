@@ -17,7 +17,7 @@ parameters = ["sigma_a", "gas_spring.k"]
 rows = [[1.0], [-0.42, 1.0]]
 
 `command = "quadratic"`, or `command = "table"` with `command_knots = [0.0, 1.5, 3.0]` [V], beside
-the law is a form that was chosen (`physics.forms`); `StudyModel.law` names both together.
+the law is a form that was chosen (`physics.forms`); `Model.law` names both together.
 `correlation` is how the errors of identified parameters go together (`model.uncertainty`); files
 without it open as before. `model.model` is what is read, `model.model_file` writes the file.
 """
@@ -43,8 +43,8 @@ from ..units import convert
 from ..user_code.load import waiting, why_left_out
 from .model import (
     VALUE,
-    StudyModel,
-    Value,
+    Fact,
+    Model,
     as_written,
     declared_of,
     defaults_of,
@@ -98,7 +98,7 @@ _SPEC = Spec({
 })  # fmt: skip
 
 
-def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) -> StudyModel:
+def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) -> Model:
     """Return the model in a model.toml; what is missing takes the law's values, free.
 
     Parameters
@@ -135,12 +135,16 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     _exclusions(document, [name for name in effects if name not in only_shown])
     if building and not (beside / building).is_file():
         document.error(("building",), f"there is no file {beside / building}.")
-    model = StudyModel(law, parameters, effects, building, tuple(only_shown), drive=drive)
     document.check()  # else what is wrong with an effect would be said again of its correlation
+    model = Model(
+        law, tuple(effects), drive=drive, building=building, only_shown=tuple(only_shown)
+    ).with_facts(parameters)
+    for effect, own in effects.items():
+        model = model.with_facts({f"{effect}.{name}": fact for name, fact in own.items()})
     correlation = None
     if "correlation" in document.data:
         correlation = read_correlation(
-            document, found["correlation"], list(model.flat()), model.uncertain()
+            document, found["correlation"], list(model.facts), model.uncertain()
         )
     document.check()
     return replace(model, correlation=correlation)
@@ -165,7 +169,7 @@ def _unusable_law(document: Document, law: str, folder: Path, to_show: bool) -> 
 def _effects(
     document: Document, given: Mapping[str, Any], joined: tuple[str, str], beside: Path,
     to_show: bool,
-) -> tuple[dict[str, dict[str, Value]], list[str]]:  # fmt: skip
+) -> tuple[dict[str, dict[str, Fact]], list[str]]:  # fmt: skip
     """Return the values of all effects, and the names of those whose code must not run yet.
 
     Parameters
@@ -175,7 +179,7 @@ def _effects(
     beside : the folder where those of the user's own are, in effects
     to_show : whether those that must not run are there as well, else TrustError is raised
     """
-    effects: dict[str, dict[str, Value]] = {}
+    effects: dict[str, dict[str, Fact]] = {}
     only_shown = []
     for name, table in given.items():
         keys, own = ("effects", name), beside / "effects" / f"{name}.py"
@@ -211,7 +215,7 @@ def _exclusions(document: Document, effects: list[str]) -> None:
 
 def _values(
     document: Document, keys: KeyPath, given: Mapping[str, Any], owner: tuple[str, str], drive: str
-) -> dict[str, Value]:
+) -> dict[str, Fact]:
     """Return the values of an owner, (law, "") or (law, effect), that stand in a table."""
     declared, out = declared_of(*owner, drive), defaults_of(*owner, drive)
     tables = table_names(*owner)
@@ -232,9 +236,9 @@ def _values(
 
 
 def _value(
-    document: Document, keys: KeyPath, given: Any, declared: Parameter, default: Value,
+    document: Document, keys: KeyPath, given: Any, declared: Parameter, default: Fact,
     name: str = "",
-) -> Value:  # fmt: skip
+) -> Fact:  # fmt: skip
     """Return a parameter's value; `name` where its key is another."""
     name = name or str(keys[-1])
     if not isinstance(given, dict):
@@ -260,18 +264,18 @@ def _value(
         right = f"{low:g} to {high:g} {unit}"
         document.error((*keys, "value"), f"{name} = {value:g} is outside {right}.")
     free = default.free if found["free"] is None else found["free"]
-    return Value(value, unit, low, high, free, found["std"], found["origin"])
+    return Fact(value, unit, low, high, free, found["std"], found["origin"])
 
 
 # A model as the text of a model.toml, with the comments of the file that it replaces.
 
 
-def write_model(path: Path, model: StudyModel) -> None:
+def write_model(path: Path, model: Model) -> None:
     """Write a model.toml; comments of the file that it replaces stay."""
     write_whole(path, model_text(model, path))
 
 
-def model_text(model: StudyModel, beside: Path | None = None) -> str:
+def model_text(model: Model, beside: Path | None = None) -> str:
     """Return a model as TOML, on top of an older file's comments where there is one."""
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
@@ -292,16 +296,20 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
     for key in ("parameters", "effects"):
         if key not in document:
             document[key] = tomlkit.table(is_super_table=True)
-    _update(document["parameters"], _listed(model.parameters, table_names(model.law)), False)
+    facts = model.written()
+    own = {name: fact for name, fact in facts.items() if "." not in name}
+    _update(document["parameters"], _listed(own, table_names(model.law)), False)
     effects = document["effects"]
     for name in [name for name in effects if name not in model.effects]:
         del effects[name]
-    for name, values in model.effects.items():
+    for name in model.effects:
+        begin = f"{name}."
+        own = {n.removeprefix(begin): f for n, f in facts.items() if n.startswith(begin)}
         if name not in effects:
             effects[name] = tomlkit.table()
         if "parameters" not in effects[name]:
             effects[name]["parameters"] = tomlkit.inline_table()
-        _update(effects[name]["parameters"], _listed(values, table_names("", name)), True)
+        _update(effects[name]["parameters"], _listed(own, table_names("", name)), True)
     if not model.effects:
         del document["effects"]
     set_correlation(document, model.correlation, model.uncertain())
@@ -309,7 +317,7 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
 
 
 def _listed(
-    values: Mapping[str, Value], tables: Mapping[str, tuple[str, ...]]
+    values: Mapping[str, Fact], tables: Mapping[str, tuple[str, ...]]
 ) -> dict[str, dict[str, Any] | list[dict[str, Any]]]:
     """Return values as a file has them: those of a table as one list."""
     inside = {name for names in tables.values() for name in names}
@@ -351,7 +359,7 @@ def _set_or_drop(table: Any, key: str, value: Any) -> None:
         table[key] = value
 
 
-def _as_toml(value: Value) -> dict[str, Any]:
+def _as_toml(value: Fact) -> dict[str, Any]:
     found: dict[str, Any] = {"value": value.value, "unit": value.unit}
     if value.std is not None and value.std == value.std and value.std != float("inf"):
         found["std"] = value.std

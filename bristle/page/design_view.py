@@ -213,7 +213,7 @@ def _inverse(folder: Path, asked: RunRequest) -> dict[str, Any]:
     known = asked.load().component("controller").description.variables
     here = {
         f"{law}.{name}": float(f"{value:.6g}")
-        for name, value in model.at("damper", not model.building).values().items()
+        for name, value in model.at("damper", not model.building).values.items()
     }
     own = {name: value for name, value in here.items() if name in known}
     if not own:

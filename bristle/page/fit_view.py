@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.files import read_json
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, base_and_variant
 from ..study.changes import other_data
@@ -49,7 +49,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def rows_of(model: StudyModel, found: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rows_of(model: Model, found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return a row per parameter: value, half of its 95 % interval, how it is known, what it is.
 
     Parameters
@@ -58,7 +58,7 @@ def rows_of(model: StudyModel, found: Mapping[str, Any]) -> list[dict[str, Any]]
     found : what its identification found, empty where it is not known
     """
     rows = []
-    for name, value in model.flat().items():
+    for name, value in model.written().items():
         own = (found.get("parameters") or {}).get(name, {})
         std = value.std
         how = own.get("how") or ("identified" if std is not None else value.origin)
@@ -73,7 +73,7 @@ def rows_of(model: StudyModel, found: Mapping[str, Any]) -> list[dict[str, Any]]
     return rows
 
 
-def _about(model: StudyModel) -> list[dict[str, str]]:
+def _about(model: Model) -> list[dict[str, str]]:
     """Return what law and effects are: the first paragraphs of their texts, formulas included."""
     law = base_and_variant(model.law)[0]
     own = [("law", law.name, law)] + [("effect", n, EFFECTS[n]) for n in model.effects]

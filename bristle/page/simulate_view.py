@@ -255,7 +255,7 @@ def damper_of(folder: Path, scenario: str, study: object) -> dict[str, Any]:
     if not dampers:
         raise ScenarioError(f"{scenario} has no damper whose place that of {study} could take.")
     place = dampers[0]
-    values = {f"{place}.{name}": float(f"{value:.6g}") for name, value in here.values().items()}
+    values = {f"{place}.{name}": float(f"{value:.6g}") for name, value in here.values.items()}
     switches = {f"{place}.{name}.on": True for name in here.effects}
     return {f"{place}.fmu": component_of_law(model.base_law), **switches, **values}
 

@@ -16,7 +16,6 @@ from ..identification.problem import Run
 from ..identification.rig import DAMPER
 from ..physics.effect import plain_name
 from ..study.identified import is_identified
-from ..study.identify import as_model
 from ..study.study import Study
 from .information import DRAWS, Question
 from .limits import RigLimits, limits_of_runs, with_given
@@ -102,9 +101,7 @@ def _opened(study: Study) -> Prepared:
     """Return the model of a study with its runs."""
     study.usable_effects()
     model, runs = study.model(), study.runs()
-    rig = BenchRuns(
-        runs.train, runs.holdout, as_model(model), identified=is_identified(model), say=tell
-    )
+    rig = BenchRuns(runs.train, runs.holdout, model, identified=is_identified(model), say=tell)
     refuse_lacking(study.folder, rig.lacking)
     opened = rig.prepare(DAMPER)
     assert opened is not None

@@ -25,7 +25,6 @@ from ..physics.building import Building, frequencies
 from ..physics.drive import DRIVES
 from ..physics.effect import plain_name
 from ..prediction.model_system import BuildingWithFile
-from ..study.identify import as_model
 from ..study.rig import building_of
 from ..study.study import Study
 from .added_sensors import Added, added_sensors, place_of
@@ -244,7 +243,7 @@ def plan_building(
     measured = [*runs.train, *runs.holdout]
     motions = records_at_hand(measured, records, Path.cwd())
     house = BuildingWithFile(building, study.folder / model.building if model.building else None)
-    found = BuildingRuns(runs.train, runs.holdout, as_model(model), building, say=tell)
+    found = BuildingRuns(runs.train, runs.holdout, model, building, say=tell)
     sites = _opened(study, found)
     rig = _within(limits_of_shaking(measured, sites, house), limits or {})
     given = request is not None and not request.nothing

@@ -13,8 +13,9 @@ from ..core.config import Document
 from ..diagnosis.effect_size import SizeSearch as Fitted
 from ..errors import StudyError
 from ..identification.fit import fit_from_starts
-from ..identification.problem import REFERENCE, Model, Problem, Run
+from ..identification.problem import REFERENCE, Problem, Run
 from ..identification.smoothing import posterior_draws
+from ..model.model import Model
 from ..physics.laws import LAWS
 from .bench import planned
 from .information import DRAWS, Question

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from ..data.corrections import jumps
 from ..identification.building_sites import StructureRun
-from ..identification.problem import Expected, Model, Problem, Run, residuals
+from ..identification.problem import Expected, Problem, Run, residuals
 from ..identification.start_grid import Search
 from ..learning.signals import ALONG
+from ..model.model import Model
 from .limits import RESERVE, RigLimits, Signals, Test
 
 # Parts without a form, along a coordinate: what runs must cover for a curve to be learned.

@@ -11,7 +11,7 @@ from ..comparison.names import effect_name
 from ..core.text import plain, quantity
 from ..diagnosis.effect_size import ONE_SIDED, TWO_SIDED
 from ..diagnosis.rule import BENCH
-from ..identification.problem import parameter
+from ..model.model import parameter
 from ..physics.drive import VOLTAGE, drive_named, unit_for
 from .information import Information, PreparedQuestion
 from .questions import Purposes, SizedRival, seen, separated

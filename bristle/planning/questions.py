@@ -18,9 +18,10 @@ from ..diagnosis.rule import BENCH, DecisionRule
 from ..diagnosis.trials import LONG, joinable, short_search
 from ..errors import StudyError
 from ..identification.fit import fit_from_starts
-from ..identification.problem import Model, Problem, Run
+from ..identification.problem import Problem, Run
 from ..identification.start_grid import SearchContext, ranked_guesses, refine
 from ..learning.signals import ALONG
+from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
 from ..physics.laws import laws_of

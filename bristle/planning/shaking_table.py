@@ -19,7 +19,7 @@ from ..data.measurement import Measurement
 from ..data.sampling import Sampling
 from ..errors import RecordError, RunError
 from ..identification.building_sites import StructureProblem
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.drive import VOLTAGE
 from ..prediction.model_system import BuildingWithFile, Excitation, write_signals
 from ..prediction.monte_carlo import Simulator
@@ -57,7 +57,7 @@ class ShakingTable:
 
     Parameters
     ----------
-    model : StudyModel
+    model : Model
         The damper's law with the effects of all sites.
     house : BuildingWithFile
     like : Measurement
@@ -70,7 +70,7 @@ class ShakingTable:
         An empty folder for files of the simulation.
     """
 
-    model: StudyModel
+    model: Model
     house: BuildingWithFile
     like: Measurement
     noise: Mapping[str, float]

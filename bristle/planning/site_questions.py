@@ -22,11 +22,12 @@ from ..diagnosis.site import joinable_at
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit_from_starts
-from ..identification.problem import Model, Problem, Run
+from ..identification.problem import Problem, Run
 from ..identification.rig import DAMPER, at_site
 from ..identification.rig_fit import fit_line, joined
 from ..learning.curve import CurvePlace
 from ..learning.signals import ALONG
+from ..model.model import Model
 from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
 from ..physics.laws import LAWS, law_of_part

@@ -17,7 +17,7 @@ from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..identification.problem import following
 from ..model.draws import OpenEffect, has_covariance, left_open
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..model.model_file import read_model
 from ..study.changes import behind_data
 from ..study.history import history_steps
@@ -138,7 +138,7 @@ def closed_loop_in(
 
 
 def _prepared(
-    study: Study, model: StudyModel, draws: int, with_limits: bool
+    study: Study, model: Model, draws: int, with_limits: bool
 ) -> tuple[list[OpenEffect], list[str]]:
     """Return the effects that the band is to have, with notes; refuse what has no band."""
     if draws and not has_covariance(model):
@@ -197,7 +197,7 @@ def _trials(
 
 def _predicted(
     study: Study,
-    model: StudyModel,
+    model: Model,
     place: tuple[BuildingWithFile, bool],
     trials: Sequence[PredictedRun],
     draws: int,
@@ -243,7 +243,7 @@ def _predicted(
     return replace(said, folder=str(study.folder))
 
 
-def _before(study: Study) -> tuple[StudyModel | None, str]:
+def _before(study: Study) -> tuple[Model | None, str]:
     """Return the model before the last step, and what that step was.
 
     The model that a study begins with is nobody's guess of this damper: then there is none.

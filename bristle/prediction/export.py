@@ -20,11 +20,10 @@ from ..fmu.build import Plan, build, plan
 from ..fmu.catalogue import component_of_law
 from ..identification.problem import following
 from ..identification.rig import DAMPER
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.building import GROUND
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
-from ..study.identify import as_model
 from ..study.rig import building_of, rig_of
 from ..study.runs import Runs
 from ..study.study import Study
@@ -106,11 +105,11 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     return Exported(fmu, scenario, tuple(files), measurement.name, tuple(notes), proof)
 
 
-def _held_out(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> HeldOut | None:
+def _held_out(study: Study, model: Model, runs: Runs, notes: list[str]) -> HeldOut | None:
     """Return what the damper is held against; None, and a note, where the runs do not tell it."""
     try:
         rig = rig_of(study, model, runs)
-        there = DAMPER in rig.sites(as_model(model))
+        there = DAMPER in rig.sites(model)
     except RecordError as error:
         notes.append(f"the FMU was not held against the runs: {error}")
         return None
@@ -153,7 +152,7 @@ def write_editable(study: Study, folder: Path) -> Editable:
 
     with _writing(folder):
         scenario, _ = _scenario(study, model, measurement, VOLTAGE, folder, damper, notes)
-    numbers = tuple(name for name in values if name in own.values())
+    numbers = tuple(name for name in values if name in own.values)
     return Editable(scenario, measurement.name, numbers, measurement.has("force"), tuple(notes))
 
 
@@ -170,7 +169,7 @@ def _writing(folder: Path) -> Iterator[None]:
 
 
 def _scenario(
-    study: Study, model: StudyModel, measurement: Measurement, drive: Drive, folder: Path,
+    study: Study, model: Model, measurement: Measurement, drive: Drive, folder: Path,
     damper: DamperText, notes: list[str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of a study's damper, on the bench or in its building, and its files."""
@@ -195,7 +194,7 @@ def _one_run(study: Study, runs: Runs) -> Measurement:
     return next(one for one, top in zip(able, tops, strict=True) if 2.0 * top >= max(tops))
 
 
-def _bare(study: Study, model: StudyModel, notes: list[str]) -> StudyModel:
+def _bare(study: Study, model: Model, notes: list[str]) -> Model:
     """Return the damper's own law and effects; note what is an instrument's."""
     bench = not study.settings.has_building
     sensors = model.at("sensor", bench).effects
@@ -207,14 +206,12 @@ def _bare(study: Study, model: StudyModel, notes: list[str]) -> StudyModel:
     return model.at("damper", bench)
 
 
-def _signals(damper: StudyModel) -> Collection[str]:
+def _signals(damper: Model) -> Collection[str]:
     """Return the parameters that follow a measured channel: they are inputs of the damper."""
     return following(damper.effects)
 
 
-def _damper(
-    study: Study, model: StudyModel, runs: Runs, notes: list[str], step: float | None
-) -> Plan:
+def _damper(study: Study, model: Model, runs: Runs, notes: list[str], step: float | None) -> Plan:
     """Plan the damper with the model's values as its defaults."""
     own = _bare(study, model, notes)
     starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
@@ -230,7 +227,7 @@ def _damper(
     )
 
 
-def _with_stroke(study: Study, model: StudyModel, measurement: Measurement) -> Measurement:
+def _with_stroke(study: Study, model: Model, measurement: Measurement) -> Measurement:
     """Return a run with the displacement across the damper, where it is a building's device."""
     building = building_of(study, model)
     if building is None or not building.studied:
@@ -247,7 +244,7 @@ def _with_stroke(study: Study, model: StudyModel, measurement: Measurement) -> M
     )
 
 
-def _range(study: Study, model: StudyModel, runs: Runs, notes: list[str]) -> dict[str, float]:
+def _range(study: Study, model: Model, runs: Runs, notes: list[str]) -> dict[str, float]:
     """Return the command's limit and stroke [m] that hold what was measured in all runs.
 
     Where the defaults do they are left out. The run that is played alone does not tell: another
@@ -276,7 +273,7 @@ def _model_name(name: str) -> str:
 
 
 def _structure(
-    study: Study, model: StudyModel, shaking: Excitation, folder: Path, damper: DamperText,
+    study: Study, model: Model, shaking: Excitation, folder: Path, damper: DamperText,
     notes: list[str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of the study's building with the damper, under a run's ground motion."""

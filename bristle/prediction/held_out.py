@@ -26,7 +26,6 @@ from ..identification.error import ForceError, error_on, pooled, reasons_of, zer
 from ..identification.histories import before_jump
 from ..identification.problem import (
     Fed,
-    Model,
     Moments,
     Problem,
     Run,
@@ -36,10 +35,9 @@ from ..identification.problem import (
     shown_force,
 )
 from ..identification.rig import DAMPER, Rig, at_site
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.drive import drive_named
 from ..physics.effect import EFFECTS
-from ..study.identify import as_model
 from .model_system import start_values
 from .stepping import Job, step_through
 
@@ -124,7 +122,7 @@ class HeldOut(NamedTuple):
     for an input that was not measured; None where no motion of the damper was.
     """
 
-    damper: StudyModel
+    damper: Model
     problem: Problem
     model: Model
     runs: Sequence[Run]
@@ -151,9 +149,7 @@ class HeldOut(NamedTuple):
         return pooled(found)
 
 
-def held_out(
-    damper: StudyModel, model: StudyModel, rig: Rig, measured: Sequence[Measurement]
-) -> HeldOut:
+def held_out(damper: Model, model: Model, rig: Rig, measured: Sequence[Measurement]) -> HeldOut:
     """Return what a study's damper is held against.
 
     Parameters
@@ -163,9 +159,8 @@ def held_out(
     rig : the sites with their runs
     measured : the held-out runs as measured, of a building with the motion across the device
     """
-    whole = as_model(model)
-    sites = rig.sites(whole)
-    site, own = sites[DAMPER], at_site(whole, DAMPER, sites)
+    sites = rig.sites(model)
+    site, own = sites[DAMPER], at_site(model, DAMPER, sites)
     problem = site.problem_of("holdout")
     training = problem is None
     problem = site.train if problem is None else problem
@@ -349,7 +344,7 @@ def _pulse_response(held: HeldOut, fed: Fed) -> Array | None:
     return response if np.max(np.abs(off)) <= OF_FORCE * np.std(force) else None
 
 
-def _inputs(damper: StudyModel, run: Run, fed: Fed) -> dict[str, tuple[str, Array]]:
+def _inputs(damper: Model, run: Run, fed: Fed) -> dict[str, tuple[str, Array]]:
     """Return unit and values (m,) of what an FMU is fed, by its inputs' names."""
     x, v, a, V, _ = fed.moments
     drive = drive_named(run.drive)
@@ -362,9 +357,7 @@ def _inputs(damper: StudyModel, run: Run, fed: Fed) -> dict[str, tuple[str, Arra
     return out
 
 
-def _dense_inputs(
-    damper: StudyModel, run: Run, fed: Fed, step: float
-) -> dict[str, tuple[str, Array]]:
+def _dense_inputs(damper: Model, run: Run, fed: Fed, step: float) -> dict[str, tuple[str, Array]]:
     moments, dense = _dense(fed, round(fed.moments.dt / step))
     return _inputs(damper, run, dense._replace(moments=moments))
 

@@ -19,12 +19,11 @@ from ..errors import StudyError
 from ..fmu.damper import input_of
 from ..identification.prepare import prepare
 from ..identification.problem import Fed, Problem, Run, following, true_motion, values_of_labels
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.building import Building, Ports, driven_mass
 from ..physics.drive import VOLTAGE, Drive, drive_named, states_for
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
-from ..study.identify import as_model
 from ..system.toml import DamperText, Parameters, model_scenario_text, part_text, signal_file
 from ..user_code.load import own_effects
 
@@ -113,7 +112,7 @@ class Loads(NamedTuple):
     effects: tuple[Path, ...] = ()
 
 
-def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
+def loads(model: Model, building: Building, bench: bool = False) -> Loads:
     """Return what a model's effects make of the structure, and what the damper has to know of it.
 
     Parameters
@@ -122,14 +121,14 @@ def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
     building : what the damper acts in
     bench : whether the model was identified on a bench, where all effects are the damper's
     """
-    values, layer = model.values(), model.at("structure", bench)
+    layer = model.at("structure", bench)
     own = {f"{name}.on": True for name in layer.effects}
     device = building.device(building.studied)
-    structure: Parameters = {**own, **{n: v for n, v in layer.values().items() if "." in n}}
+    structure: Parameters = {**own, **{n: v for n, v in layer.values.items() if "." in n}}
     damper: Parameters = {}
     mass, notes = driven_mass(building.M, device), []
     for name in masses(model.at("damper", bench)):
-        moved = values.get(name, 0.0)
+        moved = model.values.get(name, 0.0)
         if moved > 0.0 and not device.on_first:
             notes.append(
                 f"{name} = {moved:g} kg stays in the damper, which takes it from differences of "
@@ -150,7 +149,7 @@ def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
     return Loads(structure, damper, tuple(notes), effects)
 
 
-def masses(damper: StudyModel) -> list[str]:
+def masses(damper: Model) -> list[str]:
     """Return the parameters of a damper's effects that are a mass which moves with the rod."""
     return [f"{name}.{EFFECTS[name].mass}" for name in damper.effects if EFFECTS[name].mass]
 
@@ -273,7 +272,7 @@ AGREEMENT = 0.01
 
 
 def write_bench_scenario(
-    folder: Path, title: str, model: StudyModel, measurement: Measurement, drive: Drive,
+    folder: Path, title: str, model: Model, measurement: Measurement, drive: Drive,
     damper: DamperText,
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario that moves a damper as in a measured run, and its files.
@@ -291,10 +290,9 @@ def write_bench_scenario(
     -------
     scenario, files : the path of bench.toml, and of the files that it reads
     """
-    fitted = as_model(model)
     run = prepare(measurement)
-    fed = Problem([run]).fed(fitted, run)
-    v, a = true_motion(fitted.effects, fitted.values, run.v, run.a, run.dt)
+    fed = Problem([run]).fed(model, run)
+    v, a = true_motion(model.effects, model.values, run.v, run.a, run.dt)
     run = replace(run, v=v, a=a)
     fine = max(1, ceil(run.dt / BENCH_STEP - 1e-9))
     step = float(f"{run.dt / fine:.12g}")
@@ -352,7 +350,7 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
     return signal_file(nodes, x, "displacement", "m", path)
 
 
-def start_values(damper: StudyModel, fed: Fed, run: Run) -> dict[str, float]:
+def start_values(damper: Model, fed: Fed, run: Run) -> dict[str, float]:
     """Return the parameters that a run sets: states that begin with a signal, labels, its load."""
     drive = drive_named(run.drive)
     moments = fed.moments
@@ -363,11 +361,11 @@ def start_values(damper: StudyModel, fed: Fed, run: Run) -> dict[str, float]:
         starts = EFFECTS[name].starts
         states |= {f"{name}.{called[state]}": signal for state, signal in starts.items()}
     begun = {f"{name}_0": first[signal] for name, signal in states.items() if signal in first}
-    begun |= Problem([run]).carrying(as_model(damper), run)
+    begun |= Problem([run]).carrying(damper, run)
     return begun | values_of_labels(damper.effects, run.labels)
 
 
-def prediction(model: StudyModel, run: Run, bench: bool = True) -> Array:
+def prediction(model: Model, run: Run, bench: bool = True) -> Array:
     """Return the force (n,) [N] that the damper of a model gives in a run, before instruments.
 
     Parameters
@@ -376,6 +374,5 @@ def prediction(model: StudyModel, run: Run, bench: bool = True) -> Array:
     run : its motion and voltage
     bench : whether the model is of a damper on a bench
     """
-    fitted, bare = as_model(model), as_model(model.at("damper", bench))
-    v, a = true_motion(fitted.effects, fitted.values, run.v, run.a, run.dt)
-    return Problem([run]).predict(bare, replace(run, v=v, a=a))
+    v, a = true_motion(model.effects, model.values, run.v, run.a, run.dt)
+    return Problem([run]).predict(model.at("damper", bench), replace(run, v=v, a=a))

@@ -17,7 +17,7 @@ from ..engine.coupled import simulate
 from ..errors import PhysicsError, RunError, ScenarioError
 from ..identification.problem import values_of_labels
 from ..model.draws import OpenEffect, drawn_models, in_short, reach, simulated_whole
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.drive import VOLTAGE
 from ..physics.forms import shown_law
 from ..system.scenario import Scenario, load_scenario
@@ -45,7 +45,7 @@ class Simulator:
 
     Parameters
     ----------
-    model : StudyModel
+    model : Model
         The law with the effects of all sites.
     house : BuildingWithFile
     bench : bool
@@ -56,7 +56,7 @@ class Simulator:
         An empty folder for the scenario's files.
     """
 
-    model: StudyModel
+    model: Model
     house: BuildingWithFile
     bench: bool
     shaking: Excitation
@@ -79,7 +79,7 @@ class Simulator:
         return {name: values[:: self.shaking.fine] for name, values in columns.items()}
 
     def with_errors(
-        self, scenario: Scenario, models: list[StudyModel], noise: tuple[float, float],
+        self, scenario: Scenario, models: list[Model], noise: tuple[float, float],
         generator: np.random.Generator,
     ) -> Iterator[dict[str, Array] | None]:  # fmt: skip
         """Yield the responses of other values, with noise on ground and command.
@@ -112,7 +112,7 @@ class Simulator:
         write_signals(self.folder, replace(shaking, drive=VOLTAGE))
 
     def without_noise(
-        self, scenario: Scenario, models: list[StudyModel]
+        self, scenario: Scenario, models: list[Model]
     ) -> Iterator[dict[str, Array] | RunError]:
         """Yield the responses of other values under the ground motion as it is, or why not.
 
@@ -127,7 +127,7 @@ class Simulator:
             except RunError as error:
                 yield error
 
-    def _with_values(self, scenario: Scenario, model: StudyModel) -> Scenario:
+    def _with_values(self, scenario: Scenario, model: Model) -> Scenario:
         own = loads(model, self.house.building, self.bench)
         # A mass that is drawn as zero is in no load, and must not stay what it is in the scenario.
         structure = {"attached_mass": 0.0, **own.structure}
@@ -225,7 +225,7 @@ SIZES = 6
 
 
 def changes_not_excluded(
-    model: StudyModel,
+    model: Model,
     place: tuple[BuildingWithFile, bool],
     trial: PredictedRun,
     effects: Sequence[OpenEffect],
@@ -268,7 +268,7 @@ def changes_not_excluded(
 
 
 def _tried(
-    models: list[StudyModel], place: tuple[BuildingWithFile, bool], trial: PredictedRun
+    models: list[Model], place: tuple[BuildingWithFile, bool], trial: PredictedRun
 ) -> list[dict[Key, float] | str]:
     """Return the figures of models, or why they cannot be simulated."""
     try:
@@ -278,8 +278,8 @@ def _tried(
 
 
 def _figures(
-    model: StudyModel,
-    models: list[StudyModel],
+    model: Model,
+    models: list[Model],
     place: tuple[BuildingWithFile, bool],
     trial: PredictedRun,
 ) -> list[dict[Key, float] | str]:
@@ -376,7 +376,7 @@ class Figures:
 
 
 def figures_of(
-    model: StudyModel,
+    model: Model,
     place: tuple[BuildingWithFile, bool],
     trial: PredictedRun,
     draws: int,

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from ..comparison.result import Comparison
     from ..data.measurement import Measurement
-    from ..model.model import StudyModel, Value
+    from ..model.model import Fact, Model
     from ..study.study import Study
 
 
@@ -52,7 +52,7 @@ _COLOURS = {
 }
 
 
-def parameter_table(model: StudyModel, drive: str) -> tuple[list[str], list[list[str]], list[str]]:
+def parameter_table(model: Model, drive: str) -> tuple[list[str], list[list[str]], list[str]]:
     """Return header, rows and notes of a model's parameters with their 95 % intervals.
 
     Without a command (`drive` "") those that act through one alone are left out.
@@ -60,7 +60,7 @@ def parameter_table(model: StudyModel, drive: str) -> tuple[list[str], list[list
     header = ["parameter", "value", "95 % interval", "unit", "origin", "what it is"]
     rows, edges = [], []
     driven = LAWS[model.law].driven() if not drive and model.law in LAWS else ()
-    flat = {name: value for name, value in model.flat().items() if name not in driven}
+    flat = {name: fact for name, fact in model.written().items() if name not in driven}
     for name, value in flat.items():
         text, half = with_interval(value.value, value.std)
         origin = value.origin if value.free else f"{value.origin}, held"
@@ -79,7 +79,7 @@ def parameter_table(model: StudyModel, drive: str) -> tuple[list[str], list[list
     return header, rows, notes
 
 
-def _at_bound(value: Value) -> bool:
+def _at_bound(value: Fact) -> bool:
     """Return whether a value stands at a bound, as far as its own size and interval can tell.
 
     The range tells nothing: that of a stiffness spans nine orders of magnitude.

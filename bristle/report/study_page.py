@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from ..comparison.comparison import RigComparer
     from ..comparison.result import Comparison
     from ..identification.rig_fit import SiteModel
-    from ..model.model import StudyModel
+    from ..model.model import Model
     from ..study.history import Step
     from ..study.study import Study
 
@@ -53,7 +53,7 @@ class Content:
     """
 
     study: Study
-    model: StudyModel
+    model: Model
     verdict: dict[str, Any] | None
     steps: tuple[Step, ...]
     history_steps: tuple[HistoryStep, ...]
@@ -75,7 +75,6 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
     `what_if` adds sliders that compute the model in the page, which needs zig.
     """
     from ..model.model_file import read_model
-    from ..study.identify import as_model
     from ..study.steps import compare_study, comparer
     from .what_if import what_if_section
 
@@ -88,7 +87,7 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
     try:
         study.model()  # raises where the code of an effect waits for consent
         against = comparer(study)
-        now, damper = against.compare(as_model(model)), against.damper(as_model(model))
+        now, damper = against.compare(model), against.damper(model)
         for step in reversed(steps):
             gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
             if step.number == 0 or not gone <= set(model.effects):
@@ -97,7 +96,7 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
                 tell("the model before its last effect")
-                before, added = against.compare(as_model(earlier)), " and ".join(new)
+                before, added = against.compare(earlier), " and ".join(new)
                 break
         found = [_with_error(one, against, study) for one in counted(found, "step")]
         if open_test and study.files(TEST):
@@ -116,12 +115,11 @@ def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> Histor
 
     from ..identification.search import z_scale
     from ..model.model_file import read_model
-    from ..study.identify import as_model
 
     if step.z is not None or step.number == 0:
         return step  # the model that a study begins with is nobody's guess of this damper
     then = read_model(study.history.model_file(step.number), study.folder)
-    runs = against.predictions(as_model(then))
+    runs = against.predictions(then)
     if not all(one.noise_known for one in runs):
         return step
     return replace(step, z=z_scale(np.concatenate([one.normalised for one in runs])))

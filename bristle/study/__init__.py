@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..errors import StudyError
-from ..model.model import StudyModel, Value, new_model
+from ..model.model import Fact, Model, new_model
 from ..model.model_file import read_model, write_model
 from .history import Step
 from .runs import Runs
@@ -13,14 +13,14 @@ from .study_file import RunFile, Settings
 
 __all__ = [
     "Created",
+    "Fact",
+    "Model",
     "RunFile",
     "Runs",
     "Settings",
     "Step",
     "Study",
     "StudyError",
-    "StudyModel",
-    "Value",
     "create_study",
     "new_model",
     "read_model",

@@ -20,12 +20,12 @@ from ..errors import StudyError
 from ..identification.histories import compile_ahead
 from ..identification.rig import Rig, bench_rig, building_rig
 from ..identification.rig_fit import force_errors, site_models
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.building import Building
 from ..physics.laws import DEFAULT
 from .forms import all_laws, left_out_notes, refuse_in_building, with_law
 from .identified import Identified, is_identified
-from .identify import FitTask, as_model, identify_on_rig, identify_study
+from .identify import FitTask, identify_on_rig, identify_study
 from .inputs import (
     Channels,
     Data,
@@ -62,7 +62,7 @@ def identify(
         The runs; or a study, or its folder. Columns and keys are named by channel: `time`,
         `displacement`, `velocity`, `voltage` or `current`, `force`, with the unit in brackets,
         "force [kN]", or in SI. Other names are guessed, and `notes` of the result tell how.
-    model : str, path, StudyModel or Identified, optional
+    model : str, path, Model or Identified, optional
         The law, such as "bingham", or a model to begin with; else the study's, else "lugre". With
         "all", on a test bench, `laws` of the result tells how every law does, and the model has
         the study's, else the simplest that no other surpasses on held-out runs.
@@ -91,7 +91,7 @@ def identify(
     -------
     Identified
         `parameters()` lists values, units and 95 % intervals; `unidentified` names those that the
-        data do not identify; `after` holds the errors; `model.values()` the values in SI.
+        data do not identify; `after` holds the errors; `model.values` the values in SI.
 
     Raises
     ------
@@ -136,9 +136,9 @@ def identify(
     task = FitTask(CUT_OFF, table=table, command=command)
     if not free:
         return identify_on_rig(rig, runs, chosen, task)
-    rows = all_laws(rig, runs, as_model(chosen))
+    rows = all_laws(rig, runs, chosen)
     found = identify_on_rig(rig, runs, with_law(chosen, simplest(rows).law), task)
-    left_out = left_out_notes(rig, as_model(chosen))
+    left_out = left_out_notes(rig, chosen)
     return replace(found, laws=rows, notes=(*found.notes, *left_out))
 
 
@@ -159,7 +159,7 @@ def compare(
     ----------
     data : Study, path, pattern, frame, mapping of arrays, Measurement, or several of these
         The runs to compare with, see `bristle.identify`; or a study, or its folder.
-    model : str, path, StudyModel or Identified, optional
+    model : str, path, Model or Identified, optional
         What `identify` returned, a model.toml, or a law at its defaults; of a study its own.
     effects : str or list of str
         Effects that the model has on top, at their defaults.
@@ -222,9 +222,8 @@ def compare(
     house = building_from(building, device)
     runs = measurements(given, channels, building=house)
     fitted = runs if train is None else measurements(train, channels, building=house)
-    present = as_model(chosen)
     rig = _rig(Runs(fitted, runs), house)
-    return RigComparer(rig, "holdout", present, seen=None).compare(present)
+    return RigComparer(rig, "holdout", chosen, seen=None).compare(chosen)
 
 
 def diagnose(
@@ -245,7 +244,7 @@ def diagnose(
     ----------
     data : Study, path, pattern, frame, mapping of arrays, Measurement, or several of these
         The runs, see `bristle.identify`; or a study, or its folder.
-    model : str, path, StudyModel or Identified, optional
+    model : str, path, Model or Identified, optional
         What `identify` returned, or a law, which is then identified on the way; else the study's.
         With "all", and on a test bench where none is chosen, the law is sought together with the
         effects: `law` of the result is the one that the verdict is about, `laws` tells how all do.
@@ -313,14 +312,12 @@ def diagnose(
     compile_ahead()
     runs = _runs(given, holdout, channels, house)
     if free:
-        return diagnose_laws(runs.train, runs.holdout, as_model(chosen), house, profile=profile)
-    known, present = is_identified(chosen), as_model(chosen)
-    found = diagnose_rig(
-        runs.train, runs.holdout, present, house, identified=known, profile=profile
-    )
+        return diagnose_laws(runs.train, runs.holdout, chosen, house, profile=profile)
+    known = is_identified(chosen)
+    found = diagnose_rig(runs.train, runs.holdout, chosen, house, identified=known, profile=profile)
     if not known:
         return found
-    return replace(found, error=force_errors(site_models(_rig(runs, house), present)))
+    return replace(found, error=force_errors(site_models(_rig(runs, house), chosen)))
 
 
 def _is_all(model: Given | None) -> bool:
@@ -345,7 +342,7 @@ def _refuse_of_study(**given: object) -> None:
         )
 
 
-def _present(study: Study, model: Given | None, effects: str | Sequence[str]) -> StudyModel:
+def _present(study: Study, model: Given | None, effects: str | Sequence[str]) -> Model:
     """Return a study's model, or the one that was given, with the study's building."""
     own = study.model()
     chosen = model_of(own if model is None else model, effects, own.law)

@@ -19,7 +19,8 @@ from ..view.style import BLUE, GREEN, GREY, INK, PALE, PURPLE, VERMILION, Page, 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..identification.problem import Model, Problem
+    from ..identification.problem import Problem
+    from ..model.model import Model
 
 Array = NDArray[np.float64]
 Budgets = dict[str, list[ForceShare]]

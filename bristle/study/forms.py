@@ -6,7 +6,7 @@ import hashlib
 import json
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -19,16 +19,14 @@ from ..core.text import command, unknown
 from ..data.checks.runs import LEAST_LEVELS, command_levels, drives_of, tells_a_bend
 from ..data.measurement import Measurement
 from ..errors import BristleError, PhysicsError, StudyError
-from ..identification.problem import Model
 from ..identification.rig import DAMPER, Rig
-from ..model.model import StudyModel, new_model
+from ..model.model import Model
 from ..model.model_file import model_text
 from ..physics.command import MOST_KNOTS
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS
 from ..physics.forms import FORMS, LINEAR_FORM, TABLE_FORM, joined_form, split_form
 from ..physics.laws import DEFAULT, base_and_variant
-from ..units import convert
 from ..version import __version__
 from .runs import Runs
 from .study import Study
@@ -51,7 +49,7 @@ class FormError:
     """
 
     form: str
-    model: StudyModel
+    model: Model
     errors: dict[str, float]
     numbers: int
 
@@ -65,7 +63,7 @@ class FormError:
         _, _, knots = split_form(self.model.law)
         return {
             "command": self.form, "knots": list(knots), "fitted": self.numbers,
-            "errors": finite(self.errors), "values": self.model.values(),
+            "errors": finite(self.errors), "values": self.model.values,
         }  # fmt: skip
 
 
@@ -74,7 +72,7 @@ def finite(errors: Mapping[str, float]) -> dict[str, float | None]:
     return {name: value if value == value else None for name, value in errors.items()}
 
 
-def form_of(model: StudyModel) -> str:
+def form_of(model: Model) -> str:
     """Return the form of the command that a model has: "linear" where none was chosen."""
     return split_form(model.law)[1] or LINEAR_FORM
 
@@ -140,7 +138,7 @@ def _rounded(levels: Any) -> tuple[float, ...]:
     return tuple(round(float(level), places) + 0.0 for level in levels)
 
 
-def in_form(model: StudyModel, form: str, runs: Sequence[Measurement]) -> StudyModel:
+def in_form(model: Model, form: str, runs: Sequence[Measurement]) -> Model:
     """Return a model with another form of the command, as near to what it was as can be.
 
     Parameters
@@ -170,27 +168,26 @@ def in_form(model: StudyModel, form: str, runs: Sequence[Measurement]) -> StudyM
             f"{', '.join(unfit)} bends the command already, and a {form} would do so once more: "
             "undo that step first."
         )
-    other = replace(new_model(name, (), model.building, model.drive), effects=dict(model.effects))
-    return _carried(model, other)
+    return _carried(model, model.with_law(name, model.effects))
 
 
-def _carried(model: StudyModel, other: StudyModel) -> StudyModel:
+def _carried(model: Model, other: Model) -> Model:
     """Return the other model with what both have, and quantities as they are in the first."""
-    kept = {n: v for n, v in model.parameters.items() if n in other.parameters}
-    other = replace(other, parameters={**other.parameters, **kept})
+    kept = {n: f for n, f in model.written().items() if n in other.values}
+    other = other.with_facts(kept)
     before, after = (base_and_variant(one.law)[0] for one in (model, other))
-    values, top = model.values(), max(before.knots or after.knots or (1.0,))
+    top = max(before.knots or after.knots or (1.0,))
     new: dict[str, float] = {}
     for quantity, form in after.command.items():
 
         def at(V: float, quantity: str = quantity) -> float:
-            return float(getattr(before.at(values, V), quantity))
+            return float(getattr(before.at(model.values, V), quantity))
 
         names = [name for one in form.names() for name in after.listed(one)]
         points = after.knots if quantity in after.tables else ()
         found = _numbers(at, points, top)
         new.update({n: v for n, v in zip(names, found, strict=False) if n not in kept})
-    bounded = {n: float(np.clip(v, *bounds_of(other, n))) for n, v in new.items()}
+    bounded = {n: float(np.clip(v, *other.bounds(n))) for n, v in new.items()}
     return other.with_values(bounded, origin="assumed")
 
 
@@ -201,12 +198,6 @@ def _numbers(at: Any, knots: Sequence[float], top: float) -> Iterator[float]:
         yield from (at(b) - at(a) for a, b in pairwise(knots))
     else:
         yield from (at(0.0), (at(top) - at(0.0)) / top, 0.0)
-
-
-def bounds_of(model: StudyModel, name: str) -> tuple[float, float]:
-    """Return the bounds of a parameter in SI."""
-    own, unit = model.flat()[name], model.declared(name).unit
-    return convert(own.low, own.unit, unit), convert(own.high, own.unit, unit)
 
 
 # The fits of a search for the law, kept as they are made: an interrupted one goes on there.
@@ -226,7 +217,7 @@ class LawFits:
     model : the present one, whose effects the laws have
     """
 
-    def __init__(self, study: Study, model: StudyModel) -> None:
+    def __init__(self, study: Study, model: Model) -> None:
         self._study = study
         self._key = _key(study, model)
         self.known: dict[str, dict[str, float]] = _read(study, self._key)
@@ -260,7 +251,7 @@ def _read(study: Study, key: str) -> dict[str, dict[str, float]]:
         return {}  # a file that somebody changed: the fits are made anew
 
 
-def _key(study: Study, model: StudyModel) -> str:
+def _key(study: Study, model: Model) -> str:
     whole = hashlib.sha256(f"{__version__} {study.data} {model_text(model)}".encode())
     for folder in (study.laws_folder, study.effects_folder):
         for path in sorted(folder.glob("*.py")) if folder.is_dir() else ():
@@ -337,7 +328,7 @@ def left_out_notes(rig: Rig, present: Model) -> tuple[str, ...]:
     return (left_out(unfit),) if unfit else ()
 
 
-def with_law(model: StudyModel, law: str) -> StudyModel:
+def with_law(model: Model, law: str) -> Model:
     """Return a model with another law, such as "lugre[quadratic]", and the effects that can join.
 
     Raises
@@ -346,12 +337,12 @@ def with_law(model: StudyModel, law: str) -> StudyModel:
         If there is no such law.
     """
     base, _ = base_and_variant(law)
-    kept = {
-        name: values
-        for name, values in model.effects.items()
+    able = [
+        name
+        for name in model.effects
         if base.site not in EFFECTS[name].sites or EFFECTS[name].joins(base)
-    }
-    return replace(new_model(law, (), model.building, model.drive), effects=kept)
+    ]
+    return model.with_law(law, able)
 
 
 def law_command(folder: object, law: str, *others: str) -> str:

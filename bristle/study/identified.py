@@ -11,7 +11,7 @@ from ..identification.error_table import LawError
 from ..identification.fit import Fit
 from ..identification.problem import Problem
 from ..identification.rig_fit import RigErrors, SiteModel
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.forms import split_form
 from ..view import Viewable
 from .forms import FormError, finite, form_of
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from ..diagnosis.law_trials import LawTrial
 
 
-def is_identified(model: StudyModel) -> bool:
+def is_identified(model: Model) -> bool:
     """Return whether a value of a model comes from an identification."""
-    return any(value.origin == "identified" for value in model.flat().values())
+    return any(value.origin == "identified" for value in model.facts.values())
 
 
 @dataclass(frozen=True, repr=False)
@@ -34,8 +34,8 @@ class Identified(Viewable):
 
     Attributes
     ----------
-    model : StudyModel
-        The model with the values found; `model.values()` are those in SI.
+    model : Model
+        The model with the values found; `model.values` are those in SI.
     fit : Fit
         Values and standard deviations in SI.
     errors_before, errors : RigErrors
@@ -69,7 +69,7 @@ class Identified(Viewable):
     """
 
     fit: Fit
-    model: StudyModel
+    model: Model
     table: list[LawError]
     cutoff: float
     errors_before: RigErrors | None
@@ -181,7 +181,7 @@ class Identified(Viewable):
     def parameters(self) -> list[dict[str, Any]]:
         """Return one row per parameter: name, value, unit, half of its 95 % interval, how."""
         rows = []
-        for name, value in self.model.flat().items():
+        for name, value in self.model.written().items():
             if name in self.fit.unidentified:
                 how = "not identified"
             elif name in self.fit.std:

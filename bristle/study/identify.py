@@ -16,13 +16,12 @@ from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..identification.error import ForceError
 from ..identification.error_table import LawError, error_table
-from ..identification.fit import Fit
 from ..identification.histories import compile_ahead
-from ..identification.problem import Model, robust_z
+from ..identification.problem import robust_z
 from ..identification.rig import DAMPER, Rig
 from ..identification.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identification.run_start import under_load_text
-from ..model.model import StudyModel, new_model
+from ..model.model import Model
 from ..physics.effect import AT, EFFECTS, exclude, laws_joined
 from ..physics.forms import shown_law
 from ..physics.laws import LAWS, base_and_variant, law_names
@@ -31,7 +30,6 @@ from .changes import behind_data
 from .forms import (
     FormError,
     all_laws,
-    bounds_of,
     form_of,
     forms_asked,
     in_form,
@@ -113,7 +111,7 @@ def by_site(models: SiteModels) -> list[str]:
     return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
 
 
-def weighing(rows: list[LawError], model: StudyModel, own: ForceError, z: float) -> list[str]:
+def weighing(rows: list[LawError], model: Model, own: ForceError, z: float) -> list[str]:
     """Return what a model that errs by more than noise does to intervals and to the fit.
 
     Parameters
@@ -187,7 +185,7 @@ def refuse_left_out(file: Path) -> None:
         raise StudyError(why)
 
 
-def refuse_effect(model: StudyModel, name: str, bench: bool) -> None:
+def refuse_effect(model: Model, name: str, bench: bool) -> None:
     """Refuse an effect that is not known, is in a model already, or cannot join it.
 
     Parameters
@@ -232,7 +230,7 @@ def identify_study(
     *,
     law: str | None = None,
     command: str | Sequence[str] | None = None,
-    model: StudyModel | None = None,
+    model: Model | None = None,
     cutoff: float | None = None,
     starts: int = 4,
     table: bool = True,
@@ -307,14 +305,14 @@ class FitTask:
     cutoff: float
     starts: int = 4
     table: bool = True
-    present: StudyModel | None = None
+    present: Model | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
     command: str | Sequence[str] | None = None
     show: Show = _show_nothing
     laws: bool = False
 
 
-def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified:
+def identify_model(study: Study, model: Model, task: FitTask) -> Identified:
     """Identify a model on a study's training runs; the study stays as it is.
 
     Raises
@@ -332,7 +330,7 @@ def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified
     return replace(found, notes=(*found.notes, *left_out))
 
 
-def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identified:
     """Identify a model on a rig, in the form of the command that the task asks for.
 
     Parameters
@@ -366,10 +364,10 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     return replace(found, forms=tuple(sorted(rows, key=lambda row: forms.index(row.form))))
 
 
-def _with_all_laws(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
-    rows = all_laws(rig, runs, as_model(model))
+def _with_all_laws(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identified:
+    rows = all_laws(rig, runs, model)
     found = identify_on_rig(rig, runs, model, replace(task, laws=False))
-    notes = (*found.notes, *left_out_notes(rig, as_model(model)))
+    notes = (*found.notes, *left_out_notes(rig, model))
     return replace(found, laws=rows, notes=notes)
 
 
@@ -377,19 +375,17 @@ def _form_error(form: str, found: Identified) -> FormError:
     return FormError(form, found.model, found.after, len(found.fit.std))
 
 
-def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+def _in_own_form(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identified:
     """Fit a model at all sites of a rig, then judge it there."""
-    start = as_model(model)
-    rig.prepare(start)
+    rig.prepare(model)
     notes = [*runs.notes, *doubts([run for run in runs.all if run.has("force")])]
     task.show(1)
-    fits = fit_rig(rig, start, task.starts, task.begin)
+    fits = fit_rig(rig, model, task.starts, task.begin)
     task.show(2)
-    fit = fits.whole(start)
-    fitted = _with_fit(model, fit)
-    models = site_models(rig, as_model(fitted))
+    fit = fits.whole(model)
+    models = site_models(rig, fit.model)
     present = task.present or model
-    old = site_models(rig, as_model(present))
+    old = site_models(rig, present)
     # The start of a first fit is nobody's model: its error is no step on the way.
     fitted_before = is_identified(present) or _lines_alone(old)
     before = errors_of(old, task.cutoff) if fitted_before else None
@@ -405,7 +401,7 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
         *weighing(rows, model, own, after.numbers["z_train"]),
     ]
     notes += [*rig.notes, *under_load(at)]
-    return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+    return Identified(fit, fit.model, rows, task.cutoff, before, after, tuple(notes), None, at)
 
 
 def _lines_alone(models: SiteModels) -> bool:
@@ -445,13 +441,13 @@ def _tabled(own: str) -> tuple[str, ...]:
     return names if own in names else (*names, own)
 
 
-def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
+def _with_choices(model: Model, begin: Mapping[str, float]) -> Model:
     """Return the model with the choices of a form, such as a storey's number, that were found."""
-    chosen = {n: v for n, v in begin.items() if n.endswith(".which") and n in model.flat()}
+    chosen = {n: v for n, v in begin.items() if n.endswith(".which") and n in model.values}
     return model.with_values(chosen, origin="assumed") if chosen else model
 
 
-def _with_labels(model: StudyModel, runs: Sequence[Measurement]) -> StudyModel:
+def _with_labels(model: Model, runs: Sequence[Measurement]) -> Model:
     """Return the model with what is known of runs at their mean, unless it was set by hand."""
     found = {}
     for name in model.effects:
@@ -459,19 +455,18 @@ def _with_labels(model: StudyModel, runs: Sequence[Measurement]) -> StudyModel:
         for own, label in {**effect.labels, **effect.label_means}.items():
             numbers = [y for run in runs if not isinstance(y := run.labels.get(label, ""), str)]
             parameter = f"{name}.{own}"
-            left = model.flat()[parameter].value == effect.parameters[own].value
+            left = model.values[parameter] == effect.parameters[own].value
             if left and len(numbers) == len(runs):
                 found[parameter] = float(np.mean(numbers))
     return model.with_values(found, origin="measured") if found else model
 
 
-def _of_law(model: StudyModel, law: str | None) -> StudyModel:
+def _of_law(model: Model, law: str | None) -> Model:
     """Return the model with another law, its effects kept where they can join."""
     if law is None or law == model.law:
         return model
     if law not in law_names():
         raise StudyError(f'law "{law}"; there are: {", ".join(law_names())}.')
-    other = new_model(law, (), model.building, model.drive)
     base, _ = base_and_variant(law)
     unfit = [
         name
@@ -480,34 +475,4 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
     ]
     if unfit:
         raise StudyError(f'{", ".join(unfit)} cannot join the law "{law}": undo the step first.')
-    return replace(other, effects=dict(model.effects))
-
-
-def as_model(model: StudyModel) -> Model:
-    """Return a study's model as the fit takes it: values, fixed parameters and bounds in SI."""
-    fixed = tuple(name for name, value in model.flat().items() if not value.free)
-    limits = {name: bounds_of(model, name) for name in model.flat()}
-    return Model(model.base_law, tuple(model.effects), model.values(), fixed, limits)
-
-
-def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
-    """Return the study's model with the values found; what is not identified has no interval."""
-    flat = model.flat()
-    identifiable = [name for name in fit.std if name not in fit.unidentified]
-    found = model.with_values(
-        {name: _inside(model, name, fit.model.values[name]) for name in identifiable},
-        {name: fit.std[name] for name in identifiable},
-    )
-    silent = [name for name in fit.unidentified if flat[name].free]
-    found = found.with_values(
-        {name: _inside(model, name, fit.model.value(name)) for name in silent}, origin="assumed"
-    )
-    if fit.covariance is None or not identifiable:
-        return found
-    index = [list(fit.std).index(name) for name in identifiable]
-    return found.with_covariance(identifiable, fit.covariance[np.ix_(index, index)])
-
-
-def _inside(model: StudyModel, name: str, value: float) -> float:
-    """Return a value that rounding has not put outside of its bounds."""
-    return float(np.clip(value, *bounds_of(model, name)))
+    return model.with_law(law, model.effects)

@@ -19,7 +19,7 @@ from ..data.measurement import Measurement, is_part, measurements_of, names_of_f
 from ..data.read import files_in, read_table
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
-from ..model.model import StudyModel, new_model
+from ..model.model import Model, new_model
 from ..model.model_file import read_model
 from ..physics.building import Building, with_damper
 from ..physics.effect import EFFECTS
@@ -38,7 +38,7 @@ Data: TypeAlias = Source | Sequence[Source] | Mapping[str, Source]
 """One run or several; the keys of a mapping are then their names."""
 Channels: TypeAlias = Mapping[str, str | ChannelSpec]
 """Where channels are: {"force": "-Ch3@kN"}, as `--channel force=-Ch3@kN` says it."""
-Given: TypeAlias = str | Path | StudyModel | Identified
+Given: TypeAlias = str | Path | Model | Identified
 """A law by its name, a model.toml, or a model."""
 
 _FITTED_TO = 3  # of so many runs one is held out, as in a new study
@@ -169,12 +169,12 @@ def _with_own_names(runs: Sequence[Measurement]) -> list[Measurement]:
     ]
 
 
-def model_of(given: Given | None, effects: str | Sequence[str], default: str) -> StudyModel:
+def model_of(given: Given | None, effects: str | Sequence[str], default: str) -> Model:
     """Return the model that was named or given, with more effects.
 
     Parameters
     ----------
-    given : a law's name, the path of a model.toml, a StudyModel, what `identify` returned, or None
+    given : a law's name, the path of a model.toml, a Model, what `identify` returned, or None
     effects : names of effects that come on top
     default : the law where nothing is given
 
@@ -239,10 +239,10 @@ def names_in(building: Building) -> list[str]:
     return sorted(names, key=lambda name: name != building.studied)
 
 
-def _model(given: object) -> StudyModel:
+def _model(given: object) -> Model:
     if isinstance(given, Identified):
         return given.model
-    if isinstance(given, StudyModel):
+    if isinstance(given, Model):
         return given
     if isinstance(given, Path) or (isinstance(given, str) and given.endswith(".toml")):
         return read_model(Path(given))

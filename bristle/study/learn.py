@@ -26,7 +26,6 @@ from ..trust import remember_made
 from ..user_code.load import flaw_of
 from .history import LEARNED
 from .identified import is_identified
-from .identify import as_model
 from .rig import building_of
 from .study import Study
 
@@ -147,7 +146,7 @@ def _opened(study: Study, at: str) -> tuple[str, Prepared]:
 def _rig(study: Study) -> RigRuns:
     model, runs = study.model(), study.runs()
     return runs_of_rig(
-        runs.train, runs.holdout, as_model(model), building_of(study, model),
+        runs.train, runs.holdout, model, building_of(study, model),
         identified=is_identified(model), say=tell,
     )  # fmt: skip
 

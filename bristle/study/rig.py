@@ -13,13 +13,13 @@ from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.cut_off import without_cut_off
 from ..data.measurement import Measurement
 from ..identification.rig import Rig, bench_rig, building_rig
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.building import GROUND, Building, paper_building, with_damper
 from .runs import Runs
 from .study import Study
 
 
-def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:
+def rig_of(study: Study, model: Model, runs: Runs) -> Rig:
     """Return the rig of a study with its runs; what a channel's range cut off is not judged.
 
     Raises
@@ -34,7 +34,7 @@ def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:
     return replace(rig, notes=(*rig.notes, *notes))
 
 
-def building_of(study: Study, model: StudyModel) -> Building | None:
+def building_of(study: Study, model: Model) -> Building | None:
     """Return the building of a study: its file, or the paper's where it names none.
 
     None where the damper was measured on a test bench. The building knows which of its devices the

@@ -32,9 +32,8 @@ from ..identification.building_fit import (
     identify_structure,
 )
 from ..identification.histories import compile_ahead
-from ..identification.problem import Model
 from ..identification.rig_fit import force_errors, site_models
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..model.model_file import read_model
 from ..physics.building import Building, frequencies
 from ..physics.effect import EFFECTS
@@ -46,7 +45,6 @@ from .history import Step
 from .identified import Identified, is_identified
 from .identify import (
     FitTask,
-    as_model,
     as_named_here,
     identify_model,
     identify_study,
@@ -103,7 +101,7 @@ def diagnose_study(
             f"{law_command(study.folder, str(law))} ; to compare all of them:  "
             f"{command('diagnose', study.folder, '--law', ALL)}"
         )
-    known = runs.train, runs.holdout, as_model(model), building_of(study, model)
+    known = runs.train, runs.holdout, model, building_of(study, model)
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
             kept = LawFits(study, model) if write else None
@@ -113,7 +111,7 @@ def diagnose_study(
             found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
     if is_identified(model):
         rig = rig_of(study, model, runs)
-        found = replace(found, error=force_errors(site_models(rig, as_model(model))))
+        found = replace(found, error=force_errors(site_models(rig, model)))
     if write:
         study.write_verdict(verdict_of(study, found))
         keeps("The verdict is kept in verdict.json.")
@@ -234,8 +232,7 @@ def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]
     for name in _named_here(study, names):
         refuse_effect(model, name, not study.settings.has_building)
         model = model.with_effect(name)
-    known = set(model.flat())
-    start = {k: v for k, v in begin.items() if k in known}
+    start = {k: v for k, v in begin.items() if k in model.values}
     # With the new effects at their defaults it would be nobody's model: before is the one without.
     task = FitTask(study.settings.cut_off, table=False, present=present, begin=start)
     return identify_model(study, model, task)
@@ -356,15 +353,13 @@ def comparer(study: Study, role: str = "holdout") -> RigComparer:
     if role == TEST:
         runs = runs_for_test(study, runs)
     tell("holding the model against the runs")
-    made = RigComparer(rig_of(study, model, runs), role, as_model(model))
+    made = RigComparer(rig_of(study, model, runs), role, model)
     if role == TEST:  # before anybody can have seen an error
         count_test_set_use(study)
     return made
 
 
-def compare_study(
-    study: Study, model: StudyModel | None = None, *, role: str = "holdout"
-) -> Comparison:
+def compare_study(study: Study, model: Model | None = None, *, role: str = "holdout") -> Comparison:
     """Compare a study's model, the present one by default, with its runs of one role.
 
     Of a building it tells all sites, and at length the one where the present model fails the most.
@@ -374,7 +369,7 @@ def compare_study(
     StudyError, RecordError
         As `comparer`, and if nothing tells what error is large.
     """
-    found = comparer(study, role).compare(as_model(model or study.model()))
+    found = comparer(study, role).compare(model or study.model())
     if role != TEST:
         return found
     said = opened_text(len(uses_of_test_set(study)))
@@ -432,7 +427,7 @@ def before_after(study: Study) -> BeforeAfter | None:
     return _refined(model, verdict) or _added(study)
 
 
-def _refined(model: StudyModel, verdict: Mapping[str, Any]) -> BeforeAfter | None:
+def _refined(model: Model, verdict: Mapping[str, Any]) -> BeforeAfter | None:
     """Return the present model, and that which a diagnosis refined; None where there is none."""
     refined = verdict.get("refined") or {}
     effects = tuple(refined.get("effects", ()))
@@ -440,25 +435,24 @@ def _refined(model: StudyModel, verdict: Mapping[str, Any]) -> BeforeAfter | Non
     other_law = verdict.get("laws") and model.law != joined_form(verdict["law"], verdict["command"])
     if not effects or unknown or other_law:
         return None
-    before, joined = as_model(model), model
+    after = model
     for one in effects:
-        joined = joined.with_effect(one)
-    after = as_model(joined)
+        after = after.with_effect(one)
     known = {name: float(v) for name, v in refined["values"].items() if name in after.values}
-    return BeforeAfter(effects, before, replace(after, values={**after.values, **known}))
+    return BeforeAfter(effects, model, replace(after, values={**after.values, **known}))
 
 
 def _added(study: Study) -> BeforeAfter | None:
     """Return the models on both sides of the last step that added an effect; None without one."""
     numbers = study.history.numbers()
-    later: StudyModel | None = None
+    later: Model | None = None
     for number in reversed(numbers):
         model = read_model(study.history.model_file(number), study.folder)
         model = model.with_drive(study.drive or model.drive)
         new = () if later is None else tuple(n for n in later.effects if n not in model.effects)
         if later is not None and new:
             step = numbers[numbers.index(number) + 1]
-            return BeforeAfter(new, as_model(model), as_model(later), step)
+            return BeforeAfter(new, model, later, step)
         later = model
     return None
 

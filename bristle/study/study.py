@@ -18,7 +18,7 @@ from ..data.channels import ChannelSpec
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..errors import StudyError
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..model.model_file import model_text, read_model
 from ..trust import can_do_without, load
 from ..user_code.load import Loaded, waiting
@@ -267,7 +267,7 @@ class Study(Viewable):
         twins = twins_within(train) + twins_within(holdout)
         return Runs(train, holdout, (*idle, *twins))
 
-    def model(self, *, to_show: bool = False) -> StudyModel:
+    def model(self, *, to_show: bool = False) -> Model:
         """Return the present model.
 
         Parameters
@@ -321,7 +321,7 @@ class Study(Viewable):
         self,
         what: str,
         why: str,
-        model: StudyModel,
+        model: Model,
         before: Mapping[str, Any] | None = None,
         after: Mapping[str, Any] | None = None,
     ) -> Step:
@@ -331,7 +331,7 @@ class Study(Viewable):
         ----------
         what, why : str
             As in "add gas_spring", "verdict of the diagnosis: ...".
-        model : StudyModel
+        model : Model
             The model that is written to model.toml.
         before, after : mapping
             Errors of the two models by name, on training and held-out runs.

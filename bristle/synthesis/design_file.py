@@ -192,7 +192,7 @@ def damper_from_model(
         raise DesignError(str(error)) from None
     inside = model.at("damper", bench=not model.building)
     try:
-        return Damper(model.law, inside.values(), tuple(inside.effects), v_max, known_to)
+        return Damper(model.law, inside.values, inside.effects, v_max, known_to)
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from None
 

@@ -16,7 +16,7 @@ from ..core.toml_lines import KeyPath
 from ..core.toml_write import toml_key, toml_table, toml_value
 from ..errors import BristleError, PhysicsError, TrustError
 from ..fmu.description import Value
-from ..model.model import StudyModel
+from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..physics.forms import split_form
 from ..user_code.load import own_effects, own_laws
@@ -311,7 +311,7 @@ DamperText = Callable[[Parameters], str]
 """Parameters that the scenario knows to the table of its damper."""
 
 
-def source_of(damper: StudyModel) -> dict[str, Any]:
+def source_of(damper: Model) -> dict[str, Any]:
     """Return what a damper is made from where it is no FMU of its own: law, form, own effects.
 
     Parameters
@@ -326,11 +326,11 @@ def source_of(damper: StudyModel) -> dict[str, Any]:
     return source | ({"effects": own} if own else {})
 
 
-def values_of(damper: StudyModel) -> Parameters:
+def values_of(damper: Model) -> Parameters:
     """Return what such a damper is given: values of its law and effects, and their switches."""
     values = {
         name: value
-        for name, value in damper.values().items()
+        for name, value in damper.values.items()
         if "." not in name or name.partition(".")[0] in damper.effects
     }
     return {**values, **{f"{effect}.on": True for effect in damper.effects}}

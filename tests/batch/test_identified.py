@@ -17,7 +17,7 @@ from bristle.campaign.identified import Places
 from bristle.campaign.table import LEVELS, VARIES, notes, quantiles
 from bristle.cli import main
 from bristle.errors import BristleError, EnsembleError, RunError
-from bristle.model.model import StudyModel, new_model
+from bristle.model.model import Model, new_model
 from bristle.model.model_file import model_text
 from bristle.system.scenario import Scenario
 
@@ -37,12 +37,12 @@ TINY = {**SPRING, "effect": "quadratic_damping", "parameter": "c_2", "limit95": 
 HIDDEN = {"effect": "coil_lag", "why": "the command is constant"}
 
 
-def a_model(*effects: str) -> StudyModel:
+def a_model(*effects: str) -> Model:
     model = new_model("lugre", effects).with_values({"sigma_a": 640.0, "sigma_0": 400.0}, STD)
     return model.with_covariance(list(STD), COVARIANCE)
 
 
-def a_study(folder: Path, model: StudyModel | None = None, *limits: dict[str, Any]) -> Path:
+def a_study(folder: Path, model: Model | None = None, *limits: dict[str, Any]) -> Path:
     """Write what an ensemble reads of a study."""
     rig = folder / "my_rig"
     rig.mkdir()

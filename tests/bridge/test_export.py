@@ -177,7 +177,7 @@ def test_a_dampers_own_stop_and_friction_are_in_the_fmu(bench: Study) -> None:
     run = prepare(bench.runs().holdout[0])
     expected = prediction(bench.model(), run)
     plain = DamperForces("lugre", []).force(
-        run.x, run.v, run.a, run.V, run.dt, bench.model().values()
+        run.x, run.v, run.a, run.V, run.dt, bench.model().values
     )
     assert rms(expected - plain) > 0.1 * rms(plain)
     frame = bristle.run(found.scenario)
@@ -198,7 +198,7 @@ def test_an_effect_of_ones_own_is_in_the_fmu(bench: Study) -> None:
     run = prepare(study.runs().holdout[0])
     expected = prediction(study.model(), run)
     plain = DamperForces("lugre", []).force(
-        run.x, run.v, run.a, run.V, run.dt, study.model().values()
+        run.x, run.v, run.a, run.V, run.dt, study.model().values
     )
     np.testing.assert_allclose(expected - plain, 120.0 * run.x, atol=1e-9)
     shutil.rmtree(study.folder / "effects")  # the FMU carries the effect itself

@@ -20,7 +20,7 @@ from study.made import write_runs
 from bristle.cli import main
 from bristle.errors import StudyError
 from bristle.model.draws import drawn_models
-from bristle.model.model import StudyModel, new_model
+from bristle.model.model import Model, new_model
 from bristle.physics.building import paper_building
 from bristle.physics.drive import drive_named
 from bristle.physics.effect import EFFECTS
@@ -41,7 +41,7 @@ def viscous(x, v):
     return DRAG * v
 
 
-def damper(model: StudyModel, drag: float, spread: float = 0.05) -> StudyModel:
+def damper(model: Model, drag: float, spread: float = 0.05) -> Model:
     """Return a bingham model that is a dashpot, its drag known within a share."""
     values = {"f_c": 0.0, "f_v": 0.0, "c_v": 0.0, "exponent": 0.0, "v_n": 0.02}
     model = model.with_values(values, origin="assumed")
@@ -289,11 +289,11 @@ def test_draws_have_the_joint_covariance_within_the_bounds() -> None:
     model = model.with_values({"f_c": 2.0, "c_0": 60.0}, {"f_c": 0.2, "c_0": 3.0})
     model = model.with_covariance(["f_c", "c_0"], covariance)
     drawn = drawn_models(model, 2000, np.random.default_rng(3))
-    values = np.array([[one.values()[name] for name in ("f_c", "c_0")] for one in drawn])
+    values = np.array([[one.values[name] for name in ("f_c", "c_0")] for one in drawn])
     np.testing.assert_allclose(np.cov(values.T), covariance, rtol=0.15)
     unsure = model.with_values({"f_c": 0.1}, {"f_c": 5.0}).with_covariance(["f_c"], np.eye(1) * 25)
     drawn = drawn_models(unsure, 50, np.random.default_rng(3))
-    assert min(one.values()["f_c"] for one in drawn) == 0.0
+    assert min(one.values["f_c"] for one in drawn) == 0.0
 
 
 def test_law_form_effects_and_limits_are_in_the_scenario(tmp_path: Path) -> None:

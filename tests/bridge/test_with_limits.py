@@ -17,7 +17,7 @@ from study.house_made import study_of
 
 from bristle.cli import main
 from bristle.errors import RunError, StudyError
-from bristle.model.model import StudyModel
+from bristle.model.model import Model
 from bristle.prediction import monte_carlo
 from bristle.prediction.closed_loop import closed_loop
 from bristle.prediction.closed_loop_result import ClosedLoop, Predicted
@@ -185,7 +185,7 @@ def test_an_effect_with_which_nothing_can_be_simulated_is_in_no_band(
     Study(rig).write_verdict(verdict(SPRING, SMALL))
     simulated = monte_carlo._figures
 
-    def figures(model: StudyModel, *rest: Any) -> Any:
+    def figures(model: Model, *rest: Any) -> Any:
         if "quadratic_damping" in model.effects:
             raise RunError("it does not come to rest.")
         return simulated(model, *rest)
@@ -205,7 +205,7 @@ def test_an_effect_that_stops_one_of_its_draws_is_left_out_whole(
     Study(rig).write_verdict(verdict(SPRING, SMALL))
     simulated = monte_carlo._figures
 
-    def figures(model: StudyModel, *rest: Any) -> Any:
+    def figures(model: Model, *rest: Any) -> Any:
         found = simulated(model, *rest)
         return ["it stops", *found[1:]] if "gas_spring" in model.effects else found
 

@@ -17,8 +17,9 @@ from bristle.comparison.predictions import halved, run_predictions
 from bristle.data.left_out import MISSING
 from bristle.errors import RecordError
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.smoothing import posterior_draws, smooth
+from bristle.model.model import Model
 
 
 def bench(law="lugre", values=None, n=4000, count=3, noise=0.01, skip=25):

@@ -10,7 +10,7 @@ import pytest
 from bristle import run
 from bristle.comparison.predictions import run_predictions
 from bristle.identification.building_sites import StructureProblem, structure_run
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.study import create_study
 from bristle.study.steps import compare_study
 

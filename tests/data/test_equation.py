@@ -5,22 +5,22 @@ import re
 import pytest
 
 from bristle.model.equations import equations, formulas, symbols
-from bristle.model.model import StudyModel, Value
+from bristle.model.model import Fact, Model
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
 
 
-def value(number: float, unit: str, std: float | None = None, free: bool = True) -> Value:
-    return Value(number, unit, -1e9, 1e9, free, std, "identified")
+def value(number: float, unit: str, std: float | None = None, free: bool = True) -> Fact:
+    return Fact(number, unit, -1e9, 1e9, free, std, "identified")
 
 
-def bingham(**more) -> StudyModel:
-    parameters = {
+def bingham(effect: dict[str, Fact] | None = None, **more) -> Model:
+    facts = {
         "f_c": value(1.5, "N", 0.01), "f_v": value(0.75, "N/V", 0.002), "c_0": value(40.0, "N.s/m"),
         "c_v": value(5.0, "N.s/(m.V)", 0.5), "v_n": value(20.0, "mm/s", 1.0),
         "exponent": value(1.0, "1", free=False),
     }  # fmt: skip
-    return StudyModel(**{"law": "bingham", "parameters": parameters, **more})
+    return Model("bingham", **more).with_facts({**facts, **(effect or {})})
 
 
 def test_numbers_stand_in_place_of_names_in_si_with_their_intervals():
@@ -42,17 +42,18 @@ def test_the_command_has_its_own_symbol_which_is_told_where_it_is_no_voltage():
 
 
 def test_effects_have_their_own_names_and_negative_numbers_their_brackets():
-    spring = {"preload": value(-0.5, "N"), "k": value(150.0, "N/m"), "k_2": value(0.0, "N/m2"),
-              "k_3": value(1e5, "N/m3")}  # fmt: skip
-    _, found = equations(bingham(effects={"gas_spring": spring}))
+    spring = {
+        "gas_spring.preload": value(-0.5, "N"), "gas_spring.k": value(150.0, "N/m"),
+        "gas_spring.k_2": value(0.0, "N/m2"), "gas_spring.k_3": value(1e5, "N/m3"),
+    }  # fmt: skip
+    _, found = equations(bingham(spring, effects=("gas_spring",)))
     assert found.of == "gas_spring"
     assert found.numbers == "F = (-0.5) + 150 x + 0 x^2 + 100000 x^3"
 
 
 def test_a_law_that_does_without_a_part_shows_no_formula_that_has_it():
-    model = bingham()
-    model.parameters["exponent"] = value(0.0, "1", free=False)
-    assert equations(model) == []
+    held = {"exponent": value(0.0, "1", free=False)}
+    assert equations(bingham(held)) == []
 
 
 def test_code_that_waits_for_consent_states_nothing():

@@ -58,7 +58,7 @@ def test_nineteen_of_twenty_sizes_are_below_the_limit() -> None:
 def test_the_effect_joins_and_the_models_own_parameters_move_along() -> None:
     model = new_model("bingham").with_values({"c_0": 60.0, "f_c": 2.0})
     joined = spring().joined(model, 0.5)
-    values = joined.values()
+    values = joined.values
     assert values["gas_spring.k"] == 20.0
     assert values["c_0"] == 58.5
     assert values["f_c"] == 0.0  # its bound
@@ -68,9 +68,8 @@ def test_the_effect_joins_and_the_models_own_parameters_move_along() -> None:
 
 def test_a_parameter_that_is_not_free_does_not_move() -> None:
     model = new_model("bingham").with_values({"c_0": 60.0})
-    fixed = {"c_0": replace(model.parameters["c_0"], free=False)}
-    held = replace(model, parameters={**model.parameters, **fixed})
-    assert spring().joined(held, 1.0).values()["c_0"] == 60.0
+    held = replace(model, fixed=(*model.fixed, "c_0"))
+    assert spring().joined(held, 1.0).values["c_0"] == 60.0
 
 
 def test_an_effect_that_vanishes_as_its_parameter_grows() -> None:

@@ -10,8 +10,8 @@ from bristle.diagnosis.building_numbers import moved, moved_numbers, within_prio
 from bristle.diagnosis.rule import BENCH
 from bristle.identification.building_motion import responses
 from bristle.identification.building_sites import problems_of
-from bristle.identification.problem import Model
 from bristle.identification.rig_fit import fit_damper
+from bristle.model.model import Model
 
 
 def dashpot(x, v):

@@ -15,7 +15,8 @@ from bristle.diagnosis.sensor_faults import as_json, instruments_of
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 
 STEP = 0.002  # s
 T = STEP * np.arange(5000)

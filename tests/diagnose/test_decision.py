@@ -10,7 +10,7 @@ import pytest
 from bristle.diagnosis.decision import decide, missing
 from bristle.diagnosis.rule import BENCH, INSIDE, RECONSTRUCTED
 from bristle.diagnosis.trials import Trial
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 
 SAMPLES = 6000
 NOISE = np.random.default_rng(1).standard_normal(SAMPLES) ** 2

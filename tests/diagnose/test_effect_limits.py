@@ -12,9 +12,10 @@ from bristle.diagnosis.effect_size import STANDS_OUT, Sized, SizeSearch, resolve
 from bristle.diagnosis.view import verdict_view
 from bristle.diagnosis.words import limit_rows
 from bristle.identification.fit import intervals_of
-from bristle.identification.problem import Model, residuals
+from bristle.identification.problem import residuals
 from bristle.identification.search import HUBER
 from bristle.identification.start_grid import refine
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.view.blocks import Table
 from tests.diagnose.test_limits import VALUES, T, problem_of, steady, steps

@@ -10,7 +10,8 @@ from test_starts import LAW, recorded_rig
 from bristle.diagnosis.experiments import separating
 from bristle.diagnosis.prepared import corrected
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
+from bristle.model.model import Model
 
 N = 1000
 FORCE, SLOPE = np.random.default_rng(3).standard_normal((2, N))

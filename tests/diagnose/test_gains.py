@@ -8,7 +8,7 @@ from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.verdict import gains_of
 from bristle.diagnosis.words import sentences
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 
 NOISE = np.random.default_rng(1).standard_normal(6000) ** 2
 

@@ -14,8 +14,8 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit, fit_from_starts
-from bristle.identification.problem import Model
 from bristle.identification.rig_fit import joined
+from bristle.model.model import Model
 from tests.identify.truths import hidden_case, true_case
 
 

@@ -26,7 +26,7 @@ from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.words import headline, law_sentences, law_table
 from bristle.identification.error import ForceError
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.physics.laws import base_and_variant
 
 SAMPLES = 6000

@@ -12,7 +12,7 @@ from bristle.diagnosis.joint_search import diagnose_laws
 from bristle.diagnosis.rig_runs import BuildingRuns
 from bristle.errors import RecordError
 from bristle.identification.building_sites import ANY_LAW, blind_at_rest
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 
 HOUSE = building(1, True, 3)
 FEW = ("tanh", "dahl")

@@ -11,8 +11,9 @@ from bristle.diagnosis.law_trials import LawTrial, better_law, not_finite, try_l
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.words import left_out
 from bristle.identification.error import ForceError
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.identification.rig import bench_rig
+from bristle.model.model import Model
 from bristle.study.inputs import measurements
 from tests.study.made import bench_run
 

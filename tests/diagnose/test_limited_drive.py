@@ -14,7 +14,8 @@ from bristle.diagnosis.prepared import corrected
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 
 DT, N, NOISE = 0.002, 2500, 0.05
 T = DT * np.arange(N)

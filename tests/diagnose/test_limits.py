@@ -12,7 +12,8 @@ from bristle.diagnosis.effect_limits import detectable, untestable
 from bristle.diagnosis.rule import BENCH
 from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
+from bristle.model.model import Model
 
 STEP = 0.002
 T = STEP * np.arange(3000)

@@ -11,7 +11,8 @@ from bristle.diagnosis.decision import missing
 from bristle.diagnosis.effect_limits import detectable
 from bristle.diagnosis.trials import judge
 from bristle.identification.error_table import error_rms
-from bristle.identification.problem import Model, Problem, Run, robust_z
+from bristle.identification.problem import Problem, Run, robust_z
+from bristle.model.model import Model
 
 DT = 0.002
 T = np.arange(0.0, 24.0, DT)

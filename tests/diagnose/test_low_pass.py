@@ -13,7 +13,7 @@ from scipy.signal import cont2discrete
 from bristle.diagnosis.load_cell import low_pass_text
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.physics.effects.delay import Delay
 
 

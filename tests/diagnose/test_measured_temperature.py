@@ -20,8 +20,9 @@ from bristle.errors import PhysicsError
 from bristle.fmu.model_description import unit_definitions
 from bristle.identification.fit import fit
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.start_grid import initial_guesses, refine
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS, Effect
 from bristle.physics.parameter import Parameter
 

@@ -10,7 +10,8 @@ from bristle.diagnosis.model_faults import model_based_faults
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 
 DT, N, NOISE = 0.002, 3000, 0.03
 T = DT * np.arange(N)

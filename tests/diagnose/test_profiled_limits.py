@@ -10,8 +10,9 @@ import pytest
 
 from bristle.diagnosis.effect_limits import EffectLimit, limit_of, profiled
 from bristle.diagnosis.effect_size import Sized, SizeSearch
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.start_grid import refine
+from bristle.model.model import Model
 
 TRUE = Model("bingham", values={"f_c": 5.0, "c_0": 20.0, "v_n": 100.0}, fixed=("f_v", "c_v", "v_n"))
 

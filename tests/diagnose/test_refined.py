@@ -10,7 +10,7 @@ import pytest
 from bristle.diagnosis import Diagnosis
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 
 EMPTY = np.zeros(0)
 BEFORE = Trial(Model("bingham", (), {"f_c": 1.0}), 5.0, 5.0, 1.0, EMPTY, EMPTY)

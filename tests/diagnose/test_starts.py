@@ -10,8 +10,9 @@ from bristle.data.measurement import measurements_of_frame
 from bristle.diagnosis.trials import joinable, short_search
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.identification.start_grid import SearchContext, initial_guesses, ranked_guesses, refine
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 
 DT, RATE = 0.002, 500.0

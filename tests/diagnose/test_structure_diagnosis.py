@@ -23,7 +23,7 @@ from bristle.diagnosis.trials import Trial, judge
 from bristle.errors import RecordError
 from bristle.identification.building_motion import responses
 from bristle.identification.building_sites import StructureProblem, problems_of
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 
 

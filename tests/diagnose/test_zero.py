@@ -15,7 +15,8 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.site import free_zero, renewed_zero, zero_fault
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit_from_starts
-from bristle.identification.problem import Model, errors, has_offset, robust_z, zero_of
+from bristle.identification.problem import errors, has_offset, robust_z, zero_of
+from bristle.model.model import Model
 
 OFFSET = 0.6
 HIDDEN = {"effects": ("stribeck",), "values": {"stribeck.rise": 0.5}}

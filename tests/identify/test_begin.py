@@ -10,8 +10,9 @@ import pytest
 
 from bristle.data.measurement import measurements_of_frame
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.run_start import SETTLING, under_load_text
+from bristle.model.model import Model
 
 DT, NOISE = 0.002, 0.02
 MODEL = Model(

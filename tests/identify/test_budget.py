@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bristle.identification.error_table import force_budget
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 from bristle.physics.laws import laws_of
 from bristle.study.budget_picture import draw_budget
 

@@ -13,8 +13,8 @@ from bristle.identification.building_fit import building_text, identify_structur
 from bristle.identification.building_motion import respond
 from bristle.identification.building_sites import motion_across, sliding, storey_run
 from bristle.identification.equilibrium import equations_of, reconstructed, stiffness_matrix
-from bristle.identification.problem import Model
 from bristle.identification.rig import building_rig
+from bristle.model.model import Model
 from bristle.physics.building import GROUND, Device, with_damper
 from bristle.study.inputs import measurements
 

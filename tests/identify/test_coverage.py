@@ -9,7 +9,8 @@ import pytest
 from truths import hidden_case, true_case
 
 from bristle.identification.fit import fit, fit_from_starts, multistart_refit
-from bristle.identification.problem import Model, robust_z
+from bristle.identification.problem import robust_z
+from bristle.model.model import Model
 
 RIGS = ("bench_10N", "bench_2kN")
 NOISES = (0.01, 0.03)

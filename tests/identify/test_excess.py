@@ -12,7 +12,6 @@ from scipy.optimize import least_squares
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.problem import (
     EXPLAINS,
-    Model,
     Problem,
     errors,
     excess_of,
@@ -23,6 +22,7 @@ from bristle.identification.problem import (
 from bristle.identification.rig import DAMPER, ROLES, Site
 from bristle.identification.rig_fit import fit_site
 from bristle.identification.start_grid import Search
+from bristle.model.model import Model
 
 LAW = "bingham"
 

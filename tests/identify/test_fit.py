@@ -12,8 +12,9 @@ from bristle.data.measurement import measurements_of_frame
 from bristle.errors import RecordError
 from bristle.identification.fit import fit, fit_from_starts
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.identification.smoothing import smooth, smooth_steps
+from bristle.model.model import Model
 from bristle.physics.laws import LAWS, laws_of
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.identification.problem import Model, Problem, Run, earlier, pure_delay
+from bristle.identification.problem import Problem, Run, earlier, pure_delay
+from bristle.model.model import Model
 
 DT = 0.002
 LAW = {"f_c": 1.3, "f_v": 0.8, "c_0": 100.0, "c_v": 20.0, "v_n": 0.02, "exponent": 1.0}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bristle.identification.fit import Fit
-from bristle.identification.problem import Model
 from bristle.identification.rig_fit import RigFit
+from bristle.model.model import Model
 
 NAME = "storey_softening.d_half"
 

@@ -25,9 +25,9 @@ from bristle.identification.building_sites import (
     thinned,
 )
 from bristle.identification.equilibrium import reconstructed
-from bristle.identification.problem import Model
 from bristle.identification.rig import Site
 from bristle.identification.rig_fit import RigFit, at_bound, fit_line
+from bristle.model.model import Model
 from bristle.physics.laws.linear_layer import LinearLayer
 
 

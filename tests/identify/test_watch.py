@@ -16,9 +16,10 @@ from bristle.data.left_out import MISSING
 from bristle.identification import error_table, watch
 from bristle.identification.error_table import error_table as error_table_error_table
 from bristle.identification.fit import Fit, fit, fit_from_starts
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.identification.search import z_of
 from bristle.identification.watch import LAW, MODEL, series, watched
+from bristle.model.model import Model
 
 Seen = list[Mapping[str, Any]]
 

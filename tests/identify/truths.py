@@ -6,7 +6,8 @@ import pandas as pd
 
 from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
+from bristle.model.model import Model
 from tests.independent.generate import UNITS, make_case
 
 

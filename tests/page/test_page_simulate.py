@@ -63,7 +63,7 @@ def test_the_damper_of_a_study_takes_the_place_of_the_scenarios(home: Path) -> N
     assert "rig" in simulate_view.choices(home, {})["studies"]
     given = damper_of(home, BENCH, "rig")
     assert given["damper.fmu"] == "BinghamDamper"
-    assert given["damper.f_c"] == study.model().values()["f_c"]
+    assert given["damper.f_c"] == study.model().values["f_c"]
     shown = simulate_view.answer(home, {"scenario": BENCH, "study": "rig"})
     assert "--set damper.fmu=BinghamDamper" in shown["command"]
 

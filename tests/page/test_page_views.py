@@ -12,7 +12,7 @@ from study.made import bench_run, write, write_runs
 
 from bristle.data.channels import ChannelSpec
 from bristle.errors import StudyError
-from bristle.model.model import Value
+from bristle.model.model import Fact
 from bristle.page import (
     channels_view,
     check_view,
@@ -109,7 +109,7 @@ def test_view_2_has_values_with_half_of_their_intervals(home: Path, tmp_path: Pa
     assert {row["how"] for row in shown["parameters"]} == {"assumed"}
     model = Study(home / "rig").model()
     known = model.with_values({"f_c": 1.5}, {"f_c": 0.1})
-    assert isinstance(known.parameters["f_c"], Value)
+    assert isinstance(known.facts["f_c"], Fact)
     (row,) = [row for row in fit_view.rows_of(known, {}) if row["name"] == "f_c"]
     assert (row["value"], row["half"], row["how"]) == (1.5, pytest.approx(0.196), "identified")
     held = fit_view.rows_of(known, {"parameters": {"f_c": {"how": "not identified"}}})

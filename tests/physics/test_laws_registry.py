@@ -17,9 +17,9 @@ from bristle.fmu.controller import invertible
 from bristle.identification.error_table import error_table
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import DamperForces as CompiledBench
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.starts import start_models
-from bristle.model.model import new_model
+from bristle.model.model import Model, new_model
 from bristle.model.model_file import model_text, read_model
 from bristle.physics import damper
 from bristle.physics.command import Linear

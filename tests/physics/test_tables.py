@@ -15,9 +15,9 @@ from bristle.errors import PhysicsError, StudyError
 from bristle.fmu import catalogue
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.starts import start_models
-from bristle.model.model import new_model
+from bristle.model.model import Model, new_model
 from bristle.model.model_file import model_text, read_model
 from bristle.physics import damper
 from bristle.physics.command import Linear, Monotone, Quadratic
@@ -217,7 +217,7 @@ def test_a_model_file_may_give_plain_numbers(effect: type[Effect], tmp_path: Pat
     path = tmp_path / "model.toml"
     head = 'schema = 1\nlaw = "bingham"\n\n[effects.sloped]\nparameters = '
     path.write_text(head + "{ curve = [-1.0, 0.0, { value = 500.0, unit = 'mN' }, 2.5] }\n")
-    values = read_model(path).values()
+    values = read_model(path).values
     assert [values[f"sloped.curve[{k}]"] for k in range(1, 5)] == [-1.0, 0.0, 0.5, 2.5]
     path.write_text(head + "{ curve = [-1.0, 0.0] }\n")
     with pytest.raises(StudyError, match=r":5: .*a list of 4 values"):

@@ -13,8 +13,9 @@ from bristle.diagnosis.conclusion import lookalikes
 from bristle.diagnosis.trials import joinable
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
-from bristle.identification.problem import REFERENCE, Model, Problem, Run
+from bristle.identification.problem import REFERENCE, Problem, Run
 from bristle.identification.start_grid import initial_guesses
+from bristle.model.model import Model
 from bristle.physics import damper
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import EFFECTS

@@ -19,7 +19,8 @@ from bristle.diagnosis.rule import BENCH
 from bristle.errors import StudyError
 from bristle.examples.make import Choice, make_bench
 from bristle.identification.fit import intervals_of
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 from bristle.planning.folder import read_plan
 from bristle.planning.information import (
     Evidence,
@@ -50,7 +51,6 @@ from bristle.planning.questions import (
 from bristle.planning.search import Planner
 from bristle.planning.waveforms import Command, Waveform
 from bristle.study.extend import extend_study
-from bristle.study.identify import as_model
 
 SHEET = """schema = 1
 [damper]
@@ -295,7 +295,7 @@ def test_what_the_runs_at_hand_allow_of_an_effect_is_what_the_verdict_says(
 @pytest.mark.slow
 def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Study) -> None:
     told = {one.effect: one for one in bristle.diagnose(rig, write=False).limits["damper"]}
-    runs, model = rig.runs(), as_model(rig.model())
+    runs, model = rig.runs(), rig.model()
     opened = BenchRuns(runs.train, runs.holdout, model, identified=True).prepare("damper")
     assert opened is not None
     names = ["delay", "stribeck", "saturation"]

@@ -6,7 +6,7 @@ import pytest
 
 from bristle.diagnosis.effect_limits import NO_AMOUNT
 from bristle.errors import StudyError
-from bristle.identification.problem import Model
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.planning.questions import refuse_unable
 

@@ -17,7 +17,7 @@ from made import write_runs
 
 from bristle.cli import main
 from bristle.core.text import with_interval
-from bristle.model.model import StudyModel, Value
+from bristle.model.model import Fact, Model
 from bristle.report.figures import curves_section, parameter_table
 from bristle.report.study_page import gather, render, study_report
 from bristle.study import Study, create_study
@@ -134,7 +134,7 @@ def test_the_page_says_what_the_study_holds(page, folder):
     assert "A sine of 12 mm at 3 Hz &amp; 6 V tells the two apart." in text
     assert "Sensor: gain of velocity, 1.05." in text
     assert "displacement 42 µm" in text
-    for name in Study(folder).model().flat():
+    for name in Study(folder).model().values:
         assert f" {name} " in text
     assert "1.300 ± 0.020 N identified" in text
     for run in Study(folder).settings.runs:
@@ -250,8 +250,8 @@ def test_values_have_the_digits_that_their_intervals_leave(value, std, told):
     [(721.0, 0.0, False), (0.0, 0.0, True), (1e9, 0.0, True), (1e-4, 0.0, True)],
 )
 def test_a_value_is_at_the_edge_only_where_it_stands_at_a_bound(value, low, told):
-    known = Value(value, "N/m", low, 1e9, std=0.9)
-    _, _, notes = parameter_table(StudyModel("lugre", parameters={"sigma_a": known}), "voltage")
+    model = Model("lugre").with_facts({"sigma_a": Fact(value, "N/m", low, 1e9, std=0.9)})
+    _, _, notes = parameter_table(model, "voltage")
     assert any("at a bound" in note for note in notes) is told
 
 

@@ -343,8 +343,8 @@ def test_the_title_tells_the_command(tmp_path, title, drive, unit) -> None:
     assert study.settings.channels[drive].unit == unit
     model = study.model()
     assert model.drive == drive
-    assert model.parameters["sigma_0"].unit == unit_for("N/(m.V)", DRIVES[drive])
-    assert model.with_effect("saturation").effects["saturation"]["V_s"].unit == DRIVES[drive].unit
+    assert model.facts["sigma_0"].unit == unit_for("N/(m.V)", DRIVES[drive])
+    assert model.with_effect("saturation").facts["saturation.V_s"].unit == DRIVES[drive].unit
 
 
 def test_a_model_made_for_volts_takes_the_unit_of_its_study(tmp_path) -> None:
@@ -355,8 +355,8 @@ def test_a_model_made_for_volts_takes_the_unit_of_its_study(tmp_path) -> None:
     old = path.read_text()
     path.write_text(old.replace('drive = "current"\n', "").replace("m.A)", "m.V)"))
     model = Study(tmp_path / "rig").model()
-    assert model.parameters["sigma_0"].unit == "N/(m.A)"
-    assert model.values() == study.model().values()
+    assert model.facts["sigma_0"].unit == "N/(m.A)"
+    assert model.values == study.model().values
     path.write_text(old.replace('"current"', '"pressure"'))
     with pytest.raises(StudyError, match='drive "pressure"'):
         Study(tmp_path / "rig").model()

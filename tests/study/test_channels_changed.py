@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,8 +79,7 @@ def given(*texts: str) -> dict[str, object]:
 def identified(folder: Path) -> Study:
     """Return the study with results, as if fit, diagnosis and learning had been."""
     study, model = Study(folder), Study(folder).model()
-    value = replace(model.parameters["c_0"], value=3.0, origin="identified", std=0.1)
-    model = replace(model, parameters={**model.parameters, "c_0": value})
+    model = model.with_values({"c_0": 3.0}, {"c_0": 0.1})
     study.add_step("identify bingham", "by hand", model, {}, {"z_holdout": 9.0})
     study.write_verdict({"schema": 2, "kind": "none", "effects": []})
     study.add_step("add gas_spring", "by hand", model.with_effect("gas_spring"))

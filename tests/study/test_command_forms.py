@@ -80,7 +80,7 @@ def test_the_rigs_form_is_found_with_intervals_that_hold(
     for row in bent.parameters():
         if row["name"] in TRUTH:
             assert abs(row["value"] - TRUTH[row["name"]]) < 2.0 * row["interval95"], row["name"]
-    values = {row.form: row.model.values() for row in found.forms}["table"]
+    values = {row.form: row.model.values for row in found.forms}["table"]
     table = [values[f"yield_force[{k}]"] for k in (1, 2, 3, 4)]
     right = [1.5 + 2.0 * V - 0.2 * V * V for V in (0.0, 1.0, 2.5, 5.0)]
     assert np.cumsum(table) == pytest.approx(right, rel=0.05)
@@ -102,7 +102,7 @@ def test_the_form_is_stored_and_everything_follows_it(
     assert 'command = "table"\ncommand_knots = [0.0, 1.0, 2.5, 5.0]\n' in text
     model = Study(study.folder).model()
     assert model.law == "bingham[table 0 1 2.5 5]"
-    assert model.values() == pytest.approx(
+    assert model.values == pytest.approx(
         {name: row["value"] for name, row in told["parameters"].items()}
     )
     assert main(["identify", folder, "--no-table", "--json"]) == 0  # the form stays
@@ -214,7 +214,7 @@ def test_the_fmu_carries_the_form_to_the_last_bit(study: Study) -> None:
     study.add_step("choose", "a test", model)
     found = export_study(study)
     shown = bristle.run(found.scenario)
-    damper = DamperModel(law, model.values())
+    damper = DamperModel(law, model.values)
     rod, drive = shown["rod.displacement"].to_numpy(), shown["drive.value"].to_numpy()
     v, dt = shown["rod.velocity"].to_numpy(), float(shown.index[1] - shown.index[0])
     own = [

@@ -14,11 +14,12 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.verdict import SCHEMA
 from bristle.errors import StudyError
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.learning.closed_forms import Closed, formula_of
 from bristle.learning.curve import Curve
 from bristle.learning.curve_picture import draw_curve
 from bristle.learning.fit import LearnedCurve
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.study import learn as curves
 from bristle.study.identify import identify_study

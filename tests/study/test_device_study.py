@@ -40,7 +40,7 @@ def test_a_study_is_about_the_device_that_is_named(two):
     (run, *_) = two.read()
     assert run.has("force", "voltage", "tie_force")
     assert two.drive == "voltage"
-    values = two.model().values()
+    values = two.model().values
     for name, value in BRACE.items():
         assert values[name] == pytest.approx(value, rel=0.05)
 

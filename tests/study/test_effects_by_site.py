@@ -14,10 +14,10 @@ from bristle.diagnosis.trials import joinable
 from bristle.errors import StudyError
 from bristle.identification.building_sites import StructureProblem, structure_run
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.rig import Rig, Site, at_site
 from bristle.identification.rig_fit import fit_site
-from bristle.model.model import new_model
+from bristle.model.model import Model, new_model
 from bristle.model.model_file import read_model, write_model
 from bristle.physics.building import paper_building
 from bristle.study.steps import add_effects
@@ -64,11 +64,11 @@ def test_a_model_holds_the_stop_of_the_layer_and_that_of_the_damper(tmp_path: Pa
     assert '[effects."end_stop@damper"]' in path.read_text()
     again = read_model(path)
     assert again == model
-    assert again.values()["end_stop@damper.clearance"] == 0.006
+    assert again.values["end_stop@damper.clearance"] == 0.006
     inside, layer = again.at("damper", bench=False), again.at("structure", bench=False)
     assert list(inside.effects) == list(layer.effects) == ["end_stop"]
-    assert inside.values()["end_stop.clearance"] == 0.006
-    assert layer.values()["end_stop.clearance"] == 0.004
+    assert inside.values["end_stop.clearance"] == 0.006
+    assert layer.values["end_stop.clearance"] == 0.004
 
 
 def test_a_file_of_before_means_what_it_meant(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_a_file_of_before_means_what_it_meant(tmp_path: Path) -> None:
     path.write_text('schema = 1\nlaw = "lugre"\n\n[effects.end_stop]\nparameters = {}\n')
     model = read_model(path)
     assert list(model.at("structure", bench=False).effects) == ["end_stop"]
-    assert model.at("damper", bench=False).effects == {}
+    assert model.at("damper", bench=False).effects == ()
     assert list(model.at("damper", bench=True).effects) == ["end_stop"]
 
 
@@ -163,7 +163,7 @@ def test_a_stop_is_added_on_a_bench_by_its_plain_name(study: Study) -> None:
     added = add_effects(study, ["end_stop@damper"])
     assert added.effects == ("end_stop",)
     assert "[effects.end_stop]" in (study.folder / "model.toml").read_text()
-    values = study.model().values()
+    values = study.model().values
     assert values["end_stop.clearance"] == pytest.approx(0.006, rel=0.02)
     assert values["end_stop.k"] == pytest.approx(4e3, rel=0.1)
     with pytest.raises(StudyError, match="end_stop is in the model already"):

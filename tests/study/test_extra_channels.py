@@ -20,7 +20,7 @@ from bristle.model.model import new_model
 from bristle.prediction.export import export_study
 from bristle.study import Study, create_study
 from bristle.study.data_check import check_data
-from bristle.study.identify import as_model, identify_study
+from bristle.study.identify import identify_study
 from bristle.study.learn import learn_effect
 from bristle.study.steps import add_effects
 
@@ -76,7 +76,7 @@ def test_a_channel_that_one_run_lacks_is_told_and_costs_no_run(tmp_path):
 def test_the_error_depends_on_the_pressure(tmp_path):
     study = create_study(tmp_path / "rig", lab(tmp_path / "lab", seconds=8.0)).study
     problem = Problem([prepare(run) for run in study.runs().train])
-    plain = as_model(new_model("bingham_standard"))
+    plain = new_model("bingham_standard")
     known = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.0}
     found = compare(problem, replace(plain, values={**plain.values, **known}))
     assert found.first.coordinate == "oil_pressure"

@@ -109,8 +109,8 @@ def test_a_steady_voltage_leaves_its_parameters_unidentified_at_zero(volts):
         frame = frame.drop(columns="voltage")
     found = identify([frame], "bingham")
     assert set(found.unidentified) == {"f_v", "c_v"}
-    assert found.model.values()["f_v"] == 0.0
-    assert found.model.parameters["f_v"].std is None
+    assert found.model.values["f_v"] == 0.0
+    assert found.model.facts["f_v"].std is None
     at = values["f_c"] + (4.0 if volts is None else volts) * values["f_v"]
     assert found.fit.model.values["f_c"] == pytest.approx(at, rel=0.02)
     assert "f_v" not in found.fit.std
@@ -133,11 +133,11 @@ def test_held_parameters_and_bounds_of_the_user_are_kept(tmp_path):
     )
     found = identify_study(Study(study.folder), table=False)
     model = Study(study.folder).model()
-    assert model.values()["v_n"] == 0.03
-    assert model.parameters["v_n"].origin == "assumed"
-    assert model.values()["f_c"] <= 1.2
-    assert model.parameters["c_0"].unit == "kN.s/m"
-    assert model.values()["c_0"] == pytest.approx(found.fit.model.values["c_0"])
+    assert model.values["v_n"] == 0.03
+    assert model.facts["v_n"].origin == "assumed"
+    assert model.values["f_c"] <= 1.2
+    assert model.facts["c_0"].unit == "kN.s/m"
+    assert model.values["c_0"] == pytest.approx(found.fit.model.values["c_0"])
     assert "v_n" not in found.fit.std
 
 
@@ -155,15 +155,15 @@ def test_the_step_holds_the_errors_before_and_after_and_can_be_undone(tmp_path, 
     assert "before" not in out
     assert step.after["z_holdout"] == pytest.approx(1.0, abs=0.1)
     model = Study(study.folder).model()
-    assert model.parameters["f_c"].origin == "identified"
-    assert model.parameters["f_c"].std is not None
+    assert model.facts["f_c"].origin == "identified"
+    assert model.facts["f_c"].std is not None
     reports = study.folder / "reports"
     assert (reports / "identify.png").stat().st_size > 10_000
     answer = json.loads((reports / "identify.json").read_text())
     assert answer["step"] == step.number
     assert {row["law"] for row in answer["table"]} >= {"bingham", "lugre"}
     Study(study.folder).undo()
-    assert Study(study.folder).model().parameters["f_c"].std is None
+    assert Study(study.folder).model().facts["f_c"].std is None
 
 
 def test_errors_before_another_law_are_those_of_the_model_that_the_study_had(tmp_path):

@@ -13,8 +13,7 @@ from studies import case_study
 from bristle.cli import main
 from bristle.diagnosis.trials import Trial
 from bristle.errors import StudyError
-from bristle.identification.problem import Model
-from bristle.model.model import new_model
+from bristle.model.model import Model, new_model
 from bristle.physics.building import paper_building
 from bristle.study import auto
 from bristle.study.api import diagnose, identify

@@ -98,7 +98,7 @@ def test_a_unit_in_the_title_of_a_column_is_not_told_twice(study, tmp_path, caps
 def test_an_effect_that_is_there_already_is_refused(study):
     with pytest.raises(StudyError, match="in the model already"):
         add_effects(study, ["gas_spring", "gas_spring"])
-    assert study.model().effects == {}
+    assert study.model().effects == ()
 
 
 def test_an_effect_of_the_other_law_is_refused(study, tmp_path):
@@ -147,7 +147,7 @@ def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch
     monkeypatch.setattr(steps, "diagnose_rig", killed)
     with pytest.raises(Killed):
         complete(study)
-    assert Study(study.folder).model().effects == {}
+    assert Study(study.folder).model().effects == ()
     assert (study.folder / "verdict.json").read_text() == before
 
 

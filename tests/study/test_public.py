@@ -57,7 +57,7 @@ def found(files):
 
 
 def values(found: bristle.Identified) -> dict[str, float]:
-    return found.model.values()
+    return found.model.values
 
 
 def test_files_frames_arrays_and_measurements_give_the_same(files, found, study):
@@ -82,7 +82,7 @@ def test_files_frames_arrays_and_measurements_give_the_same(files, found, study)
         other = bristle.identify(data, "bingham", holdout=holdout)
         assert values(other) == pytest.approx(values(found), rel=1e-4)
         assert other.after["z_holdout"] == pytest.approx(found.after["z_holdout"], rel=1e-3)
-    assert study.model().values() == pytest.approx(values(found), rel=1e-4)
+    assert study.model().values == pytest.approx(values(found), rel=1e-4)
     by_folder = bristle.identify(str(study.folder), write=False)
     assert values(by_folder) == pytest.approx(values(found), rel=1e-2)
     assert by_folder.step is None

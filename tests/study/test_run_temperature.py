@@ -28,7 +28,7 @@ def test_a_study_takes_the_temperature_of_its_runs(tmp_path):
     assert "temperature" in study.settings.channels
     assert [run.labels["temperature"] for run in study.read()] == list(WARM.values())
     found = add_effects(study, ["measured_temperature"]).identified
-    values = found.model.values()
+    values = found.model.values
     assert values["measured_temperature.T_0"] == pytest.approx(26.0)
     assert values["measured_temperature.c_yield"] == pytest.approx(SHARE, rel=0.2)
     assert found.after["z_holdout"] < 0.8 * found.before["z_holdout"]

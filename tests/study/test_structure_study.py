@@ -12,8 +12,8 @@ from shaken import building, friction
 from bristle.diagnosis.conclusion import VerdictContext, conclude
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.errors import StudyError
-from bristle.identification.problem import Model
 from bristle.identification.rig import at_site, unassigned
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.study.identify import identify_study
 

@@ -109,7 +109,7 @@ def test_law_and_schema_suffice(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     path.write_text('schema = 1\nlaw = "lugre"\n', encoding="utf-8")
     model = read_model(path)
-    assert model.values()["sigma_a"] == 650.0
+    assert model.values["sigma_a"] == 650.0
     assert "sigma_a" in model.free()
     assert "exponent" not in model.free()
 
@@ -117,7 +117,7 @@ def test_law_and_schema_suffice(tmp_path: Path) -> None:
 def test_standard_laws_lack_the_exponential(tmp_path: Path) -> None:
     model = new_model("bingham_standard")
     assert model.base_law == "bingham"
-    assert model.values()["exponent"] == 0.0
+    assert model.values["exponent"] == 0.0
     assert model.free() == ["f_c", "f_v", "c_0", "c_v"]
 
 
@@ -129,12 +129,12 @@ def test_model_keeps_units_and_converts(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     model = read_model(path)
-    assert model.values()["sigma_a"] == pytest.approx(700.0)
-    assert model.flat()["gas_spring.k"].std == 3.0
+    assert model.values["sigma_a"] == pytest.approx(700.0)
+    assert model.facts["gas_spring.k"].std == 3.0
     fitted = model.with_values({"sigma_a": 650.0, "gas_spring.k": 90.0}, {"sigma_a": 12.0})
-    assert fitted.parameters["sigma_a"].value == pytest.approx(0.65)
-    assert fitted.parameters["sigma_a"].std == pytest.approx(0.012)
-    assert fitted.parameters["sigma_a"].origin == "identified"
+    assert fitted.facts["sigma_a"].value == pytest.approx(0.65)
+    assert fitted.facts["sigma_a"].std == pytest.approx(0.012)
+    assert fitted.facts["sigma_a"].origin == "identified"
     write_model(path, fitted)
     assert read_model(path) == fitted
 
@@ -203,7 +203,7 @@ def test_comments_of_a_model_stay(tmp_path: Path) -> None:
     write_model(path, model)
     assert "# ours" in path.read_text(encoding="utf-8")
     assert read_model(path) == model
-    plain = replace(model, effects={})
+    plain = model.only(())
     write_model(path, plain)
     assert read_model(path) == plain
 

@@ -110,13 +110,13 @@ def test_hand_edits_are_steps_that_undo_brings_back(study: Study) -> None:
     path = study.folder / "model.toml"
     path.write_text(path.read_text().replace("value = 650.0", "value = 700.0"), encoding="utf-8")
     edited = Study(study.folder)
-    assert edited.model().values()["sigma_a"] == 700.0
+    assert edited.model().values["sigma_a"] == 700.0
     edited.add_step("add gas_spring", "to see", edited.model().with_effect("gas_spring"))
     assert [step.what for step in edited.steps()][1:] == ["edited by hand", "add gas_spring"]
     edited.undo()
-    assert edited.model().values()["sigma_a"] == 700.0
+    assert edited.model().values["sigma_a"] == 700.0
     edited.undo()
-    assert edited.model().values()["sigma_a"] == 650.0
+    assert edited.model().values["sigma_a"] == 650.0
 
 
 def test_a_verdict_is_on_the_model_that_was_edited(study: Study) -> None:

@@ -11,9 +11,10 @@ import pytest
 from bristle.data.left_out import LOADED, MASKED, MISSING, SATURATED, SETTLING
 from bristle.errors import RecordError
 from bristle.identification.error import ForceError, error_of, pooled, refuse_empty
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.identification.rig import Site
 from bristle.identification.rig_fit import SiteModel, force_errors
+from bristle.model.model import Model
 
 N = 10_000
 LAW = Model("bingham")

@@ -13,8 +13,8 @@ from shaken import building, friction, measured, shake
 from bristle.cli import main
 from bristle.identification.building_sites import StructureRun
 from bristle.identification.error import errors_by_run
-from bristle.identification.problem import Model
 from bristle.identification.rig import DAMPER, building_rig
+from bristle.model.model import Model
 
 HOUSE = building(2)
 

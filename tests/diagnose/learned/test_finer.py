@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from bristle.diagnosis.trials import Trial
-from bristle.identification.problem import Model
 from bristle.learning import fit
 from bristle.learning.curve import Curve
 from bristle.learning.fit import Fitted
 from bristle.learning.rule import LEARN
 from bristle.learning.signals import SLIP
+from bristle.model.model import Model
 
 CURVE = Curve("yield", "speed", (), (0.0, 0.1, 0.4), (0.0, 2.0, -1.0), held=(0, 2))
 NONE = np.zeros(0)

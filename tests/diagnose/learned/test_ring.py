@@ -9,12 +9,13 @@ from test_screen import STEP, VALUES, T, runs
 
 from bristle.identification.fit import fit
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, shown_force
+from bristle.identification.problem import shown_force
 from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
 from bristle.learning.normal import residual_of
 from bristle.learning.screen import promises
 from bristle.learning.signals import RING, frequencies, response, ringing
+from bristle.model.model import Model
 from bristle.user_code.load import defined
 
 FREQUENCY, DAMPING, SHARE = 9.3, 0.03, 0.2  # Hz, 1, 1

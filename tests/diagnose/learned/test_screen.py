@@ -11,12 +11,13 @@ from bingham_runs import NOISE, NOWHERE, STEP, VALUES, T, runs
 from bristle.data.extra_channels import Extra
 from bristle.errors import RecordError
 from bristle.identification.fit import fit
-from bristle.identification.problem import Model, Problem, Run, tracks_of
+from bristle.identification.problem import Problem, Run, tracks_of
 from bristle.learning.effect_file import effect_text
 from bristle.learning.normal import Normal, hats_at, residual_of
 from bristle.learning.rule import LEARN
 from bristle.learning.screen import distinct, knots_of, promises, signals
 from bristle.learning.signals import SLIP, rebuilt, slips
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.user_code.load import defined
 

@@ -11,7 +11,7 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import Trial, judge
 from bristle.identification.fit import fit
 from bristle.identification.histories import DamperForces
-from bristle.identification.problem import Model, Problem, Run
+from bristle.identification.problem import Problem, Run
 from bristle.learning import fit as learned_fit
 from bristle.learning.closed_forms import closed_forms
 from bristle.learning.curve import Curve
@@ -20,6 +20,7 @@ from bristle.learning.fit import Fitted, with_law_of
 from bristle.learning.normal import residual_of
 from bristle.learning.rule import LEARN
 from bristle.learning.screen import promises
+from bristle.model.model import Model
 from bristle.user_code.load import defined
 
 STEP = 0.002  # s

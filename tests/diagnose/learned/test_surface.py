@@ -15,7 +15,7 @@ from scipy.signal import savgol_filter
 from bristle.cli import main
 from bristle.data.extra_channels import Extra
 from bristle.identification.fit import fit
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
 from bristle.learning.closed_forms import closed_forms
 from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
@@ -24,6 +24,7 @@ from bristle.learning.rule import LEARN
 from bristle.learning.screen import promises
 from bristle.learning.signals import ALONG
 from bristle.learning.surface import PARTS_OF_SURFACE, continued, continues, separated, surfaces
+from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS, Q
 from bristle.user_code.conformance import examine
 from bristle.user_code.load import defined
