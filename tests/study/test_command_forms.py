@@ -179,10 +179,10 @@ def test_from_form_to_form_the_quantities_stay() -> None:
     line = new_model("lugre")
     table = in_form(line, "table", runs)
     back = in_form(table, "linear", runs)
-    assert back.values() == pytest.approx(line.values())
+    assert back.values == pytest.approx(line.values)
     bent = in_form(table, "quadratic", runs)
-    assert bent.values() == pytest.approx(
-        {**line.values(), "stiffness_bend": 0.0, "viscosity_bend": 0.0}
+    assert bent.values == pytest.approx(
+        {**line.values, "stiffness_bend": 0.0, "viscosity_bend": 0.0}
     )
 
 
