@@ -229,6 +229,11 @@ class Model:
         """Return all parameters as a model.toml has them, numbers as typed where they still are."""
         return {name: self._written(name) for name in self.facts or self.values}
 
+    def written_of(self, effect: str = "") -> dict[str, Fact]:
+        """Return the parameters of an effect, or of the law, by their own names; see `written`."""
+        parts = ((name.rpartition("."), fact) for name, fact in self.written().items())
+        return {own: fact for (of, _, own), fact in parts if of == effect}
+
     def _written(self, name: str) -> Fact:
         declared = self.declared(name)
         unit = declared.unit

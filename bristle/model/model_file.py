@@ -296,30 +296,25 @@ def model_text(model: Model, beside: Path | None = None) -> str:
     for key in ("parameters", "effects"):
         if key not in document:
             document[key] = tomlkit.table(is_super_table=True)
-    facts = model.written()
-    own = {name: fact for name, fact in facts.items() if "." not in name}
-    _update(document["parameters"], _listed(own, table_names(model.law)), False)
+    _update(document["parameters"], _listed(model), False)
     effects = document["effects"]
     for name in [name for name in effects if name not in model.effects]:
         del effects[name]
     for name in model.effects:
-        begin = f"{name}."
-        own = {n.removeprefix(begin): f for n, f in facts.items() if n.startswith(begin)}
         if name not in effects:
             effects[name] = tomlkit.table()
         if "parameters" not in effects[name]:
             effects[name]["parameters"] = tomlkit.inline_table()
-        _update(effects[name]["parameters"], _listed(own, table_names("", name)), True)
+        _update(effects[name]["parameters"], _listed(model, name), True)
     if not model.effects:
         del document["effects"]
     set_correlation(document, model.correlation, model.uncertain())
     return tomlkit.dumps(document)
 
 
-def _listed(
-    values: Mapping[str, Fact], tables: Mapping[str, tuple[str, ...]]
-) -> dict[str, dict[str, Any] | list[dict[str, Any]]]:
-    """Return values as a file has them: those of a table as one list."""
+def _listed(model: Model, effect: str = "") -> dict[str, dict[str, Any] | list[dict[str, Any]]]:
+    """Return the values of the law or an effect as a file has them: those of a table as one list."""
+    values, tables = model.written_of(effect), table_names(model.law, effect)
     inside = {name for names in tables.values() for name in names}
     plain = {name: _as_toml(value) for name, value in values.items() if name not in inside}
     rows = {

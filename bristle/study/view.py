@@ -14,7 +14,7 @@ from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, error_text, verdict_view
 from ..errors import RecordError
 from ..learning.result import LearnedEffect
-from ..model.model import Value
+from ..model.model import Model
 from ..model.model_file import read_model
 from ..physics.drive import DRIVES
 from ..physics.forms import joined_form
@@ -106,7 +106,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     added = [name for name in model.effects if name not in began.effects]
     if not added or not judged:
         return view
-    own = [effect_text(name, _sizes(model.effects[name]), DRIVES[model.drive]) for name in added]
+    own = [effect_text(name, _sizes(model, name), DRIVES[model.drive]) for name in added]
     told = [Text(text, "say") for text in own]
     title = f"Found and added: {effect_names(added)}."
     if verdict.get("kind") != "none":
@@ -142,9 +142,9 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     return view._replace(blocks=(*curves, *view.blocks, table))
 
 
-def _sizes(values: Mapping[str, Value]) -> dict[str, tuple[float, float | None, str]]:
+def _sizes(model: Model, effect: str) -> dict[str, tuple[float, float | None, str]]:
     """Return the values of an effect with standard deviation and unit."""
-    return {name: (one.value, one.std, one.unit) for name, one in values.items()}
+    return {name: (f.value, f.std, f.unit) for name, f in model.written_of(effect).items()}
 
 
 def _fall(first: HistoryStep, last: HistoryStep) -> str:
