@@ -313,7 +313,7 @@ def model_text(model: Model, beside: Path | None = None) -> str:
 
 
 def _listed(model: Model, effect: str = "") -> dict[str, dict[str, Any] | list[dict[str, Any]]]:
-    """Return the values of the law or an effect as a file has them: those of a table as one list."""
+    """Return the values of the law or an effect as a file has them; a table is one list."""
     values, tables = model.written_of(effect), table_names(model.law, effect)
     inside = {name for names in tables.values() for name in names}
     plain = {name: _as_toml(value) for name, value in values.items() if name not in inside}

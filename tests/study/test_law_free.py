@@ -51,7 +51,7 @@ class Folder:
 
     def model(self):
         found = new_model("bingham").with_values({"f_c": 1.0})
-        return SimpleNamespace(law="bingham", flat=found.flat, effects=list(self.names))
+        return SimpleNamespace(law="bingham", facts=found.facts, effects=list(self.names))
 
 
 @pytest.fixture
