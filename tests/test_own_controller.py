@@ -59,7 +59,7 @@ def test_the_template_builds_runs_and_conforms(
     assert voltage == pytest.approx(np.clip(wanted, 0.0, 5.0), abs=1e-9)
     assert voltage.max() == 5.0, "the limit was reached"
     report = conform("MyController.fmu")
-    assert report.ok, report.to_text()
+    assert report.ok, repr(report)
 
 
 def test_the_page_shows_the_template_without_its_comments(file: Path) -> None:

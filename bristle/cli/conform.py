@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from typing import TYPE_CHECKING
 
-from ._options import add_json, print_table
-
-if TYPE_CHECKING:
-    from ..conformance.report import Report
+from ._options import add_details, add_json
 
 HELP = "check an FMU against FMI 2.0 or 3.0 co-simulation"
-
-_COLOURS = {"pass": "green", "fail": "bold red", "note": "yellow"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in separate processes, with a time limit, with your rights."
     )
     parser.add_argument("fmu", metavar="FILE.fmu", help="an FMU of any tool")
+    add_details(parser)
     add_json(parser, "print the table as JSON")
     text = "exit with 1 for a lack of robustness as well"
     parser.add_argument("--strict", action="store_true", help=text)
@@ -39,25 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Judge one FMU; return 0 if it conforms, 1 if it breaks a rule."""
     from ..conformance import conform
+    from ..view import terminal
 
     report = conform(arguments.fmu, arguments.timeout, only=arguments.only, beside=arguments.beside)
     if arguments.json:
         print(report.to_json())
-    elif sys.stdout.isatty():
-        _show(report)
     else:
-        print(report.to_text())
+        print(terminal.text(report.view(), details=arguments.details))
     return 0 if (report.ok if arguments.strict else report.conforms) else 1
-
-
-def _show(report: Report) -> None:
-    from rich.console import Console
-    from rich.text import Text
-
-    heads = ("probe", "tried", "seen", "what the standard says", "verdict")
-    rows = [
-        (row.probe, row.tried, row.seen, row.standard, Text(row.verdict, _COLOURS[row.verdict]))
-        for row in report.rows
-    ]
-    print_table(heads, rows, lines=True)
-    Console().print(Text(report.summary()))

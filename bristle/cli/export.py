@@ -12,7 +12,15 @@ from pathlib import Path
 
 from ..core.text import command
 from ..errors import ScenarioError, StudyError
-from ._options import add_json, add_native, add_overrides, add_trust, builder, print_json
+from ._options import (
+    add_json,
+    add_native,
+    add_overrides,
+    add_trust,
+    builder,
+    print_json,
+    print_view,
+)
 
 HELP = "write a study's model as an FMU; or a scenario as one FMU, or as a web page"
 
@@ -74,13 +82,7 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print_json(answer)
         return 0
-    print(f"{found.fmu}: the damper with the model's values.")
-    print(f"{found.scenario}: applies the motion of {found.run} to it.")
-    for line in found.proof.lines(found.fmu.parent) if found.proof else ():
-        print(line)
-    print(f"Run it:  {command('run', found.scenario)}")
-    for note in found.notes:
-        print(f"{note[:1].upper()}{note[1:]}")
+    print_view(found.view(), ())
     return 0
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..core.text import command
+from ..view.blocks import Next
 from ._options import (
     add_common_to_actions,
     add_details,
@@ -19,6 +20,7 @@ from ._options import (
     files_of,
     print_json,
     print_study_view,
+    print_view,
     test_files,
 )
 
@@ -107,8 +109,6 @@ def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
 
 def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
     """Print what changes, what is no longer of the data, and the next command."""
-    from ..core.text import command
-
     if not done.changes:
         print(f"{study.folder}: the channels are so already. Nothing is written.")
         return
@@ -394,7 +394,7 @@ def _new(arguments: argparse.Namespace) -> int:
     if arguments.json:
         _print_json(created)
     else:
-        _print_new(created)
+        print_view(created.view(), ())
     return 0
 
 
@@ -412,33 +412,6 @@ def _print_json(created: Created) -> None:
         "notes": list(created.notes),
     }
     print_json(answer)
-
-
-def _print_new(created: Created) -> None:
-    from ..core.text import capital, command, listed
-
-    folder, settings = created.study.folder, created.study.settings
-    print(f"{folder}: a study of {len(settings.runs)} run(s). The columns are read as:")
-    for guess in created.guesses:
-        turned = "turned" if guess.sign < 0 else ""
-        told = guess.column.endswith((f"[{guess.unit}]", f"({guess.unit})"))
-        column = guess.column if told else f"{guess.column} [{guess.unit}]"
-        print(f"  {guess.channel:28} {column} {turned}".rstrip())
-        print(f"  {'':28}   {guess.reason}")
-        if guess.doubt:
-            print(f"  {'':28}   doubtful: {guess.doubt}")
-    extra = [f"  {name:28} {one.column}, in {one.unit}" for name, one in created.extra.items()]
-    if extra:
-        head = "Extra channels, on which an error may depend ([extra] in study.toml):"
-        print(head, *extra, sep="\n")
-    if created.unused:
-        print(f"Not used: {listed(created.unused)}.")
-    files = [run.file for run in (*settings.runs, *settings.excluded)]
-    for note in created.notes:
-        print(f"{capital(note, files)}.")
-    then = command("study", "check", folder)
-    wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
-    print(f"Wrong? Correct it:  {wrong}\nThen:  {then}")
 
 
 def _check(arguments: argparse.Namespace) -> int:
@@ -473,10 +446,11 @@ def _check(arguments: argparse.Namespace) -> int:
         answer |= {"not_corrected": apart} if apart else {}
         print_json(answer)
     else:
-        print(found.text())
-        print(f"\nPicture: {picture}")
-        if not found.ok:
-            print("Correct these errors before you fit a model.", file=sys.stderr)
+        then = Next(command("identify", study.folder), "fits the model")
+        view = found.view()
+        view = view._replace(blocks=(*view.blocks, *([then] if found.ok else [])))
+        print_view(view, ())
+        print(f"Picture: {picture}")
     return 0 if found.ok else StudyError.exit_code
 
 

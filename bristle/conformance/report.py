@@ -1,4 +1,4 @@
-"""What a judgement consists of, and its two plain forms: JSON and text."""
+"""What a judgement consists of, and its plain form, JSON."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+
+from ..view import Viewable
 
 VERDICTS = ("pass", "fail", "note")
 RULES = {
@@ -31,8 +33,8 @@ class Row:
     rule: str
 
 
-@dataclass(frozen=True)
-class Report:
+@dataclass(frozen=True, repr=False)
+class Report(Viewable):
     """All rows of one FMU, in the order in which they were tried."""
 
     fmu: str
@@ -80,31 +82,12 @@ class Report:
         )
 
     def summary(self) -> str:
-        """Return what falls short, a line per probe by the rule that it breaks, and the counts."""
-        lines = []
-        for rule, heading in RULES.items():
-            rows = self.failures(rule)
-            if rows:
-                lines += [f"{heading}:", *(f"  {row.probe}: {row.seen}" for row in rows), ""]
+        """Return in one sentence whether the FMU conforms, with the counts."""
         counts = self.counts()
         verdict = "conforms to the standard" if self.conforms else "does not conform"
         weak = len(self.failures("robustness"))
         robust = f", {weak} of them in robustness" if weak else ""
-        return "\n".join(
-            [
-                *lines,
-                f"{self.fmu} {verdict}: {counts['pass']} passed, {counts['fail']} failed{robust}, "
-                f"{counts['note']} noted",
-            ]
+        return (
+            f"{self.fmu} {verdict}: {counts['pass']} passed, {counts['fail']} failed{robust}, "
+            f"{counts['note']} noted."
         )
-
-    def to_text(self) -> str:
-        """Return the table as plain text, one block per probe, for pipes and logs."""
-        blocks = [
-            f"{row.verdict:<5} {row.probe}\n"
-            f"      tried     {row.tried}\n"
-            f"      seen      {row.seen}\n"
-            f"      standard  {row.standard}"
-            for row in self.rows
-        ]
-        return "\n".join([*blocks, "", self.summary()])

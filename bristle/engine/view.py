@@ -70,7 +70,7 @@ def run_view(frame: pd.DataFrame) -> View:
         said += f" {more} more columns."
     energy = made.get("energy_residual", {}) if "coupling_error" not in frame.attrs else {}
     energies = (
-        f"Energy made by the coupling: {100 * share:.2g} % of that through {name}."
+        f"Stepping part by part adds {100 * share:.2g} % to the energy through {name}."
         for name, share in energy.items()
     )
     return View(

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..core.files import read_json
-from ..diagnosis.view import verdict_view, worst
+from ..diagnosis.view import worst
 from ..errors import BristleError
 from ..planning.folder import read_plan
 from ..study.study import Study
+from ..study.view import story_view
 from ..view.page_data import page_data
 from .data_view import thinned
 
@@ -32,7 +33,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """
     study = Study(folder)
     verdict = study.verdict()
-    told = {"verdict": None} if verdict is None else {"verdict": shown(verdict)}
+    told = {"verdict": None if verdict is None else shown(study, verdict)}
     return {
         **told, "learned": learned(study),
         "plans": [_plan(one) for one in sorted(folder.glob("plan*")) if one.is_dir()],
@@ -72,9 +73,9 @@ def learned(study: Study) -> list[dict[str, Any]]:
     return found
 
 
-def shown(verdict: Mapping[str, Any]) -> dict[str, Any]:
+def shown(study: Study, verdict: Mapping[str, Any]) -> dict[str, Any]:
     """Return a verdict as the page shows it: blocks, and the trials that it draws itself."""
-    view, at = verdict_view(verdict), worst(verdict)
+    view, at = story_view(study, verdict), worst(verdict)
     return {
         "kind": verdict["kind"], "title": view.title, "answer": page_data(view.blocks),
         "details": page_data(view.details), "effects": list(verdict.get("effects") or []),

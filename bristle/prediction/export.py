@@ -29,6 +29,7 @@ from ..study.runs import Runs
 from ..study.study import Study
 from ..system.toml import DamperText, Parameters, part_text, source_of, values_of
 from ..user_code.load import own_effects
+from ..view import Viewable
 from . import model_system
 from .held_out import FOLDER, HeldOut, Proof, held_out, prove, step_for, write_inputs, write_proof
 from .model_system import BuildingWithFile, Excitation, loads, shaking_of, write_scenario
@@ -36,8 +37,8 @@ from .model_system import BuildingWithFile, Excitation, loads, shaking_of, write
 Build = Callable[[Plan, Path], Path]
 
 
-@dataclass(frozen=True)
-class Exported:
+@dataclass(frozen=True, repr=False)
+class Exported(Viewable):
     """What was written: the FMU, the scenario, the files it reads; what was left out, and why.
 
     `proof` is what the FMU gives on the held-out runs, whose inputs are among the files; None where

@@ -5,9 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..comparison.names import effect_name, name_of
-from ..core.text import capital, percent, plain, scale
-from ..view.blocks import Table, Text, View, view_of
+from ..core.text import capital, command, percent, plain, scale
+from ..view.blocks import Next, Table, Text, View, view_of
 from .closed_loop_result import CAUSES, KINDS, ClosedLoop, Predicted
+from .export import Exported
+
+
+@view_of(Exported)
+def exported_view(found: Exported) -> View:
+    """Return the view of an export: the FMU, what it was found to give, how it is run."""
+    proof = found.proof.lines(found.fmu.parent) if found.proof else ()
+    notes = [Text(capital(note, ()), "note") for note in found.notes]
+    return View(
+        f"{found.fmu}: the damper with the model's values.",
+        (
+            *map(Text, proof), *notes,
+            Next(command("run", found.scenario), f"applies the motion of {found.run} to it"),
+        ),
+    )  # fmt: skip
 
 
 @view_of(ClosedLoop)

@@ -14,7 +14,6 @@ from ..comparison.names import site_name
 from ..comparison.view import band_table, headline, pattern_table, run_table, site_table, sites_page
 from ..core.progress import counted, tell
 from ..core.text import command, short_z
-from ..diagnosis.view import verdict_view
 from ..errors import BristleError
 from ..model.equations import equations
 from ..physics.drive import DRIVES
@@ -25,7 +24,7 @@ from ..planning.performed import shows
 from ..study.budget_picture import budgets, draw_budget, sentence
 from ..study.history import HistoryStep, history_steps
 from ..study.study_file import TEST
-from ..study.view import or_nothing
+from ..study.view import or_nothing, story_view
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
@@ -291,7 +290,7 @@ def _verdict(content: Content) -> View:
         then = f"{order} finds what it misses, and how certain that is."
         return View("Not diagnosed", (Text(none, "say"), Text(then)))
     notes = [note for note in verdict.get("notes") or [] if note not in content.notes]
-    return verdict_view({**verdict, "notes": notes})
+    return story_view(content.study, {**verdict, "notes": notes})
 
 
 def _tiles(content: Content) -> str:

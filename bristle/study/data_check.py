@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.finding import Finding, grouped, sentence
-from ..core.text import command, plain, scale
+from ..core.finding import Finding
+from ..core.text import command, plain
 from ..data.checks.channels import check_channels, check_sizes
 from ..data.checks.differing_runs import check_differing_runs
 from ..data.checks.motion import (
@@ -32,7 +32,7 @@ from .study_file import TEST
 if TYPE_CHECKING:
     from ..view.style import Page
 
-_HEADINGS = {"error": "Errors", "warning": "Warnings", "note": "Notes"}
+_LEVELS = ("error", "warning", "note")
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,56 +95,6 @@ class DataCheck(Viewable):
             ],
         }
 
-    def text(self) -> str:
-        """Return the channels in a table, then the findings, runs that share one joined."""
-        lines = _table(self.runs)
-        last = ""
-        for finding, group in grouped(self.findings):
-            if finding.kind == "noise" and finding.level == "note":
-                continue  # in the table
-            if finding.level != last:
-                last = finding.level
-                lines += ["", f"{_HEADINGS[last]}:"]
-            lines.append(f"  - {sentence(finding, group)}")
-            if finding.do:
-                lines.append(f"    {finding.do}")
-        return "\n".join(lines)
-
-
-def _table(runs: tuple[Measurement, ...]) -> list[str]:
-    """Return one line per channel: unit, range over all runs, noise in the middle one."""
-    lines = [f"{'channel':28} {'unit':6} {'lowest':>11} {'highest':>11} {'noise':>9} {'of RMS':>8}"]
-    for channel in dict.fromkeys(channel for run in runs for channel in run.channels):
-        there = [run for run in runs if channel in run.channels]
-        low = min(float(run[channel].min()) for run in there)
-        high = max(float(run[channel].max()) for run in there)
-        noise = float(np.median([run.noise.get(channel, 0.0) for run in there]))
-        rms = float(np.median([np.std(run[channel]) for run in there]))
-        share = plain(100.0 * noise / rms, 2) if rms > 0.0 else ""
-        factor, unit = scale(there[0].units[channel], max(abs(low), abs(high)))
-        colours = [facts.colour for run in there if (facts := run.noise_facts.get(channel))]
-        colour = max(set(colours), key=colours.count) if colours else "given"
-        lines.append(
-            f"{channel:28} {unit:6} {plain(factor * low, 4):>11} {plain(factor * high, 4):>11} "
-            f"{plain(factor * noise, 2):>9} {share:>8} % {colour}"
-        )
-    return lines + _extra_lines(runs)
-
-
-def _extra_lines(runs: tuple[Measurement, ...]) -> list[str]:
-    """Return one line per extra channel: unit and range over the runs that hold it."""
-    lines = []
-    for name in dict.fromkeys(name for run in runs for name in run.extra):
-        there = [run.extra[name] for run in runs if name in run.extra]
-        low = min(float(one.values.min()) for one in there)
-        high = max(float(one.values.max()) for one in there)
-        factor, unit = scale(there[0].unit, max(abs(low), abs(high)))
-        span = f"{plain(factor * low, 4):>11} {plain(factor * high, 4):>11}"
-        few = len(runs) - len(there)
-        lacking = f" (not in {few} run{'s' * (few > 1)})" if few else ""
-        lines.append(f"{name:28} {unit:6} {span} extra channel{lacking}")
-    return lines
-
 
 def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataCheck:
     """Check all measurements of a study.
@@ -199,7 +149,7 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     if study.settings.has_building:
         findings += _unmeasured(runs.all, at_damper)
     findings = [_of_study(_milder(finding, runs.all), study) for finding in findings]
-    ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
+    ordered = [finding for level in _LEVELS for finding in findings if finding.level == level]
     return DataCheck(tuple(ordered), tuple(excitations), tuple(every), at_damper)
 
 

@@ -584,8 +584,8 @@ def _half(std: float) -> float | None:
 # A new study from files.
 
 
-@dataclass(frozen=True)
-class Created:
+@dataclass(frozen=True, repr=False)
+class Created(Viewable):
     """A study that was made: what was guessed, what was left out, and what to know.
 
     `extra` are the channels besides those that bristle knows, by name.

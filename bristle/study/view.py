@@ -6,9 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..comparison.names import effect_names
 from ..core.finding import grouped, sentence
-from ..core.text import command, percent, plain, scale, short_z
+from ..core.text import capital, command, listed, percent, plain, scale, short_z
+from ..data.guess import Guess
+from ..data.measurement import Measurement
 from ..diagnosis.conclusion import is_correctable
 from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, error_text, verdict_view
@@ -18,7 +22,7 @@ from ..model.model import Model
 from ..model.model_file import read_model
 from ..physics.drive import DRIVES
 from ..physics.forms import joined_form
-from ..view.blocks import Figure, Next, Table, Text, View, view_of
+from ..view.blocks import Block, Figure, Next, Table, Text, View, view_of
 from ..view.style import Page
 from .auto import Completed
 from .data_check import DataCheck
@@ -26,17 +30,91 @@ from .fit_view import identified_view as identified_view
 from .forms import law_command
 from .history import HistoryStep, history_steps
 from .pictures import draw_run, staircase_page
+from .steps import Created
 from .study import Study
 from .study_file import TEST
 
 
 @view_of(DataCheck)
 def data_check_view(found: DataCheck) -> View:
-    """Return the view of a data check: its findings, worst first, and the picture of all runs."""
-    rows = [[one.level, sentence(one, runs), one.do] for one, runs in grouped(found.findings)]
-    title = "The data can be used" if found.ok else "Mend the data first"
-    alt = "All runs: channels over time, force over motion"
-    return View(title, (Table(("", "finding", "what to do"), rows), Figure(found.page, alt)))
+    """Return the view of a data check: what to mend, what each channel holds, what to know."""
+    told: dict[bool, list[Block]] = {True: [], False: []}
+    for one, runs in grouped(found.findings):
+        if one.kind == "noise" and one.level == "note":
+            continue  # in the table
+        level = "" if one.level == "note" else f"{one.level.capitalize()}: "
+        text = f"{level}{sentence(one, runs)} {one.do}".rstrip()
+        told[one.level == "note"].append(Text(text, "note"))
+    title = "The data can be used." if found.ok else "Correct these errors before you fit a model."
+    figure = Figure(found.page, "All runs: channels over time, force over motion")
+    return View(title, (*told[False], _channels(found.runs), *told[True], figure))
+
+
+def _channels(runs: Sequence[Measurement]) -> Table:
+    """Return the table of the channels: range over all runs, noise in the middle one."""
+    rows = [_channel(name, [run for run in runs if name in run.channels])
+            for name in dict.fromkeys(name for run in runs for name in run.channels)]  # fmt: skip
+    rows += [_extra(name, runs) for name in dict.fromkeys(n for run in runs for n in run.extra)]
+    header = ("channel", "unit", "lowest", "highest", "noise", "of RMS", "kind of noise")
+    return Table(header, rows, range(2, 6))
+
+
+def _channel(name: str, there: Sequence[Measurement]) -> list[str]:
+    low = min(float(run[name].min()) for run in there)
+    high = max(float(run[name].max()) for run in there)
+    noise = float(np.median([run.noise.get(name, 0.0) for run in there]))
+    rms = float(np.median([np.std(run[name]) for run in there]))
+    factor, unit = scale(there[0].units[name], max(abs(low), abs(high)))
+    colours = [facts.colour for run in there if (facts := run.noise_facts.get(name))]
+    return [
+        name, unit, plain(factor * low, 4), plain(factor * high, 4), plain(factor * noise, 2),
+        f"{plain(100.0 * noise / rms, 2)} %" if rms > 0.0 else "",
+        max(set(colours), key=colours.count) if colours else "given",
+    ]  # fmt: skip
+
+
+def _extra(name: str, runs: Sequence[Measurement]) -> list[str]:
+    there = [run.extra[name] for run in runs if name in run.extra]
+    low = min(float(one.values.min()) for one in there)
+    high = max(float(one.values.max()) for one in there)
+    factor, unit = scale(there[0].unit, max(abs(low), abs(high)))
+    few = len(runs) - len(there)
+    lacking = f" (not in {few} run{'s' * (few > 1)})" if few else ""
+    extra = f"extra channel{lacking}"
+    return [name, unit, plain(factor * low, 4), plain(factor * high, 4), "", "", extra]
+
+
+@view_of(Created)
+def created_view(created: Created) -> View:
+    """Return the view of a new study: which column each channel is, and why it was taken so."""
+    folder, settings = created.study.folder, created.study.settings
+    held = sum(run.role == "holdout" for run in settings.runs)
+    files = [run.file for run in (*settings.runs, *settings.excluded)]
+    rows = [[one.channel, _column(one), one.reason] for one in created.guesses]
+    rows += [
+        [name, f"{one.column} [{one.unit}]", "extra channel: an error may depend on it"]
+        for name, one in created.extra.items()
+    ]
+    notes = [f"{one.channel} is doubtful: {one.doubt}." for one in created.guesses if one.doubt]
+    notes += [f"Not used: {listed(created.unused)}."] if created.unused else []
+    notes += [f"{capital(note, files)}." for note in created.notes]
+    wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
+    return View(
+        f"{folder}: a study of {len(settings.runs)} run(s), {held} of them held out.",
+        (
+            Table(("channel", "column", "read so because"), rows),
+            *(Text(note, "note") for note in notes),
+            Next(command("study", "check", folder), "checks the data before any model"),
+            Next(wrong, "if a column is wrong"),
+        ),
+    )  # fmt: skip
+
+
+def _column(one: Guess) -> str:
+    """Return a column with its unit, and that its sign is turned if it is."""
+    known = one.column.endswith((f"[{one.unit}]", f"({one.unit})"))
+    column = one.column if known else f"{one.column} [{one.unit}]"
+    return f"-{column}" if one.sign < 0 else column
 
 
 @view_of(Study)

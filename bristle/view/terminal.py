@@ -59,7 +59,7 @@ def lines(block: Block) -> list[str]:
     if isinstance(block, Formula):
         return [f"  {block.text}"]
     if isinstance(block, Text) and block.text:
-        warns = block.kind != "note" or block.text.startswith("Warning:")
+        warns = block.kind != "note" or block.text.startswith(("Error:", "Warning:"))
         return wrap(block.text if warns else f"Note: {block.text}", WIDTH)
     return []
 

@@ -67,7 +67,7 @@ def toy(tmp_path: Path) -> Compile:
 
 def test_a_strict_fmu_conforms_and_no_probe_is_left_out(toy: Compile) -> None:
     report = conform(toy())
-    assert report.ok, report.to_text()
+    assert report.ok, repr(report)
     assert [row.probe for row in report.rows] == [
         name for name, probe in PROBES.items() if probe.rule != "bristle"
     ]
@@ -133,7 +133,7 @@ def test_a_native_fmu_conforms_and_keeps_the_rules_for_faults() -> None:
     from bristle.native.build import ensure
 
     report = conform(ensure("ClippedOptimal", fmi=3))
-    assert report.ok, report.to_text()
+    assert report.ok, repr(report)
     for probe in ("fault: input", "fault: step", "fault: order", "fault: earlier state"):
         assert report.row(probe).verdict == "pass"
     assert report.row("state across processes").verdict == "pass"
@@ -152,7 +152,7 @@ def test_a_native_fmu_conforms_and_keeps_the_rules_for_faults() -> None:
 )
 def test_the_reference_fmus_violate_nothing_but_lack_robustness(name: str) -> None:
     report = conform(REFERENCE / f"{name}.fmu", timeout=2.0)
-    assert report.conforms, report.to_text()
+    assert report.conforms, repr(report)
     robustness = {row.probe for row in report.failures("robustness")}
     assert robustness == (set() if name == "Stair" else {"NaN step", "infinite step"})
 

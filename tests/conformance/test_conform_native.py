@@ -82,7 +82,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Compile:
 
 def test_strict_fmu_conforms_and_refuses_with_error(compiled: Compile) -> None:
     report = conform(compiled())
-    assert report.ok, report.to_text()
+    assert report.ok, repr(report)
     assert report.row("wrong guid").seen == "refused"
     for name in (
         "step before initialisation",
@@ -150,7 +150,7 @@ def test_spoilt_fmu_fails(compiled: Compile, trait: str, probe: str, seen: str) 
     report = conform(compiled(trait), only=[probe])
     assert not report.ok
     failed = [row for row in report.rows if row.verdict == "fail"]
-    assert any(seen in row.seen for row in failed), report.to_text()
+    assert any(seen in row.seen for row in failed), repr(report)
 
 
 # Probes that judge nothing, and those with a test of their own in which they fail.
@@ -186,7 +186,7 @@ def test_fmu_for_one_instance_per_process_is_not_blamed(compiled: Compile) -> No
         'modelIdentifier="Strict" canBeInstantiatedOnlyOncePerProcess="true"',
     )
     report = conform(compiled("REFUSE_SECOND", once))
-    assert report.ok, report.to_text()
+    assert report.ok, repr(report)
     seen = report.row("two instances").seen
     assert seen == "not tried: canBeInstantiatedOnlyOncePerProcess is claimed"
 
@@ -217,7 +217,7 @@ SPOILT_DERIVATIVES = [
 
 def test_derivatives_of_inputs_are_tried_where_they_are_claimed(compiled: Compile) -> None:
     report = conform(compiled("INTERPOLATES", INTERPOLATES))
-    assert report.ok, report.to_text()
+    assert report.ok, repr(report)
     assert [report.row(name).seen for name in DERIVATIVES] == [
         "1 inputs moved by them; zero, a reset and a state hold", "refused with Error",
     ]  # fmt: skip

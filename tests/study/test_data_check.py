@@ -18,6 +18,7 @@ from bristle.data.cut_off import clipped_ends
 from bristle.errors import StudyError
 from bristle.study import Study, create_study
 from bristle.study.data_check import DataCheck, check_data
+from bristle.view.terminal import text as shown
 
 Spoil = Callable[[Columns], None]
 
@@ -45,7 +46,7 @@ def test_clean_runs_have_nothing_to_mend(tmp_path: Path) -> None:
     assert excitation.drive == "voltage"
     assert excitation.cycles > 5
     assert [level for level, _ in excitation.levels] == pytest.approx([0, 2, 4, 6])
-    assert "force" in look.text()
+    assert "force" in shown(look.view())
 
 
 def scaled(name: str, factor: float) -> Spoil:
@@ -162,7 +163,7 @@ def test_planted_faults_are_found(
 ) -> None:
     look = look_at(tmp_path, spoil)
     hits = [finding for finding in found(look, kind) if finding.level == level]
-    assert hits, look.text()
+    assert hits, shown(look.view())
     assert re.search(told, hits[0].text), hits[0].text
     assert look.ok == (level != "error")
 

@@ -47,7 +47,7 @@ def test_crank_driven_damper_as_a_study(tmp_path: Path) -> None:
     files = sorted((DATA / "mr_damper_utfpr").glob("*.csv"))[::6]
     look = check_data(create_study(tmp_path / "rig", files).study)
     kinds = {finding.kind for finding in look.findings}
-    assert look.ok, look.text()
+    assert look.ok, repr(look)
     # Its README: velocity is a numerical derivative, force carries about 130 N, one voltage a run.
     assert {"derived", "offset", "drive"} <= kinds
     assert not kinds & {"clipping", "gain", "two rigs"}
