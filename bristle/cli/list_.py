@@ -80,10 +80,17 @@ def _physics(word: str, arguments: argparse.Namespace) -> int:
     elif isinstance(told, dict):
         kind.one(told)
     else:
-        kind.table(told)
+        _print(f"{word}s", [_in_brief(row) for row in told])
+        print(f"All of one:  bristle list {word}s NAME")
     for text in left_out:
         print(f"left out: {text}", file=sys.stderr)
     return 0
+
+
+def _in_brief(row: dict[str, Any]) -> dict[str, Any]:
+    """Return the row of an effect or a law in the table of all."""
+    where = {"site": ", ".join(row["sites"])} if "sites" in row else {}
+    return {"name": row["name"], **where, "description": row["about"].removesuffix(".")}
 
 
 def _components() -> Rows:
@@ -175,7 +182,7 @@ def _print(title: str, rows: Rows) -> None:
     columns = [
         column
         for column in (rows[0] if rows else {})
-        if any(row[column] not in (None, "") for row in rows)
+        if column != "file" and any(row[column] not in (None, "") for row in rows)
     ]
     heads = [f"{column} [{_UNITS[column]}]" if column in _UNITS else column for column in columns]
     cells = [[_cell(row[column]) for column in columns] for row in rows]
@@ -201,14 +208,13 @@ class _Kind(NamedTuple):
     """What differs between effects and laws.
 
     `word` is "effect" or "law"; `registered` holds those that are known by name; `told` returns
-    what is told of one, as JSON has it; `one` and `table` print that of one and of several.
+    what is told of one, as JSON has it; `one` prints that.
     """
 
     word: str
     registered: Mapping[str, Any]
     told: Callable[[Any], dict[str, Any]]
     one: Callable[[dict[str, Any]], None]
-    table: Callable[[list[dict[str, Any]]], None]
 
 
 def _found(
@@ -239,9 +245,9 @@ def _kind(word: str) -> _Kind:
     from ..physics.laws import laws_of
 
     if word == "effect":
-        return _Kind(word, EFFECTS, effect_as_dict, _print_effect, _print_effects)
+        return _Kind(word, EFFECTS, effect_as_dict, _print_effect)
     laws = {law.name: law for law in laws_of("damper")}
-    return _Kind(word, laws, law_as_dict, _print_law, _print_laws)
+    return _Kind(word, laws, law_as_dict, _print_law)
 
 
 def _read_own(study: Path | None, word: str) -> dict[str, str]:
@@ -316,28 +322,6 @@ def _print_effect(found: dict[str, Any]) -> None:
         print(f"In a building's model the name alone is that of the {first}; else {named}.")
 
 
-def _print_effects(rows: list[dict[str, Any]]) -> None:
-    """Print the effects; each in a block of lines in a pipe, in a table on a terminal."""
-    if sys.stdout.isatty():
-        heads = ("effect", "site, laws", "what it does", "when it is missing", "parameters")
-        cells = [
-            (
-                row["name"], "\n".join([*row["sites"], *row["laws"]]),
-                f"{row['about']}\n({row['source']})", row["expect"], "\n".join(_shortly(row)),
-            )
-            for row in rows
-        ]  # fmt: skip
-        print_table(heads, cells, lines=True)
-    else:
-        for row in rows:
-            where = ", ".join([*row["sites"], *row["laws"]])
-            print(f"{row['name']} ({where}): {row['about']}")
-            print(f"  when it is missing: {row['expect']}")
-            print(f"  parameters: {', '.join(_shortly(row))}")
-            print(f"  source: {row['source']}")
-    print("All of one:  bristle list effects NAME")
-
-
 def law_as_dict(law: Any) -> dict[str, Any]:
     """Return what users are told of a law: class data, first line and formula of its text."""
     from ..physics.effect import effects_of
@@ -383,18 +367,6 @@ def _print_law(found: dict[str, Any]) -> None:
     print(f"\nIn a study:  bristle identify STUDY --law {found['name']}")
 
 
-def _print_laws(rows: list[dict[str, Any]]) -> None:
-    """Print the laws, each in a block of lines."""
-    for row in rows:
-        print(f"{row['name']}: {row['about']}")
-        print(f"  parts: {', '.join(row['parts'])}")
-        if row["contains"]:
-            print(f"  contains: {', '.join(row['contains'])}")
-        print(f"  parameters: {', '.join(_shortly(row))}")
-        print(f"  source: {row['source']}")
-    print("All of one:  bristle list laws NAME")
-
-
 def _parameters_of(one: Any) -> dict[str, Any]:
     """Return what users are told of the parameters."""
     return {
@@ -424,11 +396,3 @@ def _parameter_lines(found: dict[str, Any], begin: str) -> list[str]:
         value = f"{typed(about['value'])} {about['unit']}".removesuffix(" 1")
         lines.append(f"  {begin}{name} = {value}  ({low} to {high}): {about['text']}")
     return lines
-
-
-def _shortly(row: dict[str, Any]) -> list[str]:
-    """Return name, value and unit of each parameter."""
-    return [
-        f"{name} = {typed(about['value'])}" + (f" {about['unit']}" if about["unit"] != "1" else "")
-        for name, about in row["parameters"].items()
-    ]

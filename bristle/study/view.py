@@ -180,9 +180,11 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     view, model = diagnosed_view(verdict, study.folder), study.model(to_show=True)
     steps = history_steps(study.steps())
     judged = [one for one in steps if one.rms is not None]
+    if not judged:
+        return view
     began = read_model(study.history.model_file(steps[0].number), study.folder, to_show=True)
     added = [name for name in model.effects if name not in began.effects]
-    if not added or not judged:
+    if not added:
         return view
     own = [effect_text(name, _sizes(model, name), DRIVES[model.drive]) for name in added]
     told = [Text(text, "say") for text in own]
