@@ -21,13 +21,15 @@ _LETTER = 0.0125
 @view_of(Limit)
 def limit_view(found: Limit) -> View:
     """Return the view of a limit."""
-    title = f"{found.title}: the limit of the {found.statistic} of {found.output}"
+    least = f"{plain(found.value, 4)} {found.unit}, {_below(found.value, found.best_constant[1])}"
+    title = f"{found.title}: no {found.command} was found that brings the {found.statistic} of "
+    title += f"{found.output} below {least}."
     rows = [[name, plain(value, 4), said] for name, value, said in compared(found)]
     return View(
         title,
         (
-            Table(("control", f"{found.statistic} [{found.unit}]", ""), rows, (1,)),
             *map(Text, confidence(found)),
+            Table(("control", f"{found.statistic} [{found.unit}]", "beside"), rows, (1,)),
         ),
         (Figure(lambda: draw_limit(found), title),),
     )
