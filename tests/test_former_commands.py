@@ -16,6 +16,8 @@ from bristle.cli import main
         ("scenarios copy no_damper", "new scenario NAME --like SCENARIO"),
         ("compare --fmu a.fmu --data run.csv", "compare-fmu FILE.fmu --data FILE"),
         ("compare my_rig --closed-loop --draws 3", "predict FOLDER"),
+        ("study check my_rig --exclude run_3", "study roles FOLDER --exclude RUN"),
+        ("plan my_rig --output tests", "plan FOLDER --out PLAN"),
         ("compare my_rig --runs train", "compare FOLDER --role ROLE"),
     ],
 )

@@ -34,6 +34,8 @@ _FORMER = {
     "compare --fmu": "compare-fmu FILE.fmu --data FILE",
     "compare --closed-loop": "predict FOLDER",
     "compare --runs": "compare FOLDER --role ROLE",
+    "plan --output": "plan FOLDER --out PLAN",
+    "study check --exclude": "study roles FOLDER --exclude RUN",
 }
 """Commands of before, with an option or without, and what took their place."""
 

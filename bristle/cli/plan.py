@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", type=int, metavar="N", help="number of tests; 4 by default")
     parser.add_argument("--seed", type=int, default=1, help="seed of the candidate tests")
     text = "folder of the files; by default plan, plan_2 ... in the study"
-    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=text)
+    parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help=text)
     parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
     add_trust(parser)
     add_details(parser)
@@ -77,8 +77,8 @@ def main(arguments: argparse.Namespace) -> int:
         raise StudyError("name a study, or a rig.toml with --new; one of the two.")
     if arguments.new is not None and not arguments.new.is_file():
         raise StudyError(f"{arguments.new}: there is no such file.")
-    if arguments.output is not None and not arguments.dry_run:
-        refuse_existing(arguments.output)  # before the search, not after it
+    if arguments.out is not None and not arguments.dry_run:
+        refuse_existing(arguments.out)  # before the search, not after it
     given: dict[str, Any] = {
         name: getattr(arguments, name)
         for name in (*LIMITS, "runs")
@@ -97,7 +97,7 @@ def main(arguments: argparse.Namespace) -> int:
     )
     folder = None
     if found.worth and not arguments.dry_run:
-        folder = found.write(arguments.output or _free(arguments.folder or Path()))
+        folder = found.write(arguments.out or _free(arguments.folder or Path()))
     if arguments.json:
         place = {"folder": str(folder)} if folder else {}
         print_json({**found.as_dict(), **place})

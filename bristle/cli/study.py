@@ -302,10 +302,6 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         help="correct what can be corrected in study.toml: lines, and gain, zero or sign of a run "
         "that differs, and of the verdict on these data the delay of a run, clock, slew and range",
     )  # fmt: skip
-    parser.add_argument(
-        "--exclude", nargs="+", action="extend", default=[], metavar="RUN",
-        help="leave these runs out from now on: role = \"exclude\" in study.toml",
-    )  # fmt: skip
     add_json(parser, "print the findings as JSON")
     parser.set_defaults(act=_check)
 
@@ -426,10 +422,6 @@ def _check(arguments: argparse.Namespace) -> int:
         study = study.with_mask()
         if not arguments.json:
             print(f"{study.folder / 'study.toml'}: mask = true; isolated spikes are masked.\n")
-    if arguments.exclude:
-        study = study.with_excluded(arguments.exclude)
-        if not arguments.json:
-            print(f"{study.folder / 'study.toml'}: {study.settings.excluded_text}\n")
     total = len(study.settings.runs)
     with Progress("checking the data", total, True) as progress:
         found = check_data(study, progress.show)

@@ -481,8 +481,8 @@ def _copies_text(folder: Path, copies: Mapping[_Part, _Part], settings: Settings
         role = roles.get(places[1], ROLES[0])
         swap = command("study", "roles", folder, "--exclude", first, f"--{role}", copy)
         yield (
-            f"{one.name} is the same measurement as {other.name}, and is left out; {swap} uses it "
-            "instead"
+            f"{one.name} is the same measurement as {other.name}, and is left out. To use it "
+            f"instead:  {swap}"
         )
 
 

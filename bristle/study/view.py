@@ -97,7 +97,10 @@ def created_view(created: Created) -> View:
     ]
     notes = [f"{one.channel} is doubtful: {one.doubt}." for one in created.guesses if one.doubt]
     notes += [f"Not used: {listed(created.unused)}."] if created.unused else []
-    notes += [f"{capital(note, files)}." for note in created.notes]
+    # A command that ends a note is copied to a shell: no full stop is part of it.
+    notes += [
+        f"{capital(note, files)}{'' if ':  bristle ' in note else '.'}" for note in created.notes
+    ]
     wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
     return View(
         f"{folder}: a study of {len(settings.runs)} run(s), {held} of them held out.",
@@ -311,7 +314,7 @@ def _then(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
     if kind == "effect":
         return [Next(command("add", folder, *verdict["effects"]), "puts it into the model")]
     if kind == "unknown":
-        other_law = any(found.get("other_law") for found in verdict["findings"])
+        other_law = any(found.get("other_law") for found in verdict.get("findings") or [])
         every = command("diagnose", folder, "--law", "all")
         return [
             *([Next(every, "tries every law with its effects")] if other_law else []),
@@ -335,7 +338,7 @@ def not_excited(verdict: Mapping[str, Any]) -> list[str]:
 
     What a parameter of another effect absorbs is that effect.
     """
-    rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
+    rows = [row for found in verdict.get("findings") or [] for row in found.get("limits", ())]
     hidden = [row for row in rows if row.get("why") and "." not in row["why"].partition(" ")[0]]
     return sorted({row["effect"] for row in hidden if row["why"] != NO_AMOUNT})
 

@@ -13,6 +13,7 @@ MOST = 12
 WIDEST = 120
 """Of a table, before the cells of a row stand below each other."""
 _NEXT = "Next:  "
+_BRISTLE = "bristle "
 
 
 def text(view: View, *, details: bool = False, elsewhere: str = "") -> str:
@@ -60,7 +61,10 @@ def lines(block: Block) -> list[str]:
         return [f"  {block.text}"]
     if isinstance(block, Text) and block.text:
         warns = block.kind != "note" or block.text.startswith(("Error:", "Warning:"))
-        return wrap(block.text if warns else f"Note: {block.text}", WIDTH)
+        words, ordered, order = block.text.rpartition(f":  {_BRISTLE}")
+        words = f"{words}:" if ordered else block.text
+        told = wrap(words if warns else f"Note: {words}", WIDTH)
+        return [*told, f"  {_BRISTLE}{order}"] if ordered else told  # to be copied as it is
     return []
 
 

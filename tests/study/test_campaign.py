@@ -61,7 +61,7 @@ def files(folder: Path) -> list[Path]:
 
 def test_levels_and_labels_are_offered_from_the_names(lab, tmp_path, capsys) -> None:
     assert main(["study", "new", str(tmp_path / "rig"), "--data", str(lab)]) == 0
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert "No column holds a command. --level 'I{}A' says the same" in said
     assert "0 A, 0.5 A, 1 A, 1.5 A" in said
     study = Study(tmp_path / "rig")

@@ -267,12 +267,12 @@ def test_commands_print_and_draw(tmp_path: Path, capsys: pytest.CaptureFixture[s
         write(tmp_path / "lab" / f"run_{k}.csv", bench_run(k, 2.0))
     rig = str(tmp_path / "rig")
     assert main(["study", "new", rig, "--data", str(tmp_path / "lab" / "*.csv")]) == 0
-    text = capsys.readouterr().out
+    text = " ".join(capsys.readouterr().out.split())
     assert "force" in text
     assert "it resists the motion" in text
     assert "Held out: run_2.csv" in text
     assert main(["study", "check", rig]) == 0
-    assert "noise" in capsys.readouterr().out
+    assert "noise" in " ".join(capsys.readouterr().out.split())
     picture = tmp_path / "rig" / "reports" / "data_check.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert main(["study", "check", rig, "--json"]) == 0
@@ -332,7 +332,9 @@ def test_errors_end_the_check_with_2_and_advice_names_the_study(
     create_study(rig, [write(tmp_path / "run.csv", columns)])
     for more in ([], ["--json"]):
         assert main(["study", "check", str(rig), *more]) == 2
-    assert f"bristle study channels '{rig}' --channel displacement=" in capsys.readouterr().out
+    assert f"bristle study channels '{rig}' --channel displacement=" in " ".join(
+        capsys.readouterr().out.split()
+    )
 
 
 def test_a_study_that_is_not_there_is_made_where_it_was_looked_for(tmp_path: Path) -> None:
@@ -356,7 +358,7 @@ def test_a_channel_without_a_number_can_be_left_out_of_a_new_study(
     settings = Study(tmp_path / "rig").settings
     assert "voltage" not in settings.channels
     assert not settings.extra
-    assert "Not used: U [V]" in capsys.readouterr().out
+    assert "Not used: U [V]" in " ".join(capsys.readouterr().out.split())
     assert main(["study", "new", str(tmp_path / "a"), *new[3:], "--without", "current"]) == 2
     assert "--without current: no column was taken for it" in capsys.readouterr().err
 

@@ -37,7 +37,7 @@ def test_names_with_one_level_and_two_motions_are_told(
         frame = pd.DataFrame({"time [s]": t, "x [mm]": x, "F [N]": force})
         frame.to_csv(tmp_path / f"{name}.csv", index=False)
     assert main(["study", "new", str(tmp_path / "s"), "--data", str(tmp_path / "*.csv")]) == 0
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert "a_0-5A.csv and a_0_5A.csv tell the same, 0.5 A, and their motions differ" in said
 
 

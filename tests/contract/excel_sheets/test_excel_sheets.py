@@ -40,7 +40,7 @@ def test_what_stands_before_the_channels_is_not_taken_for_them(
     file = book(tmp_path / "run.xlsx", Before=before, Data=RUN)
     assert read_table(file).rows == 300
     assert main(["study", "new", str(tmp_path / "s"), "--data", str(file), "--quiet"]) == 0
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert f'run.xlsx: sheet "Data" is read; "Before" ({len(before) - 1} row' in said.replace(
         "(2 row", "(1 row"
     )
@@ -49,7 +49,7 @@ def test_what_stands_before_the_channels_is_not_taken_for_them(
 def test_of_two_runs_the_other_is_named(tmp_path: Path, capsys) -> None:
     file = book(tmp_path / "run.xlsx", one=RUN, two=RUN[:200])
     assert main(["study", "new", str(tmp_path / "s"), "--data", str(file), "--quiet"]) == 0
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert 'sheet "one" is read; "two" (199 rows: time [s], x [mm], F [kN]) is not.' in said
 
 

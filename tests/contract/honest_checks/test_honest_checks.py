@@ -45,7 +45,7 @@ def test_a_switch_with_an_overshoot_is_no_loose_cable(tmp_path, capsys, size) ->
     file = written(tmp_path / "a.csv", bench(voltage=switched(size)))
     assert main(["study", "new", str(tmp_path / "rig"), "--data", str(file)]) == 0
     main(["study", "check", str(tmp_path / "rig")])
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert "spike" not in said
     assert "loose cable" not in said
 
@@ -61,7 +61,7 @@ def test_a_rig_without_a_command_is_told_of_no_coil(tmp_path, capsys) -> None:
     file = written(tmp_path / "a.csv", bench())
     assert main(["study", "new", str(tmp_path / "rig"), "--data", str(file)]) == 0
     main(["study", "check", str(tmp_path / "rig")])
-    said = capsys.readouterr().out.lower()
+    said = " ".join(capsys.readouterr().out.lower().split())
     assert "no command was recorded" in said
     assert not [word for word in ("coil", "voltage", "drive", "current") if word in said]
 
@@ -99,7 +99,9 @@ def test_a_friction_without_noise_is_not_blamed_on_the_load_cell_alone(tmp_path,
     study = str(tmp_path / "rig")
     assert main(["study", "new", study, "--data", str(written(tmp_path / "a.csv", columns))]) == 0
     main(["study", "check", study])
-    assert "or a friction without noise that nothing changes" in capsys.readouterr().out
+    assert "or a friction without noise that nothing changes" in " ".join(
+        capsys.readouterr().out.split()
+    )
 
 
 def test_a_line_of_300_hz_alone_is_of_either_mains(tmp_path, capsys) -> None:
@@ -111,4 +113,4 @@ def test_a_line_of_300_hz_alone_is_of_either_mains(tmp_path, capsys) -> None:
     study = str(tmp_path / "rig")
     assert main(["study", "new", study, "--data", str(written(tmp_path / "a.csv", columns))]) == 0
     main(["study", "check", study])
-    assert "(300 Hz of the mains of 50 or 60 Hz)" in capsys.readouterr().out
+    assert "(300 Hz of the mains of 50 or 60 Hz)" in " ".join(capsys.readouterr().out.split())

@@ -28,7 +28,7 @@ def made(tmp_path: Path, word: str) -> list[str]:
 def test_what_is_missing_is_marked_and_said(tmp_path, capsys, word) -> None:
     assert main(made(tmp_path, word)) == 0
     code = word.lstrip("-").replace(".", "").isdigit()
-    assert ("in 3 places, and else within" in capsys.readouterr().out) is code
+    assert ("in 3 places, and else within" in " ".join(capsys.readouterr().out.split())) is code
     (run,) = Study(tmp_path / "rig").read()
     np.testing.assert_allclose(run["force"], 1e3 * F, atol=25.0)
     assert any("3 samples (0.33 %) were missing" in note for note in run.notes)
