@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from textwrap import wrap
 
 from .blocks import Block, Formula, Next, Table, Text, View
@@ -12,6 +13,8 @@ MOST = 12
 """Lines of an answer, besides its tables, notes and blank lines; the rest is with the details."""
 WIDEST = 120
 """Of a table, before the cells of a row stand below each other."""
+_wrapped = partial(wrap, break_long_words=False, break_on_hyphens=False)
+"""Breaks a text into lines, and no path or command at a hyphen."""
 _NEXT = "Next:  "
 _BRISTLE = "bristle "
 
@@ -22,7 +25,7 @@ def text(view: View, *, details: bool = False, elsewhere: str = "") -> str:
     Tables stay, and so do notes, which warn and say what is left out. Of words that go beyond
     `MOST` lines the last ones are details. `elsewhere` is a command that shows the details too.
     """
-    out = wrap(view.title, WIDTH)
+    out = _wrapped(view.title, WIDTH)
     then = [one for one in view.blocks if isinstance(one, Next)]
     room, kept, cut = MOST - len(out) - len(then) - 1, list[Block](), list[Block]()
     for block in view.blocks:
@@ -55,7 +58,7 @@ def lines(block: Block) -> list[str]:
     """Return the lines of a block: none of a figure, which a terminal does not show."""
     if isinstance(block, Table):
         title = [block.title] if block.title else []
-        note = wrap(block.note, WIDTH, initial_indent="  ", subsequent_indent="  ")
+        note = _wrapped(block.note, WIDTH, initial_indent="  ", subsequent_indent="  ")
         return [*title, *aligned(block.header, block.rows, block.numbers), *note]
     if isinstance(block, Formula):
         return [f"  {block.text}"]
@@ -63,7 +66,7 @@ def lines(block: Block) -> list[str]:
         warns = block.kind != "note" or block.text.startswith(("Error:", "Warning:"))
         words, ordered, order = block.text.rpartition(f":  {_BRISTLE}")
         words = f"{words}:" if ordered else block.text
-        told = wrap(words if warns else f"Note: {words}", WIDTH)
+        told = _wrapped(words if warns else f"Note: {words}", WIDTH)
         return [*told, f"  {_BRISTLE}{order}"] if ordered else told  # to be copied as it is
     return []
 
@@ -94,7 +97,7 @@ def aligned(
             return [line for lines in tables for line in (*lines, "")][:-1]
     if sum(wide) + 2 * len(wide) > WIDEST:
         return [line for row in rows for line in _stacked(header, row)]
-    titles = [wrap(title, width) for title, width in zip(header, wide, strict=True)]
+    titles = [_wrapped(title, width) for title, width in zip(header, wide, strict=True)]
     high = max(map(len, titles))
     head = zip(*([""] * (high - len(one)) + one for one in titles), strict=True)
     return [
@@ -108,5 +111,7 @@ def aligned(
 
 def _stacked(header: Sequence[str], row: Sequence[str]) -> list[str]:
     told = [f"{title}: {cell}" for title, cell in zip(header[1:], row[1:], strict=True) if cell]
-    inside = (wrap(one, WIDTH, initial_indent=" " * 4, subsequent_indent=" " * 6) for one in told)
+    inside = (
+        _wrapped(one, WIDTH, initial_indent=" " * 4, subsequent_indent=" " * 6) for one in told
+    )
     return [f"  {row[0]}", *(line for lines in inside for line in lines)]
