@@ -43,16 +43,16 @@ def draw(folder: Path, target: Path) -> Path:
     study = Study(folder)
     steps = study.steps()
     added = max(step.number for step in steps if step.what.startswith("add "))
-    names = steps[added].what.removeprefix("add ")
     verdict = json.loads((study.history.path(added - 1) / "verdict.json").read_text())
     about = EFFECTS[verdict["effects"][0]].first_line()
+    missing = f"{about[:1].lower()}{about[1:].partition(':')[0]}"
     against = comparer(study)
     shown = [_prediction(study, against, number) for number in (added - 1, added)]
     with look():
         page = Page(
             11.0,
             4.15,
-            f"Missing from the model: {about[:1].lower()}{about[1:].partition(':')[0]}.",
+            f"Missing from the model: {missing}.",
             f"{about} The force error on held-out runs falls from {_error(steps[added - 1])} to "
             f"{_error(steps[added])}.",
             "$ bristle " + " && bristle ".join(COMMANDS),
@@ -61,7 +61,7 @@ def draw(folder: Path, target: Path) -> Path:
         axes = [page.figure.add_subplot(grid[0, column]) for column in range(3)]
         axes[1].sharey(axes[0])
         law = study.model().law
-        titles = (f"before: {law}, fitted", f"after: {law} + {names}")
+        titles = (f"before: {law}, fitted", f"after: {law} + {missing}")
         for one, panel, title in zip(shown, axes, titles, strict=False):
             _loop(panel, one, title)
         _errors(axes[2], steps)
@@ -94,8 +94,9 @@ def _loop(axes: Axes, run: RunPrediction, title: str) -> None:
 
 
 def _errors(axes: Axes, steps: list[Step]) -> None:
-    """Draw the error of each step's model on held-out runs, over the noise."""
-    heights = [steps[1].before["z_holdout"], *(one.after["z_holdout"] for one in steps[1:])]
+    """Draw the error of each step's model on held-out runs, over the noise; the first has none."""
+    steps = [one for one in steps if "z_holdout" in one.after]
+    heights = [one.after["z_holdout"] for one in steps]
     axes.set_yscale("log")
     axes.axhspan(0.9, 1.1, color=FLOOR, lw=0.0)
     for i, (z, step) in enumerate(zip(heights, steps, strict=True)):
