@@ -262,6 +262,14 @@ def test_what_people_look_for_is_in_the_title_of_the_right_page(word: str, page:
     assert word.lower() in text.splitlines()[0].lower()
 
 
+def test_the_architecture_names_files_that_are_there() -> None:
+    head = (DOCS / "architecture.md").read_text(encoding="utf-8").partition("## The map")[0]
+    named = re.findall(r"`([a-z_]+/)(?:\{([a-z_,]+)\}|([a-z_]+)(?:\.py)?)`", head.replace("\n", ""))
+    files = [folder + name for folder, many, one in named for name in (many or one).split(",")]
+    assert len(set(files)) > 40
+    assert [name for name in files if not (ROOT / "bristle" / f"{name}.py").is_file()] == []
+
+
 def test_the_citation_names_this_version_and_the_paper() -> None:
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\nversion: {bristle.__version__}\n" in text
