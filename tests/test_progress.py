@@ -71,11 +71,11 @@ def test_a_pipe_gets_few_plain_lines(
 def test_what_takes_long_is_told_though_nothing_more_is_said(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(_line, "_PLAIN_AFTER", 0.5)
-    monkeypatch.setattr(_line, "_AGAIN", 1.5)
+    monkeypatch.setattr(_line, "_PLAIN_AFTER", 0.3)
+    monkeypatch.setattr(_line, "_AGAIN", 1.0)
     with Line() as line, telling(line.say):
         tell("compiling the laws, once")
-        time.sleep(4.5)
+        time.sleep(2.5)
     first, second, *_ = capsys.readouterr().err.splitlines()
     assert first == "compiling the laws, once ..."
     assert re.fullmatch(r"compiling the laws, once, \d s \.\.\.", second)

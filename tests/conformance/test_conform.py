@@ -449,9 +449,7 @@ def tried(name: str, only: tuple[str, ...] | None = None) -> Report:
     return report
 
 
-@pytest.mark.parametrize(
-    "name", _slow_but("LuGreDamper", "ClippedOptimal", "ConstantVoltage"), ids=str
-)
+@pytest.mark.parametrize("name", _slow_but("LuGreDamper", "ClippedOptimal"), ids=str)
 def test_built_in_fmu_conforms(name: str) -> None:
     report = tried(name)
     for probe in ("another FMU before", "another FMU after", "repeatable", "bare interpreter"):
@@ -497,9 +495,7 @@ REFERENCE = Path(__file__).parents[2].parent / "shared" / "fmi" / "reference_fmu
 @pytest.mark.parametrize(
     "name",
     [  # each waits for the steps that never end
-        pytest.param(
-            path.stem, marks=[] if path.stem in ("Stair", "Feedthrough") else pytest.mark.slow
-        )
+        pytest.param(path.stem, marks=[] if path.stem == "Stair" else pytest.mark.slow)
         for path in sorted(REFERENCE.glob("*.fmu"))
     ],
 )

@@ -1,4 +1,4 @@
-"""The built-in FMUs, built once per test process into a temporary folder."""
+"""The built-in FMUs, which all workers and sessions share."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def folder() -> Path:
 @cache
 def built(component: str) -> Path:
     """Return a built-in component's FMU."""
-    return build.build(build.plan(component), folder())
+    return build.ensure(component)
 
 
 @cache

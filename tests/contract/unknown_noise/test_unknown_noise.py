@@ -41,7 +41,7 @@ def study_of(folder: Path, hard: float, capsys: pytest.CaptureFixture[str]) -> P
     write_runs(folder, hard)
     study = folder / "rig"
     assert main(["study", "new", str(study), "--data", str(folder / "*.csv"), "--law", "tanh"]) == 0
-    assert main(["identify", str(study), "--no-table", "--details"]) == 0
+    assert main(["identify", str(study), "--no-table", "--starts", "2", "--details"]) == 0
     assert "z, held-out runs" in capsys.readouterr().out
     return study
 
