@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,9 @@ def test_what_is_added_is_a_step_and_undo_takes_it_back(bench_study: Path, capsy
     assert (added["step"], added["added"], added["effects"]) == (2, ["gas_spring"], ["gas_spring"])
     k = added["parameters"]["gas_spring.k"]
     assert abs(k["value"] - TRUE_K) < 2.0 * k["interval95"]
+    kept = tomllib.loads((bench_study / "model.toml").read_text())
+    std = kept["effects"]["gas_spring"]["parameters"]["k"]["std"]
+    assert k["interval95"] == pytest.approx(1.96 * std, rel=1e-3)
     assert added["before"]["z_holdout"] > 5.0 * added["after"]["z_holdout"]
     assert added["after"]["z_holdout"] == pytest.approx(1.0, abs=0.1)
     compared = asked(capsys, "compare", bench_study)
