@@ -48,7 +48,7 @@ def test_a_test_keeps_every_limit_with_a_reserve(kind: str, limited: str) -> Non
         np.max(np.abs(signals.x)) / limits.stroke, np.max(np.abs(signals.v)) / limits.speed,
         np.max(np.abs(signals.a)) / limits.acceleration,
     ]  # fmt: skip
-    assert max(shares) == pytest.approx(RESERVE)
+    assert max(shares) == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize("kind", list(COMMANDS))

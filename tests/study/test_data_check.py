@@ -225,6 +225,13 @@ def test_clipping_of_a_quantised_sine_is_none() -> None:
         assert stretches == 10
 
 
+@pytest.mark.parametrize(("stood", "seen"), [(2, False), (3, True)])
+def test_three_equal_samples_at_an_end_are_a_stretch(stood: int, seen: bool) -> None:
+    wave = np.concatenate([np.linspace(-1.0, 0.97, 60), np.full(stood, 1.0)])
+    values = np.concatenate([np.tile(wave, 8), [0.0]])
+    assert bool([end for end in clipped_ends(values, 0.0) if end[1] == 1.0]) is seen
+
+
 def test_what_keeps_to_levels_by_its_nature_is_not_cut_off(tmp_path: Path) -> None:
     def spoil(data: Columns) -> None:
         t = data["time [s]"]
