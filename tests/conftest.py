@@ -56,7 +56,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         path = os.pathsep.join([str(script.parents[1]), os.environ.get("PYTHONPATH", "")])
         config.stash[_AHEAD] = subprocess.Popen(
             [sys.executable, str(script)], env={**os.environ, "PYTHONPATH": path},
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
 
 

@@ -47,6 +47,11 @@ STIFFENING = 1.5e7  # N/m3, of the springs below the house
 
 def study(name: str, folder: Path) -> Path:
     """Copy a study into a folder; return its own, `folder / "rig"`."""
+    return Path(shutil.copytree(made(name) / "rig", folder / "rig"))
+
+
+def made(name: str) -> Path:
+    """Return the folder of a study with its runs, made where no other process has."""
     kept = Path(os.environ[FOLDER])
     with (kept / f"{name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -54,9 +59,9 @@ def study(name: str, folder: Path) -> Path:
             unfinished = kept / f"{name}.unfinished"
             shutil.rmtree(unfinished, ignore_errors=True)
             unfinished.mkdir()
-            _MADE[name](unfinished)
+            MADE[name](unfinished)
             unfinished.rename(kept / name)
-    return Path(shutil.copytree(kept / name / "rig", folder / "rig"))
+    return kept / name
 
 
 def write(path: Path, columns: dict[str, NDArray[np.float64]]) -> Path:
@@ -75,7 +80,7 @@ def titled(channels: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.flo
 
 
 def _order(*words: str | Path) -> None:
-    assert main([str(word) for word in words]) == 0
+    assert main([*map(str, words), "--quiet"]) == 0
 
 
 def case_study(case: Case, folder: Path) -> Path:
@@ -165,6 +170,6 @@ def _learned(folder: Path) -> None:
     _order("add", folder / "rig", "learned_1")
 
 
-_MADE: dict[str, Callable[[Path], None]] = {
+MADE: dict[str, Callable[[Path], None]] = {
     "bench": _bench, "building": _building, "device": _device, "learned": _learned,
 }  # fmt: skip
