@@ -259,7 +259,7 @@ def test_the_mount_does_not_chatter(law: str, dt: float, k: float, c: float) -> 
 @pytest.mark.parametrize(
     "values", [{"k": 1e6}, {"k": 1e9}, {"mass": 1e-5}, {"c": 0.0}, {"c": 10.0}], ids=str
 )
-@pytest.mark.parametrize("dt", [0.0005, 0.002, 0.01])
+@pytest.mark.parametrize("dt", [pytest.param(0.0005, marks=pytest.mark.slow), 0.002, 0.01])
 def test_no_mount_throws_the_joint_about(law: str, values: dict[str, float], dt: float) -> None:
     # Without enough damping the joint jumps where the viscous part falls: that is physical, and
     # then it swings beyond the fluid's largest force, in a tight integration by a tenth.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import exp, inf, pi
 from types import SimpleNamespace
 
@@ -225,9 +226,9 @@ def test_at_rest_bristles_hold_the_base_off_its_middle() -> None:
 # -- the sine loop
 
 
-@pytest.mark.parametrize("row", MODEL["sine_loop"]["rows"], ids=lambda row: f"{row[0]:g} V")
-def test_sine_loop_of_the_laws(row: list[float]) -> None:
-    V, lugre_max, at_v_max, lugre_energy, at_rest, bingham_max, bingham_energy = row
+@cache
+def bristles_of_the_sine() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times [s] of a settled cycle, the bristles' deflection [m] and the velocity [m/s]."""
     period = 0.5
 
     def velocity(t: np.ndarray) -> np.ndarray:
@@ -238,7 +239,13 @@ def test_sine_loop_of_the_laws(row: list[float]) -> None:
         lambda t, z: [bristle_rate(z[0], float(velocity(t)))],
         (0.0, times[-1]), [0.0], "LSODA", times, rtol=1e-11, atol=1e-15, max_step=period / 50,
     )  # fmt: skip
-    z, v = solution.y[0], velocity(times)
+    return times, solution.y[0], velocity(times)
+
+
+@pytest.mark.parametrize("row", MODEL["sine_loop"]["rows"], ids=lambda row: f"{row[0]:g} V")
+def test_sine_loop_of_the_laws(row: list[float]) -> None:
+    V, lugre_max, at_v_max, lugre_energy, at_rest, bingham_max, bingham_energy = row
+    times, z, v = bristles_of_the_sine()
     lugre = np.array([force_at("lugre", v=b, V=V, z=a) for a, b in zip(z, v, strict=True)])
     bingham = np.array([force_at("bingham", v=b, V=V) for b in v])
     dt = times[1] - times[0]
