@@ -14,6 +14,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy.fmi2 import FMU2Slave
+from kinds import ONE_OF_EACH
 
 from bristle.fmu import build, catalogue
 from bristle.fmu.archive import extract, library_member
@@ -97,8 +98,14 @@ def _in_python(about: Description, folder: Path) -> list[float]:
     return last
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(20, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", catalogue.component_names())
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        pytest.param(n, c, marks=() if c == 8 and n in ONE_OF_EACH else pytest.mark.slow)
+        for n in catalogue.component_names()
+        for c in (8, 20)
+    ],
+)
 def test_c_host_runs_the_fmu_and_ends_cleanly_every_time(
     name: str, count: int, host: Path, tmp_path: Path
 ) -> None:
