@@ -449,14 +449,16 @@ def tried(name: str, only: tuple[str, ...] | None = None) -> Report:
     return report
 
 
-@pytest.mark.parametrize("name", _slow_but("LuGreDamper", "ClippedOptimal"), ids=str)
+@pytest.mark.parametrize("name", _slow_but("LuGreDamper"), ids=str)
 def test_built_in_fmu_conforms(name: str) -> None:
     report = tried(name)
     for probe in ("another FMU before", "another FMU after", "repeatable", "bare interpreter"):
         assert report.row(probe).verdict == "pass"
 
 
-@pytest.mark.parametrize("name", _slow_but("Structure", "Sensors", "GroundMotion", "Lpv"), ids=str)
+@pytest.mark.parametrize(
+    "name", _slow_but("Structure", "Sensors", "GroundMotion", "ClippedOptimal"), ids=str
+)
 def test_what_a_component_computes_conforms(name: str) -> None:
     assert tried(name, OWN).row("bare interpreter").verdict == "pass"
 

@@ -224,6 +224,7 @@ def test_a_controller_of_ones_own_is_stepped_as_an_fmu(
     assert again.value(again.motions[0], "again", name) == own[name]
 
 
+@pytest.mark.slow
 def test_an_fmu_with_a_design_keeps_the_building_for_all(tmp_path: Path) -> None:
     fmu = build(plan("LqgClipped", name="MyLqg"), tmp_path)
     found = compare_controllers(

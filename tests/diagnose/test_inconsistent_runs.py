@@ -122,7 +122,7 @@ def sprung_finding(place: int, gain: float) -> tuple[SiteDiagnosis, Prepared]:
     return found, Prepared(before, train, held_out)
 
 
-@pytest.mark.parametrize("place", [1, 4])
+@pytest.mark.parametrize("place", [1, pytest.param(4, marks=pytest.mark.slow)])
 def test_what_an_effect_leaves_in_one_odd_run_is_no_other_form_of_it(place):
     found, opened = sprung_finding(place, 1.1)
     told = contradicted(found, opened)

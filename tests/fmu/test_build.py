@@ -187,7 +187,7 @@ def test_many_processes_build_into_one_folder(tmp_path: Path) -> None:
             stderr=subprocess.PIPE,
             text=True,
         )
-        for _ in range(9)
+        for _ in range(4)
     ]
     for process in crowd:
         out, err = process.communicate(timeout=120)

@@ -44,7 +44,7 @@ def same(fmu: Path, again: Path, **given: Any) -> bool:
 
 
 @needs_compiler
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_another_compiler_makes_the_same_fmu(fmi: int, tmp_path: Path) -> None:
     fmu = build(plan("SignalSource"), tmp_path, [here()], fmi, sources=True)
     assert validate_fmu(str(fmu)) == []

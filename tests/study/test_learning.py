@@ -120,6 +120,7 @@ class Killed(BaseException):
     """Stands for a signal: nothing may catch it."""
 
 
+@pytest.mark.slow
 def test_what_was_learnt_before_a_kill_is_kept(study):
     steps = len(study.steps())
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 
 import pytest
 from house_made import STIFF, study_of
 
-from bristle.cli import main
 from bristle.report.study_page import study_report
 from bristle.study.identify import identify_study
 from bristle.study.steps import compare_study, comparer
@@ -106,23 +103,6 @@ def test_the_site_stays_the_same_for_all_models_of_a_history(stiff):
     assert not any(one.fails for one in found.sites)
     assert found.z == pytest.approx(1.0, abs=0.1)
     assert against.compare(better.only(())).z > 1.5
-
-
-def test_the_command_tells_of_every_site(stiff, capsys):
-    assert main(["compare", str(stiff.folder), "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["site"] == "layer"
-    assert answer["sites"][0]["site"] == "layer"
-    assert [one["fails"] for one in answer["sites"]] == [True, False, False]
-    assert answer["sites"][0]["place"]["coordinate"] == "displacement"
-    assert answer["sites"][0]["z"] == answer["z"]
-    assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
-    assert main(["compare", str(stiff.folder)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    begin = next(i for i, line in enumerate(lines) if line.startswith("Error at every site"))
-    assert lines[begin + 2].split()[:2] == ["isolation", "layer"]
-    assert lines[begin + 2].split()[-1] == "displacement"
-    assert {lines[begin + i].split()[-1] for i in (3, 4)} == {"nothing"}
 
 
 def test_the_report_tells_of_every_site(stiff):

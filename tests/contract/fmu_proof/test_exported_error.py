@@ -47,7 +47,11 @@ def checked(rig: Path) -> tuple[float, float]:
 
 @pytest.mark.parametrize(
     ("rate", "law", "switched"),
-    [(500.0, "bingham", False), (500.0, "dahl", True), (3000.0, "bingham", True)],
+    [
+        (500.0, "bingham", False),
+        pytest.param(500.0, "dahl", True, marks=pytest.mark.slow),
+        (3000.0, "bingham", True),
+    ],
 )
 def test_the_fmu_has_the_error_that_compare_prints(
     rate: float, law: str, switched: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,

@@ -58,7 +58,10 @@ def grid(f) -> Curve:
     return Curve("force", "displacement", (), KNOTS, values, across="voltage", levels=LEVELS)
 
 
-@pytest.mark.parametrize("hidden", HIDDEN)
+@pytest.mark.parametrize(
+    "hidden",
+    [one if k < 2 else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(HIDDEN)],
+)
 def test_the_surface_that_is_there_promises_most_and_more_than_any_curve(hidden):
     force, kind = HIDDEN[hidden]
     left = residual(runs(force))
