@@ -23,9 +23,9 @@ from bristle.native.prepare import component_of
 from bristle.native.zig import here
 from bristle.prediction.export import export_study
 from bristle.study.study import Study
-from tests.diagnose.learned.test_curve import curve_of, slip_of
-from tests.diagnose.learned.test_line_curves import LAYER, STOREY
-from tests.diagnose.learned.test_line_curves import curve_of as line_curve_of
+from tests.learning.test_curve import curve_of, slip_of
+from tests.learning.test_line_curves import LAYER, STOREY
+from tests.learning.test_line_curves import curve_of as line_curve_of
 
 pytestmark = [needs_zig, pytest.mark.slow]
 

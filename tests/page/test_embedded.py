@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "compare"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "comparison"))
 from predictions_made import predictions_with
 
 from bristle.comparison.comparison import compare_predictions

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made import write_runs
 from page.browsing import Watched, needs_browser, shots
 from page.served import commands_that_tell, fit_told, page_on
-from study.made import write_runs
 
 from bristle.examples.make import Choice, make_bench
 from bristle.study import Study, create_study

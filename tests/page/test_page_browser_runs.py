@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made import write_runs
 from page.browsing import Watched, needs_browser, shots
 from page.served import page_on
-from study.made import write_runs
 
 from bristle.study import create_study
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from house_made import study_of
+from made import write_runs
 from page.served import page_on
-from study.house_made import study_of
-from study.made import write_runs
 
 from bristle.page import controllers_view
 from bristle.page.orders import order_of

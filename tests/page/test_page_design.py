@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made import write_runs
 from page.served import page_on
-from study.made import write_runs
 
 import bristle
 from bristle.errors import StudyError

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made import bench_run, write, write_runs
 from page.served import Client, commands_that_tell, fit_told, page_on
-from study.made import bench_run, write, write_runs
 
 from bristle import trust
 from bristle.cli import main

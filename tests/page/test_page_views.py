@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study.made import bench_run, write, write_runs
+from made import bench_run, write, write_runs
 
 from bristle.data.channels import ChannelSpec
 from bristle.errors import StudyError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from study.made import bench_run, write, write_runs
+from made import bench_run, write, write_runs
 
 from bristle.page.view_cache import ViewCache, fingerprint
 from bristle.study import create_study

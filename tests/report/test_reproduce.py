@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from study.made import bench_run, write
+from made import bench_run, write
 
 from bristle.cli import build_parser, main
 from bristle.model.model import new_model

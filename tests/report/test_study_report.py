@@ -6,13 +6,10 @@ import base64
 import json
 import re
 import shutil
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "study"))
 from made import write_runs
 
 from bristle.cli import main

@@ -6,13 +6,10 @@ import base64
 import importlib.util
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "study"))
 from made import write_runs
 
 import bristle

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study.made import bench_run, write
+from made import bench_run, write
 
 from bristle.cli import main
 from bristle.data.corrections import Correction

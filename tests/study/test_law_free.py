@@ -22,7 +22,7 @@ from bristle.study.forms import law_command, law_or_all, with_law
 from bristle.study.steps import create_study, diagnose_study
 from bristle.study.study import Study
 from tests.independent.generate import make_case
-from tests.study.made import bench_run, write_runs
+from tests.made import bench_run, write_runs
 
 NOISE = np.random.default_rng(1).standard_normal(6000) ** 2
 NAMES = ("gas_spring", "stribeck", "coil_lag", "saturation", "drift", "asymmetry")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from study.made import write_runs
+from made import write_runs
 
 import bristle
 from bristle.cli import main

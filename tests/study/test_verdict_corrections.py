@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from study.made import write_runs
+from made import write_runs
 
 from bristle.cli import main
 from bristle.data.corrections import Correction

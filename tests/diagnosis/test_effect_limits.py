@@ -18,7 +18,7 @@ from bristle.identification.start_grid import refine
 from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.view.blocks import Table
-from tests.diagnose.test_limits import VALUES, T, problem_of, steady, steps
+from tests.diagnosis.test_limits import VALUES, T, problem_of, steady, steps
 
 SPRING = "gas_spring"
 

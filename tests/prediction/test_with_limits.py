@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bridge.test_in_closed_loop import DRAG, damper, viscous
+from house_made import study_of
+from prediction.test_in_closed_loop import DRAG, damper, viscous
 from shaken import building, shake
-from study.house_made import study_of
 
 from bristle.cli import main
 from bristle.errors import RunError, StudyError

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from study.made import write_runs
+from made import write_runs
 
 from bristle.cli import main
 from bristle.errors import StudyError

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from study.made import write_runs
+from made import write_runs
 
 from bristle.cli import KEPT, build_parser, main
 from bristle.study import create_study

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from study.made import write_runs
+from made import write_runs
 
 from bristle import trust
 from bristle.cli import main

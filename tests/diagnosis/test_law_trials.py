@@ -15,7 +15,7 @@ from bristle.identification.problem import Problem
 from bristle.identification.rig import bench_rig
 from bristle.model.model import Model
 from bristle.study.inputs import measurements
-from tests.study.made import bench_run
+from tests.made import bench_run
 
 FEW = ("bingham_standard", "dahl")
 

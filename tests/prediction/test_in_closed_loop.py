@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from house_made import study_of
+from made import write_runs
 from shaken import building, shake
-from study.house_made import study_of
-from study.made import write_runs
 
 from bristle.cli import main
 from bristle.errors import StudyError

@@ -251,7 +251,7 @@ def test_a_controller_file_edited_by_hand_is_not_built(
 @pytest.fixture
 def frozen() -> Path:
     """Return the folder of the frozen controllers."""
-    return Path(__file__).parent / "reference" / "controllers"
+    return Path(__file__).parents[1] / "reference" / "controllers"
 
 
 # -- margins

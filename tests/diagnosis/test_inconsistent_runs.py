@@ -16,7 +16,7 @@ from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit, fit_from_starts
 from bristle.identification.rig_fit import joined
 from bristle.model.model import Model
-from tests.identify.truths import hidden_case, true_case
+from tests.identification.truths import hidden_case, true_case
 
 
 @pytest.mark.parametrize(

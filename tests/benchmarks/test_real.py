@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import _measured, real
 
-DATA = Path(__file__).resolve().parent.parent / "../shared/data"
+DATA = Path(__file__).resolve().parents[2] / "../shared/data"
 
 
 def test_what_is_not_there_is_said(tmp_path, capsys):

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from study.made import bench_run, write
+from made import bench_run, write
 
 from bristle.cli import main
 from bristle.core.text import log_ticks, plain, quantity, scale, short_z, tick, typed, with_interval

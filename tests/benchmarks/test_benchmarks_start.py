@@ -31,7 +31,7 @@ def test_a_benchmark_starts(name: str) -> None:
             text=True,
             timeout=AT_WORK,
             check=False,
-            cwd=Path(__file__).parents[1],
+            cwd=Path(__file__).parents[2],
         )
     except subprocess.TimeoutExpired:
         return
@@ -44,7 +44,7 @@ def test_a_benchmark_starts(name: str) -> None:
 def test_a_command_of_the_benchmarks_says_what_it_does(name: str) -> None:
     command = [sys.executable, "-m", "benchmarks", name, "--help"]
     done = subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[1]
+        command, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[2]
     )
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.startswith("usage:")

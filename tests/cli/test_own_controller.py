@@ -22,7 +22,7 @@ from bristle.fmu.own_controller import Measured
 from bristle.system.scenario import copy_scenario, load_scenario, stock_scenarios
 from bristle.system.toml import scenario_text
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
