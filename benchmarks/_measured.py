@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, read_measurement, read_measurements
-from bristle.diagnosis import Diagnosis, diagnose, diagnose_rig
+from bristle.diagnosis import Diagnosis, diagnose_rig
 from bristle.diagnosis.prepared import corrected
 from bristle.diagnosis.trials import Trial
 from bristle.identification.building_fit import equilibrium, identify_structure
@@ -81,7 +81,7 @@ def bench_row(
 ) -> None:
     """Fill a row with the diagnosis of a damper's runs; `told` says the reference of a trial."""
     begun = time.monotonic()
-    found = diagnose(train, held, law=row.law)
+    found = diagnose_rig(train, held, Model(row.law))
     row.seconds = time.monotonic() - begun
     row.verdict, row.words = verdict_of(found), found.words
     if found.before is None:

@@ -19,12 +19,14 @@ CODE = {
     "identification": """
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Model, Problem
+from bristle.identification.problem import Problem
+from bristle.model.model import Model
 fit_from_starts(Problem([prepare(m) for m in train]), Model(law))
 """,
     "diagnosis": """
-from bristle.diagnosis import diagnose
-diagnose(train, holdout, law=law)
+from bristle.diagnosis import diagnose_rig
+from bristle.model.model import Model
+diagnose_rig(train, holdout, Model(law))
 """,
 }
 READ = """

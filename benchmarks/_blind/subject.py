@@ -10,7 +10,7 @@ import pandas as pd
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, measurements_of_frame
-from bristle.diagnosis import Diagnosis, diagnose
+from bristle.diagnosis import Diagnosis, diagnose_rig
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem
 from bristle.identification.search import z_scale
@@ -56,7 +56,7 @@ def measurements(runs: list[dict[str, Any]], channels: tuple[str, ...]) -> list[
 
 def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) -> Diagnosis:
     """Return the diagnosis that a user gets who knows the law and nothing else."""
-    return diagnose(train, holdout, law=law)
+    return diagnose_rig(train, holdout, Model(law))
 
 
 def ask(case: Recorded) -> tuple[dict[str, Any], Diagnosis]:

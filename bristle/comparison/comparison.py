@@ -7,8 +7,6 @@ from dataclasses import replace
 
 from ..core.arrays import Array
 from ..errors import RecordError
-from ..identification.fit import Fit
-from ..identification.problem import Problem
 from ..identification.rig import DAMPER, Rig
 from ..identification.rig_fit import SiteModel, SiteModels, site_models
 from ..model.model import Model
@@ -34,37 +32,6 @@ FEWER_FLIPS = 299
 """Patterns of signs at a site that is not compared at length: enough for a chance of 1 %."""
 
 
-def compare(
-    problem: Problem, model: Fit | Model, *, draws: int = 12, seen: bool = False, seed: int = 0
-) -> Comparison:
-    """Hold a damper's model against measured runs.
-
-    Parameters
-    ----------
-    problem : Problem
-        The runs; held-out ones, unless `seen`.
-    model : Fit or Model
-    draws : int
-        How many draws of the inputs' error are carried through the model.
-    seen : bool
-        Whether the model was fitted to these runs; the sentences then say so.
-    seed : int
-        Of the random signs of blocks that say what chance would give.
-
-    Returns
-    -------
-    Comparison
-        The same for the same runs and model, whatever else ran before.
-
-    Raises
-    ------
-    RecordError
-        If there is no run, or a residual is not finite.
-    """
-    chosen = model.model if isinstance(model, Fit) else model
-    return compare_predictions(run_predictions(problem, chosen, draws), seen=seen, seed=seed)
-
-
 def compare_predictions(
     predictions: Sequence[RunPrediction],
     *,
@@ -75,7 +42,7 @@ def compare_predictions(
     role: str = "",
     every: Sequence[RunPrediction] = (),
 ) -> Comparison:
-    """Compare one output, measured and predicted, whatever predicted it; see `compare`.
+    """Compare one output, measured and predicted, whatever predicted it.
 
     Parameters
     ----------

@@ -101,17 +101,12 @@ def label_errors(predictions: Sequence[RunPrediction]) -> tuple[LabelError, ...]
 
 def label_sentence(errors: Sequence[LabelError]) -> str:
     """Return on which runs a model errs, by the label that tells it best; "" where none does."""
-    best: tuple[float, str] | None = None
-    for name in dict.fromkeys(one.name for one in errors):
-        own = sorted((one for one in errors if one.name == name), key=lambda one: -one.z)
-        split = _split(own)
-        if split and (best is None or split > best[0]):
-            best = split, name
-    if best is None:
+    names = dict.fromkeys(one.name for one in errors)
+    parted = [_parted([one for one in errors if one.name == name]) for name in names]
+    gap, far, rest = max(parted, key=lambda one: one[0], default=(0.0, [], []))
+    if not gap:
         return ""
-    own = sorted((one for one in errors if one.name == best[1]), key=lambda one: -one.z)
-    far = [one for one in own if one.z > CLOSE and one.z * APART > own[0].z]
-    rest = [one for one in own if one not in far]
+    own = [*far, *rest]
     if len(far) == 1 and far[0].run:
         return _of_one_run(far[0], rest[0].z)
     where = _values(far, own)
@@ -173,18 +168,23 @@ def _order(value: Label) -> tuple[bool, Label]:
     return isinstance(value, str), value
 
 
-def _split(own: Sequence[LabelError]) -> float:
-    """Return how far the values of a label part the runs, 0 where they do not.
+def _parted(errors: Sequence[LabelError]) -> tuple[float, list[LabelError], list[LabelError]]:
+    """Return how far the values of a label part the runs, 0 where they do not, and the two parts.
 
     Parameters
     ----------
-    own : the errors for the values of one label, the largest first
+    errors : for the values of one label
+
+    Returns
+    -------
+    by how many times; the values where the model errs; the others, of either the largest z first
     """
+    own = sorted(errors, key=lambda one: -one.z)
     far = [one for one in own if one.z > CLOSE and one.z * APART > own[0].z]
     rest = [one for one in own if one not in far]
     if not far or not rest or own[0].z < APART * rest[0].z:
-        return 0.0
-    return min(one.z for one in far) / rest[0].z
+        return 0.0, far, rest
+    return min(one.z for one in far) / rest[0].z, far, rest
 
 
 # In which regimes of speed and command a model is right within its noise.

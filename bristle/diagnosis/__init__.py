@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .diagnosis import diagnose, diagnose_rig
+from .diagnosis import diagnose_rig
 from .verdict import Diagnosis
 
-__all__ = ["Diagnosis", "diagnose", "diagnose_rig"]
+__all__ = ["Diagnosis", "diagnose_rig"]

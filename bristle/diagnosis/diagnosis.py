@@ -16,7 +16,6 @@ from ..identification.start_grid import is_rough
 from ..model.model import Model
 from ..physics.building import Building
 from ..physics.effect import exclude
-from ..physics.laws import DEFAULT
 from .conclusion import conclude, insufficient
 from .effect_limits import EffectLimit, detectable, effect_limits, profiled, untestable
 from .experiments import separating
@@ -139,39 +138,6 @@ def _with_intervals(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
         after = min(after, again, key=lambda one: one.z)
     identifiable = {n: s for n, s in fitted.std.items() if n not in fitted.unidentified}
     return replace(found, model=fitted.model, after=after, z_after=after.z, std=identifiable)
-
-
-def diagnose(
-    train: Sequence[Measurement],
-    holdout: Sequence[Measurement],
-    *,
-    law: str = DEFAULT,
-    effects: Sequence[str] = (),
-    values: Mapping[str, float] | None = None,
-    fixed: Sequence[str] = (),
-    limits: Mapping[str, tuple[float, float]] | None = None,
-    progress: Progress | None = None,
-) -> Diagnosis:
-    """Return which effect a damper's model misses on a test bench.
-
-    Parameters
-    ----------
-    train, holdout : measurements to fit to, and those that decide
-    law : a damper's law, such as "bingham"
-    effects : the effects that the model has already
-    values : its parameters where they were identified before, by name in SI; else they are
-        identified here
-    fixed, limits : parameters that stay as they are, and a user's bounds; see `model.Model`
-    progress : called with a sentence at each stage
-
-    Raises
-    ------
-    RecordError
-        If a run lacks a channel that is needed, or is too short for a fit.
-    """
-    present = Model(law, tuple(effects), dict(values or {}), tuple(fixed), dict(limits or {}))
-    known = values is not None
-    return diagnose_rig(train, holdout, present, identified=known, say=progress or silent)
 
 
 def diagnose_rig(

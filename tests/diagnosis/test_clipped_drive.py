@@ -8,8 +8,8 @@ import numpy as np
 from test_starts import LAW, recorded_rig
 
 from bristle.core.finding import Finding
-from bristle.diagnosis import prepared
-from bristle.diagnosis.diagnosis import diagnose
+from bristle.diagnosis import diagnose_rig, rig_runs
+from bristle.model.model import Model
 
 
 def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
@@ -22,9 +22,9 @@ def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
         value=1.0,
         std=0.0,
     )
-    monkeypatch.setattr(prepared, "sensor_faults", lambda _runs: [cut])
+    monkeypatch.setattr(rig_runs, "sensor_faults", lambda _runs: [cut])
     every = [replace(run, channels={**run.channels, "voltage": np.ones(3000)}) for run in runs]
-    found = diagnose(every[:2], every[2:], law="bingham", values=LAW)
+    found = diagnose_rig(every[:2], every[2:], Model("bingham", values=LAW), identified=True)
     assert found.kind == "insufficient"
     assert "No run for training has the 200 samples that a fit needs." in found.words
     name = every[0].name

@@ -33,7 +33,7 @@ def test_what_is_kept_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_strided_motions_take_the_same_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    law = histories.Bench("bingham", [])
+    law = histories.DamperForces("bingham", [])
     x, v, a, V = np.random.default_rng(3).normal(size=(50, 4)).T
     plain = law.force(x.copy(), v.copy(), a.copy(), V.copy(), 0.01, {})
     assert np.array_equal(law.force(x, v, a, V, 0.01, {}), plain)

@@ -11,7 +11,8 @@ import pytest
 from made import bench_run, write
 
 from bristle.cli import main
-from bristle.comparison.comparison import compare
+from bristle.comparison.comparison import compare_predictions
+from bristle.comparison.predictions import run_predictions
 from bristle.errors import RecordError, StudyError
 from bristle.fmu.description import read_description
 from bristle.identification.prepare import prepare
@@ -79,7 +80,9 @@ def test_the_error_depends_on_the_pressure(tmp_path):
     problem = Problem([prepare(run) for run in study.runs().train])
     plain = new_model("bingham_standard")
     known = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.0}
-    found = compare(problem, replace(plain, values={**plain.values, **known}))
+    found = compare_predictions(
+        run_predictions(problem, replace(plain, values={**plain.values, **known}))
+    )
     assert found.first.coordinate == "oil_pressure"
     assert found.first.significant
     assert "The error depends mainly on oil pressure" in found.sentences[1]
