@@ -11,9 +11,10 @@ import os
 import sys
 from pathlib import Path
 
+from ..core.finding import Finding
 from .bench import Bench, Plan
 from .native import BlackBox, FatalAnswerError, MissingFunctionError, UnexpectedError
-from .probe import Finding, failed
+from .probe import failed
 from .probes import PROBES
 
 PLAN, FINDING, BOX = "plan.json", "finding.json", "box"
@@ -24,14 +25,14 @@ def main(work: Path, name: str) -> None:
     bench = Bench(Plan.load(work / PLAN), BlackBox(work / BOX))
     finding = _try(bench, name)
     text = {
-        "verdict": finding.verdict, "seen": finding.seen, "data": dict(finding.data),
-        "rule": finding.rule, "said": bench.said() if finding.verdict == "fail" else "",
+        "finding": finding.as_dict("kind", "level", "text"), "pace": bench.pace,
+        "said": bench.said() if finding.level == "error" else "",
     }  # fmt: skip
     part = work / (FINDING + ".part")
     part.write_text(json.dumps(text))
     part.replace(work / FINDING)
     bench.box.note("leaving the process")
-    if "answered Fatal" in finding.seen:
+    if "answered Fatal" in finding.text:
         os._exit(0)  # not even the FMU's own cleaning up may be asked for
 
 

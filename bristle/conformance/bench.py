@@ -124,11 +124,16 @@ NAME = "bench"
 
 
 class Bench:
-    """One FMU, ready to be instantiated, stepped and compared."""
+    """One FMU, ready to be instantiated, stepped and compared.
+
+    `pace` is for the probes that follow: the steps that it makes, and what they and an instance
+    take [s].
+    """
 
     def __init__(self, plan: Plan, box: BlackBox) -> None:
         self.plan = plan
         self.box = box
+        self.pace: dict[str, float] = {}
         self._library: Library | None = None
         if plan.description is not None:
             self.inputs = plan.variables("input", "Real")
@@ -284,6 +289,13 @@ class Bench:
                     return f"{variable.name} at {self._at(k)} is {a!r} instead of {b!r}"
         return ""
 
+    def same(
+        self, rows: Iterable[Values], wanted: Sequence[Values], where: str = "", first: int = 0
+    ) -> None:
+        """Raise UnexpectedError where two runs differ, in words that begin with `where`."""
+        if difference := self.differs(rows, wanted, first):
+            raise UnexpectedError(f"{where}{difference}")
+
     @property
     def equal(self) -> str:
         """How equal runs are that do not differ."""
@@ -317,6 +329,12 @@ def not_finite(variables: Sequence[Variable], values: Values) -> list[str]:
     """Return the names of the reals that are not finite, with their values."""
     pairs = zip(variables, values, strict=True)
     return [f"{v.name} = {x}" for v, x in pairs if isinstance(x, float) and not math.isfinite(x)]
+
+
+def finite(variables: Sequence[Variable], values: Values, where: str) -> None:
+    """Raise UnexpectedError unless all reals are finite, in words that begin with `where`."""
+    if bad := not_finite(variables, values):
+        raise UnexpectedError(f"{where}: {some(bad)}")
 
 
 def some(names: Sequence[Any], most: int = 3) -> str:

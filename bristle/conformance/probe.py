@@ -3,30 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Literal
 
+from ..core.finding import Finding
 from .bench import Bench, Plan
 
-Verdict = Literal["pass", "fail", "note"]
-Level = Literal["file", "library", "run"]
+Needs = Literal["file", "library", "run"]
 Rule = Literal["standard", "robustness", "bristle"]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one probe saw, in words, and how that is to be judged.
-
-    `data` is for the probes that follow (step count, whether inputs may be driven). `rule` is which
-    rule was broken where that is not the probe's own. `said` is what the FMU itself said of it.
-    """
-
-    verdict: Verdict
-    seen: str
-    data: Mapping[str, float | bool] = field(default_factory=dict)
-    rule: Rule | None = None
-    said: str = ""
 
 
 @dataclass(frozen=True)
@@ -45,7 +30,7 @@ class Probe:
     tried: str
     standard: str
     run: Callable[[Bench], Finding]
-    needs: Level
+    needs: Needs
     unless: Callable[[Plan], str | None]
     bare: bool
     rule: Rule
@@ -61,7 +46,7 @@ def probe(
     *,
     tried: str,
     standard: str,
-    needs: Level = "run",
+    needs: Needs = "run",
     unless: Callable[[Plan], str | None] = lambda plan: None,
     bare: bool = False,
     rule: Rule = "standard",
@@ -99,19 +84,19 @@ def probe(
     return enter
 
 
-def passed(seen: str, **data: float | bool) -> Finding:
-    """Return a finding that does what the standard says."""
-    return Finding("pass", seen, data)
+def passed(seen: str) -> Finding:
+    """Return the finding that an FMU does what the standard says."""
+    return Finding("", "pass", seen)
 
 
-def failed(seen: str, rule: Rule | None = None, **data: float | bool) -> Finding:
-    """Return a finding that breaks a rule, the probe's own or another, or takes its host down."""
-    return Finding("fail", seen, data, rule)
+def failed(seen: str, rule: str = "") -> Finding:
+    """Return the finding that a rule is broken, the probe's own or another, or the host dies."""
+    return Finding(rule, "error", seen)
 
 
-def noted(seen: str, **data: float | bool) -> Finding:
+def noted(seen: str) -> Finding:
     """Return a finding that a user should know and the standard leaves open."""
-    return Finding("note", seen, data)
+    return Finding("", "note", seen)
 
 
 def unless_claimed(flag: str) -> Callable[[Plan], str | None]:

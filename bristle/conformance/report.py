@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass
 
 from ..view import Viewable
 
-VERDICTS = ("pass", "fail", "note")
+VERDICTS = {"pass": "pass", "error": "fail", "note": "note"}
+"""What a report calls the level of a finding."""
 RULES = {
     "standard": "Violations of the standard",
     "bristle": "Violations of bristle's rules for its own FMUs",
@@ -64,7 +65,7 @@ class Report(Viewable):
     def counts(self) -> dict[str, int]:
         """Return how many rows have each verdict."""
         found = Counter(row.verdict for row in self.rows)
-        return {verdict: found[verdict] for verdict in VERDICTS}
+        return {verdict: found[verdict] for verdict in VERDICTS.values()}
 
     def to_json(self) -> str:
         """Return the report as JSON text: schema, fmu, conforms, ok, counts, failures, rows."""

@@ -22,6 +22,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ..core.finding import Finding
 from ..core.progress import Count
 from ..errors import BristleError, FmuError
 from ..fmu.archive import extract, platform_folder
@@ -29,9 +30,9 @@ from ..fmu.description import NATIVE, check_ports, describe, read_description, r
 from ._probe import BOX, FINDING, PLAN
 from .bench import Plan
 from .native import BlackBox
-from .probe import Finding, Probe, failed, in_fmi3, noted
+from .probe import Probe, failed, in_fmi3, noted
 from .probes import PROBES
-from .report import Report, Row
+from .report import VERDICTS, Report, Row
 
 # On Linux a process that has imported the probes, and never an FMU, forks one child per probe:
 # starting Python anew each time would take most of the time of a judgement. Elsewhere, and where
@@ -338,6 +339,7 @@ class _Session:
         self.progress = progress or (lambda name: None)
         self.reached: set[str] = set()
         self.stuck = False
+        self.pace: dict[str, float] = {}
         self.first = set[str]().union(*(_FIRST[PROBES[name].needs] for name in only or ()))
 
     def rows(self) -> list[Row]:
@@ -349,7 +351,7 @@ class _Session:
             self.progress(probe.name)
             count.begins(probe.name)
             finding = self.find(probe)
-            if self._wanted(probe) or finding.verdict == "fail":
+            if self._wanted(probe) or finding.level == "error":
                 rows.append(self._row(probe, finding))
         return rows
 
@@ -359,11 +361,12 @@ class _Session:
         return probe.name in self.only
 
     def _row(self, probe: Probe, finding: Finding) -> Row:
-        tried, seen, standard = probe.tried, finding.seen, probe.standard
+        tried, seen, standard = probe.tried, finding.text, probe.standard
         if self.plan.fmi3 and not probe.only_fmi2:
             tried, seen = in_fmi3(tried), in_fmi3(seen)
             standard = probe.fmi3 or in_fmi3(standard)
-        return Row(probe.name, tried, seen, standard, finding.verdict, finding.rule or probe.rule)
+        verdict, rule = VERDICTS[finding.level], finding.kind or probe.rule
+        return Row(probe.name, tried, seen, standard, verdict, rule)
 
     def find(self, probe: Probe) -> Finding:
         """Try one probe, unless there is a reason not to."""
@@ -383,7 +386,7 @@ class _Session:
         if reason is not None:
             return noted(f"not tried: {reason}")
         finding = self.start(probe)
-        if probe.name == _REFERENCE and finding.verdict == "fail":
+        if probe.name == _REFERENCE and finding.level == "error":
             finding = self._at_rest(probe, finding)
         self._learn(probe, finding)
         return finding
@@ -392,27 +395,26 @@ class _Session:
         """Make the reference with inputs at rest where the FMU cannot follow moving ones."""
         self.plan.driven = False
         finding = self.start(probe)
-        if finding.verdict == "fail":
+        if finding.level == "error":
             return finding
-        return noted(f"{finding.seen} only; with inputs moving, {moving.seen}", **finding.data)
+        return noted(f"{finding.text} only; with inputs moving, {moving.text}")
 
     def _learn(self, probe: Probe, finding: Finding) -> None:
-        if probe.name == _LIBRARY and finding.verdict != "fail":
+        if probe.name == _LIBRARY and finding.level != "error":
             self.reached.add("library")
         if probe.name == _LEGAL:
-            self._pace(finding)
+            self._slow_down()
         if probe.name == _REFERENCE and (Path(self.plan.work) / "reference.json").exists():
             self.reached.add("run")
         if probe.name == _REPEATABLE:
-            self.plan.repeatable = finding.verdict == "pass"
+            self.plan.repeatable = finding.level == "pass"
 
-    def _pace(self, finding: Finding) -> None:
+    def _slow_down(self) -> None:
         """Shorten later probes for an FMU that ends early, or that takes long."""
-        if "ended" in finding.data:
+        if "ended" in self.pace:
             self.stuck = True  # every other probe would crash or hang as well
-        self.plan.steps = min(self.plan.steps, int(finding.data.get("most_steps", 1000)))
-        per_step = float(finding.data.get("per_step", 0.0))
-        per_instance = float(finding.data.get("per_instance", 0.0))
+        self.plan.steps = min(self.plan.steps, int(self.pace.get("most_steps", 1000)))
+        per_step, per_instance = (self.pace.get(k, 0.0) for k in ("per_step", "per_instance"))
         limit = self.plan.timeout
         if per_step > 0.0:
             most = int(0.05 * limit / per_step)
@@ -427,19 +429,18 @@ class _Session:
         Many FMUs say it only where they are asked to log. That may change what they do, so it is
         asked in a second run, which is for the words alone.
         """
-        finding = self._once(probe)
-        if finding.verdict != "fail":
+        finding, said, self.pace = self._once(probe)
+        if finding.level != "error":
             return finding
-        said = finding.said
-        if not finding.data.get("hung"):
+        if "hung" not in self.pace:
             self.plan.listens = True
-            again = self._once(probe)
+            again, more, _ = self._once(probe)
             self.plan.listens = False
-            said = (again.said if again.verdict == "fail" else "") or said
-        seen = f"{finding.seen}; the FMU said: {said}" if said else finding.seen
-        return replace(finding, seen=seen, said=said)
+            said = (more if again.level == "error" else "") or said
+        return replace(finding, text=f"{finding.text}; the FMU said: {said}") if said else finding
 
-    def _once(self, probe: Probe) -> Finding:
+    def _once(self, probe: Probe) -> tuple[Finding, str, dict[str, float]]:
+        """Return what a probe found, what the FMU said of it, and its pace."""
         work = Path(self.plan.work)
         self.plan.save(work / PLAN)
         for name in (FINDING, BOX):
@@ -452,20 +453,20 @@ class _Session:
         return _finding(work, code, self.plan.timeout)
 
 
-def _finding(work: Path, code: int | None, timeout: float) -> Finding:
-    """Turn what a process left behind into a finding."""
+def _finding(work: Path, code: int | None, timeout: float) -> tuple[Finding, str, dict[str, float]]:
+    """Turn what a process left behind into a finding, the FMU's own words, and its pace."""
     under_way, heard = BlackBox.read(work / BOX)
     where = f" in {under_way}" if under_way else ""
     file = work / FINDING
     found: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
-    after = f" (before that: {found['seen']})" if found else ""
+    after = f" (before that: {found['finding']['text']})" if found else ""
     if code is None:
-        ended = failed(f"hung{where}: no answer within {timeout:g} s{after}", ended=True, hung=True)
+        ended = f"hung{where}: no answer within {timeout:g} s{after}"
     elif code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
-        ended = failed(f"crashed{where}: {name}{after}", ended=True)
+        ended = f"crashed{where}: {name}{after}"
     elif code != 0 or not found:
-        ended = failed(f"left the process{where} with exit code {code}{after}", ended=True)
+        ended = f"left the process{where} with exit code {code}{after}"
     else:
-        return Finding(found["verdict"], found["seen"], found["data"], found["rule"], found["said"])
-    return replace(ended, said=heard)
+        return Finding(**found["finding"]), found["said"], found["pace"]
+    return failed(ended), heard, {"ended": 1.0} | ({"hung": 1.0} if code is None else {})

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from ..errors import UnitError
 from ..units import parse
 
-Level = Literal["error", "warning", "note"]
+Level = Literal["error", "warning", "note", "pass"]
 _OF_ONE_RUN = ("run gain", "run sign", "run zero")
 """Kinds that say how one run differs from the others."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\d)")
@@ -30,7 +30,8 @@ class Finding:
     for an override. `run` and `channel` are "" where it is about all; `runs` are those that it was
     seen in, () for all, and `either` is the channel that may be to blame instead. `value` is the
     number by which findings of one kind are ordered, worst last, or the size of a fault, `std` its
-    uncertainty. `fixes` set it right where that can be done.
+    uncertainty. `fixes` set it right where that can be done. The level "pass" is that of a rule of
+    a conformance report that holds.
     """
 
     kind: str

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from ctypes import c_void_p
 
-from ..bench import Bench, Plan, Values, good, not_finite, some
+from ...core.finding import Finding
+from ..bench import Bench, Plan, Values, finite, good
 from ..native import Instance
-from ..probe import Finding, failed, passed, probe, unless_claimed
+from ..probe import passed, probe, unless_claimed
 from .order import forbidden
 
 _FLAG = "canInterpolateInputs"
@@ -58,25 +59,24 @@ def input_derivatives(bench: Bench) -> Finding:
         return passed("not tried: it cannot follow moving inputs (see driven run)")
     instance = bench.ready()
     rows = [bench.read(instance), *_run(bench, instance, 0.0, 0, steps)]
-    if judge and (difference := bench.differs(rows, bench.reference())):
-        return failed(f"by derivatives of 0: {difference}")
+    if judge:
+        bench.same(rows, bench.reference(), "by derivatives of 0: ")
     good(instance.reset(), "Reset")
     bench.ready(instance)
     rows = _run(bench, instance, 1.0, 0, half)
     for k, row in enumerate(rows, 1):
-        if bad := not_finite(bench.observed, row):
-            return failed(f"not finite at t = {bench.time(k):g} s: {some(bad)}")
-    if bench.plan.claims("canGetAndSetFMUstate") and (difference := _replayed(bench, instance)):
-        return failed(f"by derivatives behind a copied state: {difference}")
+        finite(bench.observed, row, f"not finite at t = {bench.time(k):g} s")
+    if bench.plan.claims("canGetAndSetFMUstate"):
+        _replay(bench, instance)
     good(instance.reset(), "Reset")
-    difference = bench.differs(bench.whole_run(instance), bench.reference()) if judge else ""
-    if difference:
-        return failed(f"fmi2Reset does not clear them: {difference}")
+    if judge:
+        rows = bench.whole_run(instance)
+        bench.same(rows, bench.reference(), "fmi2Reset does not clear them: ")
     return passed(f"{len(_smooth(bench))} inputs moved by them; zero, a reset and a state hold")
 
 
-def _replayed(bench: Bench, instance: Instance) -> str:
-    """Return how a step differs that is made again by the derivatives in a copied state."""
+def _replay(bench: Bench, instance: Instance) -> None:
+    """Make a step again by the derivatives in a copied state, and hold it against the first."""
     half, state = bench.plan.steps // 2, c_void_p()
     bench.move(instance, half)
     _ramp(bench, instance, half, 1.0)
@@ -88,7 +88,7 @@ def _replayed(bench: Bench, instance: Instance) -> str:
     bench.step(instance, bench.time(half), bench.plan.step)
     found = bench.read(instance)
     good(instance.forget(state), "FreeFMUstate")
-    return bench.differs([found], [wanted], half + 1)
+    bench.same([found], [wanted], "by derivatives behind a copied state: ", half + 1)
 
 
 @probe(

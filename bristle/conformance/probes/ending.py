@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ...core.finding import Finding
 from ..bench import Bench, good, some
-from ..probe import Finding, failed, noted, passed, probe, unless_single
+from ..probe import failed, noted, passed, probe, unless_single
 
 
 @probe(

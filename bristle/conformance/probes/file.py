@@ -9,11 +9,12 @@ import zipfile
 from collections import Counter, defaultdict
 from pathlib import Path
 
+from ...core.finding import Finding
 from ...errors import FmuError
 from ...fmu.description import Variable, describe, read_root
 from ..bench import Bench, Plan, some
 from ..native import UnexpectedError
-from ..probe import Finding, failed, noted, passed, probe
+from ..probe import failed, noted, passed, probe
 
 _UNIT_IN_WORDS = re.compile(r"\[.+\]|\bin the unit of\b")
 """What a description says where FMI has no way to write the unit, or any will do."""

@@ -7,10 +7,11 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ...core.finding import Finding
 from ...fmu.archive import extract
 from ..bench import GOOD, Bench, Values, good
 from ..native import FatalAnswerError, Instance, UnexpectedError
-from ..probe import Finding, failed, noted, passed, probe, unless_single
+from ..probe import failed, noted, passed, probe, unless_single
 
 
 @probe(

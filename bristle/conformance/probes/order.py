@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from ...core.finding import Finding
 from ...fmu.description import Variable
-from ..bench import GOOD, Bench, good, not_finite, some, status_name
+from ..bench import GOOD, Bench, finite, good, not_finite, some, status_name
 from ..native import FatalAnswerError, Instance
-from ..probe import Finding, failed, noted, passed, probe, unless_claimed, unless_single
+from ..probe import failed, noted, passed, probe, unless_claimed, unless_single
 
 _ORDER = (
     "FMI 2.0 section 4.2.4: the environment must not; the answer is left open, Error being the "
@@ -188,8 +189,8 @@ def _odd_step(bench: Bench, step: float) -> Finding:
         return status
 
     finding = forbidden(bench, act, instance)
-    if bad and finding.verdict == "note":
-        return noted(f"{finding.seen}; outputs are no longer finite: {some(bad)}")
+    if bad and finding.level == "note":
+        return noted(f"{finding.text}; outputs are no longer finite: {some(bad)}")
     return finding
 
 
@@ -224,9 +225,7 @@ def variable_steps(bench: Bench) -> Finding:
         part = (1.0, 0.5, 0.25, 1.0, 0.75)[k % 5]
         bench.step(instance, bench.time(at), part * bench.plan.step)
         at += part
-        bad = not_finite(bench.observed, bench.read(instance))
-        if bad:
-            return failed(f"not finite at t = {bench.time(at):g} s: {some(bad)}")
+        finite(bench.observed, bench.read(instance), f"not finite at t = {bench.time(at):g} s")
     return passed(f"{bench.plan.steps} steps accepted")
 
 
@@ -248,9 +247,7 @@ def split_steps(bench: Bench) -> Finding:
         bench.step(instance, bench.time(k), half)
         bench.step(instance, bench.time(k) + half, half)
         rows.append(bench.read(instance))
-    bad = not_finite(bench.observed, rows[-1])
-    if bad:
-        return failed(f"not finite after two halves: {some(bad)}")
+    finite(bench.observed, rows[-1], "not finite after two halves")
     name, change = _largest_change(bench, rows)
     if change > 1e-6:
         return noted(f"accepted; {name} moves by {100 * change:.2g} % of its largest value")

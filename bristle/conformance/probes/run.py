@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import time
 
+from ...core.finding import Finding
 from ...fmu.description import Value
-from ..bench import Bench, good, not_finite, some
+from ..bench import Bench, finite, good, not_finite, some
 from ..native import DISCARD
-from ..probe import Finding, failed, noted, passed, probe
+from ..probe import failed, noted, passed, probe
 
 _MOST_STEPS = 20_000
 
@@ -58,19 +59,19 @@ def legal_run(bench: Bench) -> Finding:
         if status == DISCARD and done and instance.wants_to_end():
             judged = failed if plan.ours else noted  # ours end a run by a fault only
             seen = f"the FMU ended the run itself at t = {bench.time(done):g} s"
-            return judged(f"{seen} (Discard, and fmi2Terminated is true)", most_steps=done)
+            bench.pace["most_steps"] = done
+            return judged(f"{seen} (Discard, and fmi2Terminated is true)")
         good(status, f"DoStep at t = {bench.time(done):g} s")
-        bad = not_finite(bench.observed, bench.read(instance))
-        if bad:
-            return failed(f"not finite at t = {bench.time(done + 1):g} s: {some(bad)}")
+        where = f"not finite at t = {bench.time(done + 1):g} s"
+        finite(bench.observed, bench.read(instance), where)
         if time.monotonic() > deadline:
             break
     per_step = (time.monotonic() - began - made) / (done + 1)
     good(instance.terminate(), "Terminate")
     bench.read(instance)
     instance.free()
-    seen = f"{done + 1} of {total} steps of {plan.step:g} s, {1e6 * per_step:.0f} us each"
-    return passed(seen, per_step=per_step, per_instance=made)
+    bench.pace.update(per_step=per_step, per_instance=made)
+    return passed(f"{done + 1} of {total} steps of {plan.step:g} s, {1e6 * per_step:.0f} us each")
 
 
 @probe(
@@ -89,11 +90,8 @@ def outputs_at_start(bench: Bench) -> Finding:
     good(instance.leave(), "ExitInitializationMode")
     values = bench.read(instance, everything)
     outputs = plan.variables("output")
-    bad = not_finite(outputs, bench.read(instance, outputs))
-    if bad:
-        return failed(f"outputs that are not finite: {some(bad)}")
-    bad = not_finite(everything, values)
-    if bad:
+    finite(outputs, bench.read(instance, outputs), "outputs that are not finite")
+    if bad := not_finite(everything, values):
         return noted(f"outputs are finite, other variables are not: {some(bad)}")
     return passed(f"{len(outputs)} outputs finite, all {len(everything)} variables readable")
 
@@ -139,8 +137,7 @@ def driven_run(bench: Bench) -> Finding:
     rows = bench.whole_run()
     bench.keep(rows)
     for k, row in enumerate(rows):
-        if bad := not_finite(bench.observed, row):
-            return failed(f"not finite at t = {bench.time(k):g} s: {some(bad)}")
+        finite(bench.observed, row, f"not finite at t = {bench.time(k):g} s")
     moved = "inputs moving" if bench.plan.driven and bench.inputs else "inputs at rest"
     return passed(f"{bench.plan.steps} steps with {moved}")
 
@@ -152,7 +149,6 @@ def driven_run(bench: Bench) -> Finding:
 )
 def repeatable(bench: Bench) -> Finding:
     """Compare a fresh process with the reference."""
-    difference = bench.differs(bench.whole_run(), bench.reference())
-    if difference:
-        return noted(f"not repeatable: {difference}", repeatable=False)
+    if difference := bench.differs(bench.whole_run(), bench.reference()):
+        return noted(f"not repeatable: {difference}")
     return passed(f"equal {bench.equal}")

@@ -6,9 +6,10 @@ import os
 from ctypes import c_void_p
 from pathlib import Path
 
+from ...core.finding import Finding
 from ..bench import Bench, good
 from ..native import UnexpectedError
-from ..probe import Finding, failed, noted, passed, probe, unless_claimed, unless_single
+from ..probe import failed, noted, passed, probe, unless_claimed, unless_single
 
 _COPY, _BYTES = "canGetAndSetFMUstate", "canSerializeFMUstate"
 
@@ -32,19 +33,15 @@ def state_replay(bench: Bench) -> Finding:
     wanted = bench.run(instance, half, steps)
     for attempt in ("first", "second"):
         good(instance.restore(state), "SetFMUstate")
-        if difference := bench.differs([bench.read(instance)], [here], half):
-            return failed(f"right after fmi2SetFMUstate {difference}")
-        difference = bench.differs(bench.run(instance, half, steps), wanted, half + 1)
-        if difference:
-            return failed(f"{attempt} replay: {difference}")
+        bench.same([bench.read(instance)], [here], "right after fmi2SetFMUstate ", half)
+        bench.same(bench.run(instance, half, steps), wanted, f"{attempt} replay: ", half + 1)
     good(instance.restore(state), "SetFMUstate")
     bench.run(instance, half, half + 1)
     good(instance.save(state), "GetFMUstate into the same copy")
     bench.run(instance, half + 1, steps)
     good(instance.restore(state), "SetFMUstate")
-    difference = bench.differs(bench.run(instance, half + 1, steps), wanted[1:], half + 2)
-    if difference:
-        return failed(f"after fmi2GetFMUstate into the same copy {difference}")
+    where = "after fmi2GetFMUstate into the same copy "
+    bench.same(bench.run(instance, half + 1, steps), wanted[1:], where, half + 2)
     good(instance.forget(state), "FreeFMUstate")
     return passed(f"{steps - half} steps replayed {bench.equal}, three times")
 
@@ -66,10 +63,9 @@ def state_across_reset(bench: Bench) -> Finding:
     good(instance.reset(), "Reset")
     bench.ready(instance)
     good(instance.restore(state), "SetFMUstate after a reset")
-    difference = bench.differs(bench.run(instance, half, steps), wanted, half + 1)
+    rows = bench.run(instance, half, steps)
     good(instance.forget(state), "FreeFMUstate")
-    if difference:
-        return failed(difference)
+    bench.same(rows, wanted, first=half + 1)
     return passed(f"replayed {bench.equal}")
 
 
@@ -91,8 +87,8 @@ def freeing_states(bench: Bench) -> Finding:
         if k < 30:
             good(instance.forget(state), "FreeFMUstate")
     good(instance.forget(c_void_p()), "FreeFMUstate of a null pointer")
-    if bench.plan.repeatable and (difference := bench.differs(rows, bench.reference())):
-        return failed(f"making copies changes the run: {difference}")
+    if bench.plan.repeatable:
+        bench.same(rows, bench.reference(), "making copies changes the run: ")
     return passed("freed; the run does not notice")
 
 
@@ -136,8 +132,7 @@ def _revived(bench: Bench, data: bytes, wanted: list[list[float | int | bool | s
 def serialised_state(bench: Bench) -> Finding:
     """Serialise in mid-run, go on in another instance."""
     data, wanted = _serialised(bench)
-    difference = _revived(bench, data, wanted)
-    if difference:
+    if difference := _revived(bench, data, wanted):
         return failed(difference)
     return passed(f"{len(data)} bytes; a fresh instance continues {bench.equal}")
 
@@ -165,11 +160,8 @@ def state_across_processes(bench: Bench) -> Finding:
     if os.waitpid(child, 0)[1] != 0:
         return failed("the state cannot be serialised (see the row above)")
     rows = bench.reference()[bench.plan.steps // 2 + 1 :]
-    difference = _revived(bench, file.read_bytes(), rows)
-    if difference:
-        return (
-            failed(difference)
-            if bench.plan.repeatable
-            else noted(f"not judged, since no two runs are equal: {difference}")
-        )
+    if difference := _revived(bench, file.read_bytes(), rows):
+        if bench.plan.repeatable:
+            return failed(difference)
+        return noted(f"not judged, since no two runs are equal: {difference}")
     return passed(f"a fresh process continues {bench.equal}")

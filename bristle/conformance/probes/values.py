@@ -7,10 +7,11 @@ import math
 from collections.abc import Callable
 from functools import partial
 
+from ...core.finding import Finding
 from ...fmu.description import Value, Variable
 from ..bench import GOOD, Bench, Values, good, not_finite, some, status_name
 from ..native import FatalAnswerError, Instance, UnexpectedError
-from ..probe import Finding, failed, noted, passed, probe, unless_single
+from ..probe import failed, noted, passed, probe, unless_single
 from .order import forbidden
 
 _MOST_INPUTS = 12
@@ -89,7 +90,7 @@ def _bad_reference(bench: Bench, act: Callable[[Instance, int], int]) -> Finding
     for reference in _unused(bench):
         instance = bench.under_way()
         finding = forbidden(bench, partial(act, instance, reference), instance)
-        if finding.verdict != "pass":
+        if finding.level != "pass":
             break
     return finding
 
