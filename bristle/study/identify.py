@@ -331,52 +331,27 @@ def identify_model(study: Study, model: Model, task: FitTask) -> Identified:
 
 
 def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identified:
-    """Identify a model on a rig, in the form of the command that the task asks for.
+    """Identify a model on a rig: fit it at all sites, then judge it there.
 
     Parameters
     ----------
     rig : its sites with their runs
     runs : the measurements that the rig was made of, with what weakens their split
     model : where the fit begins
-    task : how it is to be identified
+    task : how it is to be identified, and in which forms of the command
 
     Raises
     ------
     StudyError, RecordError
         As `identify_study`.
     """
-    if task.laws:
-        return _with_all_laws(rig, runs, model, task)
-    if task.command is None:
-        return _in_own_form(rig, runs, model, task)
-    forms = forms_asked(task.command)
-    own = form_of(model) if form_of(model) in forms else forms[0]
-    models = {form: in_form(model, form, runs.train) for form in forms}
-    present = task.present or model
-    found = _in_own_form(rig, runs, models.pop(own), replace(task, present=present))
-    if not models:
-        return found
-    rows = [_form_error(own, found)]
-    for form, other in models.items():
-        tell(f"identifying with the form {form} of the command")
-        alone = replace(task, present=present, table=False, show=_show_nothing)
-        rows.append(_form_error(form, _in_own_form(rig, runs, other, alone)))
-    return replace(found, forms=tuple(sorted(rows, key=lambda row: forms.index(row.form))))
-
-
-def _with_all_laws(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identified:
-    rows = all_laws(rig, runs, model)
-    found = identify_on_rig(rig, runs, model, replace(task, laws=False))
-    notes = (*found.notes, *left_out_notes(rig, model))
-    return replace(found, laws=rows, notes=notes)
-
-
-def _form_error(form: str, found: Identified) -> FormError:
-    return FormError(form, found.model, found.after, len(found.fit.std))
-
-
-def _in_own_form(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identified:
-    """Fit a model at all sites of a rig, then judge it there."""
+    given, present = model, task.present or model
+    others: dict[str, Model] = {}
+    if task.command is not None:
+        forms = forms_asked(task.command)
+        own = form_of(model) if form_of(model) in forms else forms[0]
+        others = {form: in_form(model, form, runs.train) for form in forms}
+        model = others.pop(own)
     rig.prepare(model)
     notes = [*runs.notes, *doubts([run for run in runs.all if run.has("force")])]
     task.show(1)
@@ -384,7 +359,6 @@ def _in_own_form(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identifie
     task.show(2)
     fit = fits.whole(model)
     models = site_models(rig, fit.model)
-    present = task.present or model
     old = site_models(rig, present)
     # The start of a first fit is nobody's model: its error is no step on the way.
     fitted_before = is_identified(present) or _lines_alone(old)
@@ -394,14 +368,29 @@ def _in_own_form(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identifie
     at = models.get(DAMPER) or _worst(models)
     rows = _table(at, task) if task.table else []
     task.show(4)
-    own = after.at["train"][at.site.name]
+    error = after.at["train"][at.site.name]
     notes += [
         *fits.notes(),
         *by_site(models),
-        *weighing(rows, model, own, after.numbers["z_train"]),
+        *weighing(rows, model, error, after.numbers["z_train"]),
     ]
     notes += [*rig.notes, *under_load(at)]
-    return Identified(fit, fit.model, rows, task.cutoff, before, after, tuple(notes), None, at)
+    found = Identified(fit, fit.model, rows, task.cutoff, before, after, tuple(notes), None, at)
+    if others:
+        alone = FitTask(task.cutoff, task.starts, table=False, present=present, begin=task.begin)
+        in_forms = {own: found}
+        for form, other in others.items():
+            tell(f"identifying with the form {form} of the command")
+            in_forms[form] = identify_on_rig(rig, runs, other, alone)
+        found = replace(found, forms=tuple(_form_error(form, in_forms[form]) for form in forms))
+    if task.laws:
+        notes += left_out_notes(rig, given)
+        found = replace(found, laws=all_laws(rig, runs, given), notes=tuple(notes))
+    return found
+
+
+def _form_error(form: str, found: Identified) -> FormError:
+    return FormError(form, found.model, found.after, len(found.fit.std))
 
 
 def _lines_alone(models: SiteModels) -> bool:
