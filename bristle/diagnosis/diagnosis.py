@@ -182,8 +182,8 @@ def diagnose_rig(
         again = runs.prepare(DAMPER)
         assert again is not None
         found, prepared = diagnose_damper(again, say)
-    say("intervals")
     found = settled(found, prepared, runs, findings)
+    say(f"verdict {found.briefly}")
     if prepared.scope.any_law:
         found = _beside_other_laws(found, prepared, runs.bends, say)
     findings[DAMPER] = with_evidence(found, prepared, profile=profile)

@@ -14,8 +14,8 @@ from ..physics.building import Building
 from .conclusion import conclude, insufficient
 from .diagnosis import diagnose_lines, settled, with_evidence
 from .law_choice import LawAndEffects, LawVerdict, choose, equivalents, search, simplest
-from .law_trials import KeptFits, LawTrial, not_finite, try_laws, weighed_anew
-from .prepared import Prepared, Progress, silent
+from .law_trials import KeptFits, LawTrial, fitted_anew, not_finite, try_laws
+from .prepared import Prepared, Progress, part_of, silent
 from .rig_runs import RigRuns, runs_of_rig
 from .rule import BENCH, DecisionRule
 from .site import Trials, diagnose_damper, noise_is_all
@@ -70,9 +70,12 @@ def diagnose_laws(
 
     def searched(kept: KeptFits | None) -> _Sought:
         assert runs.damper is not None
+        whole, held_out = runs.damper
+        tried = (part_of(whole) if building is None else None) or whole
         say("trying every law")
-        rows = try_laws(*runs.damper, present, bends=bends, kept=kept)
-        sought = _sought(rows, TrialsByLaw(runs, say), runs.damper, say, rule)
+        rows = try_laws(tried, held_out, present, bends=bends, kept=kept)
+        by_law = TrialsByLaw(runs, say, in_part=tried is not whole)
+        sought = _sought(rows, by_law, (tried, held_out), say, rule)
         runs.suppose(sought.chosen.row.trial.model)
         return sought
 
@@ -81,6 +84,7 @@ def diagnose_laws(
         sought = searched(None)  # what was kept was fitted to the force of the file's numbers
     prepared = sought.prepared
     found = settled(sought.chosen.finding, prepared, runs, findings)
+    say(f"verdict on {sought.chosen.row.law}, {found.briefly}")
     findings[DAMPER] = with_evidence(found, prepared, profile=profile)
     laws = sought.verdict(named, runs.damper[0], present, rule)
     return replace(conclude(findings, runs.context(prepared)), laws=laws)
@@ -127,11 +131,12 @@ def _sought(
     if by_law.excess:
         say("what no law explains counts beside the noise")
         train, held_out = (one.with_excess(by_law.excess) for one in runs)
-        rows = weighed_anew(rows, train, held_out)
+        rows = fitted_anew(rows, train, held_out)
         pairs = search(rows, by_law, rule)
     chosen = choose(pairs, rule)
-    say(f"intervals of {chosen.row.law}")
-    return _Sought(chosen, tuple(pairs), rows)
+    of_all = {row.law: row for row in (*rows, *(pair.row for pair in pairs))}
+    ranked = sorted(of_all.values(), key=lambda row: row.trial.z)
+    return _Sought(chosen, tuple(pairs), tuple(ranked))
 
 
 class TrialsByLaw:
@@ -141,10 +146,11 @@ class TrialsByLaw:
     ----------
     runs : of the rig
     say : called with a few words at each stage
+    in_part : whether laws were tried on a part of the runs: one that is searched is fitted to all
     """
 
-    def __init__(self, runs: RigRuns, say: Progress = silent) -> None:
-        self.runs, self.say = runs, say
+    def __init__(self, runs: RigRuns, say: Progress = silent, *, in_part: bool = False) -> None:
+        self.runs, self.say, self.in_part = runs, say, in_part
         self.made: dict[str, Trials] = {}
         self.excess = 0.0  # N2, see `diagnose_damper`
 
@@ -152,6 +158,9 @@ class TrialsByLaw:
         """Return what a law lacks: single effects alone, or pairs as well where none suffices."""
         made = self.made.get(row.law)
         if made is None:
+            if self.in_part and self.runs.damper:
+                self.say(f"fitting {row.law} to all runs")
+                (row,) = fitted_anew([row], *self.runs.damper)
             prepared = self.runs.prepare(DAMPER, row.trial)
             assert prepared is not None
             if noise_is_all(prepared):

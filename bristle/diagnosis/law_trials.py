@@ -28,8 +28,11 @@ from .trials import Trial, judge
 STARTS = 2
 """Starting points of each law."""
 
+OUTSET = 4
+"""Jacobians of the search from each of them; the one that came farthest goes on."""
+
 JACOBIANS = 12
-"""Jacobians of the search from each of them."""
+"""Jacobians of that search."""
 
 WITHIN = 0.95
 """Probability of the intervals over runs."""
@@ -111,22 +114,25 @@ def try_laws(
     unfit = not_finite(train, present)  # which compiles all before threads ask for it
     names = [name for name in law_names() if name not in unfit]
     count = Count("law", len(names))
+    known: dict[str, float] = {}
 
     def tried(name: str) -> list[LawTrial]:
         with series(LAW, name):
             fitted = _fitted(name, train, present, bends, kept)
             found = [_row(law, one, train, held_out) for law, one in fitted]
-        count.done(name)
+        known.update({row.law: row.trial.z for row in found})
+        best = min(dict(known), key=lambda law: known[law])
+        count.done(name, f"best so far {best}, z {short_z(known[best])} on held-out runs")
         return found
 
     rows = [row for rows in in_threads(tried, names) for row in rows]
     return tuple(sorted(rows, key=lambda row: row.trial.z))
 
 
-def weighed_anew(
+def fitted_anew(
     rows: Sequence[LawTrial], train: Problem, held_out: Problem
 ) -> tuple[LawTrial, ...]:
-    """Return laws fitted anew by the weights of these runs, from where they ended before."""
+    """Return laws fitted to these runs, by their weights, from where they ended before."""
 
     def again(row: LawTrial) -> LawTrial:
         return _row(row.law, refine(row.trial.model, train, JACOBIANS), train, held_out)
@@ -224,7 +230,7 @@ def _fitted(
         return [(law, replace(one, values=known[law])) for law, one in of_both if known[law]]
     starts = start_models(train, model, STARTS)
     expected = train.expectation(starts[0])
-    ends = [Search(train, one, expected, one.free()).run(JACOBIANS) for one in starts]
+    ends = [Search(train, one, expected, one.free()).run(OUTSET) for one in starts]
     best, _ = min(ends, key=lambda end: end[1].cost)
     fitted = [(name, refine(best, train, JACOBIANS))]
     if bent:

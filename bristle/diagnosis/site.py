@@ -16,7 +16,7 @@ from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit
-from ..identification.problem import Problem, Run, has_offset, zero_of
+from ..identification.problem import Expected, Problem, Run, has_offset, zero_of
 from ..identification.rig import acts_at
 from ..identification.rig_fit import fit_damper, fit_line, joined
 from ..identification.search import in_threads
@@ -254,6 +254,7 @@ class Trials:
         prepared = self.prepared
         held_out = prepared.held_out
         if first.effects in self._earlier:
+            self._noise  # noqa: B018  # before threads ask for it
             trials = in_threads(self._again, self._earlier[first.effects])
         else:
             trials = try_all(
@@ -274,8 +275,15 @@ class Trials:
     def _again(self, trial: Trial) -> Trial:
         """Return a trial fitted and judged by these runs' weights, from where it ended before."""
         train, held_out = self.prepared.searched, self.prepared.held_out
-        model = refine(trial.model, train) if trial.refined else trial.model
-        return replace(judge(model, train, held_out), refined=trial.refined)
+        if trial.refined:
+            return judge(refine(trial.model, train), train, held_out)
+        return judge(trial.model, train, held_out, self._noise)
+
+    @cached_property
+    def _noise(self) -> tuple[Expected, Expected]:
+        """What a true model would show, drawn for the present model."""
+        runs = self.prepared.searched, self.prepared.held_out
+        return runs[0].expectation(self.before.model), runs[1].expectation(self.before.model)
 
     def _of_layer(self, first: Trial) -> list[Trial]:
         """Return the trials of the layer's effects, of which a reconstructed force has a share."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
+from ..core.text import short_z
 from ..identification.rig import DAMPER
 from ..model.model import Model
 from .decision import Decision
@@ -62,6 +63,13 @@ class SiteDiagnosis:
     limits: tuple[EffectLimit, ...] = ()
     beside: tuple[str, ...] = ()
     noise_known: bool = True
+
+    @property
+    def briefly(self) -> str:
+        """The verdict in a few words, which are known before its limits and intervals."""
+        names = (" or " if self.kind == "ambiguous" else " and ").join(self.effects)
+        left = f", error / noise (z) {short_z(self.z_after)}" if self.noise_known else ""
+        return f"{self.kind}{': ' if names else ''}{names}{left}; limits and intervals follow"
 
     def gain(self, trial: Trial) -> float:
         """Return by what share a trial lowers the held-out z; the RMS error if z is not known."""

@@ -14,6 +14,7 @@ from ..identification.problem import EXPLAINS, Expected, Problem, excess_of, in_
 from ..identification.search import in_threads, loss, losses, mean_loss, z_of, z_scale
 from ..identification.start_grid import (
     Candidate,
+    ScreeningData,
     Search,
     SearchContext,
     is_rough,
@@ -25,16 +26,20 @@ from ..physics.effect import EFFECTS, effects_of, exclude
 from .rule import BENCH
 
 SCREENING = 3
-"""Jacobians of the screening that decides which effects are searched as a second one."""
+"""Jacobians of the search that decides which effects could win, from the best start of each."""
+
+POSSIBLE = 0.15
+"""Share of the best gain then below which an effect is not searched further: `PROMISING` at the end
+is more than twice as much."""
 
 QUICK = 8
 """Jacobians of the first, short search from each start."""
 
 ROUGH = 24
-"""The same where impacts make the way rough, for the `CARRIED` best after `OUTSET` Jacobians."""
+"""The same where impacts make the way rough."""
 
-OUTSET = 4
-CARRIED = 2
+OUTSET, CARRIED = 4, 2
+"""Jacobians from each of several starts, and how many of them go on."""
 
 LONG = 20
 """Jacobians of the second search, of those that promise enough."""
@@ -127,20 +132,21 @@ def joinable(
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
 
-def screened(effect: str, context: SearchContext, guesses: Sequence[Candidate]) -> list[Candidate]:
-    """Return starts with what a very short search from the best one has led to in front.
+def screened(effect: str, context: SearchContext) -> list[Candidate]:
+    """Return the starts of an effect; a very short search has begun at the best, which is first.
 
     One step is not enough where the present model's parameters hold each other: a fall with speed
-    that went to its bound moves only together with what is to take its place. A joint is too dear.
+    that went to its bound moves only together with what is to take its place.
     """
-    screening = context.screening(effect)
-    search = Search(
-        screening.problem, guesses[0].model, screening.expected, guesses[0].model.free()
-    )
-    if search.rough:
-        return list(guesses)
-    model, ended = search.run(SCREENING)
-    return [Candidate(model, ended.cost), *guesses]
+    first, *others = ranked_guesses(effect, context)
+    return [_searched(first, context.screening(effect), SCREENING), *others]
+
+
+def _searched(start: Candidate, data: ScreeningData, sweeps: int) -> Candidate:
+    """Return where a search from a start comes to."""
+    search = Search(data.problem, start.model, data.expected, start.model.free())
+    model, ended = search.run(sweeps)
+    return Candidate(model, ended.cost)
 
 
 def short_search(
@@ -151,8 +157,8 @@ def short_search(
     Its loss is that on the training runs.
 
     All parameters move at once: with the law's held, an effect that the law has absorbed vanishes.
-    Where impacts make the way rough the first step says little of a start: all go a short way, and
-    those that came farthest go on.
+    The first step says little of a start, least where impacts make the way rough: of many all go a
+    short way, and those that came farthest go on.
 
     Parameters
     ----------
@@ -161,35 +167,15 @@ def short_search(
     guesses : starts of the search, the best first
     fewer : whether to go from half as many starts
     """
-    screening = context.screening(effect)
-
-    def searched(one: Candidate, sweeps: int) -> Candidate:
-        search = Search(screening.problem, one.model, screening.expected, one.model.free())
-        model, ended = search.run(sweeps)
-        return Candidate(model, ended.cost)
-
-    some = guesses[: max(1, screening.kept // 2) if fewer else screening.kept]
-    if is_rough(guesses[0].model):
-        first = sorted((searched(one, OUTSET) for one in some), key=lambda one: one.cost)
-        found = [searched(one, ROUGH) for one in first[: 1 if fewer else CARRIED]]
-    else:
-        found = [searched(one, QUICK) for one in some]
+    data = context.screening(effect)
+    rough = is_rough(guesses[0].model)
+    some = [*guesses[: max(1, data.kept // 2) if fewer else data.kept]]
+    if rough or len(some) > CARRIED:
+        some = sorted((_searched(one, data, OUTSET) for one in some), key=lambda one: one.cost)
+        some = some[: 1 if fewer else CARRIED]
+    found = [_searched(one, data, ROUGH if rough else QUICK) for one in some]
     best = min(found, key=lambda one: one.cost).model
     return Candidate(best, mean_loss(loss(residuals(context.train, best, context.expected))))
-
-
-def _starts(
-    names: Sequence[str], context: SearchContext, most: int | None
-) -> dict[str, list[Candidate]]:
-    """Return the starts of effects in their order; with `most` of those that promise most alone."""
-    looked = in_threads(lambda name: ranked_guesses(name, context), names)
-    guesses = dict(zip(names, looked, strict=True))
-    if most is None:
-        return guesses
-    looked = in_threads(lambda name: screened(name, context, guesses[name]), names)
-    guesses = dict(zip(names, looked, strict=True))
-    best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
-    return {name: guesses[name] for name in names if name in best}
 
 
 def try_all(
@@ -201,47 +187,57 @@ def try_all(
 ) -> list[Trial]:
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
-    Every effect is searched shortly from its best starts; those that gain a fair share of what the
-    best one gains on the training runs are refined.
+    A very short search shows which effects could win. These are searched shortly from their best
+    starts; those that gain a fair share of what the best one gains on the training runs are
+    refined.
 
     Parameters
     ----------
     base : the fitted model that effects join
     train, held_out : runs to fit to, and those that decide
     shown : channels whose instruments' effects are tried as well
-    most : how many effects are searched, those that a screening promises most of, from fewer
-        starts: for a second effect; None for all
+    most : how many effects are searched, from fewer starts, the others left out: for a second
+        effect; None for all
     """
     context = SearchContext(base, train)
     there = held_out.expectation(base)
     names = joinable(base, shown, train)
-    guesses = _starts(names, context, most)
-    names, fewer = [*guesses], most is not None
+    guesses = dict(zip(names, in_threads(lambda name: screened(name, context), names), strict=True))
+    first = {
+        name: 1.0 - own[0].cost / (context.screening(name).cost or 1.0)
+        for name, own in guesses.items()
+    }
+    enough = max(POSSIBLE * max(first.values()), POSSIBLE * WORTH / PROMISING)
+    able = sorted(names, key=lambda name: -first[name])[:most]
+    able = [name for name in able if first[name] >= enough] or able[:1]
     ends: dict[str, float] = {}
-    count = Count("effect", len(names))
+    count = Count("effect", len(able))
 
     def look(name: str) -> Candidate:
-        end = short_search(name, context, guesses[name], fewer)
+        end = short_search(name, context, guesses[name], most is not None)
         ends[name] = end.cost
         share = 100.0 * end.cost / context.cost if context.cost > 0.0 else 100.0
         best = min(dict(ends), key=lambda one: ends[one])
         count.done(name, f"{share:.3g} % of the cost remains; best so far {best}")
         return end
 
-    found = in_threads(look, names)
+    found = in_threads(look, able)
     gained = max(context.cost - one.cost for one in found)
     least = max(PROMISING * gained, WORTH * context.cost)
+    promising = [one.model for one in found if context.cost - one.cost >= least]
+    rest = [one.model for one in found if context.cost - one.cost < least]
+    if most is None:
+        rest += [guesses[name][0].model for name in names if name not in able]
+    refined = Count("refining effect", len(promising))
 
-    refined = Count("refining effect", sum(context.cost - one.cost >= least for one in found))
+    def finish(model: Model) -> Trial:
+        trial = judge(refine(model, train, LONG), train, held_out)
+        refined.done(model.effects[-1], f"z {trial.z:.3g} on held-out runs")
+        return trial
 
-    def finish(one: Candidate) -> Trial:
-        if context.cost - one.cost >= least:
-            trial = judge(refine(one.model, train, LONG), train, held_out)
-            refined.done(one.model.effects[-1], f"z {trial.z:.3g} on held-out runs")
-            return trial
-        return judge(one.model, train, held_out, (context.expected, there))
-
-    trials = in_threads(finish, found)
+    noise = context.expected, there
+    trials = in_threads(finish, promising)
+    trials += in_threads(lambda model: judge(model, train, held_out, noise), rest)
     return sorted(trials, key=lambda trial: trial.z)
 
 

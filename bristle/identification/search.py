@@ -39,6 +39,9 @@ SECANTS = 3
 FAITHFUL = 0.5
 """Share of the promised decrease that a step must reach for the Jacobian to be kept."""
 
+LIGHT = 1e-2
+"""Damping up to which a step goes as far as its Jacobian says."""
+
 _HUGE = 1e100  # its square is a number still
 _NUDGE = 1e-5
 _ROUGH_NUDGE = 1e-4
@@ -147,7 +150,9 @@ def descend(
             gain, promised = cost - tried.cost, tried.promised / judged
             change = tried.theta - theta
             slow = gain < tolerance * cost
-            small = small + 1 if slow else 0
+            # A Jacobian made here that promised no more either is the last one.
+            sure = slow and not secants and damping <= LIGHT and promised < tolerance * cost
+            small = 2 if sure else small + 1 if slow else 0
             if small < 2 and not slow and secants < SECANTS and gain > FAITHFUL * promised:
                 miss = tried.r - r - J @ change
                 J += np.outer(miss, change / float(change @ change))

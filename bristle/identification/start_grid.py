@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from threading import Lock
 
@@ -119,8 +120,15 @@ THIN = 6
 KEPT = {"none": 24, "memory": 2, "joint": 6}
 """From how many starts a search is made, by what the model has that makes it dear."""
 
+LOOKED = {"none": 24, "memory": 4, "joint": 6}
+"""From how many of those that promise most a linear step is made."""
+
+FARTHEST = 10.0
+"""Multiple of a start's own size at which its effect is looked at, at the most."""
+
 STEPS = (1.0, 0.3)
-"""Shares of the linear step that are looked at: a law far from linear overshoots."""
+"""Shares of the linear step, of which the first that serves counts: a law far from linear
+overshoots."""
 
 
 def initial_guesses(effect: str, base: Model, problem: Problem) -> list[Model]:
@@ -206,15 +214,52 @@ def _tied(effect: str, law: str, values: dict[str, float], problem: Problem) -> 
 
 @dataclass(frozen=True)
 class ScreeningData:
-    """Data for a search: runs, what to expect there, and the base model's sensitivities (n, p).
+    """Data for a search: runs, what to expect there, and what the base model leaves there.
 
-    `kept` says from how many starts a search is worth its cost.
+    `left` (n,) are its normalised residuals, `known` (n, p) its sensitivities; `kept` says from how
+    many starts a search is worth its cost, `looked` of how many a linear step is made.
     """
 
     problem: Problem
     expected: Expected
+    left: Array
     known: Array
     kept: int
+    looked: int
+
+    @cached_property
+    def cost(self) -> float:
+        """The base model's mean loss."""
+        return mean_loss(loss(self.left))
+
+    @cached_property
+    def _weight(self) -> Array:
+        """Root of Huber's weight (n,) of each residual."""
+        return np.sqrt(np.minimum(1.0, HUBER / np.maximum(np.abs(self.left), 1e-12)))
+
+    @cached_property
+    def _basis(self) -> Array:
+        """Orthonormal columns (n, p) that span what the base model's parameters change."""
+        columns = self._weight[:, None] * self.known
+        lengths = np.linalg.norm(columns, axis=0)
+        return np.linalg.qr(columns[:, lengths > 0.0] / lengths[lengths > 0.0])[0]
+
+    def _beyond(self, change: Array) -> Array:
+        """Return what of a change (n,) the base model's parameters do not absorb, weighted."""
+        weighted = self._weight * change
+        kept: Array = weighted - self._basis @ (self._basis.T @ weighted)
+        return kept
+
+    def promise(self, start: Model) -> float:
+        """Return by how much a start's effect lowers the squares, all else refitted linearly.
+
+        At the size at which it does so best (a score test: Rao 1948, Proc. Camb. Phil. Soc. 44(1),
+        50-57), which costs one simulation.
+        """
+        change = self._beyond(residuals(self.problem, start, self.expected) - self.left)
+        along, square = -float(change @ self._beyond(self.left)), float(change @ change)
+        size = float(np.clip(along / square, -FARTHEST, FARTHEST)) if square > 0.0 else 0.0
+        return max(2.0 * size * along - size**2 * square, 2.0 * along - square)
 
 
 class SearchContext:
@@ -234,8 +279,10 @@ class SearchContext:
             if kind not in self._screening:
                 problem, expected = _thinned_out(self.train, self.expected, kind)
                 search = Search(problem, self.base, expected, self.base.free())
+                left = search.residuals(search.start)
+                known = search.jacobian(search.start, left)
                 self._screening[kind] = ScreeningData(
-                    problem, expected, search.sensitivities(), KEPT[kind]
+                    problem, expected, left, known, KEPT[kind], LOOKED[kind]
                 )
         return self._screening[kind]
 
@@ -280,13 +327,15 @@ class Candidate:
 
 
 def ranked_guesses(effect: str, context: SearchContext) -> list[Candidate]:
-    """Return an effect's starts after one linear step of all parameters, the best first.
+    """Return an effect's best starts after one linear step of all parameters, the best first.
 
     Those from which nothing moves, as a softening spring where there is none to soften, are left
     out: they would cost no more than the law alone, and so come before starts that are too large.
     """
     screening = context.screening(effect)
     guesses = initial_guesses(effect, context.base, context.train)
+    if len(guesses) > screening.looked:
+        guesses = sorted(guesses, key=screening.promise, reverse=True)[: screening.looked]
     found = [_stepped(guess, effect, screening) for guess in guesses]
     moving = [one for one in found if one.moves]
     return sorted(moving or found, key=lambda one: one.cost)
@@ -301,7 +350,7 @@ def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
     added = [name for name in start.free() if name.startswith(f"{effect}.")]
     own = Search(screening.problem, start, screening.expected, added)
     here = own.residuals(own.start)
-    slopes = own.sensitivities() if added else np.zeros((len(here), 0))
+    slopes = own.jacobian(own.start, here) if added else np.zeros((len(here), 0))
     moves = not added or bool(slopes.any())
     J = np.hstack([screening.known, slopes])
     weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
@@ -316,7 +365,7 @@ def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
         if cost < best.cost:
             there = whole.at(theta)
             if not moves or _moves(there, effect, screening):
-                best = Candidate(there, cost, moves)
+                return Candidate(there, cost, moves)
     return best
 
 

@@ -28,10 +28,13 @@ def test_what_each_effect_leaves_of_the_cost_is_told(monkeypatch: pytest.MonkeyP
     def judged(model: Model, *_: object) -> Any:
         return SimpleNamespace(model=model, z=1.25)
 
-    context = SimpleNamespace(cost=2.0, expected=None)
+    context = SimpleNamespace(
+        cost=2.0, expected=None, screening=lambda _: SimpleNamespace(cost=2.0)
+    )
     for name, made in {
         "SearchContext": lambda *_: context, "joinable": lambda *_: list(COSTS),
-        "ranked_guesses": lambda *_: [], "short_search": searched, "judge": judged,
+        "screened": lambda *_: [SimpleNamespace(cost=1.0)], "short_search": searched,
+        "judge": judged,
         "refine": lambda model, *_: model,
     }.items():  # fmt: skip
         monkeypatch.setattr(trials, name, made)

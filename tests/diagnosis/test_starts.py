@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnosis.trials import joinable, short_search
+from bristle.diagnosis import trials
+from bristle.diagnosis.trials import joinable, short_search, try_all
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem
@@ -94,3 +95,28 @@ def test_starts_cover_the_grid_and_differ(springy, effect):
     assert len(found) % nodes == 0
     values = {tuple(sorted(model.values.items())) for model in found}
     assert len(values) == len(found)
+
+
+def test_the_effect_that_is_there_promises_most(springy):
+    (there,) = initial_guesses("gas_spring", springy.base, springy.train)
+    data = springy.screening("gas_spring")
+    for name in ("quadratic_damping", "asymmetry"):
+        others = initial_guesses(name, springy.base, springy.train)
+        assert max(map(data.promise, others)) < 0.3 * data.promise(there)
+
+
+def test_what_cannot_win_is_not_searched_further(springy, monkeypatch):
+    searched = []
+
+    def noted(name, *given):
+        searched.append(name)
+        return short_search(name, *given)
+
+    monkeypatch.setattr(trials, "short_search", noted)
+    found = try_all(springy.base, springy.train, springy.train)
+    assert found[0].effects == ("gas_spring",)
+    assert found[0].refined
+    assert {one.effects[-1] for one in found} == set(joinable(springy.base, problem=springy.train))
+    assert "gas_spring" in searched
+    assert len(searched) < len(found) / 2
+    assert not any(one.refined for one in found if one.effects[-1] not in searched)

@@ -42,6 +42,16 @@ def test_updated_jacobians_save_evaluations():
     assert found.sweeps <= 5
 
 
+def test_a_jacobian_that_promises_no_more_is_the_last_one():
+    def line(theta):
+        return theta[0] + theta[1] * T - 3.0 + np.sin(40.0 * T)
+
+    found = descend(line, np.zeros(2), WIDE[:2], -WIDE[:2], 40)
+    exact = least_squares(line, [0.0, 0.0]).x
+    assert found.theta == pytest.approx(exact, rel=1e-3)
+    assert found.sweeps == 2
+
+
 def test_a_parameter_stays_inside_its_bounds():
     low, high = np.array([0.0, 0.0, 0.6]), np.array([10.0, 10.0, 1.0])
     found = descend(decay, np.array([1.0, 1.0, 0.8]), low, high, 40)
