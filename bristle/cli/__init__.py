@@ -81,8 +81,13 @@ What is made on the way is told by who makes it, as by `study auto`, `run` and `
 """
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Return the parser with one subcommand per module of this package."""
+def build_parser(only: str = "") -> argparse.ArgumentParser:
+    """Return the parser with one subcommand per module of this package.
+
+    Parameters
+    ----------
+    only : the command whose options are wanted: the modules of the others stay unread; "" for all
+    """
     parser = argparse.ArgumentParser(
         prog="bristle",
         description="Find the physics that a damper model misses; simulate buildings with MR "
@@ -95,8 +100,11 @@ def build_parser() -> argparse.ArgumentParser:
     for found in pkgutil.iter_modules(__path__):
         if found.name.startswith("_"):
             continue
-        module = importlib.import_module(f"{__name__}.{found.name}")
         name = found.name.strip("_").replace("_", "-")
+        if only and name != only:
+            commands.add_parser(name)
+            continue
+        module = importlib.import_module(f"{__name__}.{found.name}")
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
         add_common(sub)
         module.add_arguments(sub)
@@ -106,8 +114,9 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     """Return the arguments of a command line; an old spelling is an error that names the new."""
-    parser = build_parser()
     words = sys.argv[1:] if argv is None else argv
+    known = {one.name.strip("_").replace("_", "-") for one in pkgutil.iter_modules(__path__)}
+    parser = build_parser(words[0] if words and words[0] in known else "")
     for old, new in _FORMER.items():
         command, *option = old.split()
         if words[:1] == [command] and set(option) <= set(words):

@@ -158,6 +158,39 @@ def add_overrides(
     )  # fmt: skip
 
 
+def add_dry_run(parser: argparse.ArgumentParser) -> None:
+    """Add --dry-run to a command that changes a study."""
+    parser.add_argument("--dry-run", action="store_true", help="show the result; write nothing")
+
+
+def add_channel(parser: argparse.ArgumentParser) -> None:
+    """Add --channel, which says where a channel is in a file."""
+    parser.add_argument(
+        "--channel", action="append", default=[], metavar="CHANNEL=COLUMN@UNIT",
+        help="the column of a channel; a minus before COLUMN reverses its sign: --channel "
+        "'force=-Ch3@kN'; without @UNIT the unit is that of the title",
+    )  # fmt: skip
+
+
+def add_channels_of_data(parser: argparse.ArgumentParser) -> None:
+    """Add what says where the channels are in a study's files."""
+    add_channel(parser)
+    text = "do not read this channel, whatever column it was taken from"
+    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
+    text = "sampling step in s of files without a time"
+    parser.add_argument("--step", type=float, metavar="S", help=text)
+
+
+def add_judged(parser: argparse.ArgumentParser) -> None:
+    """Add the output that is minimised, and its statistic."""
+    parser.add_argument(
+        "--output", default="structure.floor2_acceleration_absolute", metavar="NAME",
+        help="the output to minimise; else the second floor's absolute acceleration",
+    )  # fmt: skip
+    text = "its statistic; else peak"
+    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
+
+
 def add_details(parser: argparse.ArgumentParser) -> None:
     """Add --details to a command whose answer has some."""
     text = "print the evidence below the answer: all tables"

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_details, add_json, channels_of, print_json
+from ._options import add_channel, add_details, add_json, channels_of, print_json
 
 if TYPE_CHECKING:
     from ..prediction.compare_fmu import FmuComparison
@@ -37,13 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PORT=CHANNEL@UNIT",
         help="the channel that feeds an input, or that an output is compared with",
     )
-    parser.add_argument(
-        "--channel",
-        action="append",
-        default=[],
-        metavar="CHANNEL=COLUMN@UNIT",
-        help="the column of a channel in the file, instead of the guess",
-    )
+    add_channel(parser)
     text = "time limit of the run in s"
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help=text)
     parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")

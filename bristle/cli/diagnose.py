@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import add_details, add_json, add_study, add_trust, print_json, print_study_view
+from ._options import (
+    add_details,
+    add_dry_run,
+    add_json,
+    add_study,
+    add_trust,
+    print_json,
+    print_study_view,
+)
 
 HELP = "find the effects that a study's model misses, with confidence and alternatives"
 
@@ -21,8 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "refit the model at the limit of every effect: exact also if the model is far from linear"
     )
     parser.add_argument("--limits", action="store_true", help=text)
-    text = "show the verdict; do not change verdict.json"
-    parser.add_argument("--dry-run", action="store_true", help=text)
+    add_dry_run(parser)
     add_trust(parser)
     add_details(parser)
     add_json(parser, "print verdict.json")
@@ -32,11 +39,8 @@ def main(arguments: argparse.Namespace) -> int:
     """Diagnose, write verdict.json and the picture, print the verdict with its evidence."""
     from ..core.interrupt import keeps
     from ..core.progress import tell
-    from ..diagnosis.view import draw_verdict
     from ..study.steps import diagnose_study, verdict_of
     from ..study.study import Study
-    from ..study.view import diagnosed_view
-    from ..view.style import png
 
     study = Study(arguments.folder)
     found = diagnose_study(
@@ -47,9 +51,14 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.dry_run:
         keeps("The verdict is kept in verdict.json; its picture was not drawn.")
         tell("drawing")
+        from ..diagnosis.view import draw_verdict
+        from ..view.style import png
+
         picture = study.write_report("diagnose.png", png(draw_verdict(verdict)))
     if arguments.json:
         print_json(verdict)
     else:
+        from ..study.view import diagnosed_view
+
         print_study_view(diagnosed_view(verdict, study.folder), arguments, picture)
     return 0

@@ -6,6 +6,7 @@ import argparse
 
 from ._options import (
     add_details,
+    add_dry_run,
     add_json,
     add_study,
     add_trust,
@@ -42,8 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--starts", type=int, default=4, metavar="N", help=text)
     text = "leave out the table that compares the laws"
     parser.add_argument("--no-table", action="store_true", help=text)
-    text = "show the result; do not change the study"
-    parser.add_argument("--dry-run", action="store_true", help=text)
+    add_dry_run(parser)
     text = (
         "for a building: identify only the building (stiffnesses, frequencies and damping ratios "
         "from its response) and write a building file"

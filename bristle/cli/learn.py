@@ -12,7 +12,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Collection
 
-from ._options import add_details, add_json, add_study, add_trust, print_json, print_study_view
+from ._options import (
+    add_details,
+    add_dry_run,
+    add_json,
+    add_study,
+    add_trust,
+    print_json,
+    print_study_view,
+)
 
 HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
@@ -40,8 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", default="", help=text)
     text = "keep the table even if a formula fits as well"
     parser.add_argument("--table", action="store_true", help=text)
-    text = "show the learned effect; write nothing"
-    parser.add_argument("--dry-run", action="store_true", help=text)
+    add_dry_run(parser)
     add_trust(parser)
     add_details(parser)
     add_json(parser)

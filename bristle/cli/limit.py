@@ -11,7 +11,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_json, add_no_figure, add_overrides, add_trust, print_json, print_view
+from ._options import (
+    add_json,
+    add_judged,
+    add_no_figure,
+    add_overrides,
+    add_trust,
+    print_json,
+    print_view,
+)
 
 if TYPE_CHECKING:
     from ..optimal_control import Limit
@@ -28,14 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENARIO",
         help="file or stock scenario with one damper; else El Centro 0.6 g with a LuGre damper",
     )
-    parser.add_argument(
-        "--output",
-        default="structure.floor2_acceleration_absolute",
-        metavar="NAME",
-        help="output of the structure; else the second floor's absolute acceleration",
-    )
-    text = "statistic to minimise"
-    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
+    add_judged(parser)
     parser.add_argument(
         "--preview",
         nargs="*",

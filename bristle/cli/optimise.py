@@ -6,7 +6,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_json, add_no_figure, add_overrides, add_trust, print_json, print_view
+from ._options import (
+    add_json,
+    add_judged,
+    add_no_figure,
+    add_overrides,
+    add_trust,
+    print_json,
+    print_view,
+)
 
 if TYPE_CHECKING:
     from ..campaign.best_constant import Passive
@@ -48,14 +56,7 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
     )
     text = "peaks [g] to which each motion is scaled, 0: as recorded; else 0.2 0.4 0.6 0.8"
     parser.add_argument("--intensities", nargs="+", type=float, metavar="G", help=text)
-    parser.add_argument(
-        "--output",
-        default="structure.floor2_acceleration_absolute",
-        metavar="NAME",
-        help="the output to minimise; else the second floor's absolute acceleration",
-    )
-    text = "statistic to minimise"
-    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
+    add_judged(parser)
     text = "number of voltages in the grid; else 17"
     parser.add_argument("--grid", type=int, default=17, metavar="N", help=text)
     add_overrides(parser, "scenario", "damper.sigma_a=600")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next, Text
-from ._options import add_details, add_json, add_trust, print_json
+from ._options import add_details, add_dry_run, add_json, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..planning.plan import Plan
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the candidate tests")
     text = "folder of the files; by default plan, plan_2 ... in the study"
     parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help=text)
-    parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
+    add_dry_run(parser)
     add_trust(parser)
     add_details(parser)
     add_json(parser, "print the plan as JSON")

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 from ..core.text import command
 from ..view.blocks import Next
 from ._options import (
+    add_channels_of_data,
     add_common_to_actions,
     add_details,
+    add_dry_run,
     add_json,
     add_run_facts,
     add_study,
@@ -40,17 +42,8 @@ if TYPE_CHECKING:
 def add_channels(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study channels`."""
     add_study(parser)
-    parser.add_argument(
-        "--channel", action="append", default=[], metavar="CHANNEL=COLUMN@UNIT",
-        help="new column of a channel; a minus before COLUMN reverses its sign: --channel "
-        "'force=-Ch3@kN'; without @UNIT the unit stays, or is that of the title",
-    )  # fmt: skip
-    text = "do not read this channel any more"
-    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
-    text = "sampling step in s of files without a time"
-    parser.add_argument("--step", type=float, metavar="S", help=text)
-    text = "show the changes, and write nothing"
-    parser.add_argument("--dry-run", action="store_true", help=text)
+    add_channels_of_data(parser)
+    add_dry_run(parser)
     add_json(parser)
     parser.set_defaults(act=_channels)
 
@@ -318,18 +311,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--building", type=Path, metavar="FILE", help=text)
     text = "device to identify, if the building has several"
     parser.add_argument("--device", metavar="NAME", help=text)
-    parser.add_argument(
-        "--channel",
-        action="append",
-        default=[],
-        metavar="CHANNEL=COLUMN@UNIT",
-        help="column of a channel, instead of the guess; a minus before COLUMN reverses its sign: "
-        "--channel 'force=-Ch3@kN'",
-    )
-    text = "a channel that is not read, though a column was taken for it"
-    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
-    text = "sampling step in s of files without a time"
-    parser.add_argument("--step", type=float, metavar="S", help=text)
+    add_channels_of_data(parser)
     text = "test runs, which no fit and no verdict uses: names among the data, or more files"
     parser.add_argument("--test", nargs="+", action="extend", default=[], metavar="GLOB", help=text)
     _add_runs(parser)

@@ -1,4 +1,4 @@
-"""What long work is at, told to whoever listens: messages, time left, the state of a search.
+"""Progress of long work: messages, time left, the state of a search.
 
 Whoever works calls `tell`; the command decides where that goes (`telling`). Without one nothing is
 told: a library is silent.

@@ -387,7 +387,7 @@ HELD_OUT = 4
 
 
 def roles_of(count: int, judged: bool) -> list[bool]:
-    """Return of each of so many tests whether it is held out; one that is follows its like.
+    """Return for each test whether it is held out: each such test is like the one before it.
 
     Parameters
     ----------

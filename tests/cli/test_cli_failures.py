@@ -193,7 +193,7 @@ raise SystemExit(main(["undo", "rig"]))
 def test_ctrl_c_before_the_command_begins_is_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted() -> None:
+    def interrupted(_only: str) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("bristle.cli.build_parser", interrupted)
