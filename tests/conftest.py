@@ -53,9 +53,11 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
     if whole and config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
         script = Path(__file__).with_name("compile_ahead.py")
+        state = str(Path(os.environ[studies.FOLDER]) / "state")
         path = os.pathsep.join([str(script.parents[1]), os.environ.get("PYTHONPATH", "")])
         config.stash[_AHEAD] = subprocess.Popen(
-            [sys.executable, str(script)], env={**os.environ, "PYTHONPATH": path},
+            [sys.executable, str(script)],
+            env={**os.environ, "PYTHONPATH": path, trust.VARIABLE: "1", "BRISTLE_STATE": state},
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
 
