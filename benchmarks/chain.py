@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from bristle.engine.cosimulation import Master
+from bristle.engine.cosimulation import Master, ignore
 from bristle.engine.instance import Instance
 from bristle.system.scenario import load_scenario
 
@@ -73,7 +73,7 @@ def _started(count: int, algorithm: str, folder: Path) -> Master:
     file = folder / f"chain_{count}.toml"
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     scenario = load_scenario(file)
-    master = Master(scenario, *find_fmus(scenario), lambda message: None)
+    master = Master(scenario, *find_fmus(scenario), ignore)
     master.start()
     return master
 

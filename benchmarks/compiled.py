@@ -16,7 +16,7 @@ import numpy as np
 
 from bristle.component.damper import VOLTAGE
 from bristle.core.jit import compiled
-from bristle.engine.coupled import LONGEST_SUBSTEP, System, simulate
+from bristle.engine.coupled import LONGEST_SUBSTEP, Coupled, Layout
 from bristle.engine.time_loop import INLINE, MAX_SWEEPS, TOLERANCE, integrate
 from bristle.system.scenario import load_scenario
 
@@ -58,8 +58,8 @@ def against_c() -> list[Row]:
     substeps = round(scenario.step / LONGEST_SUBSTEP)
     count = scenario.steps * substeps
     with tempfile.TemporaryDirectory() as folder:
-        peer = Peer(_library(compiler, Path(folder)), System(scenario), scenario.steps, substeps)
-        ours = _Ours(System(scenario), scenario.steps, substeps)
+        peer = Peer(_library(compiler, Path(folder)), Layout(scenario), scenario.steps, substeps)
+        ours = _Ours(Layout(scenario), scenario.steps, substeps)
         ours.run(LONGEST_SUBSTEP)  # compiles, or reads what was compiled
         peer.run(LONGEST_SUBSTEP)
         apart = _apart(ours.columns(), peer.columns())
@@ -86,7 +86,7 @@ def half_sine_peaks() -> list[Row]:
     rows = []
     for case in half_sine():
         overrides = {**case.overrides, "run.step": 1e-4}
-        columns = simulate(load_scenario("half_sine_pulse", overrides))
+        columns = Coupled().run(load_scenario("half_sine_pulse", overrides))
         errors = peak_errors(case, columns)
         worst = max(errors, key=lambda n: errors[n])
         rows.append(
@@ -107,7 +107,7 @@ def passive_peaks() -> Row:
     for (intensity, voltage), peak in passive().items():
         name = f"el_centro_{intensity:.1f}g_constant_voltage".replace(".", "p")
         scenario = load_scenario(name, {"voltage.level": voltage, "run.stop": 20.0})
-        found = np.abs(simulate(scenario)[SECOND_FLOOR]).max()
+        found = np.abs(Coupled().run(scenario)[SECOND_FLOOR]).max()
         errors[intensity, voltage] = abs(found / peak - 1.0)
         beyond[intensity, voltage] = max(0.0, abs(found - peak) - 0.005) / peak
     worst = max(errors, key=lambda case: errors[case])
@@ -123,7 +123,7 @@ def passive_peaks() -> Row:
 class _Ours:
     """The compiled time loop, run again and again into the same memory."""
 
-    def __init__(self, system: System, rows: int, substeps: int) -> None:
+    def __init__(self, system: Layout, rows: int, substeps: int) -> None:
         self.system, self.rows, self.substeps = system, rows, substeps
         self.sweeps = 0
         self._slots = np.array(list(system.outputs.values()), dtype=np.int64)
@@ -176,7 +176,7 @@ class _Record(ctypes.Structure):
 class Peer:
     """The C program, given the same numbers as the compiled time loop."""
 
-    def __init__(self, library: ctypes.CDLL, system: System, rows: int, substeps: int) -> None:
+    def __init__(self, library: ctypes.CDLL, system: Layout, rows: int, substeps: int) -> None:
         self._loop = library.time_loop
         self._loop.restype = ctypes.c_long
         self.system, self.rows, self.substeps = system, rows, substeps

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
 from bristle.errors import RecordError
 from bristle.optimal_control import Limit, limit
 from bristle.system.scenario import load_scenario
@@ -79,7 +79,7 @@ def _found(record: str, intensity: float) -> tuple[Limit, float, float]:
     began = time.process_time()
     found = limit("el_centro_0p6g_constant_voltage", values)
     spent = time.process_time() - began
-    rows = simulate(load_scenario("el_centro_0p6g_clipped", values))
+    rows = Coupled().run(load_scenario("el_centro_0p6g_clipped", values))
     return found, float(np.abs(rows[OUTPUT]).max()), spent
 
 

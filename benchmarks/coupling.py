@@ -16,19 +16,22 @@ import numpy as np
 import pandas as pd
 
 import bristle
-from bristle.engine.cosimulation import Master
-from bristle.engine.coupling_error import CouplingError, against, estimate, finer
+from bristle.engine.cosimulation import Cosimulation, Master, ignore
+from bristle.engine.coupling_error import CouplingError, again_by, against, estimate, finer
 from bristle.engine.results import judged_by
-from bristle.engine.run import run_quietly
 from bristle.errors import BuildError, ScenarioError
 from bristle.fmu.build import ensure
 from bristle.native.build import ensure as ensure_native
-from bristle.system.scenario import Scenario, load_scenario
+from bristle.system.model import System
+from bristle.system.scenario import load_scenario
 
 from ._exact import half_sine_exact
 from ._published import DRIFT, Case, half_sine, peak_errors, symbol
 from ._rows import Row, least_times
 from .master import find_fmus
+
+AGAIN = again_by(Cosimulation(listen=ignore))
+
 
 ALGORITHMS = ("jacobi", "gauss-seidel", "midpoint", "midpoint-iterated")
 STEPS = (0.004, 0.002, 0.001, 0.0005)
@@ -196,12 +199,12 @@ def _stated(name: str, algorithm: str) -> list[tuple[CouplingError, CouplingErro
     """Return stated and true error of every output that a run is judged by, at every step."""
     runs: dict[float, pd.DataFrame] = {}
 
-    def again(one: Scenario, engine: str) -> pd.DataFrame:
+    def again(one: System, engine: str) -> pd.DataFrame:
         if engine == "compiled":
             raise ScenarioError("as if one of the FMUs were foreign")
         step = round(one.step, 9)
         if step not in runs:
-            runs[step] = run_quietly(one, engine)
+            runs[step] = AGAIN(one, engine)
         return runs[step]
 
     found = []
@@ -211,7 +214,7 @@ def _stated(name: str, algorithm: str) -> list[tuple[CouplingError, CouplingErro
         scenario = load_scenario(name, given)
         frame = again(scenario, "fmu")
         _, told = estimate(scenario, frame, again)
-        half, exact = again(finer(scenario, 2), "fmu"), run_quietly(scenario, "compiled")
+        half, exact = again(finer(scenario, 2), "fmu"), AGAIN(scenario, "compiled")
         for output in judged_by(frame):
             columns = (one[output].to_numpy() for one in (frame, half.iloc[::2], exact))
             found.append((told[output], against(*columns)))
@@ -259,6 +262,6 @@ def _started(
     given = {"run.algorithm": algorithm, "run.step": step, "run.stop": step * steps}
     scenario = load_scenario(name, given)
     fmus = find_fmus(scenario, build)
-    master = stack.enter_context(Master(scenario, *fmus, lambda message: None))
+    master = stack.enter_context(Master(scenario, *fmus, ignore))
     master.start()
     return master.advance

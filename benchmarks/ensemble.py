@@ -10,12 +10,10 @@ import statistics
 import time
 from collections.abc import Callable
 
-import numpy as np
-
-from bristle.campaign.campaign import Plan, prepare, statistic
+from bristle.campaign import Plan
 from bristle.campaign.ensemble_file import read_ensemble
 from bristle.campaign.pool import run_local
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
 from bristle.system.scenario import load_scenario
 
 from ._rows import Row
@@ -28,7 +26,7 @@ SLICES = 5
 def run() -> list[Row]:
     """Return the ensemble's figures."""
     plan = read_ensemble(ENSEMBLE, RUNS)
-    prepare(plan)
+    plan.campaign().prepare()
     jobs: dict[str, Callable[[range], None]] = {
         "loop": lambda runs: _loop(plan, runs),
         "one": lambda runs: _pool(plan, runs, 1),
@@ -81,12 +79,12 @@ def _loop(plan: Plan, runs: range) -> None:
     names = [varied.name for varied in plan.varied if varied.place != "building"]
     for k in runs:
         values = plan.values(k)
-        columns = simulate(load_scenario(plan.scenario, {name: values[name] for name in names}))
+        columns = Coupled().run(load_scenario(plan.system, {name: values[name] for name in names}))
         for output in plan.outputs:
-            statistic(output, np.asarray(columns[output.column]))
+            output.of(columns[output.column])
 
 
 def _pool(plan: Plan, runs: range, workers: int) -> None:
-    for outcome in run_local(plan, runs, workers):
+    for outcome in run_local(plan.campaign(), runs, workers):
         if outcome.reason:
             raise RuntimeError(outcome.reason)

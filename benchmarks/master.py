@@ -10,11 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bristle.engine.cosimulation import Master
+from bristle.engine.cosimulation import Master, ignore
 from bristle.engine.instance import Instance, Unpacked
 from bristle.fmu.build import ensure
 from bristle.fmu.description import Description, read_description
-from bristle.system.scenario import Scenario, fmu_parameters, load_scenario
+from bristle.system.model import System
+from bristle.system.scenario import load_scenario
 
 from ._rows import Row, Times, interleave, ratio_of
 
@@ -63,17 +64,17 @@ def _against(name: str, master: Times, other: Times, goal: float | None = None) 
     )
 
 
-def find_fmus(scenario: Scenario, ensure: Callable[..., Path] = ensure) -> Fmus:
+def find_fmus(scenario: System, ensure: Callable[..., Path] = ensure) -> Fmus:
     """Return files, descriptions and parameters of a scenario's FMUs, in Python or native."""
-    paths = {c.name: c.path or ensure(c.fmu, c.building, c.controller) for c in scenario.components}
+    there = scenario.components
+    paths = {n: c.path or ensure(c.kind, c.building, c.controller) for n, c in there.items()}
     descriptions = {name: read_description(path) for name, path in paths.items()}
-    folder = scenario.file.parent
-    return paths, descriptions, {c.name: fmu_parameters(c, folder) for c in scenario.components}
+    return paths, descriptions, {name: one.taken_values() for name, one in there.items()}
 
 
-def time_master(scenario: Scenario, fmus: Fmus) -> float:
+def time_master(scenario: System, fmus: Fmus) -> float:
     """Return the seconds of all steps, the table of all outputs included."""
-    with Master(scenario, *fmus, lambda message: None) as master:
+    with Master(scenario, *fmus, ignore) as master:
         master.start()
         before = time.perf_counter()
         master.advance(STEPS)
@@ -81,7 +82,7 @@ def time_master(scenario: Scenario, fmus: Fmus) -> float:
         return time.perf_counter() - before
 
 
-def time_bare(scenario: Scenario, fmus: Fmus, prepared: bool) -> float:
+def time_bare(scenario: System, fmus: Fmus, prepared: bool) -> float:
     """Return the seconds of a loop with one doStep, getReal, getInteger and setReal per FMU.
 
     Connected inputs are set, all outputs are read and kept. With `prepared` the arguments of the
@@ -147,9 +148,9 @@ class _Calls:
         return tuple(kind.from_param(value) for kind, value in zip(kinds, values, strict=True))
 
 
-def _bare_loop(scenario: Scenario, instances: list[Instance], prepared: bool) -> float:
+def _bare_loop(scenario: System, instances: list[Instance], prepared: bool) -> float:
     """Step ground, structure, voltage and damper, written out by hand; return the seconds."""
-    wires = {(w.target, w.input): (w.source, w.output) for w in scenario.connections}
+    wires = {(w.target, w.input): (w.source, w.output) for w in scenario.wires}
     fed = {i.name: [name for target, name in wires if target == i.name] for i in instances}
     made = [_Calls(i, fed[i.name], scenario.step, prepared) for i in instances]
     g, s, v, d = made
@@ -201,7 +202,7 @@ def _bare_loop(scenario: Scenario, instances: list[Instance], prepared: bool) ->
     return time.perf_counter() - before
 
 
-def time_ecos(scenario: Scenario, fmus: Fmus, csv: bool) -> float:
+def time_ecos(scenario: System, fmus: Fmus, csv: bool) -> float:
     """Return the seconds of Ecos's steps, its CSV writer included if wanted."""
     from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure
 
@@ -210,7 +211,7 @@ def time_ecos(scenario: Scenario, fmus: Fmus, csv: bool) -> float:
     structure = EcosSimulationStructure()
     for name, path in paths.items():
         structure.add_model(name, str(path))
-    for wire in scenario.connections:
+    for wire in scenario.wires:
         structure.make_real_connection(
             f"{wire.source}::{wire.output}", f"{wire.target}::{wire.input}"
         )

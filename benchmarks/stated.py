@@ -14,14 +14,25 @@ from pathlib import Path
 
 import pandas as pd
 
-from bristle.engine.coupling_error import ROUNDING, CouplingError, estimate, finer, largest
+from bristle.engine.cosimulation import Cosimulation, ignore
+from bristle.engine.coupling_error import (
+    ROUNDING,
+    CouplingError,
+    again_by,
+    estimate,
+    finer,
+    largest,
+)
 from bristle.engine.results import judged_by
-from bristle.engine.run import run_quietly
 from bristle.errors import BristleError, ScenarioError
-from bristle.system.scenario import Scenario, load_scenario
+from bristle.system.model import System
+from bristle.system.scenario import load_scenario
 
 from ._random_scenarios import write_random
 from ._rows import Row
+
+AGAIN = again_by(Cosimulation(listen=ignore))
+
 
 FIRST, CASES = 1000, 20
 TRUTH = 2e-5
@@ -66,20 +77,20 @@ def case(seed: int, folder: Path) -> dict[str, dict[str, Pair]]:
     scenario = load_scenario(write_random(seed, folder))
     runs: dict[tuple[float, str], pd.DataFrame] = {}
 
-    def again(one: Scenario, engine: str) -> pd.DataFrame:
+    def again(one: System, engine: str) -> pd.DataFrame:
         key = one.step, engine
         if key not in runs:
-            runs[key] = run_quietly(one, engine)
+            runs[key] = AGAIN(one, engine)
         return runs[key]
 
-    def alone(one: Scenario, engine: str) -> pd.DataFrame:
+    def alone(one: System, engine: str) -> pd.DataFrame:
         if engine == "compiled":
             raise ScenarioError("as if one of the FMUs were foreign")
         return again(one, engine)
 
     frame = again(scenario, "fmu")
     parts = round(scenario.step / TRUTH)
-    exact = run_quietly(finer(scenario, parts), "compiled").iloc[::parts]
+    exact = AGAIN(finer(scenario, parts), "compiled").iloc[::parts]
     found: dict[str, dict[str, Pair]] = {}
     for way, runner in zip(WAYS, (alone, again), strict=True):
         told = estimate(scenario, frame, runner)[1]

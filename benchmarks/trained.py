@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bristle.component.controller_file import read_controller
 from bristle.core.files import scenarios_folder
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
 from bristle.errors import RecordError
 from bristle.fmu.catalogue import instantiate
 from bristle.synthesis import Damper
@@ -104,7 +104,7 @@ def case(fmu: str, record: str, intensity: float) -> Case:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "case.toml"
         file.write_text(text.replace('"ClippedOptimal"', f'"{fmu}"'), encoding="utf-8")
-        rows: Any = simulate(load_scenario(file, values))
+        rows: Any = Coupled().run(load_scenario(file, values))
     y, x = np.array(rows[OUTPUT]), np.array(rows[DRIFT])
     return Case(
         float(np.abs(y).max()), float(np.sqrt(np.mean(y**2))), float(np.abs(x).max())

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from bristle.core.jit import compiled
-from bristle.engine.coupled import System, linked, simulate, substeps_of
+from bristle.engine.coupled import Coupled, Layout, linked, substeps_of
 from bristle.engine.time_loop import INLINE, integrate
 from bristle.errors import BuildError
 from bristle.export.web import export_web
@@ -81,7 +81,7 @@ def _compiled(name: str) -> float:
     scenario = load_scenario(name)
     found = []
     for _ in range(3):
-        system = System(scenario)
+        system = Layout(scenario)
         substeps = substeps_of(scenario, system)
         h = scenario.step / substeps
         table = np.zeros((scenario.steps + 1, len(system.outputs)))
@@ -99,7 +99,7 @@ def _compiled(name: str) -> float:
 
 def _worst(name: str, folder: Path) -> float:
     """Return the largest difference of a row, over the peak of its output."""
-    right = simulate(load_scenario(name))
+    right = Coupled().run(load_scenario(name))
     outputs = json.loads((folder / "scenario.json").read_text())["outputs"]
     table = np.fromfile(folder / "rows.bin").reshape(len(outputs), -1)
     worst = 0.0

@@ -11,9 +11,8 @@ Run i depends on the seed and on i alone; a killed ensemble goes on where it was
 
 from __future__ import annotations
 
-from .campaign import Plan
 from .ensemble import Ensemble, EnsembleInterrupted, ensemble
-from .ensemble_file import read_ensemble, stock_ensembles
+from .ensemble_file import Plan, read_ensemble, stock_ensembles
 
 __all__ = [
     "Ensemble",

@@ -9,7 +9,7 @@ worse one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from ..core.progress import Progress
 from ..core.text import plain, unknown
 from ..data import read_ground_motion
+from ..engine.coupled import Coupled
 from ..engine.results import make_columns
 from ..errors import ScenarioError
-from ..system.scenario import Component, Scenario, load_scenario
+from ..system.model import Component, System, plain_target
+from ..system.scenario import load_scenario
 from ..view import Viewable
-from .campaign import Output, plain_target, statistic
+from .campaign import Campaign, Statistic, Variation
 
 Array = NDArray[np.float64]
 
@@ -167,7 +169,7 @@ def optimise_passive(
     with Progress("passive optimum", count, progress) as bar:
 
         def done() -> None:
-            bar.show(min(sum(len(case.known) for case in cases), count))
+            bar.show(min(sum(case.campaign.runs for case in cases), count))
 
         values = np.array([[case(v, done) for v in voltages.tolist()] for case in cases])
         best = [
@@ -175,7 +177,7 @@ def optimise_passive(
             for case, row in zip(cases, values, strict=True)
         ]
         goals = _goals(cases, voltages, values, best, done)
-    runs = sum(len(case.known) for case in cases)
+    runs = sum(case.campaign.runs for case in cases)
     return Passive(
         chosen, output, statistic, cases[0].output.unit, voltages, values, best, goals, runs,
         tuple(dict.fromkeys(case.cut_off for case in cases if case.cut_off)),
@@ -195,43 +197,30 @@ class _Case:
         _refuse_own(overrides, ground.name, source.name)
         if motion.intensity:
             own[f"{ground.name}.peak"] = motion.intensity * G
-        elif "peak" in ground.parameters:
+        elif "peak" in ground.values:
             own[f"{ground.name}.peak"] = 0.0
-        self.scenario = load_scenario(file, {**overrides, **own})
-        self.cut_off = _cut_off(self.scenario, ground.name)
+        system = load_scenario(file, {**overrides, **own})
+        self.cut_off = _cut_off(system, ground.name)
         columns = {column.name: column for column in make_columns(base)}
         if output not in columns:
-            raise ScenarioError(f"{base.file}: {unknown('output', output, columns)}")
-        self.output = Output(output, how, columns[output].unit or "")
-        self.source = source.name
+            raise ScenarioError(f"{base.where}: {unknown('output', output, columns)}")
+        self.output = Statistic(output, how, columns[output].unit or "")
+        self.level = f"{source.name}.level"
         self.v_max = _largest_voltage(base)
-        self.known: dict[float, float] = {}
+        self.campaign = Campaign(system, Coupled(), (self.output,))
 
     def __call__(self, voltage: float, done: Callable[[], None]) -> float:
         """Return the judged value at a voltage [V]."""
-        if voltage not in self.known:
-            self.known[voltage] = self._run(voltage)
-            done()
-        return self.known[voltage]
-
-    def _run(self, voltage: float) -> float:
-        from ..engine.coupled import simulate
-
-        components = tuple(
-            replace(c, parameters={**c.parameters, "level": voltage})
-            if c.name == self.source
-            else c
-            for c in self.scenario.components
-        )
-        columns = simulate(replace(self.scenario, components=components))
-        return statistic(self.output, columns[self.output.column])
+        found = self.campaign.run(Variation({self.level: voltage}))
+        done()
+        return found.numbers[0]
 
 
-def _only(scenario: Scenario, kind: str) -> Component:
-    found = [c for c in scenario.components if c.fmu == kind and c.path is None]
+def _only(scenario: System, kind: str) -> Component:
+    found = [c for c in scenario.components.values() if c.kind == kind and c.path is None]
     if len(found) != 1:
         raise ScenarioError(
-            f"{scenario.file}: has {len(found)} components {kind}; a passive optimum needs one, "
+            f"{scenario.where}: has {len(found)} components {kind}; a passive optimum needs one, "
             f"as in {SCENARIO}."
         )
     return found[0]
@@ -249,11 +238,11 @@ def _refuse_own(overrides: Mapping[str, object], ground: str, source: str) -> No
             raise ScenarioError(f'override "{name}" would have no effect: {why}.')
 
 
-def _cut_off(scenario: Scenario, ground: str) -> str:
+def _cut_off(scenario: System, ground: str) -> str:
     """Return in a sentence that the runs end before a record does; "" where they do not."""
-    given = scenario.component(ground).parameters
+    given = scenario.components[ground].values
     record = str(given["record"])
-    time = read_ground_motion(record, scenario.file.parent).time
+    time = read_ground_motion(record, Path()).time
     end = float(time[-1]) + float(given.get("start", 0.0))
     if end <= scenario.stop + scenario.step:
         return ""
@@ -264,16 +253,16 @@ def _cut_off(scenario: Scenario, ground: str) -> str:
     )
 
 
-def _largest_voltage(scenario: Scenario) -> float:
+def _largest_voltage(scenario: System) -> float:
     """Return the least of the dampers' largest voltages [V]."""
     limits = [
-        float(c.parameters.get("v_max", c.description.variables["v_max"].start or 0.0))
-        for c in scenario.components
+        float(c.value("v_max") or 0.0)
+        for c in scenario.components.values()
         if "v_max" in c.description.variables
     ]
     if not limits or min(limits) <= 0.0:
         raise ScenarioError(
-            f"{scenario.file}: no damper that takes a voltage; a LuGreDamper or BinghamDamper "
+            f"{scenario.where}: no damper that takes a voltage; a LuGreDamper or BinghamDamper "
             "with v_max above 0 is right."
         )
     return min(limits)

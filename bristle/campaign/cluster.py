@@ -17,7 +17,7 @@ from typing import Any
 
 from ..errors import EnsembleError, RunError
 from ..version import __version__
-from .campaign import Outcome, Plan, run_one
+from .campaign import Campaign, Outcome
 
 INSTALL = 'pip install "bristle[cluster]"'
 CONNECT = 10.0
@@ -32,7 +32,9 @@ _PER_THREAD = 4
 _KILLED = "KilledWorker: "
 
 
-def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Generator[Outcome, None, None]:
+def run_cluster(
+    campaign: Campaign, runs: Iterable[int], address: str
+) -> Generator[Outcome, None, None]:
     """Yield what becomes of runs as they end, in whatever order.
 
     Scenario, records and components are read by the workers: they must see the same files.
@@ -48,10 +50,11 @@ def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Generator[Outc
     client = _connected(address)
     try:
         threads = _threads(client, address)
+        shared = client.scatter(campaign, broadcast=True)
         waiting, at_once = deque(runs), _PER_THREAD * threads
         for last in (False, False, True):
             suspects: deque[int] = deque()
-            for outcome in _gather(client, plan, waiting, at_once):
+            for outcome in _gather(client, shared, waiting, at_once):
                 killed = outcome.reason.startswith(_KILLED)
                 if killed and at_once == 1:
                     time.sleep(SETTLE)  # else the next one goes to a worker that is dead
@@ -116,7 +119,7 @@ def _version() -> str:
 
 
 def _gather(
-    client: Any, plan: Plan, waiting: deque[int], at_once: int
+    client: Any, shared: Any, waiting: deque[int], at_once: int
 ) -> Generator[Outcome, None, None]:
     ended: queue.Queue[Any] = queue.Queue()
     under_way: dict[Any, int] = {}
@@ -124,7 +127,7 @@ def _gather(
     while waiting or under_way:
         while waiting and len(under_way) < at_once:
             run = waiting.popleft()
-            future = client.submit(run_one, plan, run, pure=False)
+            future = client.submit(outcome_of, shared, run, pure=False)
             under_way[future.key] = run
             future.add_done_callback(ended.put)
         try:
@@ -135,6 +138,11 @@ def _gather(
                 raise RunError(f"the cluster has had no worker for {PATIENCE:g} s.") from None
             continue
         yield _outcome(under_way.pop(future.key), future)
+
+
+def outcome_of(campaign: Campaign, run: int) -> Outcome:
+    """Return what becomes of a run where this is called."""
+    return campaign.outcome(run)
 
 
 def _alive(client: Any) -> bool:

@@ -14,8 +14,8 @@ from ..core.progress import Progress
 from ..core.text import written
 from ..errors import EnsembleError, RunError
 from ..view import Viewable
-from .campaign import Outcome, Plan, prepare
-from .ensemble_file import read_ensemble
+from .campaign import Campaign, Outcome
+from .ensemble_file import Plan, read_ensemble
 from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
 
 if TYPE_CHECKING:
@@ -183,26 +183,26 @@ def run_left(
     done : called after each run
     cluster : address of a scheduler whose workers run in place of processes here
     """
-    left = table.left
-    if not left:
+    if not table.left:
         return
-    with closing(_outcomes(plan, left, workers, cluster)) as outcomes:
+    with closing(run_all(plan.campaign(), table.left, workers, cluster)) as outcomes:
         for outcome in outcomes:
             table.add(outcome)
             done()
 
 
-def _outcomes(
-    plan: Plan, left: list[int], workers: int, cluster: str | None
+def run_all(
+    campaign: Campaign, runs: list[int], workers: int = 1, cluster: str | None = None
 ) -> Generator[Outcome, None, None]:
+    """Yield what becomes of runs of a campaign's draws as they end, in whatever order."""
     if cluster is not None:
         from .cluster import run_cluster
 
-        return run_cluster(plan, left, cluster)
+        return run_cluster(campaign, runs, cluster)
     from .pool import run_local
 
-    prepare(plan)
-    return run_local(plan, left, min(workers, len(left)))
+    campaign.prepare()
+    return run_local(campaign, runs, min(workers, len(runs)))
 
 
 def cores() -> int:

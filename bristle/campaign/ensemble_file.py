@@ -29,7 +29,10 @@ model = "my_rig"
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -37,15 +40,17 @@ from ..core import files
 from ..core.config import ANY, Document, Key, Spec
 from ..core.text import did_you_mean, unknown, written
 from ..core.toml_lines import KeyPath
+from ..engine.cosimulation import FORMS
 from ..engine.results import make_columns
-from ..engine.run import FORMS
-from ..errors import BristleError, EnsembleError, PhysicsError, TrustError
-from ..system.overrides import FILE_PARAMETERS, FILES
-from ..system.parameters import Wrong, typed
-from ..system.scenario import Scenario, load_scenario, resolve_scenario
+from ..engine.run import engine_of
+from ..errors import BristleError, EnsembleError, TrustError
+from ..system.model import FILE_PARAMETERS, System, Wrong, plain_target, typed
+from ..system.overrides import FILES
+from ..system.scenario import load_scenario, resolve_scenario
 from ..system.toml import scenario_text
-from .campaign import STATISTICS, Output, Plan, changed_building, plain_target, split
-from .distributions import KINDS, Distribution, Value, Varied
+from ..version import __version__
+from .campaign import STATISTICS, Campaign, Statistic, is_read_anew
+from .distributions import KINDS, Distribution, Value, Varied, share
 from .identified import IDENTIFIED, Identified, read_identified
 
 MOST_RUNS = 10_000_000
@@ -53,6 +58,110 @@ MOST_RUNS = 10_000_000
 
 LEAST_RUNS = 4
 """Runs per effect that --with-limits needs at least."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A checked ensemble.
+
+    Attributes
+    ----------
+    file : Path
+        The ensemble file.
+    system : System
+        What is varied.
+    engine : str
+        "compiled" or "fmu".
+    runs, seed : int
+    varied, outputs : tuple
+    content : str
+        Digest of the base scenario and of the files that it reads.
+    identified : Identified, optional
+        A component whose parameters are drawn together.
+    fmus : str
+        "python" or "native": which FMUs the engine "fmu" steps.
+    """
+
+    file: Path
+    title: str
+    system: System
+    engine: str
+    runs: int
+    seed: int
+    varied: tuple[Varied, ...]
+    outputs: tuple[Statistic, ...]
+    content: str = ""
+    identified: Identified | None = None
+    fmus: str = "python"
+
+    @property
+    def left(self) -> bool:
+        """Whether each run is made twice, the second time with an effect that is left open."""
+        return self.identified is not None and bool(self.identified.left)
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of the numbers that are kept of each run."""
+        own = [output.name for output in self.outputs]
+        return [*own, *(f"{name} with it" for name in own)] if self.left else own
+
+    def effect(self, run: int) -> tuple[str, float]:
+        """Return the effect that joins a run, and its size over the limit."""
+        assert self.identified is not None
+        effect, part = self.identified.open_at(self.seed, run)
+        return effect.label, part
+
+    def campaign(self) -> Campaign:
+        """Return what makes its runs."""
+        return Campaign(self.system, engine_of(self.engine, self.fmus), self.outputs, self)
+
+    def with_effect(self, run: int, values: Mapping[str, Value]) -> dict[str, Value] | None:
+        """Return the values of a run with the effect that joins it, None where none does."""
+        if self.identified is None or not self.left:
+            return None
+        return {**values, **self.identified.with_effect(values, self.seed, run)}
+
+    def values(self, run: int) -> dict[str, Value]:
+        """Return what the varied names are in a run; it depends on seed, run and name alone."""
+        cycled = [v for v in self.varied if v.distribution.kind == "each"]
+        turn, chosen = run, {}
+        for varied in reversed(cycled):
+            turn, place = divmod(turn, len(varied.distribution.values))
+            chosen[varied.name] = varied.distribution.values[place]
+        joint = self.identified.draw(self.seed, run) if self.identified is not None else {}
+        known = {**joint, **chosen}
+        return {
+            varied.name: known[varied.name]
+            if varied.name in known
+            else varied.distribution.draw(share(self.seed, run, varied.name))
+            for varied in self.varied
+        }
+
+    @property
+    def combinations(self) -> int:
+        """How many combinations of the values of "each" there are; the runs go through them."""
+        return prod(
+            len(v.distribution.values) for v in self.varied if v.distribution.kind == "each"
+        )
+
+    def digest(self) -> str:
+        """Return 16 hexadecimal digits that stand for all that decides a run's numbers.
+
+        The number of runs and the title are no part of it: more runs continue an ensemble.
+        """
+        decides: dict[str, Any] = {
+            "version": __version__,
+            "content": self.content,
+            "engine": self.engine,
+            "seed": self.seed,
+            "varied": [asdict(v) for v in self.varied],
+            "outputs": [o.name for o in self.outputs],
+        }
+        if self.fmus != "python":
+            decides["fmus"] = self.fmus
+        if self.identified is not None:
+            decides["identified"] = asdict(self.identified)
+        return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def _values(value: object) -> tuple[Any, ...]:
@@ -166,14 +275,14 @@ class _Ensemble:
         for file in _files_read(base, varied):
             content.update(file.read_bytes())
         plan = Plan(
-            self.path, given["title"] or base.title, base.file, engine, runs or given["runs"],
-            given["seed"], varied, outputs, fixed, content.hexdigest()[:16], identified,
+            self.path, given["title"] or base.title, base, engine, runs or given["runs"],
+            given["seed"], varied, outputs, content.hexdigest()[:16], identified,
             given["fmus"],
         )  # fmt: skip
         _refuse_few(plan)
         return plan
 
-    def _identified(self, base: Scenario, with_limits: bool) -> Identified | None:
+    def _identified(self, base: System, with_limits: bool) -> Identified | None:
         """Return what `[identified]` says, None where there is none or it is wrong."""
         if "identified" not in self.document.data:
             if with_limits:
@@ -208,7 +317,7 @@ class _Ensemble:
                     )
         return (*joint, *varied)
 
-    def _scenario(self, fixed: Mapping[str, Value]) -> Scenario:
+    def _scenario(self, fixed: Mapping[str, Value]) -> System:
         name = self.given["scenario"]
         beside = self.path.parent / name
         return load_scenario(resolve_scenario(beside if beside.is_file() else name), fixed)
@@ -220,9 +329,7 @@ class _Ensemble:
             return str(beside) if beside.is_file() else value
         return value
 
-    def _varied(
-        self, name: str, table: dict[str, Any], base: Scenario, engine: str
-    ) -> Varied | None:
+    def _varied(self, name: str, table: dict[str, Any], base: System, engine: str) -> Varied | None:
         keys: KeyPath = ("vary", name)
         distribution = self._distribution(keys, name, table)
         if distribution is None:
@@ -273,7 +380,7 @@ class _Ensemble:
             return None
         return distribution
 
-    def _outputs(self, base: Scenario) -> tuple[Output, ...]:
+    def _outputs(self, base: System) -> tuple[Statistic, ...]:
         columns = {column.name: column for column in make_columns(base)}
         outputs = []
         for name, statistics in self.given["outputs"].items():
@@ -289,7 +396,7 @@ class _Ensemble:
                     text = unknown("statistic", statistic, STATISTICS)
                     self.error(keys, f'"{name}": {text}')
                 else:
-                    outputs.append(Output(name, statistic, columns[name].unit or ""))
+                    outputs.append(Statistic(name, statistic, columns[name].unit or ""))
         if not outputs and not self.document.found:
             self.error(("outputs",), "nothing is kept: [outputs] names columns and statistics.")
         return tuple(dict.fromkeys(outputs))
@@ -305,7 +412,7 @@ def _refuse_few(plan: Plan) -> None:
         )
 
 
-def place_of(name: str, base: Scenario, engine: str) -> str:
+def place_of(name: str, base: System, engine: str) -> str:
     """Return where the value of a name goes; see `Varied`.
 
     Raises
@@ -313,63 +420,57 @@ def place_of(name: str, base: Scenario, engine: str) -> str:
     EnsembleError
         If a building's data cannot be varied there.
     """
-    component, rest = split(name, base)
+    component, rest = base.part(name)
     if component is not None and rest.startswith("building."):
         if engine != "compiled":
             raise EnsembleError(
                 f'"{name}": a building\'s data varies only with engine = "compiled", because '
                 "an FMU contains its building."
             )
-        if component.path is not None or component.fmu != "Structure":
+        if component.path is not None or component.kind != "Structure":
             raise EnsembleError(f'"{name}": {component.name} is no Structure.')
         return "building"
-    if component is not None and rest not in FILES and rest in component.description.variables:
-        return "parameter"
-    return "scenario"
+    return "scenario" if is_read_anew(base, name) else "parameter"
 
 
-def _try(varied: Varied, base: Scenario) -> str:
+def _try(varied: Varied, base: System) -> str:
     """Return the words for why a scenario cannot take what will be drawn, "" if it can."""
-    component, rest = split(varied.name, base)
-    for value in varied.distribution.extremes():
-        if varied.place == "scenario":
-            try:
-                load_scenario(base.file, {**base.overrides, varied.name: value})
-            except TrustError:
-                raise  # no mistake of the file, and it is asked about
-            except BristleError as error:
-                return f'"{varied.name}" = {written(value)}: {error}'
-            continue
-        assert component is not None
-        if varied.place == "building":
-            try:
-                changed_building(component, {rest.removeprefix("building."): value})
-            except PhysicsError as error:
-                return f'"{varied.name}" = {written(value)}: {error}'
-            continue
+    component, rest = base.part(varied.name)
+    if varied.place == "parameter" and component is not None:
         variable = component.description.variables[rest]
         if variable.causality not in ("parameter", "input"):
             return f'"{varied.name}" is not a parameter or input and cannot be set.'
-        fits = typed(variable, value)
-        if isinstance(fits, Wrong):
-            return f'"{varied.name}" {fits.words}'
+    for value in varied.distribution.extremes():
+        if varied.place == "parameter" and component is not None:
+            fits = typed(variable, value)
+            if isinstance(fits, Wrong):
+                return f'"{varied.name}" {fits.words}'
+            continue
+        try:
+            if varied.place == "scenario":
+                load_scenario(base, {varied.name: value})
+            else:
+                base.with_values({varied.name: value})
+        except TrustError:
+            raise  # no mistake of the file, and it is asked about
+        except BristleError as error:
+            return f'"{varied.name}" = {written(value)}: {error}'
     return ""
 
 
-def _idle(varied: Varied, base: Scenario, all_varied: Collection[str]) -> str:
+def _idle(varied: Varied, base: System, all_varied: Collection[str]) -> str:
     """Return the words for why what is drawn would change nothing, "" if it does."""
-    component, rest = split(varied.name, base)
+    component, rest = base.part(varied.name)
     if component is None or varied.place != "parameter":
         return ""
-    for wire in base.connections:
+    for wire in base.wires:
         if (wire.target, wire.input) == (component.name, rest):
             return (
                 f'"{varied.name}" is fed by {wire.source}.{wire.output}, so that a value here '
                 "would have no effect; vary what feeds it."
             )
     switch = f"{rest.rpartition('.')[0]}.on"
-    known = component.description.variables.get(switch)
-    on = known is None or component.parameters.get(switch, known.start) is True
+    on = switch not in component.description.variables or component.value(switch) is True
     if on or f"{component.name}.{switch}" in map(plain_target, all_varied):
         return ""
     return (
@@ -378,15 +479,15 @@ def _idle(varied: Varied, base: Scenario, all_varied: Collection[str]) -> str:
     )
 
 
-def _files_read(base: Scenario, varied: tuple[Varied, ...]) -> list[Path]:
+def _files_read(base: System, varied: tuple[Varied, ...]) -> list[Path]:
     """Return the files whose content decides the numbers: records, signals, buildings, own laws."""
     named: list[object] = []
-    for component in base.components:
+    for component in base.components.values():
         named += [component.building, component.controller, component.path, *component.effects]
         named += [component.law.file] if component.law else []
-        named += [component.parameters.get(key) for key in FILE_PARAMETERS]
+        named += [component.values.get(key) for key in FILE_PARAMETERS]
     for one in varied:
         if one.name.rpartition(".")[2] in FILES:
             named += one.distribution.values
-    folder = base.file.parent
+    folder = base.origin.parent if base.origin else Path()
     return sorted({folder / str(name) for name in named if name and (folder / str(name)).is_file()})

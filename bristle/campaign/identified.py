@@ -24,7 +24,7 @@ from ..model.draws import OpenEffect, has_covariance, joint_errors, left_open
 from ..model.model import Model
 from ..model.model_file import read_model
 from ..physics.effect import EFFECTS, plain_name
-from ..system.scenario import Scenario
+from ..system.model import System
 from .distributions import Distribution, Value, Varied, share
 
 IDENTIFIED = Spec({
@@ -153,7 +153,7 @@ class Identified:
 
 
 def read_identified(
-    table: Mapping[str, Any], beside: Path, base: Scenario, *, with_limits: bool
+    table: Mapping[str, Any], beside: Path, base: System, *, with_limits: bool
 ) -> Identified:
     """Return what `[identified]` of an ensemble file says.
 
@@ -173,7 +173,7 @@ def read_identified(
     """
     folder, model = _model_of(table, beside)
     damper, structure = table["component"], table["structure"]
-    there = {one.name for one in base.components}
+    there = base.components
     mass = f"{structure}.attached_mass" if structure in there else ""
     places = Places(damper, structure, not model.building, mass)
     fixed = _fixed(model, places)
@@ -223,16 +223,16 @@ def _fixed(model: Model, places: Places) -> dict[str, Value]:
     return found
 
 
-def _refuse_others(fixed: Mapping[str, Value], base: Scenario, model: Model) -> None:
+def _refuse_others(fixed: Mapping[str, Value], base: System, model: Model) -> None:
     """Refuse a scenario whose components lack the model's parameters."""
-    there = {one.name: one for one in base.components}
+    there = base.components
     for full in fixed:
         name, _, rest = full.partition(".")
         if name not in there:
             raise EnsembleError(unknown("component", name, there))
         if rest not in there[name].description.variables:
             raise EnsembleError(
-                f"the model's law is {model.law}, and {name} ({there[name].fmu}) of the scenario "
+                f"the model's law is {model.law}, and {name} ({there[name].kind}) of the scenario "
                 f"has no parameter {rest}. A scenario with a damper of that law is right."
             )
 

@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from .campaign import Outcome, Plan, prepare, run_one
+from .campaign import Campaign, Outcome
 
 AHEAD = 2
 """Runs that a process has been given and not yet answered: it never waits for the next."""
@@ -35,13 +35,15 @@ class _Process:
     given: deque[int] = field(default_factory=deque)
 
 
-def run_local(plan: Plan, runs: Iterable[int], workers: int) -> Generator[Outcome, None, None]:
+def run_local(
+    campaign: Campaign, runs: Iterable[int], workers: int
+) -> Generator[Outcome, None, None]:
     """Yield what becomes of runs as they end, in whatever order.
 
     Parameters
     ----------
-    plan : Plan
-        `campaign.prepare` has been called with it: forked processes have what it loaded.
+    campaign : Campaign
+        `prepare` has been called: forked processes have what it compiled.
     runs : iterable of int
     workers : int
         Number of processes.
@@ -52,7 +54,7 @@ def run_local(plan: Plan, runs: Iterable[int], workers: int) -> Generator[Outcom
     try:
         while waiting or any(p.given for p in processes):
             while waiting and len(processes) < workers:
-                processes.append(_start(plan, processes))
+                processes.append(_start(campaign, processes))
             for p in processes:
                 _feed(p, waiting)
             ready = wait([p.pipe for p in processes if p.given])
@@ -97,29 +99,29 @@ def _bury(p: _Process, waiting: deque[int], died: dict[int, int]) -> Outcome | N
     return Outcome(at, reason=f"RunError: its process ended {how}, {TRIES} times.")
 
 
-def _start(plan: Plan, others: list[_Process]) -> _Process:
+def _start(campaign: Campaign, others: list[_Process]) -> _Process:
     # Forked processes have the compiled code and the loaded scenario at once; the library's threads
     # (of BLAS, of a progress bar) hold no lock that a run takes.
     forks = sys.platform == "linux"
     context: Any = multiprocessing.get_context("fork" if forks else "spawn")
     ours, theirs = context.Pipe()
     inherited = [ours, *(p.pipe for p in others)] if forks else []
-    process = context.Process(target=_run_members, args=(plan, theirs, inherited), daemon=True)
+    process = context.Process(target=_run_members, args=(campaign, theirs, inherited), daemon=True)
     process.start()
     theirs.close()
     return _Process(process, ours)
 
 
-def _run_members(plan: Plan, pipe: Connection, inherited: list[Connection]) -> None:
+def _run_members(campaign: Campaign, pipe: Connection, inherited: list[Connection]) -> None:
     """Answer run numbers with outcomes until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for connection in inherited:  # else nobody would notice that the parent is gone
         connection.close()
-    prepare(plan)
+    campaign.prepare()
     with suppress(EOFError, OSError):
         while True:
-            pipe.send(run_one(plan, pipe.recv()))
+            pipe.send(campaign.outcome(pipe.recv()))
     os._exit(0)  # at once: taking down compiled code takes a second
 
 

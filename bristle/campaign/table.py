@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from ..core.files import replaced_by
 from ..errors import EnsembleError, RunError
 from ..model.draws import POINT, reach, simulated_whole
-from .campaign import Outcome, Plan
+from .campaign import Outcome
+from .ensemble_file import Plan
 
 if TYPE_CHECKING:
     import pandas as pd

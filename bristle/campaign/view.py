@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from .campaign import Output
+    from .campaign import Statistic
+
 
 MOST_OUTPUTS = 6
 MOST_NAMES = 8
@@ -154,7 +155,7 @@ def correlations(done: pd.DataFrame, output: str, names: list[str]) -> list[tupl
     return sorted(found, key=lambda pair: -abs(pair[1]))
 
 
-def _histogram(axes: Axes, output: Output, values: Any) -> None:
+def _histogram(axes: Axes, output: Statistic, values: Any) -> None:
     factor, unit = _SHOWN.get(output.unit, (1.0, output.unit))
     values = values * factor
     q05, q25, q50, q75, q95 = np.quantile(values, (0.05, 0.25, 0.5, 0.75, 0.95))
@@ -194,7 +195,7 @@ def _influence(axes: Axes, pairs: list[tuple[str, float]], runs: int) -> None:
     axes.grid(axis="y", visible=False)
 
 
-def _title(output: Output) -> str:
+def _title(output: Statistic) -> str:
     """Return an output as words: "peak of floor2 acceleration absolute"."""
     component, _, port = output.column.rpartition(".")
     statistic = {"rms": "RMS"}.get(output.statistic, output.statistic)

@@ -55,7 +55,8 @@ def main(arguments: argparse.Namespace) -> int:
         if len(arguments.files) > 1 or arguments.overrides:
             raise ScenarioError("bristle check: expected one effect or law, without --set.")
         return _own(Path(arguments.files[0]), arguments.json)
-    from ..system.scenario import check_scenario, parse_overrides
+    from ..system.overrides import parse_overrides
+    from ..system.scenario import check_scenario
 
     overrides = parse_overrides(arguments.overrides)
     found = {file: check_scenario(file, overrides) for file in arguments.files}

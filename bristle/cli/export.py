@@ -103,7 +103,7 @@ def _as_one(arguments: argparse.Namespace) -> int:
     """Write a scenario as one FMU; say what it has."""
     from ..export.composite import export_composite
     from ..fmu.description import read_description
-    from ..system.scenario import parse_overrides
+    from ..system.overrides import parse_overrides
 
     if not arguments.native:
         raise ScenarioError("--as-one goes with --native: the parts are solved by compiled code.")
@@ -132,7 +132,7 @@ def _web(arguments: argparse.Namespace) -> int:
     from ..fmu.catalogue import component_names
     from ..report.what_if import movable
     from ..study.study import Study
-    from ..system.scenario import parse_overrides
+    from ..system.overrides import parse_overrides
 
     if arguments.out is not None:
         raise ScenarioError("--out is for a study; --web DIR says where the page goes.")

@@ -39,7 +39,8 @@ def main(arguments: argparse.Namespace) -> int:
     """Export; print the files, what is otherwise elsewhere, and the error to expect there."""
     from ..errors import ScenarioError
     from ..system.library import run_name
-    from ..system.scenario import load_scenario, parse_overrides, resolve_scenario
+    from ..system.overrides import parse_overrides
+    from ..system.scenario import load_scenario, resolve_scenario
     from ..system.ssp_write import export_ssp
 
     if arguments.osp is not None and arguments.fmi != 2:
@@ -52,11 +53,11 @@ def main(arguments: argparse.Namespace) -> int:
     expected: tuple[Expected, ...] = ()
     if not arguments.no_coupling_error:
         from ..core.progress import tell
-        from ..engine.coupling_error import expect
-        from ..engine.run import run_quietly
+        from ..engine.cosimulation import Cosimulation, ignore
+        from ..engine.coupling_error import again_by, expect
 
         tell("estimating the coupling error in other tools")
-        expected = expect(scenario, run_quietly)
+        expected = expect(scenario, again_by(Cosimulation(listen=ignore, progress=True)))
     if arguments.json:
         _print_json(exported, expected)
     else:

@@ -59,11 +59,13 @@ def main(arguments: argparse.Namespace) -> int:
     """Compute, write voltage, scenario, results and picture, print what was found."""
     from ..optimal_control import limit
     from ..system.library import run_name
-    from ..system.scenario import load_scenario, parse_overrides
+    from ..system.overrides import parse_overrides
+    from ..system.scenario import load_scenario, resolve_scenario
 
     overrides = parse_overrides(arguments.overrides)
-    scenario = load_scenario(arguments.scenario, overrides)
-    folder = arguments.out or Path("results", "limit", run_name(scenario.file, overrides))
+    file = resolve_scenario(arguments.scenario)
+    scenario = load_scenario(file, overrides)
+    folder = arguments.out or Path("results", "limit", run_name(file, overrides))
     found = limit(
         scenario,
         output=arguments.output,

@@ -66,7 +66,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Optimise, write table and figure, print what was found."""
     from ..campaign.best_constant import INTENSITIES, Motion, optimise_passive
     from ..errors import ScenarioError
-    from ..system.scenario import parse_overrides
+    from ..system.overrides import parse_overrides
 
     intensities = arguments.intensities or INTENSITIES
     for intensity in intensities:

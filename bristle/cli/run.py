@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,8 @@ from ._options import (
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from ..system.model import System
 
 
 HELP = "run a scenario: results, a figure, peaks and RMS"
@@ -55,30 +56,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run, draw, print; return 0, 1 if the run failed on its way, 130 if it was interrupted."""
-    from ..engine.run import IncompleteRunError, Output, RunInterrupted, execute
+    from ..engine.run import IncompleteRunError, RunInterrupted, run
     from ..errors import RunError
     from ..system.library import run_name
-    from ..system.scenario import parse_overrides, resolve_scenario
+    from ..system.overrides import parse_overrides
+    from ..system.scenario import load_scenario, resolve_scenario
 
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.file)
     if arguments.tolerance is not None:
         overrides |= _steps_for(arguments, file, overrides)
     folder = Path(arguments.out or Path("results", run_name(file, overrides)))
-    output = Output(folder, arguments.format, lambda line: print(line, file=sys.stderr, flush=True))
+    scenario = load_scenario(file, overrides)
+    _show(scenario)
     code, trouble = 0, ""
     try:
-        frame = execute(
-            file, overrides, arguments.engine, output, True, end_process=True,
+        frame = run(
+            scenario, engine=arguments.engine, fmus=arguments.fmus, out=folder,
+            format=arguments.format, progress=True, end_process=True,
             coupling_error=arguments.coupling_error or arguments.tolerance is not None,
-            fmus=arguments.fmus,
         )  # fmt: skip
     except (IncompleteRunError, RunInterrupted) as error:
         if arguments.debug and isinstance(error, IncompleteRunError):
             raise
         frame, trouble = error.frame, str(error)
         code = 1 if isinstance(error, IncompleteRunError) else 130
-    written = {"results": folder / f"results.{output.format}", "log": folder / "log"}
+    written = {"results": folder / f"results.{arguments.format}", "log": folder / "log"}
     for name, make in _further(arguments) if code != 130 else ():  # Ctrl-C waits for nothing more
         try:
             make(frame, folder / name)
@@ -93,6 +96,20 @@ def main(arguments: argparse.Namespace) -> int:
         kind = "RunError: " if code == 1 else ""
         print(f"{kind}{trouble}", file=sys.stderr)
     return code
+
+
+def _show(scenario: System) -> None:
+    """Show the warnings and notes of a scenario's check, the first ones where there are many."""
+    from ..core.text import LINES, command
+
+    remarks = scenario.remarks()
+    for line in remarks[: LINES - 1]:
+        print(line, file=sys.stderr, flush=True)
+    if len(remarks) >= LINES:
+        name = scenario.package
+        again = ["import-ssp", name] if name else ["check", scenario.where]
+        more = f"and {len(remarks) - LINES + 1} more; all:  {command(*again, '--json')}"
+        print(more, file=sys.stderr, flush=True)
 
 
 def _further(
@@ -118,17 +135,17 @@ def _steps_for(
 
     Components with a step of their own step the more often, the shorter that of the run is.
     """
-    from ..engine.coupling_error import find_step
-    from ..engine.run import run_quietly
+    from ..engine.cosimulation import Cosimulation, ignore
+    from ..engine.coupling_error import again_by, find_step
     from ..errors import not_usable
     from ..system.scenario import load_scenario
 
     if arguments.engine != "fmu":
         raise not_usable('--tolerance: engine "compiled" makes no coupling error; "fmu" does.')
     tolerance = _share(arguments.tolerance)
-    again = partial(run_quietly, fmus=arguments.fmus)
+    again = again_by(Cosimulation(arguments.fmus, ignore, progress=True))
     scenario = find_step(load_scenario(file, overrides), tolerance, again)
-    own = {one.name: one.step for one in scenario.components if one.step is not None}
+    own = {name: one.step for name, one in scenario.components.items() if one.step is not None}
     of_own = ", ".join(f"{1e3 * step:.6g} ms of {name}" for name, step in own.items())
     said = f"a step of {1e3 * scenario.step:.6g} ms{f' ({of_own})' if own else ''} keeps"
     print(f"{said} the coupling error below {100 * tolerance:.3g} %", file=sys.stderr)

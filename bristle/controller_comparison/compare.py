@@ -10,7 +10,7 @@ from math import ceil, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..campaign.campaign import Output
+from ..campaign.campaign import Statistic
 from ..campaign.ensemble import cores
 from ..core.progress import Stages, tell
 from ..core.text import unknown
@@ -169,7 +169,7 @@ class _Run:
     """The runs of a comparison, motion by motion."""
 
     def __init__(
-        self, bench: Bench, judged: Output, candidates: list[Candidate], grid: int, limit: bool,
+        self, bench: Bench, judged: Statistic, candidates: list[Candidate], grid: int, limit: bool,
         spread: Spread | None,
     ) -> None:  # fmt: skip
         self.bench, self.judged, self.candidates = bench, judged, candidates
@@ -294,7 +294,7 @@ def _step(candidates: list[Candidate]) -> float:
     return min([STEP, *(period / ceil(period / STEP - 1e-9) for period in periods)])
 
 
-def _judged(bench: Bench, output: str, statistic: str) -> Output:
+def _judged(bench: Bench, output: str, statistic: str) -> Statistic:
     column = output or bench.site.top
     for one in bench.outputs:
         if (one.column, one.statistic) == (column, statistic):

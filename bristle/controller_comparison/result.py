@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campaign.campaign import Output
+from ..campaign.campaign import Statistic
 from ..core.text import quantity
 from ..errors import not_usable
 from ..view import Viewable
@@ -37,7 +37,7 @@ class Setting:
     damper: Damper
     candidates: list[Candidate]
     motions: list[Motion]
-    judged: Output
+    judged: Statistic
     spread: Spread | None
     folder: Path | None
     varied: str = ""
@@ -51,7 +51,7 @@ class ControllerComparison(Viewable):
     ----------
     setting : Setting
         What was compared.
-    outputs : tuple of Output
+    outputs : tuple of Statistic
         What is kept of every run.
     table : DataFrame
         A row per motion and controller: motion, controller, engine, level (of a constant voltage
@@ -71,7 +71,7 @@ class ControllerComparison(Viewable):
     """
 
     setting: Setting
-    outputs: tuple[Output, ...]
+    outputs: tuple[Statistic, ...]
     table: pd.DataFrame
     worst: pd.DataFrame | None
     levels: Mapping[str, pd.DataFrame] = field(repr=False)

@@ -14,18 +14,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..campaign.campaign import Output, Plan, statistic
+from ..campaign.campaign import Statistic
 from ..campaign.ensemble import run_left
-from ..campaign.ensemble_file import read_ensemble
+from ..campaign.ensemble_file import Plan, read_ensemble
 from ..campaign.table import RunsTable
 from ..core.files import cache_folder
-from ..core.progress import Count
-from ..engine.coupled import simulate
-from ..engine.run import run_quietly
+from ..core.progress import Count, listening
+from ..engine import Engine
+from ..engine.cosimulation import Cosimulation, ignore
+from ..engine.coupled import Coupled
 from ..errors import EnsembleError, RunError, ScenarioError
 from ..optimal_control import limit
-from ..optimal_control.case import case_of, history_text
+from ..optimal_control.case import case_of, voltage_signal
 from ..system.scenario import load_scenario
+from ..system.toml import signal_file, tables_text
 from ..version import __version__
 from .setting import (
     ABOVE,
@@ -48,7 +50,6 @@ from .setting import (
     constant,
     ensemble_text,
     plain_name,
-    scenario_text,
 )
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ class Bench:
     remarks: list[str] = field(default_factory=list)
 
     @property
-    def outputs(self) -> tuple[Output, ...]:
+    def outputs(self) -> tuple[Statistic, ...]:
         """What is kept of every run."""
         return self.site.outputs(self.command)
 
@@ -136,7 +137,8 @@ class Bench:
             wires[f"{CONTROLLER}.{name}"] = f"{SENSORS}.{name}_measured" if sensed else column
         parts[CONTROLLER] = candidate.part
         title = f"{motion.name}, {self.site.building.name}, {self.damper.name}: {candidate.name}"
-        return scenario_text(title, motion.stop, self.step, parts, wires)
+        run = {"stop": motion.stop, "step": self.step, "algorithm": "midpoint"}
+        return tables_text(title, run, {name: one.table for name, one in parts.items()}, wires)
 
     def write(self, motion: Motion, candidate: Candidate) -> Path:
         """Write the scenario of a case; return its file."""
@@ -158,13 +160,10 @@ class Bench:
         scenario = load_scenario(self.write(motion, candidate))
         self.remarks.extend(one.text for one in scenario.findings if one.level == "warning")
         try:
-            found: Any
-            if self.engine_of(candidate) == "compiled":
-                found = simulate(scenario)
-                time = found["time"]
-            else:
-                found = run_quietly(scenario, "fmu", self.fmus)
-                time = found.index.to_numpy()
+            engine: Engine = Coupled()
+            if self.engine_of(candidate) != engine.name:
+                engine = Cosimulation(self.fmus, ignore, listening())
+            table = engine.run(scenario)
         except RunError as error:
             raise RunError(f"{motion.name}, {candidate.name}: {error}") from error
         columns = self.columns(candidate)
@@ -173,13 +172,13 @@ class Bench:
             f"{DAMPER}.stroke_ratio",
             f"{STRUCTURE}.{self.site.ports.velocity}",
         ]
-        names = {**{name: name for name in extra if name in found}, **columns}
-        data = {name: np.asarray(found[own], dtype=np.float64) for name, own in names.items()}
-        return pd.DataFrame(data, index=pd.Index(time, name="time"))
+        names = {**{name: name for name in extra if name in table.values}, **columns}
+        data = {name: np.asarray(table[own], dtype=np.float64) for name, own in names.items()}
+        return pd.DataFrame(data, index=pd.Index(table.time, name="time"))
 
     def measured(self, frame: pd.DataFrame) -> dict[str, float]:
         """Return what is kept of a run, by the names of `outputs`."""
-        return {o.name: statistic(o, frame[o.column].to_numpy()) for o in self.outputs}
+        return {o.name: o.of(frame[o.column].to_numpy()) for o in self.outputs}
 
     def many(
         self, file: Path, candidate: Candidate, scenario: Path, runs: int,
@@ -311,7 +310,7 @@ class Reached(NamedTuple):
     kept: bool
 
 
-def refuse_limit(bench: Bench, motion: Motion, judged: Output) -> None:
+def refuse_limit(bench: Bench, motion: Motion, judged: Statistic) -> None:
     """Refuse a case that has no limit, before the work for it is done.
 
     Raises
@@ -329,7 +328,7 @@ def refuse_limit(bench: Bench, motion: Motion, judged: Output) -> None:
 
 
 def limit_of(
-    bench: Bench, motion: Motion, judged: Output, starts: int = 3
+    bench: Bench, motion: Motion, judged: Statistic, starts: int = 3
 ) -> tuple[Candidate, Reached]:
     """Return the voltage that reaches a motion's limit as a controller, and what is known of it.
 
@@ -364,7 +363,8 @@ def limit_of(
         }  # fmt: skip
         bench.folder.write(file, json.dumps(found))
     path = bench.folder.at(LIMITS, motion.name, "voltage.csv")
-    bench.folder.write(path, history_text(found["time"], found["voltage"]))
+    bench.folder.write(path, "")
+    signal_file(voltage_signal(found["time"], found["voltage"]), path)
     said = f"{ABOVE}/{LIMITS}/{plain_name(motion.name)}/{path.name}"
     part = Part({"fmu": "SignalSource"}, {"kind": "csv", "file": said})
     about = "the voltage that reaches the limit, the ground motion known in advance"
@@ -374,7 +374,7 @@ def limit_of(
     return Candidate(LIMIT, part, {}, "value", True, None, about), reached
 
 
-def _limit_digest(bench: Bench, text: str, judged: Output, starts: int) -> str:
+def _limit_digest(bench: Bench, text: str, judged: Statistic, starts: int) -> str:
     """Return what stands for all that decides a limit: scenario, files that it reads, goal."""
     content = hashlib.sha256(f"{__version__}/{judged.name}/{starts}/".encode())
     content.update(re.sub(r"^title = .*$", "", text, flags=re.MULTILINE).encode())

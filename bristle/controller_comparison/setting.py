@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..campaign.best_constant import G
-from ..campaign.campaign import Output
+from ..campaign.campaign import Statistic
 from ..component.controller_file import Controller
 from ..core.config import toml_content
 from ..core.text import did_you_mean, unknown, written
@@ -28,9 +28,9 @@ from ..physics.building import PAPER, Building, Device, Ports, frequencies, pape
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from ..physics.laws import LAWS, laws_of
 from ..synthesis import Damper as DesignDamper
+from ..system.from_model import source_of, values_of
 from ..system.library import damper_of, law_of
 from ..system.overrides import parse_override
-from ..system.toml import component_text, joined_text, source_of, values_of
 
 # What a user chooses, as text: `WHAT,NAME=VALUE,...`, such as `Skyhook,gain=100`.
 
@@ -157,6 +157,11 @@ class Part(NamedTuple):
     source: dict[str, Any]
     parameters: dict[str, Any]
 
+    @property
+    def table(self) -> dict[str, Any]:
+        """Its table in a scenario."""
+        return self.source | ({"parameters": self.parameters} if self.parameters else {})
+
 
 class Folder:
     """The folder of a comparison.
@@ -235,27 +240,6 @@ class Folder:
 def plain_name(text: str) -> str:
     """Return a text as the name of a file: letters, digits, dots and dashes."""
     return re.sub(r"[^\w.+-]+", "_", text).strip("._") or "unnamed"
-
-
-def scenario_text(
-    title: str, stop: float, step: float, parts: Mapping[str, Part], wires: Mapping[str, Any]
-) -> str:
-    """Return the text of a scenario.
-
-    Parameters
-    ----------
-    title : of the run
-    stop, step : of the run [s]
-    parts, wires : components and connections by name, as `joined_text` takes them
-    """
-    run = {"stop": stop, "step": step, "algorithm": "midpoint"}
-    tables = (
-        component_text(
-            name, one.source | ({"parameters": one.parameters} if one.parameters else {})
-        )
-        for name, one in parts.items()
-    )
-    return joined_text(title, run, tables, wires)
 
 
 def ensemble_text(content: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
@@ -389,10 +373,10 @@ def _from_model(choice: Choice, path: Path, folder: Folder) -> Damper:
     inside = model.at("damper", bench=not model.building)
     values: dict[str, Any] = {**values_of(inside), **choice.settings}
     source = source_of(inside)
-    if isinstance(source["law"], Path):
-        source["law"] = folder.keep(source["law"])
+    if source["law"].endswith(".py"):
+        source["law"] = folder.keep(Path(source["law"]))
     if "effects" in source:
-        source["effects"] = [folder.keep(one) for one in source["effects"]]
+        source["effects"] = [folder.keep(Path(one)) for one in source["effects"]]
     law = inside.base_law
     component = catalogue.component_of_law(law)
     description = catalogue.describe(component)
@@ -697,7 +681,7 @@ class Site:
         """Return the names of the Structure's outputs."""
         return [v.name for v in catalogue.describe("Structure", self.file).of("output")]
 
-    def outputs(self, command: str) -> tuple[Output, ...]:
+    def outputs(self, command: str) -> tuple[Statistic, ...]:
         """Return what is kept of every run: peak and RMS of each quantity.
 
         Parameters
@@ -712,7 +696,7 @@ class Site:
         columns |= dict.fromkeys(self.drifts, "m")
         columns |= {self.travel: "m", f"{DAMPER}.force": "N", command: "V"}
         return tuple(
-            Output(column, statistic, unit)
+            Statistic(column, statistic, unit)
             for column, unit in columns.items()
             for statistic in ("peak", "rms")
         )

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campaign.campaign import changed_building, write_building
 from ..campaign.distributions import Distribution, share
+from ..core.toml_write import toml_table
 from ..errors import ScenarioError
 from ..fmu.controller import SAMPLE_PERIOD
 from ..physics.laws import LAWS
@@ -200,17 +201,18 @@ def _written(
     bench: Bench, motion: Motion, values: dict[str, float], candidate: Candidate, spread: Spread
 ) -> list[str]:
     """Write the members' buildings as files: an FMU contains its building; return their names."""
-    structure = load_scenario(bench.write(motion, candidate)).component(STRUCTURE)
+    system = load_scenario(bench.write(motion, candidate))
     names = []
     for run in range(spread.members):
         drawn = {
-            name: Distribution("uniform", tuple(_around(value, spread)["uniform"])).draw(
-                share(SEED, run, f"{_BUILDING}.{name}")
-            )
+            f"{_BUILDING}.{name}": Distribution(
+                "uniform", tuple(_around(value, spread)["uniform"])
+            ).draw(share(SEED, run, f"{_BUILDING}.{name}"))
             for name, value in values.items()
         }
         path = bench.folder.path / FILES / f"building_{run:03d}.toml"
-        bench.folder.write(path, "")
-        write_building(changed_building(structure, drawn), path)
+        building = system.with_values(drawn).components[STRUCTURE].building
+        assert isinstance(building, Mapping)
+        bench.folder.write(path, "\n".join(toml_table(building)) + "\n")
         names.append(f"../../{FILES}/{path.name}")
     return names

@@ -1,4 +1,4 @@
-"""The master: steps the FMUs of a scenario together and keeps every output of every step.
+"""The engine that steps FMUs together and keeps every output of every step.
 
 Row k holds all outputs at t_k = k step, t = 0 included. What is set and read when, is decided
 in `schedule`; how it is called, in `macro_step`; this module initialises, watches and explains.
@@ -6,15 +6,26 @@ in `schedule`; how it is called, in `macro_step`; this module initialises, watch
 
 from __future__ import annotations
 
+import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, Self
+from typing import Any, ClassVar, NoReturn, Self
 
 import numpy as np
 
-from ..errors import RunError
-from ..fmu.description import Description, Value
+from ..core.interrupt import Interrupt, deferred
+from ..core.progress import Progress
+from ..errors import RunError, not_usable
+from ..fmu.build import ensure
+from ..fmu.description import Description, Value, read_description
+from ..system.model import Component, System
+from ..system.toml import signal_file
+from . import Interrupted, OnRows, StoppedError
+from .coupling_error import bond_names, energy_residuals
 from .instance import FATAL, WARNING, Instance, Message, Unpacked, answer_of
 from .macro_step import Memory, compile_loop
 from .results import Array, Table, count_steps, make_columns, times
@@ -32,9 +43,6 @@ from .schedule import (
     make_nodes,
     make_schedule,
 )
-
-if TYPE_CHECKING:
-    from ..system.scenario import Component, Scenario
 
 SETTLE = 100
 """Rounds in which the values at t = 0 must settle where outputs and inputs follow each other."""
@@ -56,13 +64,139 @@ FAULTS = {
 }
 
 
+FORMS = ("python", "native")
+"""The forms of built-in components' FMUs: in Python, or native, which a compiler makes."""
+FLUSH = 1.0
+"""Seconds between two times that new rows are handed out."""
+BLOCK = 0.1
+"""Seconds of steps between two looks at Ctrl-C, progress and clock."""
+
+
+def warn(message: Message, at: float) -> None:
+    """Show what an FMU says, unless all is well; `at` [s]."""
+    if message.status != "OK":
+        logging.getLogger("bristle").warning(message.shown)
+
+
+def ignore(message: Message, at: float) -> None:
+    """Leave what an FMU says: a run for its numbers alone."""
+
+
+@dataclass(frozen=True)
+class Cosimulation:
+    """The engine that steps FMUs: built-in components as Python or as native ones.
+
+    `listen` gets what FMUs say, and the time [s]; `progress` shows a bar, on a terminal only;
+    `on_hang` ends the process where a component hangs after Ctrl-C: it gets the time [s] up to
+    which rows were handed out, None where there are none.
+    """
+
+    fmus: str = "python"
+    listen: Callable[[Message, float], None] = warn
+    progress: bool = False
+    on_hang: Callable[[float | None], None] | None = None
+    name: ClassVar[str] = "fmu"
+
+    def __post_init__(self) -> None:
+        if self.fmus not in FORMS:
+            raise not_usable(f'fmus "{self.fmus}" is not known; there are: {", ".join(FORMS)}.')
+
+    def refuses(self, system: System) -> str:
+        """Return "": it steps whatever has an FMU."""
+        return ""
+
+    def run(self, system: System, on_rows: OnRows | None = None) -> Table:
+        """Return every output at every step; see `Engine`."""
+        paths, descriptions = self._fmus(system)
+        with tempfile.TemporaryDirectory(prefix="bristle_signals_") as folder:
+            parameters = _parameters(system, Path(folder))
+            with Master(system, paths, descriptions, parameters, self.listen) as master:
+                return self._stepped(system, master, on_rows or (lambda table: None))
+
+    def _fmus(self, system: System) -> tuple[dict[str, Path], dict[str, Description]]:
+        """Return each component's FMU file, built where needed, and what it says of itself."""
+        make: Callable[..., Path] = ensure
+        if self.fmus == "native":
+            with deferred():  # an import of llvmlite that Ctrl-C breaks off is never made good
+                from ..native.build import ensure as make
+        paths, descriptions = {}, {}
+        for name, component in system.components.items():
+            path = component.path or make(
+                component.made_of(), component.building, component.controller, component.effects
+            )
+            # A missing binary is explained when the FMU is loaded, with the way out.
+            paths[name], descriptions[name] = path, read_description(path, any_platform=True)
+        return paths, descriptions
+
+    def _stepped(self, system: System, master: Master, on_rows: OnRows) -> Table:
+        given = 0
+        stopped: RunError | None = None
+
+        def give() -> None:
+            nonlocal given
+            if given < master.rows:
+                table = master.table(given)
+                given = master.rows
+                on_rows(table)
+
+        def hang() -> None:
+            assert self.on_hang is not None
+            give()
+            master.forget()
+            self.on_hang(master.time if master.rows else None)
+
+        with Interrupt(hang if self.on_hang else None) as interrupt:
+            try:
+                try:
+                    master.start()
+                finally:
+                    give()
+                with Progress(system.title, master.steps, self.progress) as bar:
+                    count, due = 1, time.perf_counter() + FLUSH
+                    try:
+                        while master.rows <= master.steps and not interrupt.asked:
+                            before = time.perf_counter()
+                            master.advance(count)
+                            now = time.perf_counter()
+                            most = int(count * BLOCK / max(now - before, 1e-9))
+                            count = max(1, min(8 * count, most))
+                            bar.show(master.rows - 1)
+                            if now >= due:
+                                give()
+                                due = now + FLUSH
+                    finally:
+                        give()
+            except RunError as error:
+                if not master.rows or error.exit_code != 1:
+                    raise
+                stopped = error
+        table = master.table()
+        if master.made.get("energy_residual"):
+            table.made["energy_residual"] = energy_residuals(
+                master.nodes, system.algorithm, system.step, table
+            )
+        if stopped:
+            raise StoppedError(str(stopped), table) from stopped
+        if interrupt.asked:  # a caller that makes many runs is to stop as well
+            raise Interrupted(table, whole=master.rows > master.steps)
+        return table
+
+
+def _parameters(system: System, folder: Path) -> dict[str, dict[str, Value]]:
+    """Return the values that each FMU is given; a signal is a file in a folder."""
+    found = {name: one.taken_values() for name, one in system.components.items()}
+    for name, one in system.components.items():
+        if one.signal is not None:
+            found[name][one.plays] = str(signal_file(one.signal, folder / f"{name}.csv"))
+    return found
+
+
 class Master:
-    """The FMUs of a scenario, stepped together.
+    """The FMUs of a system, stepped together.
 
     Parameters
     ----------
-    scenario : Scenario
-        A checked scenario.
+    system : System
     paths : mapping of str to Path
         The FMU file of each component.
     descriptions : mapping of str to Description
@@ -70,7 +204,7 @@ class Master:
     parameters : mapping of str to mapping
         Values set before initialisation, per component; also of inputs that nothing feeds.
     listen : callable
-        Gets every message of every FMU.
+        Gets every message of every FMU, and the time [s].
 
     Raises
     ------
@@ -82,7 +216,7 @@ class Master:
 
     Examples
     --------
-    >>> with Master(scenario, paths, descriptions, parameters, print) as master:  # doctest: +SKIP
+    >>> with Master(system, paths, descriptions, parameters, print) as master:  # doctest: +SKIP
     ...     master.start()
     ...     master.advance(master.steps)
     ...     table = master.table()
@@ -90,19 +224,24 @@ class Master:
 
     def __init__(
         self,
-        scenario: Scenario,
+        system: System,
         paths: Mapping[str, Path],
         descriptions: Mapping[str, Description],
         parameters: Mapping[str, Mapping[str, Value]],
-        listen: Callable[[Message], None],
+        listen: Callable[[Message, float], None],
     ) -> None:
-        self.step = scenario.step
-        self.steps = count_steps(scenario.stop, scenario.step)
-        self._stop = scenario.stop
+        self.step = system.step
+        self.steps = count_steps(system.stop, system.step)
+        self._stop = system.stop
         self._parameters = parameters
-        self.nodes = make_nodes(scenario, descriptions)
-        self.columns = make_columns(scenario, descriptions)
-        schedule = make_schedule(self.nodes, scenario.algorithm)
+        self.nodes = make_nodes(system, descriptions)
+        self.columns = make_columns(system, descriptions)
+        self.made: dict[str, Any] = {
+            "fmus": {name: f"{one.name} {one.guid}" for name, one in descriptions.items()}
+        }
+        if bonds := bond_names(self.nodes, system.algorithm):
+            self.made["energy_residual"] = dict.fromkeys(bonds)
+        schedule = make_schedule(self.nodes, system.algorithm)
         self._memory = Memory(self.nodes, schedule)
         self._rows: list[bytes] = []
         self._blocks: list[dict[Port, Array]] = []
@@ -110,7 +249,7 @@ class Master:
         self._instances: list[Instance] = []
         self._unpacked = Unpacked()
         try:
-            self._instantiate(scenario.components, paths, descriptions, listen)
+            self._instantiate(system.components.values(), paths, descriptions, listen)
             self._loop = compile_loop(
                 schedule, self._memory, self._instances, self.step, self._rows, self._check
             )
@@ -177,7 +316,9 @@ class Master:
         for column, port in zip(self.columns, self._ports(), strict=True):
             parts = [block[port][start:] for block, start in blocks]
             values[column.name] = np.concatenate(parts).astype(column.dtype)
-        return Table(times(first, self._collected, self.step), self.columns, values)
+        return Table(
+            times(first, self._collected, self.step), self.columns, values, dict(self.made)
+        )
 
     def close(self) -> None:
         """Free the FMUs and remove what was unpacked."""
@@ -191,11 +332,14 @@ class Master:
 
     def _instantiate(
         self,
-        components: Sequence[Component],
+        components: Iterable[Component],
         paths: Mapping[str, Path],
         descriptions: Mapping[str, Description],
-        listen: Callable[[Message], None],
+        listen: Callable[[Message, float], None],
     ) -> None:
+        def heard(message: Message) -> None:
+            listen(message, self.time)
+
         copies: dict[Path, int] = {}
         for component in components:
             path, description = paths[component.name], descriptions[component.name]
@@ -203,7 +347,7 @@ class Master:
             if description.capabilities.get("canBeInstantiatedOnlyOncePerProcess") == "true":
                 copies[path] = copy + 1  # a library of its own for each
             folder = self._unpacked.folder(path, copy)
-            self._instances.append(Instance(component.name, description, folder, listen))
+            self._instances.append(Instance(component.name, description, folder, heard))
 
     def _settle(self) -> dict[Port, Value]:
         """Pass outputs on until no input changes any more; return all outputs."""

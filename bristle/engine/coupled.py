@@ -1,19 +1,18 @@
-"""Runs a scenario of built-in components as one coupled system; named columns come out."""
+"""The engine that solves a system of built-in components as one: a table of rows comes out."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import isfinite
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..component import controller, damper, sensors, source, structure
 from ..core.jit import compiled
-from ..data import ground_motion_file
-from ..errors import RunError, ScenarioError
+from ..errors import BristleError, ScenarioError
 from ..fmu import catalogue
 from ..fmu.slave import Slave
 from ..physics import damper as damper_laws
@@ -23,8 +22,8 @@ from ..physics.generate import Functions, Link, Owner
 from ..physics.laws import LAWS
 from ..physics.linear import Row
 from ..physics.signals import CONSTANT
-from ..system.scenario import Component, Scenario
-from . import records, time_loop
+from ..system.model import Component, System
+from . import OnRows, StoppedError, records, time_loop
 from .records import (
     NOWHERE,
     lay_controller,
@@ -35,6 +34,7 @@ from .records import (
     lay_structure,
     substeps_in,
 )
+from .results import Table, make_columns, times
 
 Array = NDArray[Any]
 
@@ -259,7 +259,7 @@ SITES = {"damper": damper_laws.SETS, "structure": structure_laws.SETS}
 """Where effects are in the time loop, with the functions that there are."""
 
 
-class System:
+class Layout:
     """A scenario's components as configured objects, and the slots of their signals.
 
     Attributes
@@ -272,46 +272,46 @@ class System:
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : System
     offered : bool
         Whether a component has all effects that it offers, or those that are on.
     """
 
-    def __init__(self, scenario: Scenario, offered: bool = False) -> None:
+    def __init__(self, scenario: System, offered: bool = False) -> None:
         self.names: dict[str, list[str]] = {
             kind: [] for kind in ("source", "damper", "structure", "sampled")
         }
-        for c in scenario.connections:
+        for c in scenario.wires:
             if (c.factor, c.offset) != (1.0, 0.0):
                 raise ScenarioError(
-                    f'{scenario.file}: "{c.target}.{c.input}" has a factor or an offset, which is '
+                    f'{scenario.where}: "{c.target}.{c.input}" has a factor or an offset, which is '
                     "not compiled. Run it with the engine fmu."
                 )
             given, wanted = (
-                scenario.component(name).description.variables[port]
+                scenario.components[name].description.variables[port]
                 for name, port in ((c.source, c.output), (c.target, c.input))
             )
             if given.kind != wanted.kind:
                 raise ScenarioError(
-                    f'{scenario.file}: "{c.target}.{c.input}" is {wanted.kind} and is fed by '
+                    f'{scenario.where}: "{c.target}.{c.input}" is {wanted.kind} and is fed by '
                     f"{given.kind}, which is not compiled. Run it with the engine fmu."
                 )
-        for component in scenario.components:
+        for component in scenario.components.values():
             self.names[kind_of(component, scenario)].append(component.name)
         self.slaves: dict[str, Any] = {
-            component.name: instantiated(component, scenario) for component in scenario.components
+            component.name: instantiated(component) for component in scenario.components.values()
         }
         self.dampers, self.structures = self._functions(offered)
-        for component in scenario.components:
+        for component in scenario.components.values():
             configure(self.slaves[component.name], component, scenario)
         self.source_of: dict[Port, Port] = {
-            (c.target, c.input): (c.source, c.output) for c in scenario.connections
+            (c.target, c.input): (c.source, c.output) for c in scenario.wires
         }
         self.names["structure"] = self._followed_first(scenario)
         self.slots: dict[Port, int] = {}
         self.outputs: dict[str, int] = {}
         self.kinds: dict[str, str] = {}
-        for component in scenario.components:
+        for component in scenario.components.values():
             self._add_slots(component)
         self.slots.update({end: self.slots[begin] for end, begin in self.source_of.items()})
 
@@ -342,7 +342,7 @@ class System:
                 self.outputs[name] = self.slots[component.name, variable.name]
                 self.kinds[name] = variable.kind
 
-    def _followed_first(self, scenario: Scenario) -> list[str]:
+    def _followed_first(self, scenario: System) -> list[str]:
         """Return the structures so that one whose ground is another's floor comes after it."""
         ordered: list[str] = []
         left = list(self.names["structure"])
@@ -353,7 +353,7 @@ class System:
             free = [name for name in left if grounds[name] not in left]
             if not free:
                 raise ScenarioError(
-                    f"{scenario.file}: {', '.join(left)} are each other's ground, which cannot be "
+                    f"{scenario.where}: {', '.join(left)} are each other's ground, which cannot be "
                     "solved. One of them must stand on a ground motion."
                 )
             ordered += free
@@ -493,7 +493,7 @@ def _put(numbers: list[float], more: list[float]) -> int:
     return begin
 
 
-def kind_of(component: Component, scenario: Scenario) -> str:
+def kind_of(component: Component, scenario: System) -> str:
     """Return "source", "damper", "structure" or "sampled".
 
     Raises
@@ -502,17 +502,17 @@ def kind_of(component: Component, scenario: Scenario) -> str:
         Naming a component that cannot be compiled.
     """
     known = catalogue.component_names()
-    if component.path is None and (component.law or component.fmu in known):
+    if component.path is None and (component.law or component.kind in known):
         kind: Any = catalogue.component_class(catalogue.source(component.made_of()))
         return KINDS[kind.functions]
     raise ScenarioError(
-        f"{scenario.file} [components.{component.name}]: {component.fmu} cannot be compiled. "
+        f"{scenario.where} [components.{component.name}]: {component.kind} cannot be compiled. "
         f"Compiled are {', '.join(known)}; run it with the engine fmu."
     )
 
 
-def instantiated(component: Component, scenario: Scenario) -> Slave:
-    """Return the component's Python object with the scenario's values."""
+def instantiated(component: Component) -> Slave:
+    """Return the component's Python object with the values that are set."""
     slave = catalogue.instantiate(
         component.made_of(),
         component.building,
@@ -520,27 +520,25 @@ def instantiated(component: Component, scenario: Scenario) -> Slave:
         component.controller,
         component.effects,
     )
-    for name, value in component.parameters.items():
-        if name == "record":
-            value = ground_motion_file(str(value), scenario.file.parent)
-        elif name == "file":
-            value = str((scenario.file.parent / Path(str(value))).absolute())
+    for name, value in component.taken_values().items():
         index = slave._index[name]
         slave._values[index] = type(slave._values[index])(value)
         slave._set.add(index)
+    if (signal := component.signal) is not None:
+        slave.signal = signal.time.tolist(), signal.values.tolist()
     return slave
 
 
-def configure(slave: Slave, component: Component, scenario: Scenario) -> None:
+def configure(slave: Slave, component: Component, scenario: System) -> None:
     """Build the model of a component's Python object."""
     try:
         slave._check_parameters()
         slave.configure()
     except (ValueError, OSError, RuntimeError) as error:
-        raise ScenarioError(f"{scenario.file} [components.{component.name}]: {error}") from error
+        raise ScenarioError(f"{scenario.where} [components.{component.name}]: {error}") from error
     if following := getattr(slave, "following", {}):
         raise ScenarioError(
-            f"{scenario.file} [components.{component.name}]: an effect follows "
+            f"{scenario.where} [components.{component.name}]: an effect follows "
             f"{', '.join(following)}, which is not compiled. Run it with the engine fmu."
         )
 
@@ -551,83 +549,73 @@ REFERENCE_SUBSTEP = 5e-5
 """The same [s] where the errors of other runs are told by this one: it must be better than they."""
 
 
-class StoppedError(RunError):
-    """A run that had to stop; `columns` holds the rows before."""
+@dataclass(frozen=True)
+class Coupled:
+    """The engine that solves built-in components together, with no substep above `longest` [s]."""
 
-    def __init__(self, text: str, columns: dict[str, Array]) -> None:
-        super().__init__(text)
-        self.columns = columns
+    longest: float = LONGEST_SUBSTEP
+    name: ClassVar[str] = "compiled"
 
+    def refuses(self, system: System) -> str:
+        """Return why it cannot run a system, "" if it can."""
+        try:
+            Layout(system)
+        except BristleError as error:
+            return str(error)
+        return ""
 
-def simulate(scenario: Scenario, longest: float = LONGEST_SUBSTEP) -> dict[str, Array]:
-    """Return the columns of a run, time [s] first, then every output as `component.port`.
+    def run(self, system: System, on_rows: OnRows | None = None) -> Table:
+        """Return every output at every step; see `Engine`.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Of built-in components only.
-    longest : float
-        Longest substep [s].
-
-    Returns
-    -------
-    dict
-        Name to (steps + 1,) array in SI units; Integer outputs as int32.
-
-    Raises
-    ------
-    ScenarioError
-        Naming a component that cannot be compiled.
-    StoppedError
-        If a value stops being finite, or motion and forces do not agree; the text names the
-        component and the time, `columns` holds the rows before.
-    """
-    system = System(scenario)
-    rows, substeps = scenario.steps, substeps_of(scenario, system, longest)
-    h = scenario.step / substeps
-    table = np.zeros((rows + 1, len(system.outputs)))
-    slots = np.array(list(system.outputs.values()), dtype=np.int64)
-    loop = linked(system.dampers, system.structures)(time_loop.integrate)
-    filled, unsettled, _ = compiled(loop, time_loop.INLINE)(
-        (rows, substeps, h), system.sources(), system.coupled(h), system.sampled(h),
-        system.start_values(), slots, table,
-    )  # fmt: skip
-    what = ""
-    if unsettled >= 0:
-        name = system.names["damper"][unsettled]
-        what = f"{name} before t = {filled * scenario.step:.9g} s: force and motion do not agree"
-    elif not np.isfinite(table[filled - 1]).all():
-        filled -= 1
-        wrong = [n for n, v in zip(system.outputs, table[filled], strict=True) if not isfinite(v)]
-        component = wrong[0].partition(".")[0]
-        others = f" (as are {', '.join(wrong[1:4])})" if wrong[1:] else ""
-        when = f"at t = {filled * scenario.step:.9g} s"
-        what = f"{component} {when}: {wrong[0]} is not finite{others}"
-    columns = _columns(system, table[:filled], scenario.step)
-    if what:
-        raise StoppedError(
-            f"{what}.\n  A shorter step or parameters within their bounds would be right.", columns
-        )
-    return columns
+        A run stops if a value is not finite any more, or motion and forces do not agree; the text
+        names the component and the time.
+        """
+        layout = Layout(system)
+        rows, substeps = system.steps, substeps_of(system, layout, self.longest)
+        h = system.step / substeps
+        found = np.zeros((rows + 1, len(layout.outputs)))
+        slots = np.array(list(layout.outputs.values()), dtype=np.int64)
+        loop = linked(layout.dampers, layout.structures)(time_loop.integrate)
+        filled, unsettled, _ = compiled(loop, time_loop.INLINE)(
+            (rows, substeps, h), layout.sources(), layout.coupled(h), layout.sampled(h),
+            layout.start_values(), slots, found,
+        )  # fmt: skip
+        what = ""
+        if unsettled >= 0:
+            name = layout.names["damper"][unsettled]
+            what = f"{name} before t = {filled * system.step:.9g} s: force and motion do not agree"
+        elif not np.isfinite(found[filled - 1]).all():
+            filled -= 1
+            wrong = [
+                n for n, v in zip(layout.outputs, found[filled], strict=True) if not isfinite(v)
+            ]
+            component = wrong[0].partition(".")[0]
+            others = f" (as are {', '.join(wrong[1:4])})" if wrong[1:] else ""
+            when = f"at t = {filled * system.step:.9g} s"
+            what = f"{component} {when}: {wrong[0]} is not finite{others}"
+        columns = make_columns(system)
+        of = dict(zip(layout.outputs, found[:filled].T, strict=True))
+        values = {c.name: of[c.name].astype(c.dtype, copy=False) for c in columns}
+        table = Table(times(0, filled, system.step), columns, values)
+        if on_rows is not None:
+            on_rows(table)
+        if what:
+            raise StoppedError(
+                f"{what}.\n  A shorter step or parameters within their bounds would be right.",
+                table,
+            )
+        return table
 
 
-def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
-    columns: dict[str, Array] = {"time": np.arange(len(table)) * step}
-    for j, name in enumerate(system.outputs):
-        integer = system.kinds[name] == "Integer"
-        columns[name] = table[:, j].astype(np.int32) if integer else table[:, j]
-    return columns
-
-
-def substeps_of(scenario: Scenario, system: System, longest: float = LONGEST_SUBSTEP) -> int:
+def substeps_of(scenario: System, layout: Layout, longest: float = LONGEST_SUBSTEP) -> int:
     """Return into how many substeps a step is cut: at best so that instants fall on their ends.
 
     Parameters
     ----------
-    scenario, system : what runs, and its numbers
+    scenario, layout : what runs, and its numbers
     longest : longest substep [s]
     """
-    return substeps_in(scenario.step, longest, system.periods())
+    return substeps_in(scenario.step, longest, layout.periods())
 
 
 def linked(*sets: Functions, **more: Any) -> Link:

@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..component import SAMPLED
+from ..core.progress import tell
 from ..core.text import plain
 from ..errors import BristleError, RunError
 from ..fmu.description import Variable
+from ..system.model import System
 from ..system.parameters import told_over_step
-from ..system.toml import STEP_TOLERANCE
+from ..system.toml import STEP_TOLERANCE, scenario_text
 from ..units import alike, parse
-from .results import Table, judged_by, reals
+from . import Engine
+from .results import Table, judged_by, reals, to_frame
 from .schedule import Node, Port, held_inputs
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from ..system.scenario import Scenario
-
 
 LEAST_ORDER, MOST_ORDER = 0.5, 2.5
 """Orders between which the differences of runs tell the error; algorithms have 1 or 2."""
@@ -39,8 +39,28 @@ ROUNDING = 1e-9
 """Error along a run, as a share of the peak, below which an output has none worth telling."""
 
 Array = np.ndarray[Any, np.dtype[Any]]
-Again = Callable[["Scenario", str], "pd.DataFrame"]
+Again = Callable[[System, str], "pd.DataFrame"]
 """(scenario, engine) -> the results of another run."""
+
+
+def again_by(engine: Engine) -> Again:
+    """Return what makes another run, for its numbers alone: by an engine, or the coupled one.
+
+    That takes substeps short enough to tell the errors of other runs.
+    """
+
+    def again(system: System, name: str) -> pd.DataFrame:
+        if name == engine.name:
+            step = f"a step of {1e3 * system.step:.4g} ms"
+            table = engine.run(replace(system, title=f"{system.title}, {step}"))
+        else:
+            from .coupled import REFERENCE_SUBSTEP, Coupled
+
+            tell(f"{system.title}: the coupled engine")
+            table = Coupled(REFERENCE_SUBSTEP).run(system)
+        return to_frame(table, {"scenario": scenario_text(system)})
+
+    return again
 
 
 @dataclass(frozen=True)
@@ -86,13 +106,13 @@ class CouplingError:
 
 
 def estimate(
-    scenario: Scenario, frame: pd.DataFrame, again: Again
+    scenario: System, frame: pd.DataFrame, again: Again
 ) -> tuple[str, dict[str, CouplingError]]:
     """Return how the errors of a run were found, and that of every Real output.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : System
         What was run with the engine "fmu".
     frame : DataFrame
         Its results.
@@ -124,7 +144,7 @@ def estimate(
 
 
 def without_doubtful(
-    scenario: Scenario, frame: pd.DataFrame, found: dict[str, CouplingError]
+    scenario: System, frame: pd.DataFrame, found: dict[str, CouplingError]
 ) -> dict[str, CouplingError]:
     """Return estimates from finer steps, worth nothing where a signal between components spoils it.
 
@@ -134,9 +154,9 @@ def without_doubtful(
     in all runs; but Jacobi shows what follows them at once one row late, however short its step.
     """
     discrete = set(discrete_outputs(scenario))
-    fed = {wire.target for wire in scenario.connections}
+    fed = {wire.target for wire in scenario.wires}
     doubtful = set()
-    for name in {f"{wire.source}.{wire.output}" for wire in scenario.connections} & found.keys():
+    for name in {f"{wire.source}.{wire.output}" for wire in scenario.wires} & found.keys():
         error, stands = found[name], name in discrete
         follows = name.partition(".")[0] in fed or scenario.algorithm == "jacobi"
         settles = error.worth or (error.order > MOST_ORDER and not stands)
@@ -155,11 +175,11 @@ def switches(values: Array) -> bool:
     return float(np.abs(np.diff(values)).max(initial=0.0)) >= 0.5 * float(np.ptp(values)) > 0.0
 
 
-def discrete_outputs(scenario: Scenario) -> list[str]:
+def discrete_outputs(scenario: System) -> list[str]:
     """Return the Real outputs that stand between instants of their component's own."""
     return [
         f"{component.name}.{variable.name}"
-        for component in scenario.components
+        for component in scenario.components.values()
         for variable in component.description.of("output")
         if variable.kind == "Real"
         and (variable.variability == "discrete" or variable.name in told_over_step(component))
@@ -224,11 +244,12 @@ def _judged(
     )
 
 
-def finer(scenario: Scenario, parts: float) -> Scenario:
+def finer(scenario: System, parts: float) -> System:
     """Return a scenario whose step, and those of its components, are divided by a number."""
-    components = tuple(
-        replace(c, step=c.step / parts if c.step else None) for c in scenario.components
-    )
+    components = {
+        name: replace(c, step=c.step / parts if c.step else None)
+        for name, c in scenario.components.items()
+    }
     return replace(scenario, step=scenario.step / parts, components=components)
 
 
@@ -237,7 +258,7 @@ def as_data(errors: dict[str, CouplingError]) -> dict[str, dict[str, Any]]:
     return {name: asdict(error) for name, error in errors.items()}
 
 
-def coupled_run(scenario: Scenario, again: Again) -> pd.DataFrame | None:
+def coupled_run(scenario: System, again: Again) -> pd.DataFrame | None:
     """Return the run without coupling error, None where there is no such engine for it."""
     try:
         return again(scenario, "compiled")
@@ -266,12 +287,12 @@ MOST_UNKNOWN = 3
 """Steps in a row with an unknown error after which it goes no further down."""
 
 
-def find_step(scenario: Scenario, tolerance: float, again: Again) -> Scenario:
+def find_step(scenario: System, tolerance: float, again: Again) -> System:
     """Return the scenario with the largest step, 2^k times its own, whose error is small enough.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : System
     tolerance : largest error [1] along the run of any output that a run is judged by
     again : as in `estimate`
 
@@ -281,7 +302,7 @@ def find_step(scenario: Scenario, tolerance: float, again: Again) -> Scenario:
         If no step does, or one of these outputs has no estimate that is worth something.
     """
     kept = _remembered(again)
-    good: Scenario | None = None
+    good: System | None = None
     tried, unknown = scenario, 0
     for _ in range(MOST_TRIALS):
         errors = estimate(tried, frame := kept(tried, "fmu"), kept)[1]
@@ -312,7 +333,7 @@ def _remembered(again: Again) -> Again:
     """Return `again` with every run made once."""
     runs: dict[tuple[str, float, str], pd.DataFrame] = {}
 
-    def kept(one: Scenario, engine: str) -> pd.DataFrame:
+    def kept(one: System, engine: str) -> pd.DataFrame:
         key = one.algorithm if engine == "fmu" else "", one.step, engine
         if key not in runs:
             runs[key] = again(one, engine)
@@ -351,7 +372,7 @@ def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> tuple[str
     return output, f"unknown{least}; {first}{others}: {doubtful[first].doubt()}"
 
 
-def _fits(scenario: Scenario) -> bool:
+def _fits(scenario: System) -> bool:
     count = scenario.stop / scenario.step
     return count >= FEWEST_STEPS and abs(count - round(count)) <= STEP_TOLERANCE
 
@@ -404,12 +425,12 @@ class Expected:
         return f"{told}; {there} at a step of {1e3 * self.step:.4g} ms"
 
 
-def expect(scenario: Scenario, again: Again) -> tuple[Expected, ...]:
+def expect(scenario: System, again: Again) -> tuple[Expected, ...]:
     """Return the coupling error of a scenario with each algorithm of other tools.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : System
     again : callable
         (scenario, engine) -> its results.
     """
@@ -422,7 +443,7 @@ def expect(scenario: Scenario, again: Again) -> tuple[Expected, ...]:
     return tuple(found)
 
 
-def _expected(scenario: Scenario, kept: Again, again: Again) -> Expected:
+def _expected(scenario: System, kept: Again, again: Again) -> Expected:
     frame = kept(scenario, "fmu")
     errors = estimate(scenario, frame, kept)[1]
     output, doubt = worst(errors, frame)
@@ -451,7 +472,7 @@ def _halvings(error: CouplingError) -> int:
     return ceil(log2(error.along / TOLERANCE) / error.order)
 
 
-def _error_at(scenario: Scenario, judged: Mapping[str, CouplingError], again: Again) -> float:
+def _error_at(scenario: System, judged: Mapping[str, CouplingError], again: Again) -> float:
     """Return the largest error [1] along a run of the outputs that it is judged by.
 
     It is measured against the coupled engine; without that, the run at half the step differs by the

@@ -294,6 +294,12 @@ class Message:
     category: str
     text: str
 
+    @property
+    def shown(self) -> str:
+        """The line, which begins with the component."""
+        begins = f"{self.component}: "
+        return self.text if self.text.startswith(begins) else begins + self.text
+
 
 class Unpacked:
     """FMUs unpacked into a temporary folder; leaving it leaves the process as it was found.

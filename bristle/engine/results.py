@@ -14,7 +14,7 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -32,7 +32,7 @@ from ..view import Viewable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..system.model import Scenario
+    from ..system.model import System
 
 
 _KIND = "# bristle results"
@@ -63,11 +63,18 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of results: `time` [s] of shape (n,), and one array of shape (n,) per column."""
+    """Rows of results: `time` [s] of shape (n,), and one array of shape (n,) per column.
+
+    `made` is what the engine knows of how they were made.
+    """
 
     time: Array
     columns: tuple[Column, ...]
     values: dict[str, Array]
+    made: dict[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.time if name == "time" else self.values[name]
 
 
 def to_frame(table: Table, made: Mapping[str, Any], complete: bool = True) -> Results:
@@ -438,17 +445,16 @@ class Results(pd.DataFrame, Viewable):
 
 
 def make_columns(
-    scenario: Scenario, descriptions: Mapping[str, Description] | None = None
+    system: System, descriptions: Mapping[str, Description] | None = None
 ) -> tuple[Column, ...]:
     """Return the columns of the results: every output but texts, in the order of the file.
 
     `descriptions` are those of the FMUs that are stepped; else the scenario's own.
     """
-    known = descriptions or {c.name: c.description for c in scenario.components}
     return tuple(
-        Column(f"{component.name}.{variable.name}", variable.kind, variable.unit)
-        for component in scenario.components
-        for variable in known[component.name].of("output")
+        Column(f"{name}.{variable.name}", variable.kind, variable.unit)
+        for name, component in system.components.items()
+        for variable in (descriptions or {}).get(name, component.description).of("output")
         if variable.kind != "String"
     )
 
@@ -576,6 +582,15 @@ def judged_by(frame: pd.DataFrame) -> list[str]:
         chosen = [name for name in names if _INTERESTING.search(name)]
         found.update(names if component in others else chosen or names)
     return [name for name in reals(frame) if name in found]
+
+
+def statistic_of(values: NDArray[Any], how: str) -> float:
+    """Return the "peak" (of its size), "rms", "max", "min", "mean" or "last" of an output (n,)."""
+    if how == "peak":
+        return float(max(values.max(), -values.min()))
+    if how == "rms":
+        return float(np.sqrt(np.mean(np.square(values, dtype=np.float64))))
+    return float(values[-1] if how == "last" else getattr(values, how)())
 
 
 def by_component(names: Iterable[str]) -> dict[str, list[str]]:

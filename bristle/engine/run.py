@@ -7,64 +7,29 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from ..core.interrupt import Interrupt, deferred
-from ..core.progress import Progress, listening, tell
-from ..core.text import LINES, command, written
+from ..core.progress import listening
+from ..core.text import written
 from ..errors import RunError, not_usable
-from ..fmu.description import Description, read_description
-from ..system.scenario import Scenario, fmu_parameters, loaded_with
+from ..system.model import System
+from ..system.scenario import load_scenario
 from ..system.toml import scenario_text
 from ..version import __version__
-from .coupling_error import as_data, estimate
-from .results import CsvWriter, Table, cannot_write, make_columns, times, to_frame, write_parquet
+from . import Engine, Interrupted, StoppedError
+from .cosimulation import Cosimulation, ignore
+from .coupling_error import Again, again_by, as_data, estimate
+from .results import CsvWriter, Results, Table, cannot_write, to_frame, write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from .cosimulation import Master
     from .instance import Message
-    from .results import Results
-
-
-# The two forms of the built-in components' FMUs: in Python, or native, which a compiler makes.
-
-FORMS = ("python", "native")
-
-
-def ensure_of(form: str, engine: str) -> Callable[..., Path]:
-    """Return what gives a built-in component's FMU of a form: `ensure` of fmu or of native.
-
-    Parameters
-    ----------
-    form : str
-        Of `FORMS`.
-    engine : str
-        "fmu", or "compiled", which steps none.
-
-    Raises
-    ------
-    BristleError
-        If there is no such form; if native FMUs are asked for where none is stepped.
-    KeyboardInterrupt
-        Ctrl-C while what makes native FMUs was imported, raised once that is whole.
-    """
-    if form not in FORMS:
-        raise not_usable(f'fmus "{form}" is not known; there are: {", ".join(FORMS)}.')
-    if form == "python":
-        from ..fmu.build import ensure
-
-        return ensure
-    if engine != "fmu":
-        raise not_usable(f'native FMUs: engine "{engine}" steps no FMUs; "fmu" does.')
-    with deferred():  # an import of llvmlite that Ctrl-C breaks off is never made good
-        from ..native.build import ensure as ensure_native
-    return ensure_native
 
 
 # The folder of a run: results.csv or results.parquet, figure.png, spectrum.csv and log.
@@ -76,28 +41,18 @@ _OURS = ("results.csv", "results.parquet", "figure.png", "spectrum.csv", "log")
 class Output:
     """Where a run's files go; None as the folder means that nothing is written.
 
-    `show` gets the warnings and notes of the scenario's check before the run; by default they are
-    in the log alone. `quiet` keeps the warnings of the run itself off stderr.
-
     Raises
     ------
     RunError
         The folder cannot be made or written to, exit code 2.
     """
 
-    def __init__(
-        self,
-        folder: Path | None,
-        format: str = "csv",
-        show: Callable[[str], None] = lambda line: None,
-        quiet: bool = False,
-    ) -> None:
+    def __init__(self, folder: Path | None, format: str = "csv") -> None:
         if format not in FORMATS:
             raise not_usable(f'format "{format}" is not known; there are: {", ".join(FORMATS)}.')
         self.folder = folder
         self.format = format
-        self.show = show
-        self.quiet = quiet
+        self.begun = False
         self._made: list[Path] = []
         self._writer: CsvWriter | None = None
         self._log: TextIO | None = None
@@ -118,6 +73,7 @@ class Output:
 
     def begin(self, table: Table, made: Mapping[str, Any], remarks: Iterable[str] = ()) -> None:
         """Write the first rows and log remarks; from now on there is a file that can be read."""
+        self.begun = True
         if self.folder is None:
             return
         for name in _OURS[:4]:
@@ -153,7 +109,7 @@ class Output:
     def warn(self, line: str) -> None:
         """Write a line to the log and show it, once, on stderr."""
         self.log(f"warning: {line}")
-        if line not in self._told and not self.quiet:
+        if line not in self._told:
             self._told.add(line)
             logging.getLogger("bristle").warning(line)
 
@@ -202,12 +158,28 @@ class Output:
 # A run: whatever ends it, and how, the rows before are kept.
 
 ENGINES = ("fmu", "compiled")
-FLUSH = 1.0
-"""Seconds between two writes of a running results file."""
-BLOCK = 0.1
-"""Seconds of steps between two looks at Ctrl-C, progress and clock."""
 MOST_WARNINGS = 9
 """Outputs with a doubtful coupling error that are named on a terminal."""
+
+
+def engine_of(name: str, fmus: str = "python") -> Engine:
+    """Return the engine of a name: "fmu", which steps FMUs of a form, or "compiled".
+
+    Raises
+    ------
+    RunError
+        If there is none, or no such form; if native FMUs are asked for where none is stepped.
+    """
+    engine = Cosimulation(fmus)
+    if name == engine.name:
+        return engine
+    if name not in ENGINES:
+        raise not_usable(f'engine "{name}" is not known; there are: {", ".join(ENGINES)}.')
+    if fmus != "python":
+        raise not_usable(f'native FMUs: engine "{name}" steps no FMUs; "fmu" does.')
+    from .coupled import Coupled
+
+    return Coupled()
 
 
 class IncompleteRunError(RunError):
@@ -227,7 +199,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 def run(
-    scenario: str | Path | Scenario,
+    scenario: str | Path | System,
     overrides: Mapping[str, object] | None = None,
     *,
     engine: str = "fmu",
@@ -236,12 +208,13 @@ def run(
     format: str = "csv",
     progress: bool = False,
     coupling_error: bool = False,
+    end_process: bool = False,
 ) -> Results:
     """Run a scenario and return every output at every step.
 
     Parameters
     ----------
-    scenario : path or Scenario
+    scenario : path or System
         A scenario file, the name of a stock scenario, or a loaded scenario.
     overrides : mapping, optional
         Values that take the place of the file's: `{"damper.f_c": 2.0, "run.stop": 10.0}`; those
@@ -260,6 +233,8 @@ def run(
     coupling_error : bool
         Estimate the error that the exchange of values at steps causes, by runs besides: one at half
         the step and one of the coupled engine, or those at a half and a quarter of the step.
+    end_process : bool
+        Whether a component that hangs after Ctrl-C costs the process, not the results.
 
     Returns
     -------
@@ -288,18 +263,35 @@ def run(
     (5.9, 'N')
     """
     _refuse_types(scenario, overrides, out)
+    chosen = engine_of(engine, fmus)
+    if coupling_error and not isinstance(chosen, Cosimulation):
+        raise not_usable(f'engine "{engine}" makes no coupling error; "fmu" does.')
     output = Output(None if out is None else Path(out), format)
-    return execute(
-        scenario, overrides, engine, output, progress, coupling_error=coupling_error, fmus=fmus
-    )
+    try:
+        system = load_scenario(scenario, overrides)
+        if not isinstance(chosen, Cosimulation):
+            return _kept(system, chosen, output)
+        hang = partial(_end_process, output) if end_process else None
+        heard = replace(chosen, listen=partial(_listen, output), progress=progress, on_hang=hang)
+        frame = _kept(system, heard, output)
+        if coupling_error:
+            _add_error(
+                system,
+                frame,
+                output,
+                again_by(replace(chosen, listen=ignore, progress=listening())),
+            )
+        return frame
+    finally:
+        output.close()
 
 
 def _refuse_types(scenario: object, overrides: object, out: object) -> None:
     """Refuse arguments of run of a type that it does not take: exit code 2."""
-    if not isinstance(scenario, str | Path | Scenario):
+    if not isinstance(scenario, str | Path | System):
         raise not_usable(
             f"run: the scenario is {written(scenario)}; a file, the name of a stock scenario or a "
-            "loaded Scenario is right."
+            "loaded System is right."
         )
     if overrides is not None and not isinstance(overrides, Mapping):
         raise not_usable(
@@ -310,63 +302,90 @@ def _refuse_types(scenario: object, overrides: object, out: object) -> None:
         raise not_usable(f"run: out is {written(out)}; a folder is right.")
 
 
-def execute(
-    scenario: str | Path | Scenario,
-    overrides: Mapping[str, object] | None,
-    engine: str,
-    output: Output,
-    progress: bool,
-    end_process: bool = False,
-    coupling_error: bool = False,
-    reference: bool = False,
-    fmus: str = "python",
-) -> Results:
-    """Run a scenario as `run` does, into an output that is closed afterwards.
+def _kept(system: System, engine: Engine, output: Output) -> Results:
+    """Run a system and keep what there is, whatever happens."""
+    began = time.perf_counter()
+    made: dict[str, Any] = {
+        "version": __version__,
+        "title": system.title,
+        "file": system.where,
+        "overrides": dict(system.overrides),
+        "algorithm": system.algorithm if isinstance(engine, Cosimulation) else "coupled",
+        "engine": engine.name,
+        "step": system.step,
+        "stop": system.stop,
+        "fmus": {},
+        "scenario": scenario_text(system),
+    }
 
-    Parameters
-    ----------
-    scenario, overrides, engine, progress, fmus
-        As in `run`, and what is returned and raised too.
-    output : Output
-        What takes results and log.
-    end_process : bool
-        Whether a component that hangs after Ctrl-C costs the process, not the results.
-    coupling_error : bool
-        Whether to estimate the coupling error as well.
-    reference : bool
-        Whether the coupled engine takes the substeps of one that tells the errors of other runs.
-    """
+    def keep(rows: Table) -> None:
+        if output.begun:
+            output.write(rows)
+        else:
+            output.begin(rows, {**made, **rows.made}, system.remarks())
+
+    stopped: StoppedError | Interrupted | None = None
     try:
-        if engine not in ENGINES:
-            raise not_usable(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}.')
-        ensure = ensure_of(fmus, engine)
-        scenario = loaded_with(scenario, overrides)
-        remarks = scenario.remarks()
-        for line in remarks[: LINES - 1]:
-            output.show(line)
-        if len(remarks) >= LINES:
-            name = scenario.package
-            again = ["import-ssp", name] if name else ["check", scenario.file]
-            output.show(f"and {len(remarks) - LINES + 1} more; all:  {command(*again, '--json')}")
-        job = _Job(scenario, engine, output, ensure)
-        if engine == "compiled":
-            if coupling_error:
-                raise not_usable('engine "compiled" makes no coupling error; "fmu" does.')
-            return job.solve(reference)
-        frame = job.step(progress, end_process)
-        if coupling_error:
-            _add_error(scenario, frame, output, partial(run_quietly, fmus=fmus))
+        table = engine.run(system, keep)
+    except (StoppedError, Interrupted) as error:
+        stopped, table = error, error.table
+    if isinstance(stopped, StoppedError):
+        output.log(f"error: {stopped}")
+    complete = stopped is None or (isinstance(stopped, Interrupted) and stopped.whole)
+    made |= {**table.made, "wall_time": round(time.perf_counter() - began, 3)}
+    for column in table.columns:
+        if column.name.endswith(".stroke_ratio"):
+            _judge_stroke(column.name, table, output)
+    frame = to_frame(table, made, complete)
+    output.log(
+        f"{'complete' if complete else 'incomplete'}: {len(table.time)} rows up to "
+        f"t = {table.time[-1]:.9g} s in {made['wall_time']} s"
+    )
+    output.finish(frame)
+    if stopped is None:
         return frame
-    finally:
-        output.close()
+    kept = "Rows up to t = {:.9g} s are kept in {}, marked incomplete.".format(
+        table.time[(output.written or len(table.time)) - 1],
+        output.results or "the frame of this error",
+    )
+    if isinstance(stopped, StoppedError):
+        raise IncompleteRunError(f"{stopped}\n  {kept}", frame) from stopped
+    if stopped.whole:  # a caller that makes many runs is to stop as well
+        raise RunInterrupted("interrupted after the last step; every row is kept.", frame)
+    raise RunInterrupted(f"interrupted. {kept}", frame)
 
 
-def _add_error(
-    scenario: Scenario, frame: Results, output: Output, again: Callable[[Scenario, str], Results]
-) -> None:
+def _judge_stroke(name: str, table: Table, output: Output) -> None:
+    ratio = table[name]
+    if ratio.max() > 1:
+        first = table.time[(ratio > 1).argmax()]
+        output.warn(
+            f"{name.rpartition('.')[0]}: the displacement leaves the stroke: stroke_ratio "
+            f"is above 1 from t = {first:.9g} s on, at most {ratio.max():.4g}"
+        )
+
+
+def _listen(output: Output, message: Message, at: float) -> None:
+    if message.status == "OK":
+        output.log(f"t = {at:.9g} s: {message.shown}")
+    else:
+        output.warn(message.shown)
+
+
+def _end_process(output: Output, until: float | None) -> None:
+    """Leave: the main thread is in a component that hangs; rows were kept up to a time [s]."""
+    kept = "Nothing was kept."
+    if until is not None:
+        kept = f"Rows up to t = {until:.9g} s are kept in {output.results}."
+    print(f"interrupted; a component does not end its step. {kept}", file=sys.stderr)
+    sys.stderr.flush()
+    os._exit(130)
+
+
+def _add_error(system: System, frame: Results, output: Output, again: Again) -> None:
     """Estimate the coupling error of a run, keep it with the results and tell it."""
     try:
-        how, found = estimate(scenario, frame, again)
+        how, found = estimate(system, frame, again)
     except RunError as error:  # the run itself is whole
         output.warn(f"the coupling error cannot be estimated: {error}")
         return
@@ -383,194 +402,3 @@ def _add_error(
     if len(doubtful) > MOST_WARNINGS:
         more = len(doubtful) - MOST_WARNINGS
         output.warn(f"and {more} more outputs: their estimates are worth nothing")
-
-
-def run_quietly(scenario: Scenario, engine: str, fmus: str = "python") -> Results:
-    """Run a scenario for its numbers alone: nothing is written, and what it warns of is known.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    engine : str
-        As in `run`; "compiled" with substeps short enough to tell the errors of other runs.
-    fmus : str
-        As in `run`, for the engine "fmu".
-    """
-    form, shown = fmus if engine == "fmu" else "python", False
-    if engine == "fmu":
-        shown = listening()
-    else:
-        tell(f"{scenario.title}: the coupled engine")
-    return execute(
-        scenario, None, engine, Output(None, quiet=True), shown, reference=True, fmus=form
-    )
-
-
-class _Job:
-    """One run on its way: what it is made of, what it has so far, how it ends."""
-
-    def __init__(
-        self, scenario: Scenario, engine: str, output: Output, ensure: Callable[..., Path]
-    ) -> None:
-        self.scenario = scenario
-        self.ensure = ensure
-        self.output = output
-        self.began = time.perf_counter()
-        self.made: dict[str, Any] = {
-            "version": __version__,
-            "title": scenario.title,
-            "file": str(scenario.file),
-            "overrides": dict(scenario.overrides),
-            "algorithm": scenario.algorithm if engine == "fmu" else "coupled",
-            "engine": engine,
-            "step": scenario.step,
-            "stop": scenario.stop,
-            "fmus": {},
-            "scenario": scenario_text(scenario),
-        }
-
-    def solve(self, reference: bool = False) -> Results:
-        """Solve the scenario with the compiled laws."""
-        from .coupled import LONGEST_SUBSTEP, REFERENCE_SUBSTEP, StoppedError, simulate
-
-        stopped: RunError | None = None
-        try:
-            values = simulate(self.scenario, REFERENCE_SUBSTEP if reference else LONGEST_SUBSTEP)
-        except StoppedError as error:
-            stopped, values = error, error.columns
-        columns = make_columns(self.scenario)
-        time = times(0, len(values["time"]), self.scenario.step)
-        table = Table(time, columns, {c.name: values[c.name].astype(c.dtype) for c in columns})
-        self.output.begin(table, self.made, self.scenario.remarks())
-        return self._end(table, stopped, interrupted=False)
-
-    def step(self, progress: bool, end_process: bool) -> Results:
-        """Step the scenario's FMUs; keep what there is, whatever happens."""
-        paths, descriptions = self._fmus()
-        folder = self.scenario.file.parent
-        parameters = {c.name: fmu_parameters(c, folder) for c in self.scenario.components}
-        from .cosimulation import Master
-        from .coupling_error import bond_names, energy_residuals
-
-        with Master(self.scenario, paths, descriptions, parameters, self._listen) as master:
-            self._master = master
-            bonds = bond_names(master.nodes, self.scenario.algorithm)
-            if bonds:
-                self.made["energy_residual"] = dict.fromkeys(bonds)
-            hang = self._end_process if end_process else None
-            stopped: RunError | None = None
-            with Interrupt(hang) as interrupt:
-                try:
-                    self._go(master, interrupt, progress)
-                except RunError as error:
-                    if not master.rows or error.exit_code != 1:
-                        raise
-                    stopped = error
-            table = master.table()
-            if bonds:
-                self.made["energy_residual"] = energy_residuals(
-                    master.nodes, self.scenario.algorithm, self.scenario.step, table
-                )
-            frame = self._end(table, stopped, interrupt.asked and master.rows <= master.steps)
-            if interrupt.asked:  # a caller that makes many runs is to stop as well
-                raise RunInterrupted("interrupted after the last step; every row is kept.", frame)
-            return frame
-
-    def _go(self, master: Master, interrupt: Interrupt, progress: bool) -> None:
-        try:
-            master.start()
-        finally:
-            if master.rows:
-                self.output.begin(master.table(), self.made, self.scenario.remarks())
-        title = self.scenario.title
-        if self.output.quiet:  # one of several, which differ in it
-            title += f", a step of {1e3 * self.scenario.step:.4g} ms"
-        with Progress(title, master.steps, progress) as bar:
-            count, due = 1, time.perf_counter() + FLUSH
-            try:
-                while master.rows <= master.steps and not interrupt.asked:
-                    before = time.perf_counter()
-                    master.advance(count)
-                    now = time.perf_counter()
-                    count = max(1, min(8 * count, int(count * BLOCK / max(now - before, 1e-9))))
-                    bar.show(master.rows - 1)
-                    if now >= due:
-                        self.output.write(master.table(self.output.written))
-                        due = now + FLUSH
-            finally:
-                if self.output.written < master.rows:
-                    self.output.write(master.table(self.output.written))
-
-    def _end(self, table: Table, stopped: RunError | None, interrupted: bool) -> Results:
-        if stopped:
-            self.output.log(f"error: {stopped}")
-        frame = self._finish(table, complete=not (stopped or interrupted))
-        if not (stopped or interrupted):
-            return frame
-        kept = "Rows up to t = {:.9g} s are kept in {}, marked incomplete.".format(
-            table.time[(self.output.written or len(table.time)) - 1],
-            self.output.results or "the frame of this error",
-        )
-        if stopped:
-            raise IncompleteRunError(f"{stopped}\n  {kept}", frame) from stopped
-        raise RunInterrupted(f"interrupted. {kept}", frame)
-
-    def _finish(self, table: Table, complete: bool) -> Results:
-        self.made["wall_time"] = round(time.perf_counter() - self.began, 3)
-        for column in table.columns:
-            if column.name.endswith(".stroke_ratio"):
-                self._judge_stroke(column.name, table)
-        frame = to_frame(table, self.made, complete)
-        self.output.log(
-            f"{'complete' if complete else 'incomplete'}: {len(table.time)} rows up to "
-            f"t = {table.time[-1]:.9g} s in {self.made['wall_time']} s"
-        )
-        self.output.finish(frame)
-        return frame
-
-    def _judge_stroke(self, name: str, table: Table) -> None:
-        ratio = table.values[name]
-        if ratio.max() > 1:
-            first = table.time[(ratio > 1).argmax()]
-            self.output.warn(
-                f"{name.rpartition('.')[0]}: the displacement leaves the stroke: stroke_ratio "
-                f"is above 1 from t = {first:.9g} s on, at most {ratio.max():.4g}"
-            )
-
-    def _fmus(self) -> tuple[dict[str, Path], dict[str, Description]]:
-        """Return each component's FMU file, built where needed, and what it says of itself."""
-        paths, descriptions = {}, {}
-        for component in self.scenario.components:
-            path = component.path or self.ensure(
-                component.made_of(), component.building, component.controller, component.effects
-            )
-            # A missing binary is explained when the FMU is loaded, with the way out.
-            description = read_description(path, any_platform=True)
-            paths[component.name], descriptions[component.name] = path, description
-            self.made["fmus"][component.name] = f"{description.name} {description.guid}"
-        return paths, descriptions
-
-    def _listen(self, message: Message) -> None:
-        text = message.text
-        if not text.startswith(f"{message.component}: "):
-            text = f"{message.component}: {text}"
-        if message.status == "OK":
-            self.output.log(f"t = {self._time():.9g} s: {text}")
-        else:
-            self.output.warn(text)
-
-    def _time(self) -> float:
-        return self._master.time if hasattr(self, "_master") else 0.0
-
-    def _end_process(self) -> None:
-        """Save what there is and leave: the main thread is in a component that hangs."""
-        master = self._master
-        if master.rows:
-            self.output.write(master.table(self.output.written))
-            kept = f"Rows up to t = {master.time:.9g} s are kept in {self.output.results}."
-        else:
-            kept = "Nothing was kept."
-        print(f"interrupted; a component does not end its step. {kept}", file=sys.stderr)
-        sys.stderr.flush()
-        master.forget()
-        os._exit(130)

@@ -34,7 +34,7 @@ from ..fmu.description import Description, Value, Variable
 from ..system.parameters import as_told, told_over_step
 
 if TYPE_CHECKING:
-    from ..system.scenario import Scenario
+    from ..system.model import System
 
 
 # What a macro step is made of: components with their sources, and the operations on them.
@@ -669,26 +669,27 @@ def _jacobi(nodes: Sequence[Node]) -> Schedule:
 # The components of a scenario as the schedule sees them.
 
 
-def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> list[Node]:
+def make_nodes(system: System, descriptions: Mapping[str, Description]) -> list[Node]:
     """Return the components as the schedule sees them, in the order of the file."""
-    numbers = {component.name: c for c, component in enumerate(scenario.components)}
-    sources: list[dict[str, Port]] = [{} for _ in scenario.components]
-    transformed: list[dict[str, tuple[float, float]]] = [{} for _ in scenario.components]
-    for connection in scenario.connections:
+    components = list(system.components.values())
+    numbers = {component.name: c for c, component in enumerate(components)}
+    sources: list[dict[str, Port]] = [{} for _ in components]
+    transformed: list[dict[str, tuple[float, float]]] = [{} for _ in components]
+    for connection in system.wires:
         port = numbers[connection.source], connection.output
         sources[numbers[connection.target]][connection.input] = port
         how = connection.factor, connection.offset
         if how != (1.0, 0.0):
             transformed[numbers[connection.target]][connection.input] = how
     nodes = []
-    for c, component in enumerate(scenario.components):
+    for c, component in enumerate(components):
         description = descriptions[component.name]
-        substeps = round(scenario.step / component.step) if component.step else 1
+        substeps = round(system.step / component.step) if component.step else 1
         told = told_over_step(component)
         outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
         inputs = {v.name: as_told(v, told) for v in description.of("input")}
         for name, (d, output) in sources[c].items():
-            source = descriptions[scenario.components[d].name].variables[output]
+            source = descriptions[components[d].name].variables[output]
             if inputs[name].kind == "Real" != source.kind:  # nothing lies between whole numbers
                 inputs[name] = replace(inputs[name], variability="discrete", over_step=None)
         takes = _interpolates(description, told) if substeps == 1 else frozenset()

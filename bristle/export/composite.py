@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..component import HELD, LINEAR, controller, damper, sensors, source, structure
-from ..engine.coupled import LONGEST_SUBSTEP, System
+from ..engine.coupled import LONGEST_SUBSTEP, Layout
 from ..engine.records import MEASURED, NOWHERE
 from ..errors import ScenarioError
 from ..fmu import catalogue
@@ -18,7 +18,8 @@ from ..fmu.build import PACKAGE, Plan
 from ..fmu.component import Played, Reading, SourceSlave
 from ..physics.linear import packed
 from ..system.library import run_name
-from ..system.scenario import Scenario, load_scenario, resolve_scenario
+from ..system.model import System
+from ..system.scenario import load_scenario, resolve_scenario
 from . import rows
 
 KINDS: dict[Any, int] = {
@@ -60,9 +61,9 @@ class Assembly:
 
     Attributes
     ----------
-    scenario : Scenario
+    scenario : System
         As it is left, without what feeds the inputs that are named.
-    system : System
+    system : Layout
     inputs : list of Input
 
     Raises
@@ -80,10 +81,10 @@ class Assembly:
         whole = load_scenario(file, overrides)
         chosen = [_named(whole, one) for one in dict.fromkeys(named)]
         cut = {(one.part, one.port) for one in chosen if not one.is_value}
-        fed = cut & {(c.target, c.input) for c in whole.connections}
-        left = [c for c in whole.connections if (c.target, c.input) not in cut]
-        self.scenario = replace(whole, connections=tuple(left))
-        self.system = System(self.scenario, offered=True)
+        fed = cut & {(c.target, c.input) for c in whole.wires}
+        left = [c for c in whole.wires if (c.target, c.input) not in cut]
+        self.scenario = replace(whole, wires=tuple(left))
+        self.system = Layout(self.scenario, offered=True)
         self.parts: dict[str, Any] = self.system.slaves
         open_ones = [
             Input(name, port, (name, port) not in fed)
@@ -234,26 +235,25 @@ class Assembly:
         return follows
 
 
-def _named(scenario: Scenario, name: str) -> Input:
+def _named(scenario: System, name: str) -> Input:
     """Return the input of a name; ScenarioError for what cannot be one."""
     part, _, port = name.partition(".")
-    known = {one.name: one for one in scenario.components}
-    found = known[part].description.variables.get(port) if part in known else None
+    found = scenario.variable(name)
     if found is None or found.causality not in ("input", "parameter"):
         raise ScenarioError(
-            f'{scenario.file}: no component has an input or a parameter "{name}"; '
+            f'{scenario.where}: no component has an input or a parameter "{name}"; '
             "COMPONENT.PORT is right, as in structure.ground_acceleration."
         )
     if found.causality == "input":
         if port == FOUND_BY_THE_STEP:
             raise ScenarioError(
-                f"{scenario.file}: {name} cannot be an input: the coupled step finds it itself."
+                f"{scenario.where}: {name} cannot be an input: the coupled step finds it itself."
             )
         return Input(part, port)
-    kind = catalogue.component_class(catalogue.source(known[part].made_of()))
+    kind = catalogue.component_class(catalogue.source(scenario.components[part].made_of()))
     if found.kind != "Real" or not issubclass(kind, SourceSlave):
         raise ScenarioError(
-            f"{scenario.file}: {name} cannot be an input: it is fixed once a run begins. Ports "
+            f"{scenario.where}: {name} cannot be an input: it is fixed once a run begins. Ports "
             "can be, and numbers of sources, as ground.factor or voltage.level."
         )
     return Input(part, port, is_value=True)
@@ -329,7 +329,7 @@ def plan_of(
     name = re.sub(r"[^A-Za-z0-9_]", "_", run_name(file, chosen))
     if not name[0].isalpha():
         name = f"scenario_{name}"
-    parts = assembly.scenario.components
+    parts = assembly.scenario.components.values()
     effects = dict.fromkeys(path for part in parts for path in part.effects)
     laws = dict.fromkeys(part.law.file for part in parts if part.law and part.law.file)
     baked = {"name": name, "scenario": str(file), "overrides": chosen, "inputs": named}

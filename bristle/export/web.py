@@ -21,7 +21,7 @@ from ..fmu.description import Variable
 from ..native import zig
 from ..native.build import SHIM, functions_text, keep, shim_digest, shim_sources
 from ..native.prepare import GUID, Prepared, prepare
-from ..system.scenario import Component, Scenario
+from ..system.model import Component, System
 from ..view.html import escape, page
 from .web_module import Numbers, Slider, module
 
@@ -170,10 +170,10 @@ def _check_apart(one: Slider, others: Sequence[Slider]) -> None:
             raise ScenarioError(f"{one.name} and {other.name} move the same: take one of them.")
 
 
-def offered(scenario: Scenario) -> list[str]:
+def offered(scenario: System) -> list[str]:
     """Return the numbers that a reader would move first: what is set, then the laws' own."""
-    names = [name for component in scenario.components for name in _set(component)]
-    for component in scenario.components:
+    names = [name for component in scenario.components.values() for name in _set(component)]
+    for component in scenario.components.values():
         if component.made_of().endswith("Damper"):
             names += [f"{component.name}.{one.name}" for one in _own_numbers(component)]
     return list(dict.fromkeys(names))
@@ -181,7 +181,7 @@ def offered(scenario: Scenario) -> list[str]:
 
 def _set(component: Component) -> list[str]:
     known = component.description.variables
-    return [f"{component.name}.{n}" for n in component.parameters if known[n].kind == "Real"]
+    return [f"{component.name}.{n}" for n in component.values if known[n].kind == "Real"]
 
 
 def _own_numbers(component: Component) -> list[Variable]:

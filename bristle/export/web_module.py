@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..core.jit import RefusedError, library_text
 from ..core.progress import tell
 from ..engine import records, time_loop
-from ..engine.coupled import System, linked, substeps_of
+from ..engine.coupled import Layout, linked, substeps_of
 from ..errors import BristleError, BuildError, ScenarioError
 from ..fmu.description import Variable
 from ..native import zig
@@ -28,7 +28,8 @@ from ..physics import damper, structure
 from ..physics.effect import EFFECTS
 from ..physics.generate import Functions
 from ..physics.laws import LAWS
-from ..system.scenario import Scenario, load_scenario
+from ..system.model import System
+from ..system.scenario import load_scenario
 from ..user_code.load import own_effects, own_laws
 
 Array = NDArray[Any]
@@ -79,7 +80,7 @@ class Numbers:
 
     Attributes
     ----------
-    scenario, system : Scenario, System
+    scenario, system : System, Layout
     rows, substeps, h : int, int, float
         Rows behind the first, substeps of each, a substep [s].
     names, units : list of str
@@ -91,14 +92,14 @@ class Numbers:
 
     def __init__(self, file: str | Path, overrides: Mapping[str, object] | None = None) -> None:
         scenario = load_scenario(file, overrides)
-        system = self.system = System(scenario)
+        system = self.system = Layout(scenario)
         self._file, self._overrides = file, dict(overrides or {})
         self.scenario, self.rows = scenario, scenario.steps
         self.substeps = substeps_of(scenario, system)
         self.h = scenario.step / self.substeps
         shown = {name: at for name, at in system.outputs.items() if system.kinds[name] == "Real"}
         self.names = list(shown)
-        self.units = [_unit(scenario, name) for name in self.names]
+        self.units = [scenario.unit(name) for name in self.names]
         outputs = np.array(list(shown.values()), dtype=np.int64)
         sampled = system.sampled(self.h)
         arrays = (
@@ -131,7 +132,8 @@ class Numbers:
             reads does not follow it in proportion.
         """
         variable = _variable(self.scenario, name)
-        value = float(_value(self.scenario, name, variable))
+        component, own = self.scenario.part(name)
+        value = float((component.value(own) if component else None) or 0.0)
         low = min(0.5 * value, 1.5 * value) if low is None else low
         high = max(0.5 * value, 1.5 * value) if high is None else high
         least = -np.inf if variable.minimum is None else variable.minimum
@@ -196,26 +198,14 @@ def _read(data: bytes, places: Array) -> Array:
     return raw[places[:, None] + np.arange(8)].copy().view(np.float64)[:, 0]
 
 
-def _variable(scenario: Scenario, name: str) -> Variable:
-    component, _, parameter = name.partition(".")
-    known = {one.name: one for one in scenario.components}
-    found = known[component].description.variables.get(parameter) if component in known else None
+def _variable(scenario: System, name: str) -> Variable:
+    found = scenario.variable(name)
     if found is None or found.causality not in ("parameter", "input") or found.kind != "Real":
         raise ScenarioError(
-            f'{scenario.file}: no component has a number "{name}"; COMPONENT.PARAMETER is right, '
+            f'{scenario.where}: no component has a number "{name}"; COMPONENT.PARAMETER is right, '
             "as in voltage.level."
         )
     return found
-
-
-def _value(scenario: Scenario, name: str, variable: Variable) -> Any:
-    component, _, parameter = name.partition(".")
-    return scenario.component(component).parameters.get(parameter, variable.start or 0.0)
-
-
-def _unit(scenario: Scenario, name: str) -> str:
-    component, _, port = name.partition(".")
-    return scenario.component(component).description.variables[port].unit or ""
 
 
 # The WebAssembly module that runs any scenario of built-in components.
@@ -229,12 +219,12 @@ SOURCE = Path(__file__).with_name("march.c")
 SITES = {"damper": damper.SETS, "structure": structure.SETS}
 
 
-def module(system: System | None = None) -> bytes:
+def module(system: Layout | None = None) -> bytes:
     """Return the module, compiled if it is not in the cache: a minute or two, once.
 
     Parameters
     ----------
-    system : System, optional
+    system : Layout, optional
         What it is to run, where a law or effect is not of the library.
 
     Raises

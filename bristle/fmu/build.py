@@ -121,7 +121,7 @@ def plan(
     component: str,
     *,
     name: str | None = None,
-    building: Path | None = None,
+    building: catalogue.BuildingData | None = None,
     record: Path | None = None,
     samples: Path | None = None,
     starts: Mapping[str, Any] | None = None,
@@ -361,7 +361,7 @@ def _pack(loose: Path, target: Path) -> None:
 
 def ensure(
     component: str,
-    building: Path | None = None,
+    building: catalogue.BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
 ) -> Path:
@@ -389,7 +389,7 @@ def ensure(
 
 def planned(
     component: str,
-    building: Path | None = None,
+    building: catalogue.BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
 ) -> Plan:

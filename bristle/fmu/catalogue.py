@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
@@ -23,6 +23,8 @@ from .component import EffectSlave
 from .description import Description, Variable
 from .slave import Slave
 
+BuildingData = Path | Mapping[str, Any]
+"""A building file, or the checked data of one."""
 _PACKAGE = Path(__file__).resolve().parent.parent
 _OWN_DAMPER = '''"""FMU: a damper by the law {law}, which no component of the library has."""
 
@@ -161,7 +163,7 @@ def _class_of(path: Path, content: bytes) -> type[Slave]:
 
 def instantiate(
     name: str,
-    building: Path | None = None,
+    building: BuildingData | None = None,
     instance: str = "",
     controller: Path | None = None,
     effects: Iterable[Path] = (),
@@ -204,12 +206,14 @@ def instantiate(
     return kind(baked=baked, instance_name=instance or name, resources=resources)
 
 
-def read_building_data(path: Path) -> dict[str, Any]:
-    """Return the checked data of a building file, to be baked into a Structure."""
+def read_building_data(building: BuildingData) -> dict[str, Any]:
+    """Return the checked data of a building or its file, to be baked into a Structure."""
     from ..data.building_file import read_building
 
-    read_building(path)
-    return toml_content(path)
+    if not isinstance(building, Path):
+        return dict(building)
+    read_building(building)
+    return toml_content(building)
 
 
 def design_file(component: str, kind: type[Slave], controller: Path) -> str:
@@ -260,7 +264,7 @@ def check_controller(
 
 def describe(
     name: str,
-    building: Path | None = None,
+    building: BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
     drive: str = "",

@@ -250,12 +250,16 @@ class SourceSlave(ComponentSlave):
     file_of: ClassVar[Optional[Reading]] = None  # noqa: UP045 (read by Python 3.9)
     pairs_of: ClassVar[Optional[Reading]] = None  # noqa: UP045
     header: ClassVar[Optional[str]] = None  # noqa: UP045
+    signal: Optional[tuple[list[float], list[float]]] = None  # noqa: UP045
+    """Times [s] and values that are played in place of a file."""
 
     def played(self) -> list[Played]:
         return [Played(self.file_of, self.pairs_of, self.header)]
 
     def samples(self) -> tuple[list[float], list[float]]:
         """Return times [s] and values of what the component plays, from its parameters."""
+        if self.signal:
+            return self.signal
         if self.file_of and self._is_read(self.file_of):
             name = self[self.file_of.parameter]
             file = self.resource(f"{name}.csv") if name in self.bundled() else name

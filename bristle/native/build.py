@@ -17,6 +17,7 @@ from ..core.progress import Count, tell
 from ..errors import BuildError
 from ..fmu.archive import write_archive
 from ..fmu.build import Plan, built_guid, planned
+from ..fmu.catalogue import BuildingData
 from . import zig
 from .description import text_of
 from .prepare import GUID, compile_functions, prepare
@@ -299,7 +300,7 @@ def build(
 
 def ensure(
     component: str,
-    building: Path | None = None,
+    building: BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
     fmi: int = 2,

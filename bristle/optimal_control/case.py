@@ -16,14 +16,14 @@ from ..component.damper import REMEMBERED
 from ..component.structure import Constants
 from ..core.jit import compiled
 from ..core.text import unknown
-from ..engine.coupled import System
+from ..engine.coupled import Layout
 from ..errors import ScenarioError, not_usable
+from ..fmu import catalogue
 from ..physics import damper as damper_laws
 from ..physics.building import frequencies
 from ..physics.generate import Functions
 from ..physics.tuples import Setup
-from ..system.scenario import Component, Connection, Scenario, load_scenario
-from ..system.toml import scenario_text
+from ..system.model import Component, Connection, Signal, System
 from .horizon import PULL_BACK, RECEDE, RESPOND, SLOPES, START, Horizon, compute
 from .response import STATES, TRIED, VOLTAGE_0, X_0, Course, Gradient, Plant
 
@@ -45,7 +45,7 @@ class Case:
 
     Attributes
     ----------
-    scenario : Scenario
+    scenario : System
     structure, damper, command : str
         Names of the components, and of the damper's input that is free.
     output, unit : str
@@ -69,7 +69,7 @@ class Case:
         Whether the damper is its law alone, without effects.
     """
 
-    scenario: Scenario
+    scenario: System
     structure: str
     damper: str
     command: str
@@ -94,7 +94,7 @@ class Case:
         return found
 
 
-def case_of(scenario: Scenario, output: str) -> Case:
+def case_of(scenario: System, output: str) -> Case:
     """Return what a limit of a scenario is computed for.
 
     Raises
@@ -104,14 +104,14 @@ def case_of(scenario: Scenario, output: str) -> Case:
         the structure is not linear; if there is no such output of the structure; if a component
         cannot be compiled.
     """
-    system = System(scenario)
+    system = Layout(scenario)
     building, damper = (_only(system, kind, scenario) for kind in ("structure", "damper"))
     slave, law = system.slaves[building], system.slaves[damper]
     _refuse_effects(slave, scenario, building)
     unit = _unit_of(output, scenario, system, building)
     if system.coupled(scenario.step)[0][0]["on_structure"] < 0:
         raise ScenarioError(
-            f"{scenario.file} [components.{damper}]: must feel the motion of the place at "
+            f"{scenario.where} [components.{damper}]: must feel the motion of the place at "
             f"{building} where its force acts; a limit is computed for one damper at one place."
         )
     v_max = _largest(law, scenario, damper)
@@ -127,37 +127,37 @@ def case_of(scenario: Scenario, output: str) -> Case:
         _plant(slave, h, ports.index(pushed), felt, output.partition(".")[2], bool(setup.signed)),
         setup, law.made, _ground(system, building, h, scenario),
         np.array(law.state[: len(law.state) - REMEMBERED]), v_max,
-        scenario.component(damper).description.variables[command.name].unit or "", frequency,
+        scenario.components[damper].description.variables[command.name].unit or "", frequency,
         np.linalg.inv(np.reshape(slave.constants.m_inverse, (slave.constants.n, -1))),
         np.reshape(slave.constants.stiffness, (slave.constants.n, -1)), not setup.active,
     )  # fmt: skip
 
 
-def _refuse_effects(slave: Any, scenario: Scenario, building: str) -> None:
+def _refuse_effects(slave: Any, scenario: System, building: str) -> None:
     if slave.constants.active:
         raise ScenarioError(
-            f"{scenario.file} [components.{building}]: effects make the structure nonlinear; a "
+            f"{scenario.where} [components.{building}]: effects make the structure nonlinear; a "
             "limit is computed for a linear one. Switch them off."
         )
 
 
-def _unit_of(output: str, scenario: Scenario, system: System, building: str) -> str:
+def _unit_of(output: str, scenario: System, system: Layout, building: str) -> str:
     """Return the unit of an output of the structure."""
     if output not in system.outputs or not output.startswith(f"{building}."):
         known = [name for name in system.outputs if name.startswith(f"{building}.")]
-        raise ScenarioError(f"{scenario.file}: {unknown('output', output, known)}")
-    found = scenario.component(building).description.variables[output.partition(".")[2]]
+        raise ScenarioError(f"{scenario.where}: {unknown('output', output, known)}")
+    found = scenario.components[building].description.variables[output.partition(".")[2]]
     return found.unit or ""
 
 
-def _largest(law: Any, scenario: Scenario, damper: str) -> float:
+def _largest(law: Any, scenario: System, damper: str) -> float:
     """Return the largest command, in its own unit."""
     v_max = float(law.constants.v_max)
     if v_max <= 0.0:
         limit = law.drive.limit
         raise ScenarioError(
-            f"{scenario.file} [components.{damper}]: {limit} = {v_max:g} leaves nothing to choose; "
-            f"{law.drive.largest:g} {law.drive.unit} is usual."
+            f"{scenario.where} [components.{damper}]: {limit} = {v_max:g} leaves nothing to "
+            f"choose; {law.drive.largest:g} {law.drive.unit} is usual."
         )
     return v_max
 
@@ -172,18 +172,18 @@ def _compilable(setup: Any) -> Setup:
     return given
 
 
-def _only(system: System, kind: str, scenario: Scenario) -> str:
+def _only(system: Layout, kind: str, scenario: System) -> str:
     found = system.names[kind]
     if len(found) != 1:
         listed = f" ({', '.join(found)})" if found else ""
         raise ScenarioError(
-            f"{scenario.file}: has {len(found)} components of the kind {kind}{listed}; a limit is "
+            f"{scenario.where}: has {len(found)} components of the kind {kind}{listed}; a limit is "
             "computed for one structure with one damper."
         )
     return found[0]
 
 
-def _refuse_other_forces(scenario: Scenario, system: System, building: str, pushed: str) -> None:
+def _refuse_other_forces(scenario: System, system: Layout, building: str, pushed: str) -> None:
     """Refuse forces on the structure besides the damper's."""
     slave = system.slaves[building]
     for index in slave._inputs:
@@ -192,12 +192,12 @@ def _refuse_other_forces(scenario: Scenario, system: System, building: str, push
             continue
         if (building, name) in system.source_of or slave._values[index] != 0.0:
             raise ScenarioError(
-                f"{scenario.file} [components.{building}]: {name} acts besides the damper; a limit "
-                "is computed for the ground motion and the damper alone."
+                f"{scenario.where} [components.{building}]: {name} acts besides the damper; a "
+                "limit is computed for the ground motion and the damper alone."
             )
 
 
-def _step(scenario: Scenario, frequency: float) -> float:
+def _step(scenario: System, frequency: float) -> float:
     """Return the step of the computation: a whole number of the scenario's steps."""
     whole = max(1, round(1.0 / (frequency * STEPS_PER_PERIOD * scenario.step)))
     while scenario.steps % whole:
@@ -205,12 +205,13 @@ def _step(scenario: Scenario, frequency: float) -> float:
     return whole * scenario.step
 
 
-def _ground(system: System, building: str, h: float, scenario: Scenario) -> Array:
+def _ground(system: Layout, building: str, h: float, scenario: System) -> Array:
     name, _ = system.source_of.get((building, "ground_acceleration"), ("", ""))
     if name not in system.names["source"]:
         raise ScenarioError(
-            f"{scenario.file} [components.{building}]: no ground motion feeds ground_acceleration; "
-            "a limit needs a GroundMotion or another source that is known in advance."
+            f"{scenario.where} [components.{building}]: no ground motion feeds "
+            "ground_acceleration; a limit needs a GroundMotion or another source that is known in "
+            "advance."
         )
     constants, shown = system.slaves[name].constants, [0.0, 0.0]
     found = np.zeros(round(scenario.stop / h) + 1)
@@ -219,11 +220,13 @@ def _ground(system: System, building: str, h: float, scenario: Scenario) -> Arra
         found[k] = shown[0]
     if len(found) < MIN_INSTANTS:
         raise ScenarioError(
-            f"{scenario.file}: stop = {scenario.stop:g} s is too short for a limit; "
+            f"{scenario.where}: stop = {scenario.stop:g} s is too short for a limit; "
             f"{MIN_INSTANTS * h:g} s or more is right."
         )
     if not found.any():
-        raise ScenarioError(f"{scenario.file}: the ground does not move: nothing is to be lowered.")
+        raise ScenarioError(
+            f"{scenario.where}: the ground does not move: nothing is to be lowered."
+        )
     return found
 
 
@@ -287,9 +290,9 @@ def room(case: Case) -> int:
     return damper_laws.room(len(case.states)) + 3 * len(case.states)
 
 
-# A scenario whose damper gets a voltage history from a file, in place of what commanded it.
+# A scenario whose damper gets a voltage history in place of what commanded it.
 
-VOLTAGE_FILE, SCENARIO_FILE = "voltage.csv", "limit.toml"
+SCENARIO_FILE = "limit.toml"
 _NAME = "limit_voltage"
 
 
@@ -308,79 +311,44 @@ def refuse_folder(folder: Path) -> None:
         raise not_usable(f"{there}: cannot be written to; name another folder.")
 
 
-def write_scenario(case: Case, time: Array, voltage: Array, folder: Path) -> Scenario:
-    """Write a voltage history and a scenario that plays it into a folder; return the scenario.
+def with_voltage(case: Case, voltage: Array) -> System:
+    """Return the scenario with a source that plays a voltage (N + 1,) [V] as the damper's command.
 
     What commanded the damper goes where nothing else reads it.
-
-    Parameters
-    ----------
-    case : Case
-    time, voltage : (n,) s and V; linear between
-    folder : Path
-
-    Raises
-    ------
-    RunError
-        If the folder cannot be written, exit code 2.
-    """
-    rows = history_text(time.tolist(), voltage.tolist(), case.command, case.command_unit)
-    path = folder / SCENARIO_FILE
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / VOLTAGE_FILE).write_text(rows, encoding="utf-8")
-        text = scenario_text(with_voltage(case, folder / VOLTAGE_FILE))
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
-    return load_scenario(path)
-
-
-def history_text(
-    times: Iterable[float], values: Iterable[float], name: str = "voltage", unit: str = "V"
-) -> str:
-    """Return a command's history as a CSV of two columns.
-
-    Parameters
-    ----------
-    times : of the samples [s]
-    values : of the command
-    name, unit : of the column
-    """
-    rows = (f"{t:.9g},{V:.9g}" for t, V in zip(times, values, strict=True))
-    return "\n".join([f"time [s],{name} [{unit}]", *rows]) + "\n"
-
-
-def with_voltage(case: Case, file: Path) -> Scenario:
-    """Return the scenario with a source that plays a file as the damper's command.
-
-    Its source has not been checked: write it, and load it again.
     """
     scenario, port = case.scenario, (case.damper, case.command)
-    names = {component.name for component in scenario.components}
     name = _NAME
-    while name in names:
+    while name in scenario.components:
         name += "_"
-    before = {c.source for c in scenario.connections if (c.target, c.input) == port}
-    read = {c.source for c in scenario.connections if (c.target, c.input) != port}
-    gone = before - read
-    kept = [c for c in scenario.components if c.name not in gone]
-    at = next(k for k, c in enumerate(kept) if c.name == case.damper)
-    damper = replace(
-        kept[at], parameters={k: v for k, v in kept[at].parameters.items() if k != case.command}
-    )
-    values: dict[str, bool | int | float | str] = {"kind": "csv", "file": str(file.absolute())}
-    source = Component(name, "SignalSource", None, None, values, None, damper.description)
+    before = {c.source for c in scenario.wires if (c.target, c.input) == port}
+    gone = before - {c.source for c in scenario.wires if (c.target, c.input) != port}
+    kept = {key: one for key, one in scenario.components.items() if key not in gone}
+    damper = kept[case.damper]
+    free = replace(damper, values={k: v for k, v in damper.values.items() if k != case.command})
+    signal = voltage_signal(case.time, voltage, case.command, case.command_unit)
+    kind = "SignalSource"
+    source = Component(name, kind, catalogue.describe(kind), {"kind": "csv"}, signal=signal)
+    components: dict[str, Component] = {}
+    for key, one in kept.items():
+        components |= {name: source, key: free} if key == case.damper else {key: one}
     wires = [
-        c for c in scenario.connections
+        c for c in scenario.wires
         if (c.target, c.input) != port and c.target not in gone and c.source not in gone
     ]  # fmt: skip
     return replace(
         scenario,
         title=f"{scenario.title}, the voltage of the limit",
-        components=(*kept[:at], source, damper, *kept[at + 1 :]),
-        connections=(*wires, Connection(*port, name, "value")),
+        components=components,
+        wires=(*wires, Connection(*port, name, "value")),
     )
+
+
+def voltage_signal(
+    time: Iterable[float], voltage: Iterable[float], command: str = "voltage", unit: str = "V"
+) -> Signal:
+    """Return a command's history to the nine digits that are played and kept."""
+    times, values = (np.array([float(f"{x:.9g}") for x in row]) for row in (time, voltage))
+    return Signal(times, values, unit, command, "voltage")
 
 
 # The response as a function of the voltage's history, and its derivative.

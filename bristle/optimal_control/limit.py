@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time as clock
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -14,14 +13,17 @@ from numpy.typing import NDArray
 
 from ..core.progress import Count, counted, tell
 from ..core.text import unknown
-from ..engine.coupled import simulate
+from ..engine.coupled import Coupled
+from ..engine.results import statistic_of
 from ..engine.run import run
-from ..errors import RunError, ScenarioError
-from ..system.scenario import Scenario, loaded_with
+from ..errors import RunError, ScenarioError, not_usable
+from ..system.model import System
+from ..system.scenario import load_scenario
+from ..system.toml import save
 from ..view import Viewable
 from .bound import FASTER, bound_of, largest_force
-from .case import Case, Problem, case_of, refuse_folder, write_scenario
-from .search import descended, foreseen, levelled, value_of
+from .case import SCENARIO_FILE, Case, Problem, case_of, refuse_folder, with_voltage
+from .search import descended, foreseen, levelled
 
 if TYPE_CHECKING:
     from ..engine.results import Results
@@ -128,7 +130,7 @@ class Limit(Viewable):
 
 
 def limit(
-    scenario: str | Path | Scenario,
+    scenario: str | Path | System,
     overrides: Mapping[str, object] | None = None,
     *,
     output: str = OUTPUT,
@@ -144,7 +146,7 @@ def limit(
 
     Parameters
     ----------
-    scenario : path or Scenario
+    scenario : path or System
         With one structure without effects, one damper, and a ground motion. What commands the
         damper is left out of account.
     overrides : mapping, optional
@@ -182,14 +184,14 @@ def limit(
     seen = _checked(statistic, previews, starts)
     if out is not None:
         refuse_folder(Path(out))
-    loaded = loaded_with(scenario, overrides)
+    loaded = load_scenario(scenario, overrides)
     case = case_of(loaded, output)
     tell("compiling the laws, once")
     whole = Problem(case)
     levels = np.linspace(0.0, case.v_max, LEVELS).tolist()
-    constant = {V: value_of(whole.respond(whole.level(V)), statistic) for V in levels}
+    constant = {V: statistic_of(whole.respond(whole.level(V)), statistic) for V in levels}
     if not np.isfinite([*constant.values()]).all():
-        raise RunError(f"{loaded.file}: {output} is not finite at some constant {case.command}.")
+        raise RunError(f"{loaded.where}: {output} is not finite at some constant {case.command}.")
     best = min(constant, key=lambda V: constant[V])
     last = _window(whole, best) if statistic == "peak" else whole.last
     problem, found = _searched_from_all(whole, last, statistic, best, starts)
@@ -201,10 +203,11 @@ def limit(
         ahead[s] = _seen_ahead(problem, whole, s, best, searched, statistic)
     bound, most = _bound(problem, whole, voltage, statistic)
     results = _played(case, voltage, out)
+    reached = statistic_of(results[output].to_numpy(), statistic)
     return Limit(
-        loaded.title, output, statistic, case.unit, value_of(results[output].to_numpy(), statistic),
-        searched, tuple(start for start, _ in found), bound, most, ahead, constant,
-        value_of(simulate(loaded)[output], statistic), case.time, voltage, case.command,
+        loaded.title, output, statistic, case.unit, reached, searched,
+        tuple(start for start, _ in found), bound, most, ahead, constant,
+        statistic_of(Coupled().run(loaded)[output], statistic), case.time, voltage, case.command,
         case.command_unit, results, clock.monotonic() - began,
     )  # fmt: skip
 
@@ -269,12 +272,12 @@ def _searched(
 ) -> tuple[Start, Array]:
     """Search from voltages (n,) at the nodes; return what came out, and the voltage (N + 1,)."""
     begin = _continued(problem, problem.between(values), rest)
-    before = value_of(whole.respond(begin), statistic)
+    before = statistic_of(whole.respond(begin), statistic)
     values = descended(problem, values, statistic)
     if statistic == "peak":
         values = levelled(problem, values)[0]
     voltage = _continued(problem, problem.between(values), rest)
-    return Start(name, before, value_of(whole.respond(voltage), statistic)), voltage
+    return Start(name, before, statistic_of(whole.respond(voltage), statistic)), voltage
 
 
 def _continued(problem: Problem, voltage: Array, rest: float) -> Array:
@@ -288,7 +291,7 @@ def _seen_ahead(
 ) -> float:
     """Return what a receding horizon reaches; the cost is never told by less than 2 % of least."""
     voltage = foreseen(problem, seconds, rest, 0.02 * least, statistic)
-    return value_of(whole.respond(_continued(problem, voltage, rest)), statistic)
+    return statistic_of(whole.respond(_continued(problem, voltage, rest)), statistic)
 
 
 def _bound(
@@ -307,7 +310,11 @@ def _bound(
 
 def _played(case: Case, voltage: Array, out: str | Path | None) -> Results:
     """Return the results of the scenario under a voltage, run by the coupled engine."""
-    if out is not None:
-        return run(write_scenario(case, case.time, voltage, Path(out)), engine="compiled", out=out)
-    with tempfile.TemporaryDirectory() as folder:
-        return run(write_scenario(case, case.time, voltage, Path(folder)), engine="compiled")
+    system = with_voltage(case, voltage)
+    if out is None:
+        return run(system, engine="compiled")
+    try:
+        save(system, Path(out) / SCENARIO_FILE)
+    except OSError as error:
+        raise not_usable(f"{out}: cannot be written: {error.strerror or error}.") from error
+    return run(Path(out) / SCENARIO_FILE, engine="compiled", out=out)

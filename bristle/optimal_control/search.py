@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog, minimize
 
+from ..engine.results import statistic_of
 from .case import Problem
 from .horizon import Horizon
 
@@ -33,13 +34,6 @@ REGION = 0.1
 LEAST_REGION = 1e-3
 GAIN = 1e-3
 """Share of the peak that a linear program must promise."""
-
-
-def value_of(y: Array, statistic: str) -> float:
-    """Return the peak or the RMS of an output, in its unit."""
-    if statistic == "rms":
-        return float(np.sqrt(np.mean(y**2)))
-    return float(np.abs(y).max())
 
 
 def descended(problem: Problem, values: Array, statistic: str) -> Array:
@@ -194,7 +188,7 @@ def foreseen(problem: Problem, seconds: float, start: float, least: float, stati
         _receded(problem, seconds, start, least, power)
         for power in (POWERS if statistic == "peak" else POWERS[:1])
     ]
-    return min(found, key=lambda voltage: value_of(problem.respond(voltage), statistic))
+    return min(found, key=lambda voltage: statistic_of(problem.respond(voltage), statistic))
 
 
 def _receded(problem: Problem, seconds: float, start: float, least: float, power: float) -> Array:

@@ -12,7 +12,7 @@ from ..campaign.best_constant import OUTPUT, G
 from ..campaign.best_constant import SCENARIO as PASSIVE
 from ..core.config import toml_content
 from ..core.files import read_json
-from ..engine.coupled import simulate
+from ..engine.coupled import Coupled
 from ..errors import DesignError, ScenarioError, StudyError
 from ..physics.drive import VOLTAGE
 from ..physics.law import base_and_variant
@@ -35,7 +35,7 @@ from .orders import (
     values_of,
 )
 from .requests import RequestError
-from .simulate_view import RunRequest, damper_of, record_of, records, stock_file, unit_of
+from .simulate_view import RunRequest, damper_of, record_of, records, stock_file
 
 ANSWER = "passive/passive.json"
 """What `bristle optimise passive` leaves in the folder of designs."""
@@ -210,7 +210,7 @@ def _inverse(folder: Path, asked: RunRequest) -> dict[str, Any]:
     """Return what makes the inverse of a force controller that of the study's law, as overrides."""
     model = Study(folder).model()
     law = base_and_variant(model.law)[0].name
-    known = asked.load().component("controller").description.variables
+    known = asked.load().components["controller"].description.variables
     here = {
         f"{law}.{name}": float(f"{value:.6g}")
         for name, value in model.at("damper", not model.building).values.items()
@@ -233,13 +233,13 @@ def _passive(folder: Path, ground: Mapping[str, Any]) -> RunRequest:
 
 def _response(asked: RunRequest) -> dict[str, Any]:
     scenario = asked.load()
-    columns = simulate(scenario)
+    columns = Coupled().run(scenario)
     every = -(-len(columns["time"]) // ROWS)
     return {
         "command": asked.run(), "time": columns["time"][::every],
         "values": columns[OUTPUT][::every], "unit": "m/s2",
         "peaks": {name: float(np.max(np.abs(columns[name]))) for name in JUDGED},
-        "units": {name: unit_of(scenario, name) for name in JUDGED},
+        "units": {name: scenario.unit(name) for name in JUDGED},
     }  # fmt: skip
 
 

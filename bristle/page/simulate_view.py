@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..core.text import command, unknown, written
 from ..data import list_ground_motions, read_ground_motion
 from ..data.response_spectrum import DAMPING
-from ..engine.coupled import simulate
+from ..engine.coupled import Coupled
 from ..engine.results import accelerations, spectra
 from ..errors import BristleError, ScenarioError
 from ..export.web import Shown, described, offered
@@ -28,7 +28,8 @@ from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..study.study import Study
-from ..system.scenario import Component, Scenario, load_scenario, stock_scenarios
+from ..system.model import Component, System
+from ..system.scenario import load_scenario, stock_scenarios
 from .requests import UPLOADS, batch_name, file_name
 
 # What may command a scenario's damper: a constant voltage, and every controller of the library.
@@ -92,15 +93,15 @@ def controls(name: str) -> dict[str, Control]:
     return found
 
 
-def commanding(scenario: Scenario) -> Component | None:
+def commanding(scenario: System) -> Component | None:
     """Return the component whose voltage goes to the first damper, None where there is none."""
-    for wire in scenario.connections:
+    for wire in scenario.wires:
         if wire.input == "voltage" and wire.output == "voltage":
-            return scenario.component(wire.source)
+            return scenario.components[wire.source]
     return None
 
 
-def _candidates(own: Scenario, name: str, control: str) -> Iterator[Control]:
+def _candidates(own: System, name: str, control: str) -> Iterator[Control]:
     """Yield scenarios that may have a control: itself, one that has it, one that can take it."""
     others = [file.stem for file in stock_scenarios() if file.stem != name]
     takes: list[Control] = []
@@ -110,14 +111,14 @@ def _candidates(own: Scenario, name: str, control: str) -> Iterator[Control]:
         carried = _carried(own, other)
         if place is None or carried is None:
             continue
-        if place.fmu == control:
+        if place.kind == control:
             yield stem, carried
-        elif CONSTANT not in (place.fmu, control):
+        elif CONSTANT not in (place.kind, control):
             takes.append((stem, {**carried, f"{place.name}.fmu": control}))
     yield from takes
 
 
-def _carried(own: Scenario, other: Scenario) -> dict[str, Any] | None:
+def _carried(own: System, other: System) -> dict[str, Any] | None:
     """Return the values that make the rest of a scenario that of `own`; None if it is another."""
     if own is other:
         return {}
@@ -126,7 +127,7 @@ def _carried(own: Scenario, other: Scenario) -> dict[str, Any] | None:
         return None
     found: dict[str, Any] = {}
     for name, component in mine.items():
-        given, there = component.parameters, its[name].parameters
+        given, there = component.values, its[name].values
         if set(there) - set(given):
             return None
         found |= {f"{name}.{key}": v for key, v in given.items() if there.get(key) != v}
@@ -135,18 +136,18 @@ def _carried(own: Scenario, other: Scenario) -> dict[str, Any] | None:
     return found
 
 
-def _rest(scenario: Scenario) -> dict[str, Component]:
+def _rest(scenario: System) -> dict[str, Component]:
     """Return the components of a scenario without the one that commands its damper."""
     place = commanding(scenario)
-    return {one.name: one for one in scenario.components if one is not place}
+    return {name: one for name, one in scenario.components.items() if one is not place}
 
 
 def _made(component: Component) -> tuple[Any, ...]:
-    return component.fmu, component.building, component.effects, component.law
+    return component.kind, component.building, component.effects, component.law
 
 
 @cache
-def _stock(name: str) -> Scenario:
+def _stock(name: str) -> System:
     return load_scenario(stock_file(name))
 
 
@@ -183,7 +184,7 @@ class RunRequest:
             for name, value in self.overrides.items()
         }
 
-    def load(self) -> Scenario:
+    def load(self) -> System:
         """Return the scenario, checked; ScenarioError if it is wrong."""
         return load_scenario(stock_file(self.scenario), self.given())
 
@@ -251,7 +252,7 @@ def damper_of(folder: Path, scenario: str, study: object) -> dict[str, Any]:
             f"{command('export', str(study))}"
         )
     components = load_scenario(stock_file(scenario)).components
-    dampers = [one.name for one in components if is_damper(one)]
+    dampers = [name for name, one in components.items() if is_damper(one)]
     if not dampers:
         raise ScenarioError(f"{scenario} has no damper whose place that of {study} could take.")
     place = dampers[0]
@@ -282,7 +283,8 @@ def record_of(folder: Path, scenario: str, record: object) -> dict[str, Any]:
     if not record:
         return {}
     loaded = load_scenario(stock_file(scenario))
-    grounds = [one.name for one in loaded.components if one.made_of() == "GroundMotion"]
+    components = loaded.components.items()
+    grounds = [name for name, one in components if one.made_of() == "GroundMotion"]
     if not grounds:
         raise ScenarioError(f"{scenario} has no ground motion whose place another could take.")
     name = str(record)
@@ -361,7 +363,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     every = -(-len(columns["time"]) // ROWS)
     outputs = [
         {
-            "name": name, "unit": unit_of(scenario, name), "values": column[::every],
+            "name": name, "unit": scenario.unit(name), "values": column[::every],
             "peak": float(np.max(np.abs(column))), "rms": float(np.sqrt(np.mean(column**2))),
         }
         for name, column in columns.items()
@@ -462,21 +464,16 @@ def _columns(asked: RunRequest) -> dict[str, NDArray[Any]]:
 
 @lru_cache(maxsize=2)
 def _run(folder: Path, scenario: str, overrides: str) -> dict[str, NDArray[Any]]:
-    return simulate(RunRequest(folder, scenario, json.loads(overrides)).load())
+    table = Coupled().run(RunRequest(folder, scenario, json.loads(overrides)).load())
+    return {"time": table.time, **table.values}
 
 
-def unit_of(scenario: Scenario, name: str) -> str:
-    """Return the unit of an output by its name, "component.port"."""
-    component, _, port = name.partition(".")
-    return scenario.component(component).description.variables[port].unit or ""
-
-
-def _sliders(scenario: Scenario) -> list[dict[str, Any]]:
+def _sliders(scenario: System) -> list[dict[str, Any]]:
     """Return the numbers that a reader would move first, between half and one and a half."""
     rows = []
     for name in offered(scenario):
         component, _, own = name.partition(".")
-        found = _slider(scenario.component(component), own)
+        found = _slider(scenario.components[component], own)
         if found is not None:
             rows.append({"name": name, **found})
     return rows[:SLIDERS]
@@ -484,7 +481,7 @@ def _sliders(scenario: Scenario) -> list[dict[str, Any]]:
 
 def _slider(component: Component, name: str) -> dict[str, Any] | None:
     variable = component.description.variables[name]
-    value = float(component.parameters.get(name, variable.start or 0.0))
+    value = float(component.value(name) or 0.0)
     least = -np.inf if variable.minimum is None else variable.minimum
     most = np.inf if variable.maximum is None else variable.maximum
     low, high = sorted((0.5 * value, 1.5 * value))

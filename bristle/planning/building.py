@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -253,20 +252,17 @@ def plan_building(
     purposes = purposes_at(sites, requests, rig, study.drive)
     stand = {site: _stated(one, sites[site], seed) for site, one in purposes.items()}
     tell("looking at ground motions")
-    with tempfile.TemporaryDirectory(prefix="bristle_plan_") as folder:
-        table = ShakingTable(
-            model, house, runs.train[0], median_noise(measured), rig.command[1], Path(folder)
-        )
-        planner = TablePlanner(
-            _joint(stand), rig, 0.0, np.zeros((0, 0, 4)), rig.rate, seed=seed, drive=study.drive,
-            candidates=CANDIDATES // (1 if rig.rate * rig.duration < MANY else 2),
-            improved=IMPROVED, table=table, show=lambda few: found.planned(few, DRAWS),
-            places=tuple(site for site, one in stand.items() for _ in one.goal.asked),
-            records=tuple(
-                scalable(one, rig.rate, rig.duration, rig.usable_band[0]) for one in motions
-            ),
-        )  # fmt: skip
-        made = _planned(study, stand, planner)
+    table = ShakingTable(model, house, runs.train[0], median_noise(measured), rig.command[1])
+    planner = TablePlanner(
+        _joint(stand), rig, 0.0, np.zeros((0, 0, 4)), rig.rate, seed=seed, drive=study.drive,
+        candidates=CANDIDATES // (1 if rig.rate * rig.duration < MANY else 2),
+        improved=IMPROVED, table=table, show=lambda few: found.planned(few, DRAWS),
+        places=tuple(site for site, one in stand.items() for _ in one.goal.asked),
+        records=tuple(
+            scalable(one, rig.rate, rig.duration, rig.usable_band[0]) for one in motions
+        ),
+    )  # fmt: skip
+    made = _planned(study, stand, planner)
     return replace(made, notes=_notes(study, sites))
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from threading import Lock
 from typing import ClassVar
 
@@ -21,9 +20,8 @@ from ..errors import RecordError, RunError
 from ..identification.building_sites import StructureProblem
 from ..model.model import Model
 from ..physics.drive import VOLTAGE
-from ..prediction.model_system import BuildingWithFile, Excitation, write_signals
+from ..prediction.model_system import BuildingWithFile, Excitation, signals_of
 from ..prediction.monte_carlo import Simulator
-from ..system.scenario import Scenario
 from .data_sheet import NOISE
 from .information import JudgedTest
 from .limits import RESERVE, RigLimits, Signals, Test
@@ -66,8 +64,6 @@ class ShakingTable:
         Standard deviation of each channel in SI.
     most : float
         The largest command.
-    folder : Path
-        An empty folder for files of the simulation.
     """
 
     model: Model
@@ -75,8 +71,7 @@ class ShakingTable:
     like: Measurement
     noise: Mapping[str, float]
     most: float
-    folder: Path
-    _made: dict[int, tuple[Simulator, Scenario]] = field(default_factory=dict, repr=False)
+    _made: dict[int, Simulator] = field(default_factory=dict, repr=False)
     _one_at_a_time: Lock = field(default_factory=Lock, repr=False)
 
     @property
@@ -92,26 +87,20 @@ class ShakingTable:
     def response(self, signals: Signals) -> Columns | None:
         """Return every output (n,) of the simulation in SI; None where it has no solution."""
         with self._one_at_a_time:
-            simulator, scenario = self._ready(signals)
-            write_signals(self.folder, self._shaking(signals))
-            try:
-                return simulator.response(scenario)
-            except RunError:
-                return None
+            found = self._ready(signals).tried(signals_of(self._shaking(signals)))
+            return None if isinstance(found, RunError) else found
 
     def _shaking(self, signals: Signals) -> Excitation:
         command = signals.V if self.drive else None
         return Excitation("plan", signals.time, signals.a, command, drive=VOLTAGE)
 
-    def _ready(self, signals: Signals) -> tuple[Simulator, Scenario]:
+    def _ready(self, signals: Signals) -> Simulator:
         """Return what simulates a test of that length, made once."""
         count = len(signals.time)
         if count not in self._made:
             largest = replace(signals, V=np.full(count, self.most))
-            simulator = Simulator(
-                self.model, self.house, False, self._shaking(largest), self.folder
-            )
-            self._made[count] = simulator, simulator.scenario()
+            shaking = self._shaking(largest)
+            self._made[count] = Simulator(self.model, self.house, False, shaking)
         return self._made[count]
 
     def demands(self, columns: Columns) -> dict[str, float]:

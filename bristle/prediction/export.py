@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 from shutil import copyfile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,12 +27,19 @@ from ..physics.effect import EFFECTS
 from ..study.rig import building_of, rig_of
 from ..study.runs import Runs
 from ..study.study import Study
-from ..system.toml import DamperText, Parameters, part_text, source_of, values_of
+from ..system.from_model import DamperTable, Parameters, source_of, values_of
+from ..system.toml import save
 from ..user_code.load import own_effects
 from ..view import Viewable
-from . import model_system
 from .held_out import FOLDER, HeldOut, Proof, held_out, prove, step_for, write_inputs, write_proof
-from .model_system import BuildingWithFile, Excitation, loads, shaking_of, write_scenario
+from .model_system import (
+    BuildingWithFile,
+    Excitation,
+    bench_system,
+    building_system,
+    loads,
+    shaking_of,
+)
 
 Build = Callable[[Plan, Path], Path]
 
@@ -93,8 +100,8 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     with _writing(folder):
         fmu = build(_damper(study, model, runs, notes, step), folder)
 
-        def damper(parameters: Parameters) -> str:
-            return part_text("damper", {"fmu": fmu.name}, parameters)
+        def damper(parameters: Parameters) -> dict[str, Any]:
+            return {"fmu": str(fmu.absolute()), "parameters": parameters}
 
         drive = drive_named(measurement.drive)
         scenario, files = _scenario(study, model, measurement, drive, folder, damper, notes)
@@ -148,8 +155,8 @@ def write_editable(study: Study, folder: Path) -> Editable:
     limit = drive_named(measurement.drive).limit
     values |= {VOLTAGE.limit if name == limit else name: value for name, value in found.items()}
 
-    def damper(parameters: Parameters) -> str:
-        return part_text("damper", source_of(own), {**values, **parameters})
+    def damper(parameters: Parameters) -> dict[str, Any]:
+        return {**source_of(own), "parameters": {**values, **parameters}}
 
     with _writing(folder):
         scenario, _ = _scenario(study, model, measurement, VOLTAGE, folder, damper, notes)
@@ -171,13 +178,13 @@ def _writing(folder: Path) -> Iterator[None]:
 
 def _scenario(
     study: Study, model: Model, measurement: Measurement, drive: Drive, folder: Path,
-    damper: DamperText, notes: list[str],
+    damper: DamperTable, notes: list[str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of a study's damper, on the bench or in its building, and its files."""
     if not study.settings.has_building:
-        return model_system.write_bench_scenario(
-            folder, study.name, model, measurement, drive, damper
-        )
+        system, about = bench_system(study.name, model, measurement, drive, damper)
+        scenario, *files = save(system, folder / "bench.toml", about)
+        return scenario, files
     shaking = replace(shaking_of(measurement), drive=drive)
     return _structure(study, model, shaking, folder, damper, notes)
 
@@ -274,14 +281,15 @@ def _model_name(name: str) -> str:
 
 
 def _structure(
-    study: Study, model: Model, shaking: Excitation, folder: Path, damper: DamperText,
+    study: Study, model: Model, shaking: Excitation, folder: Path, damper: DamperTable,
     notes: list[str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of the study's building with the damper, under a run's ground motion."""
     file = study.folder / model.building if model.building else None
     building = building_of(study, model)
     assert building is not None  # `_scenario` asked
-    house = BuildingWithFile(building, file)
+    copied = [] if file is None else [Path(copyfile(file, folder / "building.toml"))]
+    house = BuildingWithFile(building, copied[0] if copied else None)
     own = loads(model, house.building)
     notes += own.notes
     if channels := dict.fromkeys(following(model.effects).values()):
@@ -289,11 +297,9 @@ def _structure(
             f"{', '.join(channels)}: the damper's input keeps its mean in the scenario, for a "
             "building under a ground motion does not give it. Connect it to a signal."
         )
-    head = (
-        f"{study.name}: the building with the model's damper, ground of {shaking.name}",
-        "# The model's damper in the study's building.",
-    )
-    copied = [Path(copyfile(one, folder / one.name)) for one in own.effects]
-    own = own._replace(effects=tuple(Path(one.name) for one in copied))
-    scenario, files = write_scenario(folder, head, house, shaking, own, damper)
-    return scenario, [*files, *copied]
+    title = f"{study.name}: the building with the model's damper, ground of {shaking.name}"
+    effects = [Path(copyfile(one, folder / one.name)) for one in own.effects]
+    system = building_system(title, house, shaking, own._replace(effects=tuple(effects)), damper)
+    about = "# The model's damper in the study's building."
+    scenario, *files = save(system, folder / "structure.toml", about)
+    return scenario, [*copied, *files, *effects]

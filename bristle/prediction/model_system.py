@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import ceil
@@ -12,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.files import write_whole
 from ..data.channels import device_channel
 from ..data.measurement import Measurement
 from ..errors import StudyError
@@ -24,14 +22,15 @@ from ..physics.building import Building, Ports, driven_mass
 from ..physics.drive import VOLTAGE, Drive, drive_named, states_for
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
-from ..system.toml import DamperText, Parameters, model_scenario_text, part_text, signal_file
+from ..system.from_model import DamperTable, Parameters
+from ..system.model import Signal, System
+from ..system.scenario import make_system
 from ..user_code.load import own_effects
 
 Array = NDArray[np.float64]
 
 STEP = 2e-3
 """Longest step [s] of a building's scenario."""
-GROUND, COMMAND = "ground.csv", "drive.csv"
 
 
 @dataclass(frozen=True)
@@ -154,34 +153,25 @@ def masses(damper: Model) -> list[str]:
     return [f"{name}.{EFFECTS[name].mass}" for name in damper.effects if EFFECTS[name].mass]
 
 
-def write_scenario(
-    folder: Path, head: tuple[str, str], house: BuildingWithFile, shaking: Excitation, own: Loads,
-    damper: DamperText,
-) -> tuple[Path, list[Path]]:  # fmt: skip
-    """Write the scenario of a building with its damper under a ground motion, and its files.
+def building_system(
+    title: str, house: BuildingWithFile, shaking: Excitation, own: Loads, damper: DamperTable
+) -> System:
+    """Return a building with its damper under a ground motion, as a system.
 
     Parameters
     ----------
-    folder : where they go
-    head : title of the scenario, and the comment above
+    title : of figures
     house, shaking : the building, and what drives it
     own : what the model makes of the building
-    damper : parameters to the text of the component that is called damper
-
-    Returns
-    -------
-    scenario, files : the path of structure.toml, and of the files that it reads
+    damper : parameters to the table of the component that is called damper
     """
-    files: list[Path] = []
-    source: dict[str, Any] = {"fmu": "Structure"}
+    structure: dict[str, Any] = {"fmu": "Structure", "parameters": own.structure}
     if house.file is not None:
-        files.append(Path(shutil.copyfile(house.file, folder / "building.toml")))
-        source["building"] = files[0].name
+        structure["building"] = str(house.file.absolute())
     if own.effects:
-        source["effects"] = list(own.effects)
-    files += write_signals(folder, shaking)
+        structure["effects"] = [str(file.absolute()) for file in own.effects]
     ports = studied_ports(house.building)
-    wires = {
+    wires: dict[str, Any] = {
         "structure.ground_acceleration": "ground.ground_acceleration",
         f"structure.{ports.force}": "damper.force",
         "damper.displacement": f"structure.{ports.displacement}",
@@ -189,32 +179,24 @@ def write_scenario(
     }
     if "moving_mass" in own.damper:
         wires["damper.holding_force"] = f"structure.{ports.holding_force}"
-    parts = [
-        part_text("ground", {"fmu": "GroundMotion"}, {"record": GROUND}),
-        part_text("structure", source, own.structure),
-    ]
-    moving = dict(own.damper)
+    signals, moving = signals_of(shaking), dict(own.damper)
+    record = {"record": signals["ground.record"]}
+    parts = {"ground": {"fmu": "GroundMotion", "parameters": record}, "structure": structure}
     if shaking.command is None:
         moving[shaking.drive.name] = shaking.level
     else:
-        parts.append(_signal("drive", COMMAND))
-        wires[f"damper.{shaking.drive.name}"] = "drive.value"
+        parts["drive"] = _source(signals["drive.file"])
+        wires[f"damper.{shaking.drive.name}"] = _as_it_is("drive")
     for name in others_of(house.building, shaking):
-        file = folder / f"{name}_force.csv"
-        files.append(signal_file(shaking.time, shaking.others[name], "force", "N", file))
-        parts.append(_signal(f"{name}_measured", file.name))
-        wires[f"structure.{name}_force"] = f"{name}_measured.value"
+        force = signal_of(shaking.time, shaking.others[name], "force", "N", f"{name}_force")
+        parts[f"{name}_measured"] = _source(force)
+        wires[f"structure.{name}_force"] = _as_it_is(f"{name}_measured")
     if shaking.force is not None:
-        files.append(
-            signal_file(shaking.time, shaking.force, "force", "N", folder / "measured.csv")
-        )
-        parts.append(_signal("measured", "measured.csv"))
-    parts.append(damper(moving))
+        parts["measured"] = _source(signal_of(shaking.time, shaking.force, "force", "N"))
     step = float(f"{shaking.spacing / shaking.fine:.12g}")
     stop = float(f"{(len(shaking.time) - 1) * shaking.fine * step:.12g}")
-    scenario = folder / "structure.toml"
-    write_whole(scenario, model_scenario_text(head, (stop, step), parts, wires))
-    return scenario, files
+    run = {"stop": stop, "step": step, "algorithm": "gauss-seidel"}
+    return make_system(title, run, {**parts, "damper": damper(moving)}, wires)
 
 
 def studied_ports(building: Building) -> Ports:
@@ -246,18 +228,33 @@ def others_of(building: Building, shaking: Excitation) -> list[str]:
     return names
 
 
-def write_signals(folder: Path, shaking: Excitation) -> list[Path]:
-    """Write the ground motion, and the command where it moves; return the files."""
-    ground = signal_file(shaking.time, shaking.ground, "acceleration", "m/s2", folder / GROUND)
+def signals_of(shaking: Excitation) -> dict[str, Signal]:
+    """Return the ground motion, and the command where it moves, as values of such a system."""
+    ground = signal_of(shaking.time, shaking.ground, "acceleration", "m/s2")
     if shaking.command is None:
-        return [ground]
+        return {"ground.record": ground}
     name, unit = shaking.drive.name, shaking.drive.unit
-    return [ground, signal_file(shaking.time, shaking.command, name, unit, folder / COMMAND)]
+    return {
+        "ground.record": ground,
+        "drive.file": signal_of(shaking.time, shaking.command, name, unit),
+    }
 
 
-def _signal(name: str, file: str) -> str:
-    kind: Mapping[str, str] = {"kind": "csv", "file": file}
-    return part_text(name, {"fmu": "SignalSource"}, kind)
+def signal_of(
+    time: NDArray[Any], values: NDArray[Any], quantity: str, unit: str, name: str = ""
+) -> Signal:
+    """Return a signal at times that have twelve digits: what k dt has beyond them is rounding."""
+    rounded = np.array([float(f"{t:.12g}") for t in time.tolist()])
+    return Signal(rounded, values, unit, quantity, name)
+
+
+def _source(signal: Signal, fmu: str = "SignalSource") -> dict[str, Any]:
+    return {"fmu": fmu, "parameters": {"kind": "csv", "file": signal}}
+
+
+def _as_it_is(source: str) -> dict[str, Any]:
+    """Return a connection from a SignalSource, which names no unit: its signal is the input's."""
+    return {"from": f"{source}.value", "factor": 1.0, "offset": 0.0}
 
 
 # A model's damper on the bench, moved as in a measured run, as a scenario.
@@ -271,24 +268,18 @@ AGREEMENT = 0.01
 """RMS difference of the exported FMU on the bench from the prediction, by the RMS of the force."""
 
 
-def write_bench_scenario(
-    folder: Path, title: str, model: Model, measurement: Measurement, drive: Drive,
-    damper: DamperText,
-) -> tuple[Path, list[Path]]:  # fmt: skip
-    """Write the scenario that moves a damper as in a measured run, and its files.
+def bench_system(
+    title: str, model: Model, measurement: Measurement, drive: Drive, damper: DamperTable
+) -> tuple[System, str]:
+    """Return a damper that is moved as in a measured run, as a system, and what is to know of it.
 
     Parameters
     ----------
-    folder : where they go
     title : of the study
     model : the damper's law with the effects of all sites
     measurement : the run
     drive : what the damper's command is called
-    damper : parameters to the text of the component that is called damper
-
-    Returns
-    -------
-    scenario, files : the path of bench.toml, and of the files that it reads
+    damper : parameters to the table of the component that is called damper
     """
     run = prepare(measurement)
     fed = Problem([run]).fed(model, run)
@@ -298,45 +289,40 @@ def write_bench_scenario(
     step = float(f"{run.dt / fine:.12g}")
     stop = float(f"{(len(run.x) - 1) * fine * step:.12g}")
     time = run.dt * np.arange(len(run.x))
-    files = [_motion_file(run, fine, folder / "motion.csv")]
     rows = {"measured": ("force", "N", run.force)}
-    wires = {"damper.displacement": "rod.displacement", "damper.velocity": "rod.velocity"}
+    wires: dict[str, Any] = {
+        "damper.displacement": "rod.displacement", "damper.velocity": "rod.velocity",
+    }  # fmt: skip
     if measurement.drive:
         rows["drive"] = (drive.name, drive.unit, run.V)
-        wires[f"damper.{drive.name}"] = "drive.value"
+        wires[f"damper.{drive.name}"] = _as_it_is("drive")
     own = model.at("damper", bench=True)
     for name in dict.fromkeys(following(own.effects).values()):
         rows[name] = (name, run.extra[name].known_unit, run.extra[name].values)
-        wires[f"damper.{input_of(name, own.base_law, drive)}"] = f"{name}.value"
+        wires[f"damper.{input_of(name, own.base_law, drive)}"] = _as_it_is(name)
     effects = [EFFECTS[name] for name in own.effects]
     if any("a" in effect.needs for effect in effects):
         rows["acceleration"] = ("acceleration", "m/s2", run.a)
-        wires["damper.acceleration"] = "acceleration.value"
-    motion = {"kind": "csv", "file": files[0].name}
-    parts = [part_text("rod", {"fmu": "PrescribedMotion"}, motion)]
+        wires["damper.acceleration"] = _as_it_is("acceleration")
+    parts = {"rod": _source(_motion(run, fine), "PrescribedMotion")}
     # A signal is 0 after its file, and the last step may end a rounding error later.
     time, last = np.append(time, time[-1] + run.dt), slice(-1, None)
     for name, (quantity, unit, values) in rows.items():
-        values = np.append(values, values[last])
-        files.append(signal_file(time, values, quantity, unit, folder / f"{name}.csv"))
-        signal = {"kind": "csv", "file": files[-1].name}
-        parts.append(part_text(name, {"fmu": "SignalSource"}, signal))
+        parts[name] = _source(signal_of(time, np.append(values, values[last]), quantity, unit))
     starts = start_values(own, fed, run)
     if not measurement.drive:
         starts[drive.name] = 0.0
-    parts.append(damper(starts))
-    head = (
-        f"{title}: the model on the bench, motion of {measurement.name}",
+    title = f"{title}: the model on the bench, motion of {measurement.name}"
+    settings = {"stop": stop, "step": step, "algorithm": "gauss-seidel"}
+    about = (
         f"# damper.force is the model's, measured.value the measured one [N]. Sampled at "
-        f"{run.dt:g} s; the step is finer\n# because an FMU holds its inputs over a step.",
+        f"{run.dt:g} s; the step is finer\n# because an FMU holds its inputs over a step."
     )
-    scenario = folder / "bench.toml"
-    write_whole(scenario, model_scenario_text(head, (stop, step), parts, wires))
-    return scenario, files
+    return make_system(title, settings, {**parts, "damper": damper(starts)}, wires), about
 
 
-def _motion_file(run: Run, fine: int, path: Path) -> Path:
-    """Write a displacement whose slope at every step is the run's velocity there.
+def _motion(run: Run, fine: int) -> Signal:
+    """Return a displacement whose slope at every step is the run's velocity there.
 
     PrescribedMotion gives the slope of the interval at hand: so the nodes lie half a step beside
     the steps, and the displacement between them is the integral of the velocity.
@@ -347,7 +333,7 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
     v = np.interp(steps, run.dt * np.arange(len(run.v)), run.v)
     nodes: Array = np.concatenate([[0.0], steps + 0.5 * h])
     x: Array = run.x[0] + np.concatenate([[0.0], np.cumsum(v * np.diff(nodes))])
-    return signal_file(nodes, x, "displacement", "m", path)
+    return signal_of(nodes, x, "displacement", "m", "motion")
 
 
 def start_values(damper: Model, fed: Fed, run: Run) -> dict[str, float]:

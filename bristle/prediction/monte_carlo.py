@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import ceil
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ..campaign.campaign import Campaign, Variation
 from ..core.progress import tell
-from ..engine.coupled import simulate
+from ..engine.coupled import Coupled
+from ..engine.results import statistic_of
 from ..errors import PhysicsError, RunError, ScenarioError
+from ..fmu.description import Value
 from ..identification.problem import values_of_labels
 from ..model.draws import OpenEffect, drawn_models, in_short, reach, simulated_whole
 from ..model.model import Model
 from ..physics.drive import VOLTAGE
 from ..physics.forms import shown_law
-from ..system.scenario import Scenario, load_scenario
-from ..system.toml import Parameters, part_text, source_of, values_of
+from ..system.from_model import Parameters, source_of, values_of
+from ..system.model import Signal
 from .closed_loop_result import KINDS, MISSED, PARAMETERS, Predicted
 from .excitation import PredictedRun
 from .model_system import (
     BuildingWithFile,
     Excitation,
+    building_system,
     loads,
+    signals_of,
     studied_ports,
-    write_scenario,
-    write_signals,
 )
 
 # A model's damper in a building, simulated as it is and with draws of what is uncertain.
@@ -52,49 +55,38 @@ class Simulator:
         Whether the model was identified on a bench.
     shaking : Excitation
         A built-in damper calls its command a voltage, whatever it is: its numbers are the same.
-    folder : Path
-        An empty folder for the scenario's files.
     """
 
     model: Model
     house: BuildingWithFile
     bench: bool
     shaking: Excitation
-    folder: Path
 
-    def scenario(self) -> Scenario:
-        """Write the scenario of the model as it is; return it."""
+    @cached_property
+    def campaign(self) -> Campaign:
+        """The model as it is, whose values are varied."""
         own = loads(self.model, self.house.building, self.bench)
         title = f"{shown_law(self.model.law)} in {self.house.building.name}"
         quiet = replace(self.shaking, force=None, drive=VOLTAGE)
-        file, _ = write_scenario(
-            self.folder, (title, "# The model's damper in the building."), self.house, quiet,
-            own, self._damper,
-        )  # fmt: skip
-        return load_scenario(file)
+        system = building_system(title, self.house, quiet, own, self._damper)
+        return Campaign(system, Coupled())
 
-    def response(self, scenario: Scenario) -> dict[str, Array]:
-        """Return every output (n,) at the samples of the ground motion, in SI."""
-        columns = simulate(scenario)
-        return {name: values[:: self.shaking.fine] for name, values in columns.items()}
+    def response(self, values: Mapping[str, Value | Signal]) -> dict[str, Array]:
+        """Return every output (n,) with these values, at the samples of the ground motion, SI."""
+        table = self.campaign.run(Variation(values)).table
+        assert table is not None
+        return {name: column[:: self.shaking.fine] for name, column in table.values.items()}
 
     def with_errors(
-        self, scenario: Scenario, models: list[Model], noise: tuple[float, float],
-        generator: np.random.Generator,
-    ) -> Iterator[dict[str, Array] | None]:  # fmt: skip
-        """Yield the responses of other values, with noise on ground and command.
+        self, models: list[Model], noise: tuple[float, float], generator: np.random.Generator
+    ) -> Iterator[dict[str, Array] | RunError]:
+        """Yield the responses of other values, with noise on ground and command, or why not.
 
         Parameters
         ----------
-        scenario : what `scenario` has returned
         models : the model with other values
         noise : standard deviations of the ground's acceleration [m/s2] and the command
         generator : draws the noise
-
-        Yields
-        ------
-        dict or None
-            As `response`; None where the run failed.
         """
         shaking, count = self.shaking, len(self.shaking.time)
         for model in models:
@@ -102,53 +94,33 @@ class Simulator:
             command = shaking.command
             if command is not None:
                 command = command + noise[1] * generator.standard_normal()
-            write_signals(
-                self.folder, replace(shaking, ground=ground, command=command, drive=VOLTAGE)
-            )
-            try:
-                yield self.response(self._with_values(scenario, model))
-            except RunError:
-                yield None
-        write_signals(self.folder, replace(shaking, drive=VOLTAGE))
+            moved = replace(shaking, ground=ground, command=command, drive=VOLTAGE)
+            yield self.tried({**signals_of(moved), **self.values(model)})
 
-    def without_noise(
-        self, scenario: Scenario, models: list[Model]
-    ) -> Iterator[dict[str, Array] | RunError]:
-        """Yield the responses of other values under the ground motion as it is, or why not.
+    def tried(self, values: Mapping[str, Value | Signal]) -> dict[str, Array] | RunError:
+        """Return the response with these values, or why there is none."""
+        try:
+            return self.response(values)
+        except RunError as error:
+            return error
 
-        Parameters
-        ----------
-        scenario : what `scenario` has returned
-        models : the model with other values
-        """
-        for model in models:
-            try:
-                yield self.response(self._with_values(scenario, model))
-            except RunError as error:
-                yield error
-
-    def _with_values(self, scenario: Scenario, model: Model) -> Scenario:
+    def values(self, model: Model) -> dict[str, Value]:
+        """Return the values of a model that differs in them alone, by names of the system."""
         own = loads(model, self.house.building, self.bench)
-        # A mass that is drawn as zero is in no load, and must not stay what it is in the scenario.
+        # A mass that is drawn as zero is in no load, and must not stay what it is in the system.
         structure = {"attached_mass": 0.0, **own.structure}
-        given = {
-            "structure": structure,
-            "damper": {**values_of(model.at("damper", self.bench)), **own.damper},
-        }
-        parts = [
-            replace(one, parameters={**one.parameters, **given.get(one.name, {})})
-            for one in scenario.components
-        ]
-        return replace(scenario, components=tuple(parts))
+        damper = {**values_of(model.at("damper", self.bench)), **own.damper}
+        given = {"structure": structure, "damper": damper}
+        return {f"{part}.{name}": x for part, values in given.items() for name, x in values.items()}
 
-    def _damper(self, moving: Parameters) -> str:
-        """Return the text of the damper."""
+    def _damper(self, moving: Parameters) -> dict[str, Any]:
+        """Return the table of the damper."""
         most = float(
             np.max(self.shaking.level if self.shaking.command is None else self.shaking.command)
         )
         limit = {VOLTAGE.limit: float(ceil(1.05 * most))} if most > VOLTAGE.largest else {}
         damper = self.model.at("damper", self.bench)
-        return part_text("damper", source_of(damper), {**values_of(damper), **limit, **moving})
+        return {**source_of(damper), "parameters": {**values_of(damper), **limit, **moving}}
 
 
 # Peak and RMS of the responses of a run that was simulated, as sensors would show them.
@@ -202,15 +174,8 @@ def sizes_of(
         for _ in range(count if noise > 0.0 else 1):
             shown = values + noise * generator.standard_normal(len(values)) if noise else values
             for kind in KINDS:
-                found.setdefault((name, kind), []).append(size_of(shown, kind))
+                found.setdefault((name, kind), []).append(statistic_of(shown, kind))
     return found
-
-
-def size_of(values: Array, kind: str) -> float:
-    """Return the peak or the RMS of a response (n,)."""
-    if kind == "peak":
-        return float(np.max(np.abs(values)))
-    return float(np.sqrt(np.mean(values**2)))
 
 
 # What effects that the runs do not exclude would change of a building's responses.
@@ -293,17 +258,16 @@ def _figures(
     """
     house, bench = place
     quiet = np.random.default_rng(0)  # it draws nothing
-    with tempfile.TemporaryDirectory() as folder:
-        simulator = Simulator(model, house, bench, trial.shaking, Path(folder))
-        scenario = simulator.scenario()
-        found: list[dict[Key, float] | str] = []
-        for columns in simulator.without_noise(scenario, models):
-            if isinstance(columns, RunError):
-                found.append(in_short(columns))
-                continue
-            sizes = sizes_of(columns, names_of(columns, trial), trial, quiet, 0)
-            found.append({key: values[0] for key, values in sizes.items()})
-        return found
+    found: list[dict[Key, float] | str] = []
+    simulator = Simulator(model, house, bench, trial.shaking)
+    for one in models:
+        columns = simulator.tried(simulator.values(one))
+        if isinstance(columns, RunError):
+            found.append(in_short(columns))
+            continue
+        sizes = sizes_of(columns, names_of(columns, trial), trial, quiet, 0)
+        found.append({key: values[0] for key, values in sizes.items()})
+    return found
 
 
 DRAWS = 20
@@ -366,7 +330,7 @@ class Figures:
             measured = trial.measured.get(name)
             value = None
             if measured is not None:
-                value = size_of(measured[0][trial.window], kind)
+                value = statistic_of(measured[0][trial.window], kind)
             bands = self.band((name, kind)), None if then is None else then.band((name, kind))
             before = None if then is None else then.best[name, kind]
             run = trial.shaking.name
@@ -404,25 +368,23 @@ def figures_of(
     house, bench = place
     model = model.with_values(values_of_labels(model.effects, trial.labels), origin="measured")
     generator = np.random.default_rng([7, number])
-    with tempfile.TemporaryDirectory() as folder:
-        simulator = Simulator(model, house, bench, trial.shaking, Path(folder))
-        scenario = simulator.scenario()
-        columns = simulator.response(scenario)
-        names = names_of(columns, trial)
-        sensors = np.random.default_rng([8, number])  # the same for the models before and after
-        best = {
-            key: float(np.mean(values))
-            for key, values in sizes_of(columns, names, trial, sensors, DRAWS).items()
-        }
-        collected: dict[Key, list[float]] = {key: [] for key in best}
-        failed = 0
-        models = drawn_models(model, draws, generator) if draws else []
-        for one in simulator.with_errors(scenario, models, trial.noise, generator):
-            if one is None:
-                failed += 1
-                continue
-            for key, values in sizes_of(one, names, trial, generator, 1).items():
-                collected[key] += values
+    simulator = Simulator(model, house, bench, trial.shaking)
+    columns = simulator.response({})
+    names = names_of(columns, trial)
+    sensors = np.random.default_rng([8, number])  # the same for the models before and after
+    best = {
+        key: float(np.mean(values))
+        for key, values in sizes_of(columns, names, trial, sensors, DRAWS).items()
+    }
+    collected: dict[Key, list[float]] = {key: [] for key in best}
+    failed = 0
+    models = drawn_models(model, draws, generator) if draws else []
+    for one in simulator.with_errors(models, trial.noise, generator):
+        if isinstance(one, RunError):
+            failed += 1
+            continue
+        for key, values in sizes_of(one, names, trial, generator, 1).items():
+            collected[key] += values
     changes, lost = (
         ({}, {}) if not effects else changes_not_excluded(model, place, trial, effects, number)
     )

@@ -258,13 +258,13 @@ def _designs(network: Network, library: Library, document: Document) -> None:
     """A designed controller belongs to one building: that whose floor it measures."""
     for part in network.parts.values():
         structure = network.measured_by(part)
-        if structure is None or structure.fmu != "Structure":
+        if structure is None or structure.kind != "Structure":
             continue
         try:
             if part.file:
                 library.check_carried(part.file, structure.building)
             else:
-                library.check_controller(part.fmu, part.controller, structure.building)
+                library.check_controller(part.kind, part.controller, structure.building)
         except PhysicsError:
             continue  # the building is no building: its own check has said so
         except BristleError as error:
@@ -325,7 +325,7 @@ def dampers_of(network: Network) -> list[tuple[Part, Drive]]:
 
 def asked_range(damper: Part, drive: Drive, network: Network) -> tuple[float, float] | None:
     """Return the lowest and highest command that a damper is asked for, None if unknown."""
-    if drive.name in damper.parameters:
+    if drive.name in damper.values:
         level = damper.real(drive.name)
         return None if level is None else (level, level)
     source = network.source(damper, drive.name)
@@ -381,7 +381,7 @@ def _coupling(
             port = pushed[1]
             _other_motion(damper, structure, port, network, document)
             driven.setdefault(_FORCES[0] if port in _FORCES else port, []).append((damper, drive))
-    if structure.fmu != "Structure":
+    if structure.kind != "Structure":
         return  # the mass behind the ports of another structure is not known
     for port, dampers in driven.items():
         attached = structure.real("attached_mass") or 0.0

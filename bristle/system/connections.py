@@ -11,9 +11,8 @@ from ..core.toml_lines import KeyPath
 from ..errors import UnitError
 from ..fmu.description import Variable, passes
 from ..units import Measure
-from .model import Connection, Part
+from .model import Connection, Part, shown_items
 from .overrides import flatten
-from .parameters import shown_items
 from .ssp_read import SAME
 
 FROM, FACTOR, OFFSET = TRANSFORMED = ("from", "factor", "offset")
@@ -152,7 +151,7 @@ def _end(
     if port not in part.variables:
         names = [variable.name for variable in part.description.of(wanted)]
         words = unknown(wanted, port, names, part.ports_command)
-        document.error(path, f'"{text}": {part.fmu}: {words}')
+        document.error(path, f'"{text}": {part.kind}: {words}')
         return None
     return part, part.variables[port]
 
@@ -169,7 +168,7 @@ def _wrong_end(end: str, part: Part, variable: Variable, wanted: str) -> str:
     place = "left" if wanted == "input" else "right"
     return (
         f'"{end}" is {kind}; {_ARTICLE[wanted]} belongs on the {place} of "=". '
-        f"{part.fmu} has: {listed(names) or 'none'}."
+        f"{part.kind} has: {listed(names) or 'none'}."
     )
 
 

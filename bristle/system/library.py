@@ -16,8 +16,8 @@ from ..errors import DesignError, PhysicsError
 from ..fmu.description import Description
 from ..physics.forms import joined_form
 from ..physics.laws import LAWS, laws_of
-from .model import Component, DamperLaw
-from .overrides import FILE_PARAMETERS, MADE_FROM
+from .model import FILE_PARAMETERS, Component, DamperLaw
+from .overrides import MADE_FROM
 
 
 @dataclass(frozen=True)
@@ -189,13 +189,13 @@ def changed_title(components: Iterable[Component], changed: Collection[KeyPath])
     """
     texts = []
     for component in components:
-        name = component.path.name if component.path else component.fmu
+        name = component.path.name if component.path else component.kind
         paths = [path[2:] for path in changed if path[:2] == ("components", component.name)]
         keys = {str(path[-1]) for path in paths}
         inputs = component.description.of("input")
         values = [
             _pair(component, key, value)
-            for key, value in component.parameters.items()
+            for key, value in component.values.items()
             if key in keys or not inputs
         ]
         for key in MADE_FROM:

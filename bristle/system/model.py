@@ -2,16 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import copy
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-from ..core.config import Document
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.config import Document, toml_content
 from ..core.finding import Finding, worded
-from ..core.text import command, nearest
+from ..core.text import LIST_AT_MOST, command, nearest, number, unknown, written
 from ..core.toml_lines import KeyPath
+from ..data import ground_motion_file
+from ..errors import PhysicsError, ScenarioError
+from ..fmu.catalogue import BuildingData
 from ..fmu.description import Description, Value, Variable
+from ..physics.building import PAPER, from_data
 
 ALGORITHMS = ("gauss-seidel", "midpoint", "midpoint-iterated", "jacobi")
+FILE_PARAMETERS = ("record", "file")
+"""Parameters that may name a file, relative to the scenario's folder."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A signal that a source plays: no file is needed.
+
+    `time` (n,) s, rising; `values` (n,) in the `unit`, linear between. `quantity` is what they are,
+    the title of the column, and `name` that of the file that `toml.save` writes, without its
+    ending; "": that of the component.
+    """
+
+    time: NDArray[np.float64]
+    values: NDArray[np.float64]
+    unit: str
+    quantity: str = "value"
+    name: str = ""
 
 
 @dataclass
@@ -47,7 +76,7 @@ class Part:
 
     name: str
     path: KeyPath
-    fmu: str = ""
+    kind: str = ""
     file: Path | None = None
     building: Path | None = None
     effects: tuple[Path, ...] = ()
@@ -55,7 +84,8 @@ class Part:
     law: DamperLaw | None = None
     step: float | None = None
     description: Description | None = None
-    parameters: dict[str, Value] = field(default_factory=dict)
+    values: dict[str, Value] = field(default_factory=dict)
+    signal: Signal | None = None
     places: dict[str, KeyPath] = field(default_factory=dict)
     over_step: dict[str, str] = field(default_factory=dict)
 
@@ -67,12 +97,12 @@ class Part:
     @property
     def ports_command(self) -> str:
         """The command that lists all ports; "" where its law was made for this scenario."""
-        return "" if self.law else command("list", "ports", self.fmu)
+        return "" if self.law else command("list", "ports", self.kind)
 
     def value(self, name: str) -> Value | None:
         """Return a parameter's value as set, else its start value, else None."""
         variable = self.variables.get(name)
-        return self.parameters.get(name, variable.start if variable else None)
+        return self.values.get(name, variable.start if variable else None)
 
     def real(self, name: str) -> float | None:
         """Return a parameter's value if it is a number."""
@@ -82,38 +112,93 @@ class Part:
 
 @dataclass(frozen=True)
 class Component:
-    """One FMU of a scenario.
+    """One component of a system.
 
-    `path` is the file of a foreign FMU, None for a built-in; `building` the data file that a
-    Structure is made from, None for the default; `controller` the controller file of a designed
+    `kind` is its name in the catalogue, or what the scenario calls the file of a foreign FMU, whose
+    `path` stands then; `values` those that are set, inputs that are held constant included, files
+    among them as absolute paths; `signal` what a source plays in place of a file; `building` the
+    data of a Structure, or its file, None for the default; `controller` the file of a designed
     controller, None for the one that it carries; `effects` the files of a user's own effects that a
-    built-in one carries besides the library's; `parameters` the values that the scenario sets,
-    inputs that are held constant included; `step` its own step [s], None for the run's; `law` that
-    of a damper where the scenario names it; `over_step` what the scenario says of a foreign FMU's
-    ports (see `parameters.choose_over_step`).
+    built-in one carries besides the library's; `step` its own step [s], None for the run's; `law`
+    that of a damper where the scenario names it; `over_step` what the scenario says of a foreign
+    FMU's ports (see `parameters.choose_over_step`).
     """
 
     name: str
-    fmu: str
-    path: Path | None
-    building: Path | None
-    parameters: dict[str, Value]
-    step: float | None
-    description: Description
-    effects: tuple[Path, ...] = ()
+    kind: str
+    description: Description = field(repr=False, compare=False)  # follows from the rest
+    values: dict[str, Value] = field(default_factory=dict)
+    path: Path | None = None
+    building: BuildingData | None = None
     controller: Path | None = None
+    effects: tuple[Path, ...] = ()
     law: DamperLaw | None = None
+    signal: Signal | None = None
+    step: float | None = None
     over_step: dict[str, str] = field(default_factory=dict)
 
     def made_of(self) -> str:
         """Return what the catalogue makes it from; a law of a user's own is registered then."""
         if self.law is None:
-            return self.fmu
+            return self.kind
         if self.law.file is not None:  # this process may not have read it yet
             from ..trust import load_file
 
             load_file(self.law.file, "law")
         return self.law.component
+
+    @property
+    def plays(self) -> str:
+        """The parameter that names the file which it plays, "" where it plays none."""
+        return next((name for name in FILE_PARAMETERS if name in self.description.variables), "")
+
+    def value(self, name: str) -> Value | None:
+        """Return the value of a parameter: as it is set, else where it starts."""
+        return self.values.get(name, self.description.variables[name].start)
+
+    def taken_values(self) -> dict[str, Value]:
+        """Return the values that an FMU is given.
+
+        A ground motion of another format is a two-column CSV in the user's cache.
+
+        Raises
+        ------
+        RecordError
+            If a ground motion cannot be read.
+        """
+        values = dict(self.values)
+        if self.path is None and self.kind == "GroundMotion" and values.get("record"):
+            values["record"] = ground_motion_file(str(values["record"]), Path())
+        return values
+
+    def with_values(self, given: Mapping[str, Value | Signal]) -> Component:
+        """Return it with parameters, a file's signal or numbers of its building changed.
+
+        Raises
+        ------
+        ScenarioError, PhysicsError
+            If it has no such parameter, or a value does not fit.
+        """
+        values, signal, numbers = dict(self.values), self.signal, {}
+        for name, value in given.items():
+            variable = self.description.variables.get(name)
+            if name.startswith("building."):
+                numbers[name.removeprefix("building.")] = value
+            elif variable is None:
+                raise ScenarioError(f'"{self.name}.{name}": {self.kind} has no such parameter.')
+            elif not isinstance(value, Signal):
+                fits = typed(variable, value)
+                if isinstance(fits, Wrong):
+                    raise ScenarioError(f"{self.name}.{name} {fits.words}")
+                values[name] = fits
+            elif name != self.plays or self.path is not None:
+                raise ScenarioError(f'"{self.name}.{name}": {self.kind} plays no signal there.')
+            else:
+                signal = value
+                values.pop(name, None)
+                values |= {"kind": "csv"} if "kind" in self.description.variables else {}
+        building = changed_building(self.building, numbers) if numbers else self.building
+        return replace(self, values=values, signal=signal, building=building)
 
 
 @dataclass(frozen=True)
@@ -144,40 +229,200 @@ class Connection:
 
 
 @dataclass(frozen=True)
-class Scenario:
-    """A checked scenario; `stop` [s] is a whole number of steps of `step` [s].
+class System:
+    """Components that are wired, and a run of them, checked.
 
-    `title` is the file's unless overrides changed what runs (see `library.changed_title`).
-
-    `algorithm` is one of `ALGORITHMS`; components step in their order. `findings` are the
-    warnings and notes of its check; `overrides` what was laid over the file. `package` is the SSP
-    package that it was read from, None without one.
+    `title` is the scenario's unless overrides changed what runs (see `library.changed_title`);
+    `stop` [s] is a whole number of steps of `step` [s]; `algorithm` is one of `ALGORITHMS`, and
+    components step in their order. `origin` is the file that it was read from, None where it was
+    made; `package` the SSP package that file was unpacked from; `findings` the warnings and notes
+    of its check; `overrides` what was laid over the file.
     """
 
-    file: Path
     title: str
     stop: float
     step: float
     algorithm: str
-    components: tuple[Component, ...]
-    connections: tuple[Connection, ...]
-    findings: tuple[Finding, ...] = ()
-    overrides: dict[str, object] = field(default_factory=dict)
-    package: Path | None = None
+    components: Mapping[str, Component]
+    wires: tuple[Connection, ...]
+    origin: Path | None = field(default=None, compare=False)
+    findings: tuple[Finding, ...] = field(default=(), compare=False)
+    overrides: dict[str, object] = field(default_factory=dict, compare=False)
+    package: Path | None = field(default=None, compare=False)
 
     @property
     def steps(self) -> int:
         """Number of communication steps."""
         return round(self.stop / self.step)
 
+    @property
+    def where(self) -> str:
+        """What messages call it: its file, else its title."""
+        return str(self.origin or self.title)
+
     def remarks(self) -> list[str]:
         """Return the warnings and notes of the check, a line each with its place."""
-        name = (self.package or self.file).name
+        name = (self.package or Path(self.where)).name
         return [f"{found.level}: {worded(name, found)}" for found in self.findings]
 
-    def component(self, name: str) -> Component:
-        """Return the component of a name."""
-        return next(component for component in self.components if component.name == name)
+    def with_values(self, values: Mapping[str, Value | Signal]) -> System:
+        """Return it with values by "component.parameter", a Signal for that of a file.
+
+        A number of a building is "structure.building.masses.2", counted from 0.
+
+        Raises
+        ------
+        ScenarioError, PhysicsError
+            If there is no such component or parameter, or a value does not fit.
+        """
+        given: dict[str, dict[str, Value | Signal]] = {}
+        for full, value in values.items():
+            name, _, own = plain_target(full).partition(".")
+            if name not in self.components:
+                raise ScenarioError(f'"{full}": the scenario has no such component.')
+            given.setdefault(name, {})[own] = value
+        changed = {name: self.components[name].with_values(own) for name, own in given.items()}
+        return replace(self, components={**self.components, **changed})
+
+    def variable(self, name: str) -> Variable | None:
+        """Return the variable "component.port", None where there is none."""
+        component, own = self.part(name)
+        return component.description.variables.get(own) if component else None
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a variable, "" where it has none."""
+        found = self.variable(name)
+        return (found.unit or "") if found else ""
+
+    def part(self, name: str) -> tuple[Component | None, str]:
+        """Return the component that the name of a value begins with, and the rest of it."""
+        first, _, rest = plain_target(name).partition(".")
+        return self.components.get(first), rest
+
+
+def plain_target(name: str) -> str:
+    """Return a name in its short form: "damper.f_c" of "components.damper.parameters.f_c"."""
+    first, _, rest = name.removeprefix("components.").partition(".")
+    return f"{first}.{rest.removeprefix('parameters.')}" if rest else first
+
+
+def changed_building(building: BuildingData | None, values: Mapping[str, object]) -> dict[str, Any]:
+    """Return a Structure's building data with numbers changed, checked.
+
+    Parameters
+    ----------
+    building : of the Structure
+    values : "masses.2" (counted from 0, lowest level first), "rayleigh.alpha" ... to the number
+
+    Raises
+    ------
+    PhysicsError
+        If there is no such number, or the building is none with it.
+    """
+    known = toml_content(building) if isinstance(building, Path) else building or PAPER
+    data: dict[str, Any] = copy.deepcopy(dict(known))
+    for path, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise PhysicsError(f"building {path} = {value!r} must be a number.")
+        *way, last = path.split(".")
+        place: Any = data
+        for key in way:
+            place = _within(place, key, path)
+        if isinstance(_within(place, last, path), dict | list | str | bool):
+            raise PhysicsError(f"building {path} is not a single number.")
+        place[int(last) if isinstance(place, list) else last] = float(value)
+    from_data(data, "building")
+    return data
+
+
+def _within(place: Any, key: str, path: str) -> Any:
+    if isinstance(place, list) and key.isdigit() and int(key) < len(place):
+        return place[int(key)]
+    if isinstance(place, dict) and key in place:
+        return place[key]
+    there = f"0 to {len(place) - 1}" if isinstance(place, list) else ", ".join(place or ())
+    raise PhysicsError(f"building {path}: {key!r} is not there; there is {there}.")
+
+
+# The type of a parameter, and whether a value fits it.
+
+
+_INTEGER_RANGE = (-(2**31), 2**31 - 1)
+_CHOICES = re.compile(r"\bone of:? ((?:[\w-]+, )*[\w-]+)")
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """Why a value does not fit a variable, in words that follow the variable's name."""
+
+    words: str
+
+
+def typed(variable: Variable, value: object) -> Value | Wrong:
+    """Return a value in the type of a variable, within its bounds, or what is wrong with it."""
+    unit = f" {variable.unit}" if variable.unit and variable.unit != "1" else ""
+    if variable.kind == "Boolean":
+        if isinstance(value, bool):
+            return value
+        return Wrong(f"is {written(value)}; true or false is right.")
+    if variable.kind == "String":
+        return _text(variable, value)
+    if variable.kind in ("Integer", "Enumeration"):
+        if isinstance(value, bool) or not isinstance(value, int):
+            return Wrong(f"is {written(value)}; a whole number is right.")
+        least, most = _INTEGER_RANGE
+        if not least <= value <= most:
+            return Wrong(f"is {written(value)}; FMI holds whole numbers from {least} to {most}.")
+        if variable.items and value not in variable.items.values():
+            return Wrong(f"is {value}, which is no item; {shown_items(variable)} are right.")
+        real = float(value)
+    else:
+        found = number(value)
+        if isinstance(found, str):
+            return Wrong(f"{found}; a number{f' in{unit}' if unit else ''} is right.")
+        real = found
+        value = found
+    low, high = variable.minimum, variable.maximum
+    if low is not None and real < low:
+        return Wrong(f"= {real:g}{unit} lies below {low:g}{unit}; {_range(low, high, unit)}.")
+    if high is not None and real > high:
+        return Wrong(f"= {real:g}{unit} lies above {high:g}{unit}; {_range(low, high, unit)}.")
+    return value
+
+
+def _range(low: float | None, high: float | None, unit: str) -> str:
+    if high is None:
+        return f"{low:g}{unit} or more is right"
+    if low is None:
+        return f"{high:g}{unit} or less is right"
+    return f"{low:g} to {high:g}{unit} is right"
+
+
+def shown_items(variable: Variable) -> str:
+    """Return the items of an Enumeration as words: `slow = 2, fast = 5`."""
+    items = [f"{name} = {value}" for name, value in variable.items.items()]
+    more = f" and {len(items) - LIST_AT_MOST} more" if len(items) > LIST_AT_MOST else ""
+    return ", ".join(items[:LIST_AT_MOST]) + more
+
+
+def choices(variable: Variable) -> tuple[str, ...]:
+    """Return the texts that a String variable takes, where its description lists them.
+
+    FMI 2.0 has no bounds for texts; bristle's components write "one of a, b, c".
+    """
+    match = _CHOICES.search(variable.description)
+    return tuple(match[1].split(", ")) if match else ()
+
+
+def _text(variable: Variable, value: object) -> Value | Wrong:
+    if not isinstance(value, str):
+        return Wrong(f"is {written(value)}; a text in quotes is right.")
+    if "\0" in value:
+        return Wrong("holds a null character, which no FMU can take.")
+    allowed = choices(variable)
+    if allowed and value not in allowed:
+        return Wrong(f'= "{value}": {unknown(variable.name, value, allowed)}')
+    return value
 
 
 def existing_file(

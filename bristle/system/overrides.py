@@ -14,7 +14,7 @@ from ..core.text import unknown, written
 from ..core.toml_lines import KeyPath
 from ..errors import ScenarioError
 from ..physics.forms import FORMS
-from .model import ALGORITHMS
+from .model import ALGORITHMS, FILE_PARAMETERS
 
 LAW_KEYS = ("law", "command", "command_knots")
 """Those that say which law a damper has, and how the command enters it."""
@@ -24,8 +24,6 @@ LISTS = ("command_knots", "effects")
 """Keys whose value is a list."""
 MADE_FROM = ("building", "controller")
 """Keys that name a file which a component is made from."""
-FILE_PARAMETERS = ("record", "file")
-"""Parameters that may name a file, relative to the scenario's folder."""
 FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
 """Last words of names whose value may be a file."""
 

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import pi, sin
 from pathlib import Path
 from typing import Any
 
 from ..component import SAMPLED
 from ..core.config import Document
-from ..core.text import LIST_AT_MOST, number, unknown, written
+from ..core.text import unknown
 from ..data.building_file import read_building
 from ..errors import BristleError, PhysicsError, RecordError, TrustError
-from ..fmu.description import Value, Variable
+from ..fmu.description import Variable
 from ..physics.building import ROUNDING, Building
 from ..physics.effect import EFFECTS
 from ..physics.forms import TABLE_FORM
 from ..physics.motion_file import read_two_column
 from ..physics.signals import KINDS, PARAMETERS, STEPS, TAKEN, read_steps
 from .library import Library
-from .model import Component, Part, Run, existing_file
-from .overrides import FILE_PARAMETERS
+from .model import FILE_PARAMETERS, Component, Part, Run, Signal, Wrong, existing_file, typed
 
 # Checks of built-in test signals: their samples, parameters that do nothing, rods that jump.
 
@@ -45,13 +43,13 @@ def check_signal(part: Part, folder: Path, document: Document) -> None:
     kind = part.value("kind")
     if part.file is not None or not isinstance(kind, str) or kind not in KINDS:
         return
-    if kind == "csv" and "file" in part.variables:
+    if kind == "csv" and "file" in part.variables and part.signal is None:
         _check_csv(part, folder, document)
     if kind == "steps" and "steps" in part.variables:
         _check_steps(part, document)
     taken = TAKEN[kind]
     for name in (*PARAMETERS, "steps", "file"):
-        if name in part.parameters and name not in taken:
+        if name in part.values and name not in taken:
             document.warning(
                 part.places[name],
                 f'{part.name}.{name} does nothing while {part.name}.kind is "{kind}", which takes '
@@ -128,14 +126,10 @@ def _better(duration: float, mean: float, phase: float) -> str:
     return f"; duration = {(halves - before) / (2.0 * mean):.9g} ends it at its offset"
 
 
-_INTEGER_RANGE = (-(2**31), 2**31 - 1)
-_CHOICES = re.compile(r"\bone of:? ((?:[\w-]+, )*[\w-]+)")
-
-
 def check_parameter(
     part: Part, name: str, value: object, folder: Path, library: Library, document: Document
 ) -> None:
-    """Check one parameter, and keep its value in `part.parameters` if it is right.
+    """Check one parameter, and keep its value in `part.values` if it is right.
 
     Parameters
     ----------
@@ -163,94 +157,23 @@ def check_parameter(
         )
         document.error(place, f"{where} is {kind}; only parameters and inputs can be set.")
         return
+    if isinstance(value, Signal) and name in FILE_PARAMETERS:
+        part.signal = value
+        return
     checked = typed(variable, value)
     if isinstance(checked, Wrong):
         document.error(place, f"{where} {checked.words}")
         return
-    part.parameters[name] = checked
+    part.values[name] = checked
     if variable.kind == "String" and name in FILE_PARAMETERS:
         _check_file(part, name, str(checked), folder, library, document)
-
-
-@dataclass(frozen=True)
-class Wrong:
-    """Why a value does not fit a variable, in words that follow the variable's name."""
-
-    words: str
-
-
-def typed(variable: Variable, value: object) -> Value | Wrong:
-    """Return a value in the type of a variable, within its bounds, or what is wrong with it."""
-    unit = f" {variable.unit}" if variable.unit and variable.unit != "1" else ""
-    if variable.kind == "Boolean":
-        if isinstance(value, bool):
-            return value
-        return Wrong(f"is {written(value)}; true or false is right.")
-    if variable.kind == "String":
-        return _text(variable, value)
-    if variable.kind in ("Integer", "Enumeration"):
-        if isinstance(value, bool) or not isinstance(value, int):
-            return Wrong(f"is {written(value)}; a whole number is right.")
-        least, most = _INTEGER_RANGE
-        if not least <= value <= most:
-            return Wrong(f"is {written(value)}; FMI holds whole numbers from {least} to {most}.")
-        if variable.items and value not in variable.items.values():
-            return Wrong(f"is {value}, which is no item; {shown_items(variable)} are right.")
-        real = float(value)
-    else:
-        found = number(value)
-        if isinstance(found, str):
-            return Wrong(f"{found}; a number{f' in{unit}' if unit else ''} is right.")
-        real = found
-        value = found
-    low, high = variable.minimum, variable.maximum
-    if low is not None and real < low:
-        return Wrong(f"= {real:g}{unit} lies below {low:g}{unit}; {_range(low, high, unit)}.")
-    if high is not None and real > high:
-        return Wrong(f"= {real:g}{unit} lies above {high:g}{unit}; {_range(low, high, unit)}.")
-    return value
-
-
-def _range(low: float | None, high: float | None, unit: str) -> str:
-    if high is None:
-        return f"{low:g}{unit} or more is right"
-    if low is None:
-        return f"{high:g}{unit} or less is right"
-    return f"{low:g} to {high:g}{unit} is right"
-
-
-def shown_items(variable: Variable) -> str:
-    """Return the items of an Enumeration as words: `slow = 2, fast = 5`."""
-    items = [f"{name} = {value}" for name, value in variable.items.items()]
-    more = f" and {len(items) - LIST_AT_MOST} more" if len(items) > LIST_AT_MOST else ""
-    return ", ".join(items[:LIST_AT_MOST]) + more
-
-
-def choices(variable: Variable) -> tuple[str, ...]:
-    """Return the texts that a String variable takes, where its description lists them.
-
-    FMI 2.0 has no bounds for texts; bristle's components write "one of a, b, c".
-    """
-    match = _CHOICES.search(variable.description)
-    return tuple(match[1].split(", ")) if match else ()
-
-
-def _text(variable: Variable, value: object) -> Value | Wrong:
-    if not isinstance(value, str):
-        return Wrong(f"is {written(value)}; a text in quotes is right.")
-    if "\0" in value:
-        return Wrong("holds a null character, which no FMU can take.")
-    allowed = choices(variable)
-    if allowed and value not in allowed:
-        return Wrong(f'= "{value}": {unknown(variable.name, value, allowed)}')
-    return value
 
 
 def _check_file(
     part: Part, name: str, value: str, folder: Path, library: Library, document: Document
 ) -> None:
     """Check a file that a parameter names: a ground motion is read as the run will read it."""
-    if part.fmu != "GroundMotion" or name != "record":
+    if part.kind != "GroundMotion" or name != "record":
         return
     try:
         library.read_record(value, folder)
@@ -260,7 +183,7 @@ def _check_file(
 
 def check_together(part: Part, folder: Path, document: Document) -> None:
     """Check parameters that need one another: switches of effects, kinds of signals."""
-    for name in part.parameters:
+    for name in part.values:
         switch = f"{name.rpartition('.')[0]}.on"
         if name != switch and switch in part.variables and part.value(switch) is not True:
             document.warning(
@@ -303,7 +226,7 @@ def choose_law(
         key = "command" if "command" in settings and "law" not in settings else "law"
         document.error((*part.path, key), f"{where}: {error}")
         return False
-    part.fmu = part.law.shown
+    part.kind = part.law.shown
     return True
 
 
@@ -402,7 +325,7 @@ def told_over_step(component: Component) -> dict[str, str]:
     That is what a scenario says of a foreign FMU. The outputs of a built-in signal of the kind
     "steps" stand between its steps: to go on from them would leave the range of the signal.
     """
-    kind = str(component.parameters.get("kind", ""))
+    kind = str(component.values.get("kind", ""))
     if component.path is None and KINDS.get(kind) == STEPS:
         return {v.name: SAMPLED for v in component.description.of("output") if v.kind == "Real"}
     return component.over_step

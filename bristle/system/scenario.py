@@ -6,11 +6,13 @@ Every mistake of a file is found at once, with its line and what would be right.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..core import files
-from ..core.config import Document, raised, toml_content
+from ..core.config import SCHEMA, Document, raised, toml_content
 from ..core.finding import Finding
 from ..core.text import nearest, unknown
 from ..errors import ScenarioError
@@ -18,49 +20,31 @@ from ..fmu.description import Value
 from .advice import advise
 from .connections import check_connections
 from .library import Library, changed_title, installed, needs_title
-from .model import Component, Connection, Run, Scenario
+from .model import FILE_PARAMETERS, Component, Run, System
 from .overrides import (
-    FILE_PARAMETERS,
     SCENARIO,
     apply_overrides,
     exists,
-    parse_override,
-    parse_overrides,
     plain,
 )
-from .ssp_import import unpacked
 from .toml import check_components, check_steps
-
-__all__ = [
-    "Component",
-    "Connection",
-    "Scenario",
-    "check_scenario",
-    "copy_scenario",
-    "fmu_parameters",
-    "load_scenario",
-    "loaded_with",
-    "parse_override",
-    "parse_overrides",
-    "resolve_scenario",
-    "stock_scenarios",
-]
 
 _SCHEMA = re.compile(r"^#:schema .*\n", re.MULTILINE)
 
 
 def load_scenario(
-    file: str | Path,
+    scenario: str | Path | System,
     overrides: Mapping[str, object] | None = None,
     *,
     library: Library | None = None,
-) -> Scenario:
+) -> System:
     """Return a scenario that has been checked.
 
     Parameters
     ----------
-    file : path
-        The TOML file, or the name of a stock scenario, or an SSP package.
+    scenario : path or System
+        The TOML file, or the name of a stock scenario, or an SSP package. One that is loaded
+        already keeps the overrides that it has beside new ones.
     overrides : mapping, optional
         Dotted names with values that take the place of the file's, e.g.
         `{"damper.f_c": 2.0, "run.step": 1e-3, "damper.fmu": "BinghamDamper"}`.
@@ -72,29 +56,48 @@ def load_scenario(
     ScenarioError
         If anything is wrong: the text lists every mistake with its line.
     """
-    path = resolve_scenario(file)
-    scenario, findings = _read(path, overrides or {}, library)
-    errors = [finding for finding in findings if finding.level == "error"]
-    if errors or scenario is None:
-        raise raised(ScenarioError, file, errors)
-    return scenario
+    if isinstance(scenario, System):
+        if not overrides:
+            return scenario
+        if scenario.origin is None:
+            raise ScenarioError(f"{scenario.title}: was made, and no file takes overrides.")
+        overrides = {**scenario.overrides, **overrides}
+        scenario = scenario.package or scenario.origin
+    return _checked(scenario, *_read(resolve_scenario(scenario), overrides or {}, library))
 
 
-def loaded_with(
-    scenario: Scenario | str | Path, overrides: Mapping[str, object] | None
-) -> Scenario:
-    """Return a scenario with overrides beside those that it has, where it is loaded already.
+def make_system(
+    title: str,
+    run: Mapping[str, Any],
+    components: Mapping[str, Mapping[str, Any]],
+    wires: Mapping[str, Any],
+) -> System:
+    """Return a system that is made of tables such as a scenario has, checked as one.
+
+    Parameters
+    ----------
+    title : of figures and tables
+    run : stop and step [s], algorithm
+    components : their tables by name; a Signal may stand in place of a file that is played
+    wires : input "component.port" to output, or to a table of `from`, `factor`, `offset`
 
     Raises
     ------
     ScenarioError
-        As `load_scenario`.
+        If anything is wrong.
     """
-    if not isinstance(scenario, Scenario):
-        return load_scenario(scenario, overrides)
-    if not overrides:
-        return scenario
-    return load_scenario(scenario.package or scenario.file, {**scenario.overrides, **overrides})
+    data = {
+        "schema": SCHEMA, "title": title, "run": run, "components": components,
+        "connections": wires,
+    }  # fmt: skip
+    return _checked(title, *_judged(Document(title, ScenarioError, data), {}))
+
+
+def _checked(name: str | Path, system: System | None, found: Sequence[Finding]) -> System:
+    errors = [finding for finding in found if finding.level == "error"]
+    if errors or system is None:
+        raise raised(ScenarioError, name, errors)
+    return system
 
 
 def check_scenario(
@@ -116,9 +119,12 @@ def check_scenario(
 
 def _read(
     path: Path, overrides: Mapping[str, object], library: Library | None
-) -> tuple[Scenario | None, list[Finding]]:
+) -> tuple[System | None, list[Finding]]:
+    """Return the system of a file or package, None where it has a mistake, and the findings."""
     package, notes = None, tuple[Finding, ...]()
     if path.suffix.lower() == ".ssp":
+        from .ssp_import import unpacked
+
         package = path
         try:
             made = unpacked(package)
@@ -129,10 +135,19 @@ def _read(
         document = Document(path, ScenarioError)
         if package is not None:
             document.lines.clear()  # of a file that the user does not have
-        changed = apply_overrides(document, overrides)
-        read = document.read(SCENARIO)
+        system, found = _judged(document, overrides, library, notes)
     except ScenarioError as error:
         return None, list(error.findings)
+    return system and replace(system, origin=path, package=package), found
+
+
+def _judged(
+    document: Document, overrides: Mapping[str, object], library: Library | None = None,
+    notes: Sequence[Finding] = (),
+) -> tuple[System | None, list[Finding]]:  # fmt: skip
+    """Return the system that a document describes, None where it has a mistake, and findings."""
+    changed = apply_overrides(document, overrides)
+    read = document.read(SCENARIO)
     library = library or installed()
     for note in notes:
         if ("run", note.kind) not in document.overridden:
@@ -148,52 +163,34 @@ def _read(
     # Without an error every part has been read in full.
     assert run.stop is not None
     assert run.step is not None
-    components = tuple(
-        Component(
-            part.name, part.fmu, part.file, part.building, part.parameters, part.step, description,
-            part.effects, part.controller, part.law, part.over_step,
+    folder = Path(document.path).parent
+    components = {
+        part.name: Component(
+            part.name, part.kind, description, _absolute(part.values, folder), part.file,
+            part.building, part.controller, part.effects, part.law, part.signal, part.step,
+            part.over_step,
         )
         for part in parts.values()
         if (description := part.description) is not None
-    )  # fmt: skip
-    title = path.stem if title is None else title
+    }  # fmt: skip
+    title = Path(document.path).stem if title is None else title
     if ("title",) not in document.overridden and needs_title(changed):
-        title = changed_title(components, changed)
+        title = changed_title(components.values(), changed)
     laid_over = {str(name): plain(value) for name, value in overrides.items()}
-    scenario = Scenario(
-        path, title, run.stop, run.step, run.algorithm, components, tuple(wires), tuple(found),
-        laid_over, package,
+    system = System(
+        title, run.stop, run.step, run.algorithm, components, tuple(wires), None, tuple(found),
+        laid_over,
     )  # fmt: skip
-    return scenario, found
+    return system, found
 
 
-def fmu_parameters(component: Component, folder: Path) -> dict[str, Value]:
-    """Return the values that a component's FMU is given: files as absolute paths.
-
-    Parameters
-    ----------
-    component : Component
-    folder : Path
-        The scenario's folder, `scenario.file.parent`: relative paths start there.
-
-    Raises
-    ------
-    RecordError
-        If a ground motion cannot be read. Other formats than a two-column CSV are rewritten as one
-        in the user's cache.
-    """
-    values = dict(component.parameters)
+def _absolute(values: Mapping[str, Value], folder: Path) -> dict[str, Value]:
+    """Return values with the absolute paths of files that are named from a folder."""
+    found = dict(values)
     for name in FILE_PARAMETERS:
-        value = values.get(name)
-        if not isinstance(value, str) or not value:
-            continue
-        if component.path is None and component.fmu == "GroundMotion" and name == "record":
-            from ..data import ground_motion_file
-
-            values[name] = ground_motion_file(value, folder)
-        elif exists(folder / value):
-            values[name] = str((folder / value).absolute())
-    return values
+        if (value := str(found.get(name, ""))) and (folder / value).is_file():
+            found[name] = (folder / value).absolute().as_posix()
+    return found
 
 
 def stock_scenarios() -> list[Path]:

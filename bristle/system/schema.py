@@ -13,8 +13,8 @@ from ..core.config import SCHEMA, json_schema
 from ..fmu.description import Description, Variable
 from .connections import FACTOR, FROM, OFFSET
 from .library import Library, installed
+from .model import choices
 from .overrides import COMPONENT, SCENARIO
-from .parameters import choices
 
 _TYPES = {"Real": "number", "Boolean": "boolean", "String": "string"}
 _PORT = r"^[^.]+\.."

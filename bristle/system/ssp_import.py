@@ -34,7 +34,7 @@ from .ssp_read import (
     open_package,
     read_structure,
 )
-from .toml import NAME, RESERVED, STEP_TOLERANCE, component_text, joined_text
+from .toml import NAME, RESERVED, STEP_TOLERANCE, tables_text
 
 Names = tuple[str, ...]
 Port = tuple[Names, str]
@@ -441,7 +441,7 @@ def _unpack(path: Path, folder: Path) -> ImportedPackage:
     names = _names(flat)
     parts = _components(flat, fmus, names, notes)
     wires = dict(_connection(one, flat, names) for one in flat.connections)
-    text = joined_text(structure.name or path.stem, run, parts, wires)
+    text = tables_text(structure.name or path.stem, run, parts, wires)
     scenario = folder / f"{path.stem}.toml"
     heads = [f"# {note}" for note in (f"From {path.name}.", *(note.text for note in notes))]
     scenario.write_text("\n".join([*heads, "", text]), encoding="utf-8")
@@ -485,10 +485,10 @@ def _unique(name: str, taken: Iterable[str], other: Callable[[int], str]) -> str
 
 def _components(
     flat: FlatSystem, fmus: _Fmus, names: Mapping[Names, str], notes: list[Finding]
-) -> list[str]:
+) -> dict[str, dict[str, Any]]:
     """Return the tables of the components."""
     fed = {connection.target for connection in flat.connections}
-    parts = []
+    parts: dict[str, dict[str, Any]] = {}
     for path, member in flat.components.items():
         variables = flat.descriptions[path].variables
         values = {
@@ -506,8 +506,8 @@ def _components(
                     text = f'The input "{port}" has neither source nor start value: '
                     notes.append(Finding("import", "note", f"{text}{toml_value(start)} is taken."))
                 values[variable.name] = start
-        table = {"fmu": fmus.files[member].name, **({"parameters": values} if values else {})}
-        parts.append(component_text(names[path], table))
+        given = {"parameters": values} if values else {}
+        parts[names[path]] = {"fmu": fmus.files[member].name, **given}
     return parts
 
 

@@ -16,9 +16,7 @@ from ..errors import ScenarioError
 from ..fmu.build import Plan, build, plan
 from ..fmu.description import Value, Variable
 from ..units import DIMENSIONS, Unit, alike
-from .model import Component, Connection, Scenario
-from .overrides import FILE_PARAMETERS
-from .scenario import fmu_parameters
+from .model import FILE_PARAMETERS, Component, Connection, System
 from .ssp_read import FMU_TYPE, NAMESPACES, OMS, OSP, OSP_SYSTEM, OWN, OWN_TYPE, STRUCTURE
 
 Element = ElementTree.Element
@@ -28,7 +26,7 @@ Sources = Mapping[str, str]
 """The FMU of each component by its name, relative to the text that names it."""
 
 
-def ssd_text(system: Scenario, sources: Sources) -> str:
+def ssd_text(system: System, sources: Sources) -> str:
     """Return the text of SystemStructure.ssd, SSP 1.0.
 
     The step stands in it as libcosim and Ecos read it and as OMSimulator does.
@@ -38,18 +36,18 @@ def ssd_text(system: Scenario, sources: Sources) -> str:
     root.set("version", "1.0")
     whole = _add(root, "ssd:System", name=_NAME_OF_SYSTEM)
     elements = _add(whole, "ssd:Elements")
-    ports = {component.name: _ports(component, system) for component in system.components}
+    ports = {component.name: _ports(component, system) for component in system.components.values()}
     declared = _declared(ports.values())
-    for component in system.components:
-        values = _values(component, system.file.parent)
+    for component in system.components.values():
+        values = _values(component)
         element = _add(
             elements, "ssd:Component", name=component.name, type=FMU_TYPE,
             source=sources[component.name],
         )  # fmt: skip
         _component(element, component.name, ports[component.name], values, declared)
-    if system.connections:
+    if system.wires:
         connections = _add(whole, "ssd:Connections")
-        for connection in system.connections:
+        for connection in system.wires:
             _connection(connections, connection)
     information = _add(_annotation(whole, OMS), "oms:Annotations")
     information = _add(information, "oms:SimulationInformation")
@@ -150,7 +148,7 @@ def _annotation(parent: Element, kind: str) -> Element:
     return _add(_add(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
 
 
-def osp_text(system: Scenario, sources: Sources) -> str:
+def osp_text(system: System, sources: Sources) -> str:
     """Return the text of OspSystemStructure.xml."""
     root = Element("OspSystemStructure", {"xmlns": OSP_SYSTEM, "version": "0.1"})
     for name, text in (
@@ -161,17 +159,17 @@ def osp_text(system: Scenario, sources: Sources) -> str:
     ):
         _add(root, name).text = text
     simulators = _add(root, "Simulators")
-    for component in system.components:
+    for component in system.components.values():
         source = sources[component.name]
         simulator = _add(simulators, "Simulator", name=component.name, source=source)
         if component.step is not None:
             simulator.set("stepSize", repr(component.step))
-        if values := _values(component, system.file.parent):
+        if values := _values(component):
             initials = _add(simulator, "InitialValues")
             for variable, value in values:
                 initial = _add(initials, "InitialValue", variable=variable.name)
                 _add(initial, _kind(variable), value=_written(value))
-    changed = [one for one in system.connections if one.changes]
+    changed = [one for one in system.wires if one.changes]
     if changed:
         functions = _add(root, "Functions")
         for one in changed:
@@ -179,9 +177,9 @@ def osp_text(system: Scenario, sources: Sources) -> str:
                 functions, "LinearTransformation", name=_function(one), factor=repr(one.factor),
                 offset=repr(one.offset),
             )  # fmt: skip
-    if system.connections:
+    if system.wires:
         connections = _add(root, "Connections")
-        for one in system.connections:
+        for one in system.wires:
             _osp_connection(connections, one)
     return _text(root)
 
@@ -238,13 +236,13 @@ class ExportedPackage:
 
 
 def export_ssp(
-    scenario: Scenario, file: Path, osp: Path | None = None, build: Build = build
+    scenario: System, file: Path, osp: Path | None = None, build: Build = build
 ) -> ExportedPackage:
     """Write a scenario as an SSP package, and its parts into a folder for OSP.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : System
         A checked scenario.
     file : Path
         FILE.ssp, in place of an older one.
@@ -274,26 +272,26 @@ def export_ssp(
     return ExportedPackage(tuple(written), tuple(_notes(scenario)))
 
 
-def _fmus(scenario: Scenario, folder: Path, build: Build) -> dict[str, Path]:
+def _fmus(scenario: System, folder: Path, build: Build) -> dict[str, Path]:
     """Return the FMU of each component, built with its values or copied, each of a name its own."""
     found: dict[str, Path] = {}
     taken: set[str] = set()
-    for component in scenario.components:
+    for component in scenario.components.values():
         stem = re.sub(r"[^A-Za-z0-9_]", "_", component.name)
         stem = stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}"
         while stem.lower() in taken:
             stem += "_"
         taken.add(stem.lower())
-        found[component.name] = _fmu(component, scenario.file.parent, folder, stem, build)
+        found[component.name] = _fmu(component, folder, stem, build)
     return found
 
 
-def _fmu(component: Component, home: Path, folder: Path, name: str, build: Build) -> Path:
+def _fmu(component: Component, folder: Path, name: str, build: Build) -> Path:
     if component.path is not None:
         target = folder / f"{name}.fmu"
         target.write_bytes(component.path.read_bytes())
         return target
-    values = fmu_parameters(component, home)
+    values = component.taken_values()
     files = {key: Path(str(values.pop(key))) for key in FILE_PARAMETERS if values.get(key)}
     what = plan(
         component.made_of(),
@@ -308,35 +306,35 @@ def _fmu(component: Component, home: Path, folder: Path, name: str, build: Build
     return build(what, folder)
 
 
-def _ports(component: Component, scenario: Scenario) -> list[Variable]:
+def _ports(component: Component, scenario: System) -> list[Variable]:
     """Return the connected inputs and outputs of a component."""
-    ends = {(c.target, c.input) for c in scenario.connections}
-    ends |= {(c.source, c.output) for c in scenario.connections}
+    ends = {(c.target, c.input) for c in scenario.wires}
+    ends |= {(c.source, c.output) for c in scenario.wires}
     there = component.description.variables.values()
     return [variable for variable in there if (component.name, variable.name) in ends]
 
 
-def _values(component: Component, home: Path) -> list[tuple[Variable, Value]]:
+def _values(component: Component) -> list[tuple[Variable, Value]]:
     """Return the values that stand in the package; files of built-in ones are in their FMUs."""
     inside = FILE_PARAMETERS if component.path is None else ()
-    values = fmu_parameters(component, home).items()
+    values = component.taken_values().items()
     variables = component.description.variables
     return [(variables[key], value) for key, value in values if key not in inside]
 
 
-def _notes(scenario: Scenario) -> Iterator[str]:
-    for component in scenario.components:
+def _notes(scenario: System) -> Iterator[str]:
+    for component in scenario.components.values():
         if component.step is not None and component.step != scenario.step:
             yield (
                 f"{component.name} steps every {1e3 * component.step:g} ms here; SSP has no word "
                 f"for that, and tools step it every {1e3 * scenario.step:g} ms."
             )
-        if component.path is not None and component.parameters:
+        if component.path is not None and component.values:
             yield (
                 f"{component.name}: a foreign FMU is packed as it is. Its values stand in the "
                 "package alone, which some tools leave aside."
             )
-        names = [key for key in FILE_PARAMETERS if component.parameters.get(key)]
+        names = [key for key in FILE_PARAMETERS if component.values.get(key)]
         if component.path is not None and names:
             yield f"{component.name} reads a file of this computer: {', '.join(names)}."
 
@@ -365,7 +363,7 @@ def _write(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     archive.writestr(entry, data)
 
 
-def _lay_out(folder: Path, scenario: Scenario, fmus: Mapping[str, Path]) -> list[Path]:
+def _lay_out(folder: Path, scenario: System, fmus: Mapping[str, Path]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     structure = folder / "OspSystemStructure.xml"
     for fmu in fmus.values():

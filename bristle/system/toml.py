@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-from numpy.typing import NDArray
 
 from ..core.config import ANY, Document
 from ..core.files import write_whole
@@ -15,14 +14,10 @@ from ..core.text import unknown
 from ..core.toml_lines import KeyPath
 from ..core.toml_write import toml_key, toml_table, toml_value
 from ..errors import BristleError, PhysicsError, TrustError
-from ..fmu.description import Value
-from ..model.model import Model
-from ..physics.effect import EFFECTS
 from ..physics.forms import split_form
-from ..user_code.load import own_effects, own_laws
 from .library import Library
-from .model import Component, Part, Run, Scenario, existing_file
-from .overrides import COMPONENT, FILE_PARAMETERS, LAW_KEYS, MADE_FROM, SCENARIO, flatten
+from .model import Component, Part, Run, Signal, System, existing_file
+from .overrides import COMPONENT, LAW_KEYS, MADE_FROM, SCENARIO, flatten
 from .parameters import check_parameter, check_storeys, check_together, choose_law, choose_over_step
 
 MAX_RESULT_BYTES = 2**31
@@ -180,7 +175,7 @@ def _choose_fmu(
             right = "expected a built-in name or the path of an .fmu file"
             document.error(path, f"{where}: fmu is missing: {right}.")
         return
-    part.fmu = value
+    part.kind = value
     if value.lower().endswith(".fmu") or "/" in value or "\\" in value:
         part.file = existing_file(value, folder, path, where, document)
         if part.controller:
@@ -212,7 +207,7 @@ def _describe(
             _check_begin(part, path, document)
         elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
             own = (part.effects,) if part.effects else ()
-            made_of = part.law.component if part.law else part.fmu
+            made_of = part.law.component if part.law else part.kind
             part.description = library.describe(made_of, part.building, part.controller, *own)
     except TrustError:
         raise  # no mistake of the file, and it is asked about
@@ -236,166 +231,110 @@ def _check_begin(part: Part, path: KeyPath, document: Document) -> None:
     document.note(path, f"[components.{part.name}]: {text}.")
 
 
-# A scenario as TOML text: as it is run, or made of a model and a measurement.
+# A system as TOML text, and as a folder of files.
 
 
-def scenario_text(scenario: Scenario) -> str:
-    """Return the TOML text of a scenario; read again it gives the same run.
+def scenario_text(system: System) -> str:
+    """Return the TOML text of a system; read again it gives the same one.
 
-    Files are written as absolute paths, so that the text holds wherever it is put.
+    Files are written as absolute paths, so that the text holds wherever it is put. A signal that no
+    file holds is left out: see `save`.
     """
-    folder = scenario.file.parent
-    parts = [component_text(c.name, _table_of(c, folder)) for c in scenario.components]
+    return _text(system, None)
+
+
+def save(system: System, file: Path, about: str = "") -> list[Path]:
+    """Write a system as a scenario, with the signals that it plays; return the files, it first.
+
+    Files in its folder are named from there.
+
+    Parameters
+    ----------
+    system, file : what is written, and where
+    about : comment above it
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    folder = file.absolute().parent
+    folder.mkdir(parents=True, exist_ok=True)
+    signals, components = [], dict(system.components)
+    for name, one in system.components.items():
+        if one.signal is not None:
+            signals.append(signal_file(one.signal, folder / f"{one.signal.name or name}.csv"))
+            values = {**one.values, one.plays: str(signals[-1])}
+            components[name] = replace(one, values=values, signal=None)
+    text = _text(replace(system, components=components), folder)
+    write_whole(file, f"{about}\n\n{text}" if about else text)
+    return [file, *signals]
+
+
+def _text(system: System, folder: Path | None) -> str:
     wires: dict[str, Any] = {}
-    for wire in scenario.connections:
+    for wire in system.wires:
         source = f"{wire.source}.{wire.output}"
         transformed = {"from": source, "factor": wire.factor, "offset": wire.offset}
         wires[f"{wire.target}.{wire.input}"] = transformed if wire.transformed else source
-    run = {"stop": scenario.stop, "step": scenario.step, "algorithm": scenario.algorithm}
-    return joined_text(scenario.title, run, parts, wires)
+    run = {"stop": system.stop, "step": system.step, "algorithm": system.algorithm}
+    tables = {name: _table_of(one, folder) for name, one in system.components.items()}
+    return tables_text(system.title, run, tables, wires)
 
 
-def joined_text(
-    title: str, run: Mapping[str, Any], parts: Iterable[str], wires: Mapping[str, Any]
+def tables_text(
+    title: str,
+    run: Mapping[str, Any],
+    components: Mapping[str, Mapping[str, Any]],
+    wires: Mapping[str, Any],
 ) -> str:
     """Return the text of a scenario.
 
     Parameters
     ----------
-    title : of the scenario
-    run : stop and step [s], algorithm
-    parts : the components' tables, in the order in which they step
-    wires : input "component.port" to output, or to a table of `from`, `factor`, `offset`
+    title, run, components, wires : as for `scenario.make_system`; files by their names
     """
     lines = ["schema = 1", f"title = {toml_value(title)}", "", "[run]", *toml_table(run)]
-    for part in parts:
-        lines += ["", part]
+    for name, table in components.items():
+        lines += ["", f"[components.{toml_key(name)}]", *toml_table(table)]
     return "\n".join([*lines, "", "[connections]", *toml_table(wires)]) + "\n"
 
 
-def component_text(name: str, table: Mapping[str, Any]) -> str:
-    """Return the table of a component as text."""
-    return "\n".join([f"[components.{toml_key(name)}]", *toml_table(table)])
+def _table_of(component: Component, folder: Path | None) -> dict[str, Any]:
+    """Return the table of a component; files in the folder are named from there."""
 
+    def named(file: Path) -> str:
+        file = file.absolute()
+        inside = folder is not None and file.is_relative_to(folder)
+        return (file.relative_to(folder) if inside and folder else file).as_posix()
 
-def _table_of(component: Component, folder: Path) -> dict[str, Any]:
-    """Return the table of a component; relative files are in `folder`."""
     found: dict[str, Any] = {}
     if (law := component.law) is not None:
         name, form, knots = split_form(law.name)
         given = {"command": form, "command_knots": list(knots)}
-        found["law"] = law.file.absolute().as_posix() if law.file else name
+        found["law"] = named(law.file) if law.file else name
         found |= {key: value for key, value in given.items() if value}
     else:
-        path = component.path
-        found["fmu"] = component.fmu if path is None else path.absolute().as_posix()
-    effects = [file.absolute().as_posix() for file in component.effects]
-    values = dict(component.parameters)
-    for name in FILE_PARAMETERS:
-        if (folder / str(values.get(name, ""))).is_file():
-            values[name] = (folder / str(values[name])).absolute().as_posix()
+        found["fmu"] = component.kind if component.path is None else named(component.path)
+    values = dict(component.values)
+    if (played := str(values.get(component.plays, ""))) and Path(played).is_absolute():
+        values[component.plays] = named(Path(played))
     building, controller = (
-        file.absolute().as_posix() if file is not None else None
+        named(file) if isinstance(file, Path) else file
         for file in (component.building, component.controller)
     )
     more = {
-        "building": building, "effects": effects or None, "controller": controller,
-        "step": component.step, "over_step": component.over_step or None,
-        "parameters": values or None,
+        "building": building, "effects": [named(file) for file in component.effects] or None,
+        "controller": controller, "step": component.step,
+        "over_step": component.over_step or None, "parameters": values or None,
     }  # fmt: skip
     return found | {key: value for key, value in more.items() if value is not None}
 
 
-Parameters = dict[str, float | bool]
-DamperText = Callable[[Parameters], str]
-"""Parameters that the scenario knows to the table of its damper."""
-
-
-def source_of(damper: Model) -> dict[str, Any]:
-    """Return what a damper is made from where it is no FMU of its own: law, form, own effects.
-
-    Parameters
-    ----------
-    damper : the model with the effects of the damper alone
-    """
-    plain, form, knots = split_form(damper.base_law)
-    source: dict[str, Any] = {"law": own_laws().get(plain, plain)}
-    source |= {"command": form} if form else {}
-    source |= {"command_knots": list(knots)} if knots else {}
-    own = [own_effects()[name] for name in damper.effects if EFFECTS[name].own]
-    return source | ({"effects": own} if own else {})
-
-
-def values_of(damper: Model) -> Parameters:
-    """Return what such a damper is given: values of its law and effects, and their switches."""
-    values = {
-        name: value
-        for name, value in damper.values.items()
-        if "." not in name or name.partition(".")[0] in damper.effects
-    }
-    return {**values, **{f"{effect}.on": True for effect in damper.effects}}
-
-
-def model_scenario_text(
-    head: tuple[str, str], run: tuple[float, float], parts: list[str], wires: Mapping[str, str]
-) -> str:
-    """Return the text of a scenario that is made of a model.
-
-    Parameters
-    ----------
-    head : its title, and the comment above
-    run : stop and step [s]
-    parts : the components' tables
-    wires : input to output, both "component.port"
-    """
-    title, about = head
-    plain = title.replace("\\", "/").replace('"', "'")
-    # A SignalSource names no unit. Its file holds that of the input: a factor says so to the check.
-    told = {
-        target: {"from": source, "factor": 1.0} if source.endswith(".value") else source
-        for target, source in wires.items()
-    }
-    settings = {"stop": run[0], "step": run[1], "algorithm": "gauss-seidel"}
-    return f"{about}\n\n{joined_text(plain, settings, parts, told)}"
-
-
-def part_text(name: str, source: Mapping[str, Any], parameters: Mapping[str, Value]) -> str:
-    """Return the table of a component that is made of a model.
-
-    Parameters
-    ----------
-    name : of the component
-    source : what it is made from: `fmu` or `law`, `building`, `effects` ...
-    parameters : the values that it is given
-    """
-    lines = [component_text(name, {key: _plain(value) for key, value in source.items()})]
-    if parameters:
-        pairs = (f"{toml_value(k)} = {toml_value(_plain(v))}" for k, v in parameters.items())
-        lines.append(f"parameters = {{ {', '.join(pairs)} }}")
-    return "\n".join(lines)
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as TOML has it: files are texts, and all numbers are real."""
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, bool | str | Path):
-        return str(value) if isinstance(value, Path) else value
-    return float(value)
-
-
-def signal_file(
-    time: NDArray[Any], values: NDArray[Any], title: str, unit: str, path: Path
-) -> Path:
-    """Write a signal over its times as a two-column CSV; return its path.
-
-    Parameters
-    ----------
-    time, values : (n,) s, and the signal in its unit
-    title, unit : of its column
-    path : of the file
-    """
-    rows = [f"time [s],{title} [{unit}]"]
-    rows += [f"{t:.12g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
+def signal_file(signal: Signal, path: Path) -> Path:
+    """Write a signal as a two-column CSV; return its path."""
+    rows = [f"time [s],{signal.quantity} [{signal.unit}]"]
+    for t, value in zip(signal.time.tolist(), signal.values.tolist(), strict=True):
+        rows.append(f"{repr(t).removesuffix('.0')},{value!r}")
     write_whole(path, "\n".join(rows) + "\n")
     return path

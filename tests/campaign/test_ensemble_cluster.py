@@ -14,7 +14,7 @@ import pytest
 
 import bristle
 from bristle.campaign import cluster, read_ensemble
-from bristle.campaign.campaign import Outcome, Plan
+from bristle.campaign.campaign import Campaign, Outcome
 from bristle.cli import main
 from bristle.errors import EnsembleError
 
@@ -57,11 +57,11 @@ def test_another_version_on_a_worker_is_named(
         bristle.ensemble(write(), cluster=local.scheduler_address)
 
 
-def _slow(plan: Plan, run: int) -> Outcome:
+def _slow(campaign: Campaign, run: int) -> Outcome:
     """Kill the worker at run 5, the first time; take a moment otherwise."""
     import time
 
-    marker = plan.file.parent / "died_at_5"
+    marker = campaign.draws.file.parent / "died_at_5"
     if run == 5 and not marker.exists():
         marker.touch()
         os.kill(os.getpid(), signal.SIGKILL)
@@ -74,7 +74,7 @@ def test_a_lost_worker_loses_no_finished_run(
 ) -> None:
     # Not by name: workers do not see this folder of tests.
     monkeypatch.setattr(_slow, "__module__", "__main__")
-    monkeypatch.setattr(cluster, "run_one", _slow)
+    monkeypatch.setattr(cluster, "outcome_of", _slow)
     path = write(("runs = 12", "runs = 60"))
     found = bristle.ensemble(path, out=tmp_path / "out", cluster=local.scheduler_address)
     assert (tmp_path / "died_at_5").exists()
@@ -86,13 +86,13 @@ def test_a_lost_worker_loses_no_finished_run(
 def test_a_run_that_kills_every_worker_is_a_failure(
     write: Write, local: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def deadly(plan: Plan, run: int) -> Outcome:
+    def deadly(campaign: object, run: int) -> Outcome:
         if run == 3:
             os.kill(os.getpid(), signal.SIGKILL)
         return Outcome(run, (0.0, 0.0, 0.0))
 
     monkeypatch.setattr(deadly, "__module__", "__main__")
-    monkeypatch.setattr(cluster, "run_one", deadly)
+    monkeypatch.setattr(cluster, "outcome_of", deadly)
     found = bristle.ensemble(write(), cluster=local.scheduler_address)
     # Dask may blame a neighbour as well, while a dead worker is not yet seen to be dead.
     failed = found.runs[found.runs["status"] == "failed"]

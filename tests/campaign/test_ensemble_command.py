@@ -12,7 +12,6 @@ from PIL import Image
 
 import bristle
 from bristle.campaign import read_ensemble
-from bristle.campaign.campaign import prepare
 from bristle.campaign.view import correlations, draw_ensemble, varying_numbers
 from bristle.cli import main
 from bristle.view.style import look
@@ -27,7 +26,7 @@ def test_tables_and_figure_are_written(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     path = write()
-    prepare(read_ensemble(path))  # compiling for the first time is told
+    read_ensemble(path).campaign().prepare()  # compiling for the first time is told
     monkeypatch.chdir(tmp_path)
     assert main(["ensemble", str(path)]) == 0
     out, err = capsys.readouterr()

@@ -189,7 +189,7 @@ def test_a_whole_number_is_not_drawn_from_between_two(write: Write, tmp_path: Pa
 
 def test_what_varies_is_tried_beside_what_is_set(write: Write) -> None:
     step = ("voltage.level", "run.step"), ("{ each = [0.0, 4.0] }", "{ each = [0.0003, 0.0001] }")
-    assert read_ensemble(write(*step, ("0.5", "0.3"))).fixed == {"run.stop": 0.3}
+    assert read_ensemble(write(*step, ("0.5", "0.3"))).system.overrides == {"run.stop": 0.3}
     with pytest.raises(EnsembleError, match="a whole number is right"):
         read_ensemble(write(*step))
 

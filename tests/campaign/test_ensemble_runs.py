@@ -16,11 +16,14 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle.campaign import campaign, pool, read_ensemble
-from bristle.campaign.campaign import Outcome, Output, Plan
+from bristle.campaign import Plan, read_ensemble
+from bristle.campaign.campaign import Campaign, Outcome, Statistic
 from bristle.campaign.table import LEVELS, RunsTable, failures
 from bristle.core import files
-from bristle.errors import EnsembleError, RunError
+from bristle.engine.coupled import Coupled
+from bristle.engine.results import Table
+from bristle.errors import EnsembleError, RunError, ScenarioError
+from bristle.system.model import System
 
 Write = Callable[..., Path]
 ROOT = Path(__file__).parents[2]
@@ -67,11 +70,11 @@ def test_a_scenario_that_changed_is_read_again_in_the_same_process(
         ('"structure.building.masses.2" = { uniform = [1.1, 1.4] }\n', ""),
     )
     before = read_ensemble(path)
-    assert campaign.scenario_of(before, before.values(0), tmp_path).stop == 10.0
+    assert before.campaign().varied(before.values(0)).stop == 10.0
     mine.write_text(re.sub(r"(?m)^stop = .*$", "stop = 1.0", stock))
     after = read_ensemble(path)
     assert after.digest() != before.digest()
-    assert campaign.scenario_of(after, after.values(0), tmp_path).stop == 1.0
+    assert after.campaign().varied(after.values(0)).stop == 1.0
 
 
 def test_records_steps_and_components_may_vary(write: Write, tmp_path: Path) -> None:
@@ -102,7 +105,7 @@ def test_runs_are_the_same_on_one_process_and_on_two(write: Write, tmp_path: Pat
         assert len(found.runs) == 12
         files.append((tmp_path / str(workers) / "runs.csv").read_bytes())
     assert files[0] == files[1]
-    again = campaign.run_one(found.plan, 7)
+    again = found.plan.campaign().outcome(7)
     assert again.numbers == tuple(found.runs.loc[7, [o.name for o in found.plan.outputs]])
 
 
@@ -176,15 +179,20 @@ def test_reasons_that_differ_in_numbers_are_one() -> None:
 def test_what_a_component_raises_is_a_failed_run(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken(plan: Plan, scenario: object) -> tuple[float, ...]:
+    def broken(self: Coupled, system: System) -> Table:
         raise ZeroDivisionError("somebody's effect")
 
-    plan = read_ensemble(write())
-    monkeypatch.setattr(campaign, "_numbers", broken)
-    assert campaign.run_one(plan, 3).reason == "ZeroDivisionError: somebody's effect"
-    monkeypatch.setattr(campaign, "_numbers", lambda plan, scenario: (1.0, float("nan"), 2.0))
-    reason = campaign.run_one(plan, 3).reason
-    assert reason == "RunError: rms structure.floor2_acceleration_absolute is not finite."
+    def lost(self: Coupled, system: System) -> Table:
+        table = made(self, system)
+        table["structure.floor2_acceleration_absolute"][-1] = float("nan")
+        return table
+
+    plan, made = read_ensemble(write()), Coupled.run
+    monkeypatch.setattr(Coupled, "run", broken)
+    assert plan.campaign().outcome(3).reason == "ZeroDivisionError: somebody's effect"
+    monkeypatch.setattr(Coupled, "run", lost)
+    reason = plan.campaign().outcome(3).reason
+    assert reason == "RunError: peak structure.floor2_acceleration_absolute is not finite."
 
 
 def test_quantiles_are_those_of_the_runs(write: Write) -> None:
@@ -203,12 +211,13 @@ def test_quantiles_are_those_of_the_runs(write: Write) -> None:
 )  # fmt: skip
 def test_statistics(how: str, number: float) -> None:
     values = np.array([2.0, -3.0, 1.0])
-    assert campaign.statistic(Output("a.b", how), values) == pytest.approx(number)
+    assert Statistic("a.b", how).of(values) == pytest.approx(number)
 
 
-def _dies(plan: Plan, run: int) -> Outcome:
+def _dies(campaign: Campaign, run: int) -> Outcome:
     """Kill the process at run 3 always, at run 6 the first time."""
-    marker = plan.file.parent / "died_at_6"
+    assert isinstance(campaign.draws, Plan)
+    marker = campaign.draws.file.parent / "died_at_6"
     if run == 3 or (run == 6 and not marker.exists()):
         if run == 6:
             marker.touch()
@@ -220,7 +229,7 @@ def _dies(plan: Plan, run: int) -> Outcome:
 def test_a_process_that_dies_costs_no_finished_run(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pool, "run_one", _dies)
+    monkeypatch.setattr(Campaign, "outcome", _dies)
     found = bristle.ensemble(write(), workers=2)
     assert len(found.runs) == 12
     assert found.runs.index[found.runs["status"] == "failed"].tolist() == [3]
@@ -265,7 +274,7 @@ def test_a_kill_leaves_what_there_was_and_no_process(write: Write, tmp_path: Pat
     table = RunsTable(read_ensemble(path), out / "runs.csv")
     assert len(table.outcomes) >= 5
     run, outcome = next(iter(table.outcomes.items()))
-    assert campaign.run_one(table.plan, run) == outcome
+    assert table.plan.campaign().outcome(run) == outcome
     table.close(complete=False)
 
 
@@ -328,12 +337,7 @@ def test_a_wrong_number_of_workers_is_named(write: Write, workers: int) -> None:
 def test_a_scenario_that_cannot_be_compiled_is_refused_at_once(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bristle.errors import ScenarioError
-
-    def cannot(scenario: object) -> None:
-        raise ScenarioError("cannot be compiled")
-
-    monkeypatch.setattr("bristle.engine.coupled.simulate", cannot)
+    monkeypatch.setattr(Coupled, "refuses", lambda self, system: "cannot be compiled")
     with pytest.raises(ScenarioError, match="cannot be compiled"):
         bristle.ensemble(write(), out=tmp_path / "a")
 

@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.campaign import campaign, read_ensemble
-from bristle.campaign.campaign import Plan, scenario_of
+from bristle.campaign import read_ensemble
 from bristle.campaign.identified import Places
 from bristle.campaign.table import LEVELS, VARIES, notes, quantiles
 from bristle.cli import main
+from bristle.engine.coupled import Coupled
+from bristle.engine.results import Table
 from bristle.errors import BristleError, EnsembleError, RunError
 from bristle.model.model import Model, new_model
 from bristle.model.model_file import model_text
-from bristle.system.scenario import Scenario
+from bristle.system.model import System
 
 Write = Callable[..., Path]
 MASSES = '"structure.building.masses.2" = { uniform = [1.1, 1.4] }\n'
@@ -74,7 +75,7 @@ def test_the_scenario_has_the_models_values_and_effects(write: Write, tmp_path: 
     model = a_model("gas_spring").with_values({"gas_spring.k": 33.0, "sigma_2": 77.0})
     a_study(tmp_path, model.with_covariance(list(STD), COVARIANCE))
     plan = read_ensemble(with_study(write))
-    parameters = scenario_of(plan, plan.values(0), tmp_path).component("damper").parameters
+    parameters = plan.campaign().varied(plan.values(0)).components["damper"].values
     assert parameters["gas_spring.on"] is True
     assert (parameters["gas_spring.k"], parameters["sigma_2"]) == (33.0, 77.0)
     assert parameters["sigma_a"] == plan.values(0)["damper.sigma_a"]
@@ -154,14 +155,14 @@ def test_a_limit_of_the_sampling_joins_no_run(
 
 def failing(monkeypatch: pytest.MonkeyPatch, above: float, error: Exception) -> None:
     """Let runs with a gas spring stiffer than `above` [N/m] fail."""
-    made = campaign._numbers
+    made = Coupled.run
 
-    def numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
-        if scenario.component("damper").parameters.get("gas_spring.k", 0.0) > above:
+    def run(self: Coupled, system: System, on_rows: Any = None) -> Table:
+        if float(system.components["damper"].values.get("gas_spring.k", 0.0)) > above:
             raise error
-        return made(plan, scenario)
+        return made(self, system, on_rows)
 
-    monkeypatch.setattr(campaign, "_numbers", numbers)
+    monkeypatch.setattr(Coupled, "run", run)
 
 
 def test_why_an_effect_could_not_be_simulated_is_kept(
@@ -169,7 +170,7 @@ def test_why_an_effect_could_not_be_simulated_is_kept(
 ) -> None:
     a_study(tmp_path, None, SPRING)
     path = with_study(write, (MASSES, ""), (STEADY, ""))
-    made = campaign._numbers
+    made = Coupled.run
     failing(monkeypatch, 80.0, RunError("it stops.\n  A shorter step would be right."))
     asked: dict[str, Any] = {"out": tmp_path / "out", "workers": 1, "with_limits": True}
     for _ in range(2):  # the second time from the table
@@ -180,7 +181,7 @@ def test_why_an_effect_could_not_be_simulated_is_kept(
         assert found.parts[PEAK] == {VARIES: 1.0}
         assert "(it stops)" in found.notes[0]
         assert found.notes[0] in repr(found)
-    monkeypatch.setattr(campaign, "_numbers", made)
+    monkeypatch.setattr(Coupled, "run", made)
     found = bristle.ensemble(path, runs=8, retry=True, **asked)
     assert 0 < found.continued < 8
     assert set(found.runs["reason"]) == {""}
@@ -192,7 +193,7 @@ def test_what_an_effect_raises_costs_only_the_run_with_it(
     a_study(tmp_path, None, SPRING)
     failing(monkeypatch, 0.0, ZeroDivisionError("somebody's effect"))
     plan = read_ensemble(with_study(write, (MASSES, ""), (STEADY, "")), 4, with_limits=True)
-    found = campaign.run_one(plan, 1)
+    found = plan.campaign().outcome(1)
     assert (found.reason, found.lost) == ("", "ZeroDivisionError: somebody's effect")
 
 

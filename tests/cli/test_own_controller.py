@@ -170,7 +170,7 @@ def test_a_copy_of_a_stock_scenario_runs_the_same(here: Path, stock: Path) -> No
     one, other = load_scenario(file.absolute()), load_scenario(stock)
     copied = scenario_text(one).replace(str(file.absolute().parent), str(stock.parent))
     assert copied == scenario_text(other)
-    for component in one.components:
+    for component in one.components.values():
         if component.building is not None:  # it stands beside the copy
             assert Path(component.building).is_relative_to(file.absolute().parent)
             assert Path(component.building).is_file()

@@ -15,7 +15,9 @@ from toys import Maker
 
 from bristle import load_results, run
 from bristle.cli import main
+from bristle.engine.cosimulation import Cosimulation, ignore
 from bristle.engine.coupling_error import (
+    again_by,
     against,
     discrete_outputs,
     estimate,
@@ -23,10 +25,13 @@ from bristle.engine.coupling_error import (
     find_step,
     without_doubtful,
 )
-from bristle.engine.run import run_quietly
 from bristle.engine.schedule import held_inputs, make_nodes
 from bristle.errors import RunError, ScenarioError
-from bristle.system.scenario import Scenario, load_scenario
+from bristle.system.model import System
+from bristle.system.scenario import load_scenario
+
+AGAIN = again_by(Cosimulation(listen=ignore))
+
 
 T = np.linspace(0.0, 3.0, 301)
 EXACT = np.sin(T)
@@ -107,9 +112,9 @@ def test_a_controller_that_does_not_settle_spoils_every_estimate_from_finer_step
     assert discrete_outputs(scenario) == [
         f"controller.{name}" for name in ("voltage", "command_raw", "scheduling")
     ]
-    quiet = run_quietly(scenario, "fmu")
+    quiet = AGAIN(scenario, "fmu")
 
-    def again(one: Scenario, engine: str) -> pd.DataFrame:
+    def again(one: System, engine: str) -> pd.DataFrame:
         if engine == "compiled":
             raise ScenarioError("foreign")
         parts = round(one.steps / scenario.steps)
@@ -164,7 +169,7 @@ def test_friction_that_jumps_is_warned_of(caplog: pytest.LogCaptureFixture) -> N
 
 def test_friction_that_jumps_spoils_all_that_follows_it() -> None:
     scenario = load_scenario("half_sine_pulse", {"damper.fmu": "BinghamDamper", "run.stop": 0.02})
-    frame = run_quietly(scenario, "fmu")
+    frame = AGAIN(scenario, "fmu")
     good, none = against(off(0.01), off(0.005), EXACT), against(EXACT, EXACT, EXACT)
     found = {**dict.fromkeys(map(str, frame), good), "voltage.voltage": none}
     assert without_doubtful(scenario, frame, found)["structure.drift1"].worth
@@ -185,11 +190,11 @@ def test_a_signal_of_steps_is_not_told_ahead_and_spoils_jacobi_alone() -> None:
         changed = {**given, **steps, "run.stop": 0.02, "run.algorithm": algorithm}
         scenario = load_scenario("half_sine_pulse", changed)
         assert discrete_outputs(scenario) == ["voltage.value"]
-        nodes = make_nodes(scenario, {c.name: c.description for c in scenario.components})
+        nodes = make_nodes(scenario, {c.name: c.description for c in scenario.components.values()})
         damper = [node.name for node in nodes].index("damper")
         assert (damper, "voltage") not in held_inputs(nodes)
         assert (damper, "velocity") in held_inputs(nodes)
-        frame = run_quietly(scenario, "fmu")
+        frame = AGAIN(scenario, "fmu")
         good = against(off(0.01), off(0.005), EXACT)
         found = dict.fromkeys(map(str, frame), good) | {
             "voltage.value": against(EXACT, EXACT, EXACT)
@@ -208,10 +213,10 @@ def test_an_error_larger_than_the_peak_is_worth_nothing() -> None:
 
 def test_a_tolerance_finds_the_largest_step_that_keeps_it(scenario_of: Maker) -> None:
     scenario = load_scenario(oscillator(scenario_of, "midpoint"))
-    steps = {t: find_step(scenario, t, run_quietly).step for t in (3e-3, 3e-4, 3e-5)}
+    steps = {t: find_step(scenario, t, AGAIN).step for t in (3e-3, 3e-4, 3e-5)}
     assert steps[3e-5] < steps[3e-4] <= 0.025
     for tolerance, step in steps.items():
-        finest = load_scenario(scenario.file, {"run.step": step, "two.step": step / 2})
+        finest = load_scenario(scenario.origin, {"run.step": step, "two.step": step / 2})
         frame = run(finest)
         exact = 1.0 - np.cos(frame.index.to_numpy())
         assert np.abs(frame["one.x"] - exact).max() / 2.0 <= 1.1 * tolerance
@@ -224,7 +229,7 @@ def test_a_tolerance_shortens_the_own_steps_of_components_too(
     given = ["run", str(file), "--no-figure", "--out", str(tmp_path / "out")]
     assert main([*given, "--tolerance", "0.003%"]) == 0
     made = load_results(tmp_path / "out").attrs["made"]
-    step = find_step(load_scenario(file), 3e-5, run_quietly).step
+    step = find_step(load_scenario(file), 3e-5, AGAIN).step
     assert step < load_scenario(file).step
     assert made["overrides"] == {"run.step": step, "two.step": step / 2}
     assert f"({1e3 * step / 2:.6g} ms of two)" in capsys.readouterr().err
@@ -232,10 +237,10 @@ def test_a_tolerance_shortens_the_own_steps_of_components_too(
 
 def test_a_tolerance_that_nothing_keeps_is_refused(scenario_of: Maker) -> None:
     scenario = load_scenario(oscillator(scenario_of, "midpoint"))
-    quiet = run_quietly(scenario, "fmu")
+    quiet = AGAIN(scenario, "fmu")
     noise = np.random.default_rng(1)
 
-    def noisy(one: Scenario, engine: str) -> pd.DataFrame:
+    def noisy(one: System, engine: str) -> pd.DataFrame:
         rows = round(one.steps / scenario.steps)
         frame = quiet.loc[quiet.index.repeat(rows)].iloc[rows - 1 :]
         if engine == "compiled":

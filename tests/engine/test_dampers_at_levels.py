@@ -12,7 +12,7 @@ from scipy.signal import lsim
 
 from bristle import run
 from bristle.data.building_file import read_building
-from bristle.engine.coupled import room, sharing, simulate
+from bristle.engine.coupled import Coupled, room, sharing
 from bristle.engine.coupling_error import bond_names
 from bristle.engine.schedule import make_nodes
 from bristle.fmu import catalogue
@@ -81,7 +81,7 @@ def energy(building: Building, columns: dict[str, np.ndarray]) -> np.ndarray:
 def test_the_dampers_take_what_an_undamped_building_loses(tmp_path: Path) -> None:
     names = ["damper", "brace", "tie"]
     file = scenario(tmp_path, dict.fromkeys(names, LUGRE), "damping_ratio = 0.0")
-    columns = simulate(load_scenario(file))
+    columns = Coupled().run(load_scenario(file))
     after = columns["time"] > 0.2005
     kept = energy(read_building(tmp_path / "tower.toml"), columns)[after]
     taken = sum(columns[f"{name}.dissipated_energy"] for name in names)[after]
@@ -95,7 +95,7 @@ def test_dashpots_at_several_levels_are_their_matrices(tmp_path: Path) -> None:
     # A Bingham law without friction whose viscous part does not fall off at such speeds.
     dashpot = 'law = "bingham"\nparameters = {{ voltage = 0.0, f_c = 0.0, c_0 = {}, v_n = 100 }}'
     file = scenario(tmp_path, {name: dashpot.format(value) for name, value in c.items()})
-    columns = simulate(load_scenario(file, {"ground.amplitude": 0.03}))
+    columns = Coupled().run(load_scenario(file, {"ground.amplitude": 0.03}))
     building = read_building(tmp_path / "tower.toml")
     M, C, K = (np.array(matrix) for matrix in building[1:4])
     for name, value in c.items():
@@ -132,7 +132,9 @@ def test_the_master_comes_to_the_coupled_engine_in_second_order() -> None:
 
 def test_every_damper_has_its_power_bond() -> None:
     loaded = load_scenario(STOCK)
-    descriptions = {c.name: catalogue.describe(c.made_of(), c.building) for c in loaded.components}
+    descriptions = {
+        c.name: catalogue.describe(c.made_of(), c.building) for c in loaded.components.values()
+    }
     assert bond_names(make_nodes(loaded, descriptions), "midpoint") == [
         "damper.force",
         "brace.force",
@@ -144,7 +146,7 @@ def test_dry_friction_sticks_at_two_levels_at_once(tmp_path: Path) -> None:
     file = scenario(
         tmp_path, {name: bingham.format(v) for name, v in (("damper", 8.0), ("brace", 6.0))}
     )
-    columns = simulate(load_scenario(file, {"run.stop": 5.0}))
+    columns = Coupled().run(load_scenario(file, {"run.stop": 5.0}))
     late = columns["time"] > 4.0
     for port in ("base_velocity", "brace_velocity"):
         assert np.abs(columns[f"structure.{port}"]).max() > 3e-3
@@ -157,7 +159,7 @@ def test_dry_friction_sticks_at_two_levels_at_once(tmp_path: Path) -> None:
 
 def test_dampers_at_one_place_share_and_others_by_how_they_move_each_other() -> None:
     scenario = load_scenario(STOCK)
-    building = read_building(scenario.component("structure").building)
+    building = read_building(scenario.components["structure"].building)
     n = building.size
     M_inverse = np.linalg.inv(building.M)
     held = np.zeros((2 * n, n + 1))

@@ -17,13 +17,16 @@ import pandas as pd
 import pytest
 
 from bristle import run
-from bristle.engine.coupling_error import expect
-from bristle.engine.run import run_quietly
+from bristle.engine.cosimulation import Cosimulation, ignore
+from bristle.engine.coupling_error import again_by, expect
 from bristle.errors import ScenarioError
 from bristle.fmu.description import read_description
-from bristle.system.model import Connection
-from bristle.system.scenario import Scenario, load_scenario
+from bristle.system.model import Connection, System
+from bristle.system.scenario import load_scenario
 from bristle.system.ssp_write import export_ssp, osp_text
+
+AGAIN = again_by(Cosimulation(listen=ignore))
+
 
 SCENARIO = """
 schema = 1
@@ -299,7 +302,7 @@ def test_the_error_to_expect_and_the_step_that_keeps_it_small(scenario: Path) ->
 
 
 def test_a_step_that_the_order_promises_and_a_run_does_not_keep_is_halved(scenario: Path) -> None:
-    def again(one: Scenario, engine: str) -> pd.DataFrame:
+    def again(one: System, engine: str) -> pd.DataFrame:
         frame = sampled(1.0)(one, engine)
         if one.step == 0.002 / 32:
             frame["damper.force"] += 0.004 * np.sin(frame.index)
@@ -328,7 +331,7 @@ def test_a_small_error_needs_no_shorter_step(scenario: Path) -> None:
 @pytest.mark.slow
 def test_the_step_that_is_told_keeps_the_error_of_a_closed_loop(loop: Path) -> None:
     file = loop.with_suffix(".toml")
-    found = expect(load_scenario(file), run_quietly)
+    found = expect(load_scenario(file), AGAIN)
     # With Jacobi the base acceleration jumps a step late, at however short a step.
     assert [one.algorithm for one in found if one.step is not None] == ["gauss-seidel"]
     for one in found:
@@ -365,5 +368,5 @@ def test_the_package_runs_here_as_the_scenario_does(package: Path, rows: pd.Data
 def test_functions_of_osp_have_names_of_their_own() -> None:
     ends = (("d", "x_in"), ("d_x", "in"))
     wires = tuple(Connection(*end, "a", "y", 2.0, 0.0, True) for end in ends)
-    text = osp_text(Scenario(Path("t.toml"), "t", 1.0, 0.1, "jacobi", (), wires), {})
+    text = osp_text(System(Path("t.toml"), "t", 1.0, 0.1, "jacobi", (), wires), {})
     assert len(set(re.findall(r'<LinearTransformation name="([^"]*)"', text))) == len(ends)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
 from bristle.engine.run import run
 from bristle.fmu import catalogue
 from bristle.fmu.controller import MEASURED
@@ -97,9 +97,9 @@ def replayed(columns: dict[str, np.ndarray], slave, ports: dict[str, str]) -> np
 
 def ready(scenario, name: str):
     """Return a component of a scenario as the object that its FMU carries."""
-    component = scenario.component(name)
-    slave = catalogue.instantiate(component.fmu)
-    for key, value in component.parameters.items():
+    component = scenario.components[name]
+    slave = catalogue.instantiate(component.kind)
+    for key, value in component.values.items():
         slave._values[slave._index[key]] = type(slave[key])(value)
     return slave
 
@@ -109,7 +109,7 @@ def test_the_engine_runs_the_law_of_the_component(
     fmu: str, given: dict[str, object], tmp_path: Path
 ) -> None:
     scenario = load_scenario(written(tmp_path, fmu, given))
-    columns = simulate(scenario)
+    columns = Coupled().run(scenario)
     answers = replayed(columns, ready(scenario, "controller"), SOURCES)
     assert np.ptp(answers[:, 0]) > 0.5
     for j, port in enumerate(("voltage", "command_raw", "scheduling")):
@@ -136,7 +136,7 @@ def test_sensors_show_in_the_engine_what_the_component_shows(tmp_path: Path) -> 
         ]
     )
     scenario = load_scenario(_file(tmp_path, components, connections, {}))
-    columns = simulate(scenario)
+    columns = Coupled().run(scenario)
     shown = replayed(columns, ready(scenario, "sensors"), SOURCES)
     for j, port in enumerate(MEASURED):
         assert columns[f"sensors.{port}_measured"] == pytest.approx(shown[:, j], rel=1e-12), port
@@ -147,8 +147,8 @@ def test_sensors_show_in_the_engine_what_the_component_shows(tmp_path: Path) -> 
 
 def test_a_controller_keeps_its_clock_whatever_the_step(tmp_path: Path) -> None:
     """Rows 10 ms apart show every fifth of those 2 ms apart: the loop inside is the same."""
-    fine = simulate(load_scenario(written(tmp_path, "Lpv", {})))
-    coarse = simulate(load_scenario(written(tmp_path, "Lpv", {}, step=0.01)))
+    fine = Coupled().run(load_scenario(written(tmp_path, "Lpv", {})))
+    coarse = Coupled().run(load_scenario(written(tmp_path, "Lpv", {}, step=0.01)))
     for name in ("structure.floor2_acceleration_absolute", "damper.force", "controller.voltage"):
         assert coarse[name] == pytest.approx(fine[name][::5], rel=1e-9, abs=1e-9), name
 
@@ -157,7 +157,7 @@ def test_instants_between_substeps_are_measured_as_if_inputs_were_linear(tmp_pat
     # 1.8943 ms is no whole number of substeps; 1.9 ms is.
     peaks = [
         np.abs(
-            simulate(load_scenario(written(tmp_path, "Skyhook", given)))[
+            Coupled().run(load_scenario(written(tmp_path, "Skyhook", given)))[
                 "structure.floor2_acceleration_absolute"
             ]
         ).max()
@@ -171,7 +171,9 @@ def test_instants_between_substeps_are_measured_as_if_inputs_were_linear(tmp_pat
 
 def test_the_force_follows_a_new_voltage_at_once() -> None:
     """At an instant the row shows the force at the new voltage: the motion has not moved yet."""
-    columns = simulate(load_scenario("el_centro_0p6g_clipped", {"run.stop": 3.0, "run.step": 2e-4}))
+    columns = Coupled().run(
+        load_scenario("el_centro_0p6g_clipped", {"run.stop": 3.0, "run.step": 2e-4})
+    )
     voltage = columns["controller.voltage"]
     changes = np.abs(np.diff(columns["damper.force"]))
     turned = np.diff(voltage) != 0.0
@@ -184,7 +186,7 @@ def test_the_force_follows_a_new_voltage_at_once() -> None:
 
 @pytest.mark.parametrize(("law", "peak"), [("hinf", 6.958), ("lpv", 6.353), ("clipped", 7.141)])
 def test_stock_scenarios_give_the_published_peaks(law: str, peak: float) -> None:
-    columns = simulate(load_scenario(f"el_centro_0p6g_{law}", {"run.stop": 31.18}))
+    columns = Coupled().run(load_scenario(f"el_centro_0p6g_{law}", {"run.stop": 31.18}))
     found = np.abs(columns["structure.floor2_acceleration_absolute"]).max()
     assert found == pytest.approx(peak, rel=0.03 if law == "clipped" else 0.01)
 
@@ -211,12 +213,12 @@ def test_a_wrong_parameter_is_refused_with_the_component(tmp_path: Path) -> None
 
     path = written(tmp_path, "Skyhook", {"kind": "pendulum"})
     with pytest.raises(ScenarioError, match=r"controller.*pendulum"):
-        simulate(load_scenario(path))
+        Coupled().run(load_scenario(path))
 
 
 def test_filtered_velocity_is_the_rate_of_the_low_passed_displacement(tmp_path: Path) -> None:
     given = {"velocity": "filtered", "velocity_corner": 18.0}
-    columns = simulate(load_scenario(written(tmp_path, "Lpv", given)))
+    columns = Coupled().run(load_scenario(written(tmp_path, "Lpv", given)))
     v, filtered = columns["structure.base_velocity"], columns["controller.scheduling"]
     spectrum, own = np.fft.rfft(v), np.fft.rfft(filtered)
     f = np.fft.rfftfreq(len(v), 0.002)

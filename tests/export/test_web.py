@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
 from bristle.errors import BuildError, ScenarioError
 from bristle.export.web import body, chosen, described, export_component, export_web
 from bristle.export.web_module import Numbers, Slider
@@ -176,7 +176,7 @@ def run_in_node(folder: Path, changes: dict[str, float], times: int = 1) -> dict
 def test_rows_are_those_of_the_compiled_engine(name: str, tmp_path: Path) -> None:
     export_web(name, tmp_path)
     found = run_in_node(tmp_path, {})
-    right = simulate(load_scenario(name))
+    right = Coupled().run(load_scenario(name))
     assert found["complete"]
     for port, column in found["columns"].items():
         peak = np.max(np.abs(right[port]))
@@ -190,7 +190,7 @@ def test_rows_are_those_of_the_compiled_engine(name: str, tmp_path: Path) -> Non
 def test_a_moved_slider_gives_the_run_with_that_value(tmp_path: Path) -> None:
     files = export_web(PASSIVE, tmp_path, {"voltage.level": (0.0, 8.0)})
     found = run_in_node(tmp_path, {"voltage.level": 7.0})
-    right = simulate(load_scenario(PASSIVE, {"voltage.level": 7.0}))
+    right = Coupled().run(load_scenario(PASSIVE, {"voltage.level": 7.0}))
     for port, column in found["columns"].items():
         assert np.max(np.abs(column - right[port])) <= AGREE * np.max(np.abs(right[port])), port
     wasm = next(file for file in files if file.suffix == ".wasm")

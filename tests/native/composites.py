@@ -12,7 +12,7 @@ from both_forms import KINDS, Native, folder
 from numpy.typing import NDArray
 
 from bristle.conformance.native import Instance
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
 from bristle.export.composite import export_composite
 from bristle.native.build import build
 from bristle.native.zig import here
@@ -96,4 +96,4 @@ def compared(
     one = Composite(built(scenario, overrides=overrides)).begin()
     rows = one.rows(run.steps, run.step)
     one.one.free()
-    return one.difference(rows, simulate(run))
+    return one.difference(rows, Coupled().run(run))

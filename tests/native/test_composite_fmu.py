@@ -19,7 +19,7 @@ from composites import Composite, built, compared
 from benchmarks import _hosts
 from bristle.cli import main
 from bristle.conformance import conform
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
 from bristle.engine.run import run
 from bristle.export.composite import export_composite
 from bristle.fmu.archive import library_member
@@ -67,7 +67,7 @@ def test_so_are_they_in_fmpy() -> None:
     experiment = description.defaultExperiment
     assert (float(experiment.stopTime), float(experiment.stepSize)) == (35.0, 0.002)
     table = fmpy.simulate_fmu(str(path), output=names, output_interval=0.002)
-    right = simulate(load_scenario(PASSIVE))
+    right = Coupled().run(load_scenario(PASSIVE))
     assert len(table) == len(right["time"])
     for name in {*names} - {"fault"}:  # that of the whole has no column in a run
         peak = float(np.max(np.abs(right[name]))) or 1.0
@@ -109,7 +109,7 @@ def test_it_conforms() -> None:
 
 def test_fmi_3_gives_the_same_rows(tmp_path: Path) -> None:
     path = export_composite(HALF_SINE, tmp_path, partial(build, platforms=[here()], fmi=3))
-    right = simulate(load_scenario(HALF_SINE, {"run.stop": 0.5}))
+    right = Coupled().run(load_scenario(HALF_SINE, {"run.stop": 0.5}))
     table = fmpy.simulate_fmu(
         str(path), output=["damper.force"], stop_time=0.5, output_interval=0.002
     )
@@ -158,13 +158,13 @@ def test_a_parameter_has_the_effect_that_it_has_in_the_scenario() -> None:
     one = Composite(built(HALF_SINE))
     for name, value in values.items():
         assert one.set(name, value) == 0
-    right = simulate(load_scenario(HALF_SINE, {**values, "run.stop": 1.0}))
+    right = Coupled().run(load_scenario(HALF_SINE, {**values, "run.stop": 1.0}))
     assert one.difference(one.begin().rows(500, 0.002), right) <= EQUAL
     seen = {"sensors.seed": 3, "sensors.base_velocity.delay": 0.0031}
     one = Composite(built(SENSORS))
     for name, value in seen.items():
         assert one.set(name, value) == 0
-    right = simulate(load_scenario(SENSORS, {**seen, "run.stop": 1.0}))
+    right = Coupled().run(load_scenario(SENSORS, {**seen, "run.stop": 1.0}))
     assert one.difference(one.begin().rows(2000, 0.0005), right) <= EQUAL
 
 
@@ -172,7 +172,7 @@ def test_a_record_of_ones_own_is_played_and_comes_along(tmp_path: Path) -> None:
     rows = "".join(f"{0.02 * k!r},{math.sin(0.3 * k)!r}\n" for k in range(60))
     quake = tmp_path / "quake.csv"
     quake.write_text("time [s],acceleration [m/s2]\n" + rows)
-    right = simulate(load_scenario(PASSIVE, {"ground.record": str(quake), "run.stop": 1.0}))
+    right = Coupled().run(load_scenario(PASSIVE, {"ground.record": str(quake), "run.stop": 1.0}))
     one = Composite(built(PASSIVE))  # read when the run begins
     assert one.set("ground.record", str(quake)) == 0
     assert one.difference(one.begin().rows(500, 0.002), right) <= EQUAL
@@ -189,7 +189,7 @@ def test_a_record_of_ones_own_is_played_and_comes_along(tmp_path: Path) -> None:
 
 
 def test_any_step_comes_to_the_same_motion() -> None:
-    right = simulate(load_scenario(PASSIVE, {"run.stop": 4.0}))
+    right = Coupled().run(load_scenario(PASSIVE, {"run.stop": 4.0}))
     one = Composite(built(PASSIVE)).begin()
     time, found = 0.0, [one.shown()]
     draw = np.random.default_rng(1)
@@ -206,12 +206,12 @@ def test_any_step_comes_to_the_same_motion() -> None:
 
 
 def test_clocks_keep_their_instants_whatever_the_step() -> None:
-    right = simulate(load_scenario(SENSORS, {"run.stop": 1.0}))
+    right = Coupled().run(load_scenario(SENSORS, {"run.stop": 1.0}))
     for step in (0.002, 0.001):
         one = Composite(built(SENSORS)).begin()
         rows = one.rows(round(1.0 / step), step)
         every = round(step / 0.0005)
-        columns = {name: column[::every] for name, column in right.items()}
+        columns = {name: column[::every] for name, column in right.values.items()}
         assert one.difference(rows, columns) <= 2e-2
     one = Composite(built(SENSORS)).begin()  # steps that end on no instant
     rows = one.rows(1428, 0.0007)
@@ -221,12 +221,12 @@ def test_clocks_keep_their_instants_whatever_the_step() -> None:
 
 
 def test_a_run_may_begin_at_any_time() -> None:
-    right = simulate(load_scenario(SENSORS, {"ground.start": 5.0 - 2.0, "run.stop": 6.0}))
+    right = Coupled().run(load_scenario(SENSORS, {"ground.start": 5.0 - 2.0, "run.stop": 6.0}))
     one = Composite(built(SENSORS))
     one.set("ground.start", 3.0)
     one.begin(time=3.0)  # until then nothing moves
     rows = one.rows(2000, 0.0005, time=3.0)
-    later = {name: column[6000:8001] for name, column in right.items()}
+    later = {name: column[6000:8001] for name, column in right.values.items()}
     j = [v.name for v in one.reals].index("structure.base_displacement")
     peak = np.abs(later["structure.base_displacement"]).max()
     assert np.abs(rows[:, j] - later["structure.base_displacement"]).max() <= 1e-2 * peak
@@ -242,7 +242,7 @@ def test_a_step_beyond_all_measure_is_refused() -> None:
 
 
 def test_a_ground_motion_from_outside_is_that_of_the_source() -> None:
-    right = simulate(load_scenario(PASSIVE, {"run.stop": 5.0}))
+    right = Coupled().run(load_scenario(PASSIVE, {"run.stop": 5.0}))
     name = "structure.ground_acceleration"
     motion = right["ground.ground_acceleration"]
     one = Composite(built(PASSIVE, [name])).begin()
@@ -256,7 +256,7 @@ def test_the_intensity_and_the_voltage_from_outside_are_those_of_the_sources() -
     one.set("ground.factor", 0.6)
     one.set("voltage.level", 6.0)
     set_so = {"ground.factor": 0.6, "voltage.level": 6.0, "run.stop": 2.0}
-    right = simulate(load_scenario(PASSIVE, set_so))
+    right = Coupled().run(load_scenario(PASSIVE, set_so))
     assert one.difference(one.begin().rows(1000, 0.002), right) <= EQUAL
     assert one.set("voltage.level", 2.0) == 0
     after = one.rows(50, 0.002, time=2.0)
@@ -265,7 +265,7 @@ def test_the_intensity_and_the_voltage_from_outside_are_those_of_the_sources() -
 
 
 def test_a_command_from_outside_is_that_of_a_source() -> None:
-    right = simulate(load_scenario(PASSIVE, {"voltage.level": 6.0, "run.stop": 2.0}))
+    right = Coupled().run(load_scenario(PASSIVE, {"voltage.level": 6.0, "run.stop": 2.0}))
     one = Composite(built(PASSIVE, ["damper.voltage"]))
     one.set("damper.voltage", 6.0)
     rows = one.begin().rows(1000, 0.002)
@@ -376,7 +376,7 @@ def test_it_is_a_component_of_another_scenario(tmp_path: Path) -> None:
         '[connections]\n"whole.structure.ground_acceleration" = "quake.ground_acceleration"\n'
     )
     frame = run(file)
-    right = simulate(load_scenario(PASSIVE, {"damper.sigma_a": 700.0, "run.stop": 2.0}))
+    right = Coupled().run(load_scenario(PASSIVE, {"damper.sigma_a": 700.0, "run.stop": 2.0}))
     for name in ("structure.base_displacement", "damper.force"):
         peak = np.abs(right[name]).max()
         assert np.abs(frame[f"whole.{name}"].to_numpy() - right[name]).max() <= 1e-9 * peak
@@ -391,7 +391,7 @@ def test_the_command_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert said.startswith(f"{path}: built, guid ")
     assert "structure.extra_force [N]" in said
     one = Composite(path).begin()
-    right = simulate(load_scenario(HALF_SINE, {"voltage.level": 2.0, "run.stop": 0.2}))
+    right = Coupled().run(load_scenario(HALF_SINE, {"voltage.level": 2.0, "run.stop": 0.2}))
     assert one.difference(one.rows(100, 0.002), right) <= EQUAL
 
 

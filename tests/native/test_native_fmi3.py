@@ -21,7 +21,7 @@ from fmpy.validation import validate_fmu
 
 import bristle
 from bristle.cli import main
-from bristle.engine.run import Output, execute
+from bristle.engine.run import run
 from bristle.fmu import catalogue
 from bristle.fmu.archive import library_member
 from bristle.fmu.build import built_guid, plan
@@ -221,7 +221,7 @@ def test_closed_loops_give_the_same_rows(stem: str, monkeypatch: pytest.MonkeyPa
     rows = []
     for fmi in (2, 3):
         monkeypatch.setattr(native_build, "ensure", partial(ensure, fmi=fmi))
-        rows.append(execute(file, {"run.stop": 2.0}, "fmu", Output(None), False, fmus="native"))
+        rows.append(run(file, {"run.stop": 2.0}, fmus="native"))
     assert list(rows[0].columns) == list(rows[1].columns)
     # Only FMI 2.0 has input derivatives, which the master uses where they save a call: its rows
     # differ by rounding.

@@ -11,12 +11,13 @@ import pytest
 import bristle
 from bristle.cli import main
 from bristle.core.files import scenarios_folder
-from bristle.engine.coupled import simulate
+from bristle.engine.coupled import Coupled
+from bristle.engine.results import statistic_of
 from bristle.errors import BristleError
 from bristle.optimal_control import Limit, case, limit, search
 from bristle.optimal_control.bound import bound_of, largest_force
 from bristle.optimal_control.case import Problem, case_of
-from bristle.optimal_control.search import descended, levelled, value_of
+from bristle.optimal_control.search import descended, levelled
 from bristle.system.scenario import load_scenario
 
 PULSE, Y = "half_sine_pulse", "structure.floor2_acceleration_absolute"
@@ -70,7 +71,7 @@ def made(stop: float, every: int = 1, output: str = Y, **values: object) -> Prob
 def test_the_response_is_that_of_the_coupled_engine(fmu: str, output: str, apart: float) -> None:
     values: dict[str, object] = {"run.stop": 1.0, "damper.fmu": fmu, "voltage.level": 3.0}
     scenario = load_scenario(PULSE, values)
-    whole = simulate(scenario)[output]
+    whole = Coupled().run(scenario)[output]
     case = case_of(scenario, output)
     one = Problem(case)
     steps = round(scenario.step / case.plant.h)
@@ -85,7 +86,7 @@ def test_a_damper_between_floors_is_felt_and_pushes_there(tmp_path: Path) -> Non
     file.write_text(BRACE.replace("FILE", building.as_posix()))
     scenario = load_scenario(file)
     one = Problem(case_of(scenario, Y))
-    whole = simulate(scenario)[Y]
+    whole = Coupled().run(scenario)[Y]
     assert np.abs(one.respond(one.level(3.0)) - whole).max() < 2e-3 * np.abs(whole).max()
 
 
@@ -121,12 +122,12 @@ def test_descent_and_linear_programs_lower_the_peak(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(search, "PROGRAMS", 2)
     one = made(0.3, 5)
     nodes = np.full(len(one.nodes), 4.0)
-    before = value_of(one.respond(one.between(nodes)), "peak")
+    before = statistic_of(one.respond(one.between(nodes)), "peak")
     first = descended(one, nodes, "peak")
-    halfway = value_of(one.respond(one.between(first)), "peak")
+    halfway = statistic_of(one.respond(one.between(first)), "peak")
     second, peak = levelled(one, first)
     assert peak < halfway < before
-    assert value_of(one.respond(one.between(second)), "peak") == pytest.approx(peak)
+    assert statistic_of(one.respond(one.between(second)), "peak") == pytest.approx(peak)
     assert second.min() >= 0.0
     assert second.max() <= 8.0
 
@@ -135,7 +136,7 @@ def test_descent_and_linear_programs_lower_the_peak(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize("statistic", ["peak", "rms"])
 def test_no_constant_voltage_comes_below_the_bound(statistic: str) -> None:
     one = made(0.8)
-    least = min(value_of(one.respond(one.level(V)), statistic) for V in (0.0, 2.0, 4.0, 8.0))
+    least = min(statistic_of(one.respond(one.level(V)), statistic) for V in (0.0, 2.0, 4.0, 8.0))
     found = bound_of(one, statistic, 9.9)
     assert found is not None
     assert 0.0 < found < least
@@ -233,7 +234,7 @@ def test_a_controller_does_not_come_below_the_limit() -> None:
     values = {"run.stop": 6.0}
     found = limit("el_centro_0p6g_clipped", values, previews=(), starts=1)
     assert found.value < 0.5 * found.as_it_is
-    lpv = simulate(load_scenario("el_centro_0p6g_lpv", values))[Y]
+    lpv = Coupled().run(load_scenario("el_centro_0p6g_lpv", values))[Y]
     assert found.value < float(np.abs(lpv).max())
 
 

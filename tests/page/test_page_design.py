@@ -33,7 +33,8 @@ from bristle.page.requests import RequestError
 from bristle.page.worker import answer
 from bristle.study import Study, create_study
 from bristle.synthesis import read_task
-from bristle.system.scenario import load_scenario, parse_overrides
+from bristle.system.overrides import parse_overrides
+from bristle.system.scenario import load_scenario
 from bristle.view.page_data import unpack
 
 SHAKEN: dict[str, Any] = {"motions": list(MOTIONS), "peak": 0.3}

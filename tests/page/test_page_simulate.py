@@ -21,7 +21,8 @@ from bristle.native import zig
 from bristle.page import simulate_view, view_cache
 from bristle.page.simulate_view import LONGEST, asked_for, controls, damper_of, stock_file
 from bristle.study import Study, create_study
-from bristle.system.scenario import load_scenario, parse_overrides, stock_scenarios
+from bristle.system.overrides import parse_overrides
+from bristle.system.scenario import load_scenario, stock_scenarios
 from bristle.view.page_data import unpack
 
 BENCH = "bench_sine_bingham"
@@ -74,9 +75,9 @@ def test_every_control_is_a_scenario_with_the_same_ground_building_and_damper() 
     assert {"ConstantVoltage", "ClippedOptimal", "HinfInverse", "Lpv", "Skyhook"} <= set(known)
     for control, (name, overrides) in known.items():
         other = load_scenario(name, overrides)
-        assert control in {one.fmu for one in other.components}
+        assert control in {one.kind for one in other.components.values()}
         for part in ("ground", "structure", "damper"):
-            mine, its = own.component(part), other.component(part)
+            mine, its = own.components[part], other.components[part]
             assert (mine.fmu, mine.parameters) == (its.fmu, its.parameters), control
         assert own.stop == other.stop
 
@@ -84,8 +85,8 @@ def test_every_control_is_a_scenario_with_the_same_ground_building_and_damper() 
 def test_another_intensity_goes_with_the_control() -> None:
     name = "el_centro_0p2g_constant_voltage"
     scenario, overrides = controls(name)["Lpv"]
-    peak = load_scenario(name).component("ground").parameters["peak"]
-    assert load_scenario(scenario, overrides).component("ground").parameters["peak"] == peak
+    peak = load_scenario(name).components["ground"].values["peak"]
+    assert load_scenario(scenario, overrides).components["ground"].values["peak"] == peak
 
 
 @pytest.mark.parametrize("name", [file.stem for file in stock_scenarios()])
@@ -100,11 +101,11 @@ def test_a_dropped_record_is_the_ground_motion_of_the_run(
     assert RECORD in simulate_view.choices(home, {})["records"]
     asked = asked_for(home, {"scenario": PASSIVE, "record": RECORD})
     loaded = asked.load()
-    assert Path(str(loaded.component("ground").parameters["record"])) == home / RECORD
+    assert Path(str(loaded.components["ground"].values["record"])) == home / RECORD
     assert loaded.stop == 42.0  # to the end of the motion
     monkeypatch.chdir(home)  # the command is for the folder of the studies
     again = load_scenario(PASSIVE, overrides_of(asked.run()))
-    assert again.component("ground").parameters == loaded.component("ground").parameters
+    assert again.components["ground"].values == loaded.components["ground"].values
     assert again.stop == loaded.stop
     motion = read_ground_motion(RECORD, home)
     assert motion.peak == pytest.approx(0.3 * 9.80665, rel=1e-3)

@@ -349,9 +349,9 @@ def test_a_scenario_can_switch_every_effect_on(damper: str, law: str, tmp_path: 
         "parameters": f"voltage = 4.0, {spelled(joined)}",
     }  # fmt: skip
     file.write_text(HOUSE.format(**text), encoding="utf-8")
-    loaded = {component.name: component for component in load_scenario(file).components}
+    loaded = {component.name: component for component in load_scenario(file).components.values()}
     for effect in joined:
-        assert loaded["damper"].parameters[f"{effect.name}.on"] is True
+        assert loaded["damper"].values[f"{effect.name}.on"] is True
         for name in effect.parameters:
             assert f"{effect.name}.{name}" in loaded["damper"].parameters
     frames = [run(file), run(file, {f"damper.{effect.name}.on": False for effect in joined})]

@@ -101,7 +101,7 @@ def test_a_record_that_is_still_or_missing_is_refused(run: Measurement) -> None:
 def table(run: Measurement, noise: dict[str, float] | None = None) -> ShakingTable:
     model: Any = None  # what simulates is not asked here
     std = run.noise if noise is None else noise
-    return ShakingTable(model, BuildingWithFile(TOWER), run, std, 5.0, Path())
+    return ShakingTable(model, BuildingWithFile(TOWER), run, std, 5.0)
 
 
 def response(signals: Signals, size: float = 0.1) -> dict[str, Array]:

@@ -233,7 +233,7 @@ def test_on_a_building_the_fluids_mass_is_attached(tmp_path: Path) -> None:
     )  # fmt: skip
     found = export_study(study)
     assert any("attached_mass" in note for note in found.notes)
-    parts = {part.name: part for part in load_scenario(found.scenario).components}
+    parts = {part.name: part for part in load_scenario(found.scenario).components.values()}
     assert parts["structure"].parameters["attached_mass"] == 0.4
     assert parts["structure"].parameters["duffing.k_3"] == 2e6
     assert parts["structure"].parameters["end_stop.clearance"] == 0.04

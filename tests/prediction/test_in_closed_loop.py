@@ -296,47 +296,44 @@ def test_draws_have_the_joint_covariance_within_the_bounds() -> None:
     assert min(one.values["f_c"] for one in drawn) == 0.0
 
 
-def test_law_form_effects_and_limits_are_in_the_scenario(tmp_path: Path) -> None:
+def test_law_form_effects_and_limits_are_in_the_scenario() -> None:
     model = new_model(joined_form("bingham", "table", (0.0, 4.0, 10.0)), ("gas_spring", "duffing"))
     time = 0.01 * np.arange(101)
     shaking = Excitation("pulse", time, np.sin(time), np.full(101, 9.0))
     paper = BuildingWithFile(paper_building())
-    scenario = Simulator(model, paper, False, shaking, tmp_path).scenario()
-    law = scenario.component("damper").law
+    scenario = Simulator(model, paper, False, shaking).campaign.system
+    law = scenario.components["damper"].law
     assert law is not None
     assert law.name == model.law
-    assert scenario.component("damper").parameters["gas_spring.on"] is True
-    assert scenario.component("damper").parameters["v_max"] == 10.0
-    assert scenario.component("structure").parameters["duffing.on"] is True
+    assert scenario.components["damper"].values["gas_spring.on"] is True
+    assert scenario.components["damper"].values["v_max"] == 10.0
+    assert scenario.components["structure"].values["duffing.on"] is True
     assert scenario.step == pytest.approx(2e-3)
     still = replace(shaking, command=None, level=3.0)
-    (tmp_path / "still").mkdir()
-    other = Simulator(model, paper, False, still, tmp_path / "still").scenario()
-    assert other.component("damper").parameters["voltage"] == 3.0
+    other = Simulator(model, paper, False, still).campaign.system
+    assert other.components["damper"].values["voltage"] == 3.0
 
 
-def test_a_mass_that_is_drawn_as_zero_is_attached_to_nothing(tmp_path: Path) -> None:
+def test_a_mass_that_is_drawn_as_zero_is_attached_to_nothing() -> None:
     mass = f"fluid_inertia.{EFFECTS['fluid_inertia'].mass}"
     model = new_model("bingham", ("fluid_inertia",)).with_values({mass: 0.4})
     shaking = Excitation("pulse", 0.01 * np.arange(101), np.zeros(101))
-    simulator = Simulator(model, BuildingWithFile(paper_building()), True, shaking, tmp_path)
-    scenario = simulator.scenario()
+    simulator = Simulator(model, BuildingWithFile(paper_building()), True, shaking)
     for drawn in (0.3, 0.0):
-        other = simulator._with_values(scenario, model.with_values({mass: drawn}))
-        assert other.component("structure").parameters["attached_mass"] == drawn
-        assert other.component("damper").parameters[mass] == 0.0
+        other = simulator.campaign.varied(simulator.values(model.with_values({mass: drawn})))
+        assert other.components["structure"].values["attached_mass"] == drawn
+        assert other.components["damper"].values[mass] == 0.0
 
 
-def test_a_command_of_another_kind_is_played_as_it_is(tmp_path: Path) -> None:
+def test_a_command_of_another_kind_is_played_as_it_is() -> None:
     time = 0.01 * np.arange(101)
     model = new_model("bingham").with_drive("current")
     shaking = Excitation("pulse", time, np.sin(time), 2.0 * time, drive=drive_named("current"))
-    simulator = Simulator(model, BuildingWithFile(paper_building()), False, shaking, tmp_path)
-    as_current = simulator.response(simulator.scenario())["damper.force"]
-    (tmp_path / "volts").mkdir()
+    simulator = Simulator(model, BuildingWithFile(paper_building()), False, shaking)
+    as_current = simulator.response({})["damper.force"]
     volts = replace(shaking, drive=drive_named("voltage"))
-    other = replace(simulator, model=new_model("bingham"), shaking=volts, folder=tmp_path / "volts")
-    np.testing.assert_array_equal(as_current, other.response(other.scenario())["damper.force"])
+    other = replace(simulator, model=new_model("bingham"), shaking=volts)
+    np.testing.assert_array_equal(as_current, other.response({})["damper.force"])
 
 
 def test_a_prediction_says_that_its_model_is_of_other_data(

@@ -12,7 +12,8 @@ import pytest
 
 from bristle.errors import ScenarioError
 from bristle.fmu.build import ensure
-from bristle.system.scenario import Scenario, check_scenario, load_scenario
+from bristle.system.model import System
+from bristle.system.scenario import check_scenario, load_scenario
 from bristle.system.ssp_import import import_ssp
 from bristle.system.ssp_read import convert, open_package, read_structure
 from bristle.system.toml import scenario_text
@@ -99,7 +100,7 @@ class Packer:
                 archive.writestr(name, content)
         return file
 
-    def load(self, body: str, **members: str | bytes) -> Scenario:
+    def load(self, body: str, **members: str | bytes) -> System:
         """Return the scenario of a package."""
         folder = self.folder / "out"
         return load_scenario(import_ssp(self(body, **members), folder).scenario)
@@ -110,10 +111,10 @@ def pack(tmp_path: Path) -> Packer:
     return Packer(tmp_path)
 
 
-def wires(scenario: Scenario) -> dict[str, tuple[str, float, float]]:
+def wires(scenario: System) -> dict[str, tuple[str, float, float]]:
     return {
         f"{c.target}.{c.input}": (f"{c.source}.{c.output}", c.factor, c.offset)
-        for c in scenario.connections
+        for c in scenario.wires
     }
 
 
@@ -126,7 +127,7 @@ def test_nested_systems_become_components_side_by_side(pack: Packer, version: st
         name="rig",
     )
     scenario = pack.load(system(MOTION + inner, connect("motion.displacement", "rig.x")))
-    assert [c.name for c in scenario.components] == ["motion", "rig_damper"]
+    assert list(scenario.components) == ["motion", "rig_damper"]
     source, factor, offset = wires(scenario)["rig_damper.displacement"]
     assert source == "motion.displacement"
     assert (factor, offset) == (pytest.approx(1.0), 0.0)  # to mm, and back to m
@@ -181,7 +182,7 @@ def test_values_find_their_way_in(pack: Packer) -> None:
             bindings=top.replace("rig.x", "x") + bound("x=30 mm"),
         )
     )
-    found = scenario.component("rig_damper").parameters
+    found = scenario.components["rig_damper"].values
     assert (found["sigma_a"], found["sigma_0"]) == (4.0, 2.5)
     assert found["displacement"] == pytest.approx(0.03)
     assert "nobody" in (pack.folder / "out" / "bench.toml").read_text()
@@ -205,7 +206,7 @@ def test_sets_and_mappings_in_files(pack: Packer) -> None:
         resources___p__ssv=f"{given}</v:ParameterSet>",
         resources___p__ssm=mapping,
     )
-    found = scenario.component("damper").parameters
+    found = scenario.components["damper"].values
     assert found["sigma_a"] == 13.0
     assert "sigma_0" not in found  # what a mapping does not name is left aside
 

@@ -10,16 +10,9 @@ from fake_library import FAKE, VALID
 
 from bristle.core import files
 from bristle.errors import ScenarioError
-from bristle.system.scenario import (
-    Connection,
-    check_scenario,
-    fmu_parameters,
-    load_scenario,
-    loaded_with,
-    parse_override,
-    parse_overrides,
-    resolve_scenario,
-)
+from bristle.system.model import Connection
+from bristle.system.overrides import parse_override, parse_overrides
+from bristle.system.scenario import check_scenario, load_scenario, resolve_scenario
 
 
 @pytest.fixture
@@ -43,18 +36,18 @@ def test_a_scenario_is_read_as_it_is_written(write):
     assert scenario.title == "El Centro, LuGre damper at 4 V"
     assert (scenario.stop, scenario.step, scenario.algorithm) == (35.0, 0.002, "gauss-seidel")
     assert scenario.steps == 17500
-    assert [c.name for c in scenario.components] == ["ground", "structure", "voltage", "damper"]
-    damper = scenario.component("damper")
-    assert damper.parameters == {"gas_spring.on": True, "gas_spring.k": 80.0}
-    assert (damper.fmu, damper.path, damper.building, damper.step) == (
+    assert list(scenario.components) == ["ground", "structure", "voltage", "damper"]
+    damper = scenario.components["damper"]
+    assert damper.values == {"gas_spring.on": True, "gas_spring.k": 80.0}
+    assert (damper.kind, damper.path, damper.building, damper.step) == (
         "LuGreDamper",
         None,
         None,
         None,
     )
     assert damper.description.variables["force"].unit == "N"
-    assert scenario.connections[1] == Connection("structure", "damper_force", "damper", "force")
-    assert len(scenario.connections) == 5
+    assert scenario.wires[1] == Connection("structure", "damper_force", "damper", "force")
+    assert len(scenario.wires) == 5
     with pytest.raises(FrozenInstanceError):
         scenario.stop = 1.0
 
@@ -95,15 +88,15 @@ def test_title_and_algorithm_have_defaults(write):
 def test_other_spellings_of_toml_mean_the_same(write, text):
     plain, other = load(write(VALID)), load(write(text, "other.toml"))
     assert other.components == plain.components
-    assert set(other.connections) == set(plain.connections)
+    assert set(other.wires) == set(plain.wires)
     assert (other.stop, other.step) == (plain.stop, plain.step)
-    assert isinstance(other.component("damper").parameters["gas_spring.k"], float)
+    assert isinstance(other.components["damper"].values["gas_spring.k"], float)
 
 
 def test_names_may_be_in_any_script(write):
     text = VALID.replace("[components.damper]", '[components."dämpfer"]')
     scenario = load(write(text.replace('"damper.', '"dämpfer.')))
-    assert scenario.component("dämpfer").fmu == "LuGreDamper"
+    assert scenario.components["dämpfer"].kind == "LuGreDamper"
 
 
 def test_an_input_may_be_held_at_a_value(write):
@@ -111,12 +104,12 @@ def test_an_input_may_be_held_at_a_value(write):
         '"gas_spring.on" = true', "voltage = 2.5"
     )
     text = text.replace(', "gas_spring.k" = 80.0', "")
-    assert load(write(text)).component("damper").parameters == {"voltage": 2.5}
+    assert load(write(text)).components["damper"].values == {"voltage": 2.5}
 
 
 def test_a_component_may_step_at_a_whole_fraction(write):
     text = VALID.replace('fmu = "LuGreDamper"', 'fmu = "LuGreDamper"\nstep = 0.0005')
-    assert load(write(text)).component("damper").step == 0.0005
+    assert load(write(text)).components["damper"].step == 0.0005
 
 
 def test_decimals_of_a_step_need_not_be_exact(write):
@@ -142,9 +135,9 @@ def test_overrides_take_the_place_of_values(write):
         },
     )
     assert (scenario.step, scenario.algorithm, scenario.title) == (0.001, "jacobi", "mine")
-    assert scenario.component("voltage").parameters == {"level": 2.0}
-    assert scenario.component("ground").step == 0.0005
-    assert scenario.component("damper").parameters == {
+    assert scenario.components["voltage"].values == {"level": 2.0}
+    assert scenario.components["ground"].step == 0.0005
+    assert scenario.components["damper"].values == {
         "gas_spring.on": True,
         "gas_spring.k": 60.0,
         "sigma_1": 4.0,
@@ -156,21 +149,24 @@ def test_an_override_replaces_any_spelling_and_adds_what_is_not_there(write, key
     text = VALID.replace('parameters = { "gas_spring.on" = true, "gas_spring.k" = 80.0 }', key)
     overrides = {"damper.gas_spring.on": True, "damper.gas_spring.k": 70.0}
     scenario = load(write(text), overrides)
-    assert scenario.component("damper").parameters == {"gas_spring.k": 70.0, "gas_spring.on": True}
+    assert scenario.components["damper"].values == {"gas_spring.k": 70.0, "gas_spring.on": True}
 
 
 def test_an_override_can_exchange_the_damper(write):
     scenario = load(write(VALID), {"damper.fmu": "BinghamDamper", "damper.f_c": 2.0})
-    assert scenario.component("damper").fmu == "BinghamDamper"
-    assert scenario.component("damper").parameters["f_c"] == 2.0
+    assert scenario.components["damper"].kind == "BinghamDamper"
+    assert scenario.components["damper"].values["f_c"] == 2.0
 
 
 def test_a_law_and_an_fmu_take_the_place_of_each_other(write):
     named = load(write(VALID), {"damper.law": "lugre"})
-    assert named.component("damper").law.name == "lugre"
+    assert named.components["damper"].law.name == "lugre"
     text = VALID.replace('fmu = "LuGreDamper"', 'law = "lugre"')
     again = load(write(text), {"damper.fmu": "LuGreDamper"})
-    assert (again.component("damper").fmu, again.component("damper").law) == ("LuGreDamper", None)
+    assert (again.components["damper"].kind, again.components["damper"].law) == (
+        "LuGreDamper",
+        None,
+    )
     with pytest.raises(ScenarioError, match="one of them must go"):
         load(write(VALID), {"damper.law": "lugre", "damper.fmu": "LuGreDamper"})
 
@@ -184,10 +180,10 @@ def test_a_scenario_knows_what_was_laid_over_its_file(write):
 
 def test_overrides_go_beside_those_of_a_loaded_scenario():
     loaded = load_scenario("half_sine_pulse", {"run.stop": 1.0})
-    assert loaded_with(loaded, {}) is loaded
-    both = loaded_with(loaded, {"voltage.level": 2.0})
+    assert load_scenario(loaded, {}) is loaded
+    both = load_scenario(loaded, {"voltage.level": 2.0})
     assert both.stop == 1.0
-    assert both.component("voltage").parameters["level"] == 2.0
+    assert both.components["voltage"].values["level"] == 2.0
 
 
 def test_an_override_can_rewire(write):
@@ -195,8 +191,8 @@ def test_an_override_can_rewire(write):
         "[components.damper]", '[components.other]\nfmu = "ConstantVoltage"\n\n[components.damper]'
     )
     scenario = load(write(text), {"connections.damper.voltage": "other.voltage"})
-    assert Connection("damper", "voltage", "other", "voltage") in scenario.connections
-    assert len(scenario.connections) == 5
+    assert Connection("damper", "voltage", "other", "voltage") in scenario.wires
+    assert len(scenario.wires) == 5
 
 
 def test_a_file_named_by_an_override_is_looked_for_in_the_current_folder(
@@ -207,7 +203,7 @@ def test_a_file_named_by_an_override_is_looked_for_in_the_current_folder(
     (here / "mine.csv").write_text("x")
     monkeypatch.chdir(here)
     scenario = load(write(VALID), {"ground.record": "mine.csv"})
-    assert scenario.component("ground").parameters["record"] == str(here / "mine.csv")
+    assert scenario.components["ground"].values["record"] == str(here / "mine.csv")
 
 
 @pytest.mark.parametrize(
@@ -349,6 +345,6 @@ def test_files_are_handed_on_as_absolute_paths(write, tmp_path):
     signal = 'fmu = "SignalSource"\nparameters = { kind = "csv", file = "signal.csv" }'
     text = VALID.replace(constant, signal)
     scenario = load(write(text.replace("voltage.voltage", "voltage.value")))
-    values = fmu_parameters(scenario.component("voltage"), scenario.file.parent)
+    values = scenario.components["voltage"].taken_values()
     assert values == {"kind": "csv", "file": str(tmp_path / "signal.csv")}
     assert Path(values["file"]).is_absolute()

@@ -69,16 +69,16 @@ def test_a_frozen_design_in_a_file_is_the_table_with_more_rows(scenario: Path) -
 
 def test_the_text_of_a_scenario_keeps_the_controller(scenario: Path, tmp_path: Path) -> None:
     loaded = load_scenario(scenario)
-    assert loaded.component("controller").controller == tmp_path / "mine.json"
+    assert loaded.components["controller"].controller == tmp_path / "mine.json"
     again = tmp_path / "elsewhere" / "again.toml"
     again.parent.mkdir()
     again.write_text(scenario_text(loaded), encoding="utf-8")
-    ours = load_scenario(again).component("controller")
-    assert (ours.fmu, ours.controller) == ("Lpv", tmp_path / "mine.json")
+    ours = load_scenario(again).components["controller"]
+    assert (ours.kind, ours.controller) == ("Lpv", tmp_path / "mine.json")
 
 
 def test_the_sample_period_is_the_files_and_cannot_be_set(scenario: Path) -> None:
-    period = load_scenario(scenario).component("controller").description.variables["sample_period"]
+    period = load_scenario(scenario).components["controller"].description.variables["sample_period"]
     assert period.start == period.minimum == period.maximum == 0.004
     with pytest.raises(ScenarioError, match="sample_period"):
         load_scenario(scenario, {"controller.sample_period": 0.002})

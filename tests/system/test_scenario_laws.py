@@ -128,9 +128,9 @@ def test_a_scenario_is_written_with_its_law(house: Path) -> None:
             scenario = load_scenario(written(house, damper))
             again = house / "again.toml"
             again.write_text(scenario_text(scenario), encoding="utf-8")
-            read = load_scenario(again).component("damper")
-            own = scenario.component("damper")
-            assert (read.law, read.parameters) == (own.law, own.parameters)
+            read = load_scenario(again).components["damper"]
+            own = scenario.components["damper"]
+            assert read == own
     assert own.law is not None
     assert own.law.name == "lugre[quadratic]"
     assert "yield_force_bend" not in own.description.variables
@@ -186,10 +186,10 @@ def test_a_wrong_law_is_a_mistake_of_the_scenario(house: Path, damper: str, text
 def test_a_law_is_chosen_by_an_override(house: Path) -> None:
     file = written(house, 'fmu = "BinghamDamper"\nparameters = { voltage = 3.0 }')
     bent = load_scenario(file, {"damper.command": "quadratic", "damper.yield_force_bend": -0.05})
-    component = bent.component("damper")
+    component = bent.components["damper"]
     assert component.law is not None
     assert component.law.name == "bingham[quadratic]"
-    assert component.parameters["yield_force_bend"] == -0.05
+    assert component.values["yield_force_bend"] == -0.05
 
 
 def test_a_law_that_nobody_knows_is_said() -> None:

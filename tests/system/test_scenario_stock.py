@@ -29,13 +29,13 @@ def test_a_stock_scenario_is_found_by_its_name_and_has_its_own_title(name):
 
 def test_the_paper_s_passive_case():
     scenario = load_scenario("el_centro_lugre_passive")
-    assert scenario.component("ground").parameters == {
+    assert scenario.components["ground"].values == {
         "record": "el_centro_1940_ns",
         "peak": pytest.approx(0.6 * 9.81),
         "factor": 0.45,
     }
-    assert scenario.component("voltage").parameters == {"level": 4.0}
-    assert scenario.component("damper").parameters == {}
+    assert scenario.components["voltage"].values == {"level": 4.0}
+    assert scenario.components["damper"].values == {}
     assert (scenario.stop, scenario.step) == (35.0, 0.002)
     assert scenario.algorithm == "midpoint"
 
@@ -43,22 +43,22 @@ def test_the_paper_s_passive_case():
 @pytest.mark.parametrize(("name", "intensity"), EL_CENTRO.items())
 def test_el_centro_at_four_intensities(name, intensity):
     scenario = load_scenario(f"el_centro_{name}g_constant_voltage")
-    assert scenario.component("ground").parameters["peak"] == pytest.approx(intensity * 9.81)
+    assert scenario.components["ground"].values["peak"] == pytest.approx(intensity * 9.81)
     assert f"{intensity} g" in scenario.title
 
 
 def test_the_pulse_and_the_mass_that_sticks():
     scenario = load_scenario("bingham_half_sine_sticking")
-    pulse = scenario.component("ground").parameters
+    pulse = scenario.components["ground"].values
     assert pulse == {"kind": "half_sine", "amplitude": 2.0, "duration": 0.2}
-    mass = scenario.component("damper").parameters["moving_mass"]
+    mass = scenario.components["damper"].values["moving_mass"]
     assert mass == pytest.approx(installed().driven_mass(None), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["bench_sine_lugre", "bench_sine_bingham"])
 def test_the_bench_runs_five_cycles_at_a_peak_speed_of_a_tenth(name):
     scenario = load_scenario(name)
-    rod = scenario.component("rod").parameters
+    rod = scenario.components["rod"].values
     assert rod["amplitude"] * 2.0 * math.pi * rod["frequency"] == pytest.approx(0.1, rel=1e-12)
     assert scenario.stop * rod["frequency"] == 5.0
 
@@ -79,7 +79,7 @@ def test_another_building_brings_its_own_ports(tmp_path):
     text = STOCK["no_damper"].read_text(encoding="utf-8")
     file = tmp_path / "mine.toml"
     file.write_text(text.replace('"Structure"', '"Structure"\nbuilding = "house.toml"'))
-    structure = load_scenario(file).component("structure")
+    structure = load_scenario(file).components["structure"]
     assert structure.building == tmp_path / "house.toml"
     assert "floor3_displacement" in structure.description.variables
 

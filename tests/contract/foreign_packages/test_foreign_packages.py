@@ -117,7 +117,7 @@ def test_a_text_that_nothing_feeds_is_held_at_its_start(
     assert main(["import-ssp", str(package), "-o", str(tmp_path / "out")]) == 0
     assert "check" not in capsys.readouterr().out
     scenario = load_scenario(tmp_path / "out" / "my.toml")
-    assert scenario.component("t").parameters == {"heard": "nothing"}
+    assert scenario.components["t"].values == {"heard": "nothing"}
     assert scenario.findings == ()
 
 
@@ -140,7 +140,7 @@ def test_inputs_of_all_types_are_held_and_those_without_a_start_are_told(
     assert main(["import-ssp", str(package), "-o", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     assert 'The input "a.bare" has neither source nor start value: 0.0 is taken.' in said
-    found = load_scenario(tmp_path / "out" / "my.toml").component("a").parameters
+    found = load_scenario(tmp_path / "out" / "my.toml").components["a"].values
     assert found == {"x": 1.5, "n": 4, "b": True, "s": "on", "bare": 0.0}
 
 

@@ -104,7 +104,7 @@ def test_units_that_mean_the_same_are_joined(
     assert code == 0
     assert [one["level"] for one in found] == (["note"] if "angle" in case else [])
     assert main(["import-ssp", str(packed(tmp_path, fmus)), "-o", str(tmp_path / "out")]) == 0
-    (wire,) = load_scenario(tmp_path / "out" / "packed.toml").connections
+    (wire,) = load_scenario(tmp_path / "out" / "packed.toml").wires
     assert (wire.factor, wire.offset, wire.transformed) == (1.0, 0.0, False)
 
 
@@ -120,10 +120,10 @@ def test_the_same_quantity_in_another_unit_is_refused_with_the_factor_and_packag
     advice = re.search(r"\{ from = .*? \}", finding["text"])
     assert advice is not None
     scenario = load_scenario(joined(tmp_path, fmus, f'"b.u" = {advice[0]}'))
-    said = scenario.connections[0]
+    said = scenario.wires[0]
     assert (said.factor, said.offset) == (pytest.approx(factor), pytest.approx(offset))
     assert main(["import-ssp", str(packed(tmp_path, fmus)), "-o", str(tmp_path / "out")]) == 0
-    (wire,) = load_scenario(tmp_path / "out" / "packed.toml").connections
+    (wire,) = load_scenario(tmp_path / "out" / "packed.toml").wires
     assert wire.factor == pytest.approx(factor, rel=1e-12)
     assert wire.offset == pytest.approx(offset, rel=1e-12)
 
@@ -226,7 +226,7 @@ def test_a_parameter_of_a_package_is_converted_into_what_the_fmu_defines(
     body = f"<d:Elements>{component('a', bound)}</d:Elements>"
     package = write_ssp(tmp_path / "a.ssp", body, {"a": fmu})
     assert main(["import-ssp", str(package), "-o", str(tmp_path / "out")]) == 0
-    found = load_scenario(tmp_path / "out" / "a.toml").component("a").parameters
+    found = load_scenario(tmp_path / "out" / "a.toml").components["a"].values
     assert found == {"m": pytest.approx(3000.0), "p": 3.0}
 
 
@@ -252,5 +252,5 @@ def test_units_convert_through_nested_systems_and_a_package_that_contradicts_its
         assert main(["import-ssp", str(package), "-o", str(tmp_path / f"out{told}")]) == 0
         said = capsys.readouterr().out
         assert said.count('the connector "y" is in [cm], in its FMU in [mm]') == notes
-        (wire,) = load_scenario(tmp_path / f"out{told}" / f"n{told}.toml").connections
+        (wire,) = load_scenario(tmp_path / f"out{told}" / f"n{told}.toml").wires
         assert wire.factor == pytest.approx(factor, rel=1e-12)
