@@ -21,7 +21,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from bristle.comparison.predictions import RunPrediction
 from bristle.core.text import plain, short_z
-from bristle.model.model_file import read_model
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
 from bristle.study.history import Step
@@ -71,7 +70,7 @@ def draw(folder: Path, target: Path) -> Path:
 
 def _prediction(study: Study, against: Any, number: int) -> RunPrediction:
     """Return the drawn run with what the model of a step predicts."""
-    model = read_model(study.history.model_file(number), study.folder)
+    model = study.model_of(number)
     return next(one for one in against.predictions(model) if one.name == RUN)
 
 

@@ -169,7 +169,9 @@ def open_effects(verdict: Mapping[str, Any], model: Model) -> LeftOpen:
     for finding in verdict.get("findings") or []:
         for one in finding.get("limits") or []:
             name = str(one["effect"])
-            if name not in EFFECTS or any(_clash(name, other) for other in model.effects):
+            if name not in EFFECTS or any(
+                name == other or exclude(name, other) for other in model.effects
+            ):
                 continue
             if one.get("why"):
                 # What a parameter of a known effect absorbs is in the band of that parameter.
@@ -282,10 +284,6 @@ def widest(parts: Sequence[Mapping[str, float]], causes: Collection[str]) -> tup
                 total[name] = total.get(name, 0.0) + part / len(parts)
     most = max(total, key=lambda name: total[name], default="")
     return (most, total[most]) if most and total[most] >= WORTH else ("", 0.0)
-
-
-def _clash(name: str, other: str) -> bool:
-    return name == other or exclude(name, other)
 
 
 def _others(site: str, name: str, told: Mapping[str, float]) -> dict[str, float]:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BristleError, TrustError
-from ..model.model_file import read_model
 from ..physics.effect import EFFECTS
 from ..report.reproduce import commands
 from ..study.history import CLOSE, HistoryStep, Step, history_steps
@@ -46,7 +45,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
 def _step(study: Study, step: Step, one: HistoryStep) -> dict[str, Any]:
     parameters: list[dict[str, Any]] = []
     with suppress(TrustError):  # the model of a step may hold code that must not run yet
-        model = read_model(study.history.model_file(step.number), study.folder, to_show=True)
+        model = study.model_of(step.number, to_show=True)
         parameters = rows_of(model, {})
     return {
         "number": step.number, "what": step.what, "why": step.why, "z": one.z, "train": one.z_train,

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from ..study.study import Study
 
 
-_RANKED = 8
 _COLOURS = {
     "white": "estimated from the samples: white",
     "low-passed": "estimated from the samples: white, low-passed above",

@@ -6,7 +6,6 @@ import shlex
 from typing import TYPE_CHECKING
 
 from ..core.text import command
-from ..model.model_file import read_model
 from ..physics.forms import split_form
 from ..study.read_again import devices_of
 from ..study.study_file import TEST
@@ -43,7 +42,7 @@ def commands(study: Study) -> list[str]:
     lines.append(command("study", "check", new))
     law = ""
     for step in study.steps():
-        present = _law(study, step)
+        present = study.model_of(step.number, to_show=True).law
         lines += _step(step, old, new, law, present)
         law = present
     return [*lines, *(command(word, new) for word in ("compare", "diagnose", "report"))]
@@ -51,7 +50,7 @@ def commands(study: Study) -> list[str]:
 
 def _new(study: Study, old: str, new: str) -> str:
     """Return the command that makes the study; its channels are given, not guessed again."""
-    settings, first = study.settings, study.history.model_file(0)
+    settings = study.settings
     files = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs)
     words = ["study", "new", new, "--data", *files]
     test = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs if run.role == TEST)
@@ -60,8 +59,8 @@ def _new(study: Study, old: str, new: str) -> str:
         words += ["--split", settings.split]
     if settings.rig != "bench":
         words += ["--rig", settings.rig]
-    if first.is_file():
-        model = read_model(first, study.folder, to_show=True)
+    if study.history.model_file(0).is_file():
+        model = study.model_of(0, to_show=True)
         words += ["--law", split_form(model.law)[0]]
         if model.building:
             words += ["--building", f"{old}/{model.building}"]
@@ -103,10 +102,6 @@ def _other_law(law: str, other: str) -> list[str]:
     (before, _, _), (after, form, _) = split_form(law), split_form(other)
     named = ["--law", after] if after != before or not form else []
     return named + (["--command", form] if form else [])
-
-
-def _law(study: Study, step: Step) -> str:
-    return read_model(study.history.model_file(step.number), study.folder, to_show=True).law
 
 
 def _copy(source: str, target: str) -> str:

@@ -23,12 +23,22 @@ from ..planning.outcome import OUTCOMES
 from ..planning.performed import shows
 from ..study.budget_picture import budgets, draw_budget, sentence
 from ..study.history import HistoryStep, history_steps
+from ..study.pictures import staircase_page
 from ..study.study_file import TEST
 from ..study.view import or_nothing, story_view
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
-from .figures import curves_section, data_table, data_words, parameter_table
+from ..view.style import png
+from .figures import (
+    curves_section,
+    data_table,
+    data_words,
+    error_page,
+    loops_page,
+    maps_page,
+    parameter_table,
+)
 from .reproduce import commands
 
 if TYPE_CHECKING:
@@ -73,7 +83,6 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
     `open_test` False leaves test runs closed; else the study counts that they were opened.
     `what_if` adds sliders that compute the model in the page, which needs zig.
     """
-    from ..model.model_file import read_model
     from ..study.steps import compare_study, comparer
     from .what_if import what_if_section
 
@@ -88,10 +97,10 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
         against = comparer(study)
         now, damper = against.compare(model), against.damper(model)
         for step in reversed(steps):
-            gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
+            gone = set(study.model_of(step.number).effects)
             if step.number == 0 or not gone <= set(model.effects):
                 break
-            earlier = read_model(study.history.model_file(step.number - 1), study.folder)
+            earlier = study.model_of(step.number - 1)
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
                 tell("the model before its last effect")
@@ -113,12 +122,10 @@ def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> Histor
     import numpy as np
 
     from ..identification.search import z_scale
-    from ..model.model_file import read_model
 
     if step.z is not None or step.number == 0:
         return step  # the model that a study begins with is nobody's guess of this damper
-    then = read_model(study.history.model_file(step.number), study.folder)
-    runs = against.predictions(then)
+    runs = against.predictions(study.model_of(step.number))
     if not all(one.noise_known for one in runs):
         return step
     return replace(step, z=z_scale(np.concatenate([one.normalised for one in runs])))
@@ -156,7 +163,6 @@ def _budget(content: Content) -> list[str]:
     at = content.damper
     if at is None:
         return []
-    from ..view.style import png
 
     problem = at.site.holdout or at.site.train
     page, said = draw_budget(problem, at.model), sentence(budgets(problem, at.model))
@@ -330,8 +336,6 @@ def _where(content: Content) -> str:
     now = content.now
     if now is None:
         return html.section("Error of the present model", html.paragraphs(content.trouble))
-    from ..view.style import png
-    from .figures import error_page
 
     along = "the two coordinates that it depends on most"
     if now.second:
@@ -373,7 +377,6 @@ def _sites(content: Content) -> list[str]:
     now = content.now
     if now is None or not now.sites:
         return []
-    from ..view.style import png
 
     rings = f" Rings: without {content.added}." if content.before else ""
     worst = now.sites[0]
@@ -401,9 +404,6 @@ def _history(content: Content) -> str:
     ]  # fmt: skip
     picture = ""
     if with_z:
-        from ..study.pictures import staircase_page
-        from ..view.style import png
-
         fall = " → ".join(or_nothing(one.z) for one in with_z)
         # Their forces are low-passed, and those of the rest of the page are not: z tells it all.
         picture = html.figure(
@@ -419,8 +419,6 @@ def _history(content: Content) -> str:
 def _before_after(content: Content) -> str:
     if content.now is None or content.now.unit != "N":
         return ""
-    from ..view.style import png
-    from .figures import loops_page, maps_page
 
     names = (f"without {content.added}", f"with {content.added}")
     if content.before is None:

@@ -99,7 +99,7 @@ def complete(
         keeps(_kept(steps))
         if free:
             found, free = _with_law_taken(study, found, stepped), False
-        names, abreast = _named(found), list[Trial]()
+        names, abreast = found.effects if found.kind == "effect" else (), list[Trial]()
         if greedy and found.kind == "unknown" and found.before is not None:
             abreast = gaining(found.before, found.trials)
         if found.kind == "unknown" and curves and not abreast:
@@ -139,10 +139,6 @@ def _begun_free(
         say("identifying the model")
         stepped(identify_study(study, law=other, table=False).step)
     return law == ALL
-
-
-def _named(found: Diagnosis) -> tuple[str, ...]:
-    return found.effects if found.kind == "effect" else ()
 
 
 def gaining(before: Trial, trials: Sequence[Trial]) -> list[Trial]:

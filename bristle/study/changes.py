@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..core.config import other_schema, toml_content
 from ..core.files import read_json, write_json
@@ -20,6 +20,8 @@ from .study_file import TEST, Settings, channel_as_toml
 
 if TYPE_CHECKING:
     from .study import Study
+
+T = TypeVar("T")
 
 
 # A digest of what a fit and its judge see: by it a result on other data is known.
@@ -107,6 +109,26 @@ def _digest(seen: dict[str, Any] | Sequence[Any]) -> str:
     return sha256(text.encode()).hexdigest()[:16]
 
 
+def noted(path: Path, key: str, make: Callable[[Any], T], damaged: str) -> tuple[T, ...]:
+    """Return the entries of a file of notes, none where there is no file.
+
+    Parameters
+    ----------
+    path, key : the file; where its entries are
+    make : of an entry what is returned
+    damaged : what is said of a file that cannot be read so
+    """
+    if not path.is_file():
+        return ()
+    data = read_json(path)
+    if data.get("schema") != 1:
+        raise StudyError(f"{path}: {other_schema(data.get('schema'))}")
+    try:
+        return tuple(map(make, data[key]))
+    except (KeyError, TypeError, ValueError):
+        raise StudyError(f"{path}: {damaged}") from None
+
+
 FILE = "added_runs.json"
 """Where a study notes it."""
 
@@ -128,21 +150,11 @@ def additions(study: Study) -> tuple[Addition, ...]:
     StudyError
         If the file that says so is damaged.
     """
-    path = study.folder / FILE
-    if not path.is_file():
-        return ()
-    data = read_json(path)
-    if data.get("schema") != 1:
-        raise StudyError(f"{path}: {other_schema(data.get('schema'))}")
-    try:
-        return tuple(
-            Addition(str(one["date"]), int(one["step"]), tuple(map(str, one["files"])))
-            for one in data["additions"]
-        )
-    except (KeyError, TypeError, ValueError):
-        raise StudyError(
-            f"{path}: it lists runs that were added, and is damaged. Remove it."
-        ) from None
+    return noted(
+        study.folder / FILE, "additions",
+        lambda one: Addition(str(one["date"]), int(one["step"]), tuple(map(str, one["files"]))),
+        "it lists runs that were added, and is damaged. Remove it.",
+    )  # fmt: skip
 
 
 def note_addition(study: Study, files: Sequence[str]) -> None:

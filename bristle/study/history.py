@@ -89,7 +89,7 @@ def results_of(study: Path) -> Results:
     ----------
     study : its folder
     """
-    folders = list(_steps(study))
+    folders = _steps(study)
     first = next((int(one.name) for one in folders[1:] if _from_data(one)), None)
     kept = [one for one in folders if first is None or int(one.name) < first]
     named = {name for one in kept for name in _effects_in(one / "model.toml")}
@@ -137,13 +137,13 @@ def set_results_aside(study: Path, number: int, first: int) -> None:
     kept.mkdir(parents=True, exist_ok=True)
     if not (kept / "study.toml").is_file():
         write_whole(kept / "study.toml", (study / "study.toml").read_bytes())
-    last = max((one for one in _steps(study) if int(one.name) < first), key=_number)
+    last = [one for one in _steps(study) if int(one.name) < first][-1]
     text = (last / "model.toml").read_bytes()
     named = {*_effects_in(last / "model.toml"), building_in(last / "model.toml")}
     for one in [*_learned(study)]:
         if one.stem not in named:
             _move(one, kept / "effects" / one.name)
-    for one in [*_steps(study)]:
+    for one in _steps(study):
         if int(one.name) >= first:
             building = study / f"building_{int(one.name)}.toml"
             if building.name not in named:
@@ -170,16 +170,10 @@ def _move(path: Path, place: Path) -> None:
         path.replace(place)
 
 
-def _number(step: Path) -> int:
-    return int(step.name)
-
-
-def _steps(study: Path) -> Iterator[Path]:
-    """Yield the folders of the steps, the first one first."""
-    history = study / "history"
-    if history.is_dir():
-        found = (one for one in history.iterdir() if one.is_dir() and _STEP.fullmatch(one.name))
-        yield from sorted(found, key=_number)
+def _steps(study: Path) -> list[Path]:
+    """Return the folders of the steps, the first one first."""
+    history = History(study)
+    return [history.path(number) for number in history.numbers()]
 
 
 def _from_data(step: Path) -> bool:

@@ -69,7 +69,6 @@ class Identified(Viewable):
     """
 
     fit: Fit
-    model: Model
     table: list[LawError]
     cutoff: float
     errors_before: RigErrors | None
@@ -79,6 +78,11 @@ class Identified(Viewable):
     at: SiteModel
     forms: tuple[FormError, ...] = ()
     laws: tuple[LawTrial, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """The model with the values found."""
+        return self.fit.model
 
     @property
     def before(self) -> dict[str, float]:

@@ -375,7 +375,7 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
         *weighing(rows, model, error, after.numbers["z_train"]),
     ]
     notes += [*rig.notes, *under_load(at)]
-    found = Identified(fit, fit.model, rows, task.cutoff, before, after, tuple(notes), None, at)
+    found = Identified(fit, rows, task.cutoff, before, after, tuple(notes), None, at)
     if others:
         alone = FitTask(task.cutoff, task.starts, table=False, present=present, begin=task.begin)
         in_forms = {own: found}

@@ -15,8 +15,7 @@ from ..comparison.comparison import RigComparer
 from ..comparison.misfit import run_error
 from ..comparison.predictions import RunPrediction
 from ..comparison.result import Comparison
-from ..core.config import other_schema
-from ..core.files import read_json, write_json, write_whole
+from ..core.files import write_json, write_whole
 from ..core.interrupt import keeps
 from ..core.progress import tell, telling
 from ..core.text import command, plain, unknown
@@ -34,12 +33,12 @@ from ..identification.building_fit import (
 from ..identification.histories import compile_ahead
 from ..identification.rig_fit import force_errors, site_models
 from ..model.model import Model
-from ..model.model_file import read_model
 from ..physics.building import Building, frequencies
 from ..physics.effect import EFFECTS
 from ..physics.forms import joined_form
 from ..physics.laws import law_names
 from ..view import Viewable
+from .changes import noted
 from .forms import LawFits, law_command, law_or_all, with_law
 from .history import Step
 from .identified import Identified, is_identified
@@ -291,19 +290,11 @@ def uses_of_test_set(study: Study) -> tuple[TestSetUse, ...]:
     StudyError
         If the file that counts is damaged.
     """
-    path = study.folder / FILE
-    if not path.is_file():
-        return ()
-    data = read_json(path)
-    if data.get("schema") != 1:
-        raise StudyError(f"{path}: {other_schema(data.get('schema'))}")
-    try:
-        return tuple(TestSetUse(str(one["date"]), int(one["step"])) for one in data["openings"])
-    except (KeyError, TypeError, ValueError):
-        raise StudyError(
-            f"{path}: it counts the openings of the test runs, and is damaged. Restore it from a "
-            "copy of the study."
-        ) from None
+    return noted(
+        study.folder / FILE, "openings", lambda one: TestSetUse(str(one["date"]), int(one["step"])),
+        "it counts the openings of the test runs, and is damaged. Restore it from a copy of the "
+        "study.",
+    )  # fmt: skip
 
 
 def count_test_set_use(study: Study) -> None:
@@ -447,8 +438,7 @@ def _added(study: Study) -> BeforeAfter | None:
     numbers = study.history.numbers()
     later: Model | None = None
     for number in reversed(numbers):
-        model = read_model(study.history.model_file(number), study.folder)
-        model = model.with_drive(study.drive or model.drive)
+        model = study.model_of(number)
         new = () if later is None else tuple(n for n in later.effects if n not in model.effects)
         if later is not None and new:
             step = numbers[numbers.index(number) + 1]

@@ -295,6 +295,11 @@ class Study(Viewable):
             self._seen_data = data_digest(self.folder, self.settings, model.building)
         return model.with_drive(self.drive or model.drive)
 
+    def model_of(self, step: int, *, to_show: bool = False) -> Model:
+        """Return the model of a step of the history; see `model` for what is raised."""
+        model = read_model(self.history.model_file(step), self.folder, to_show=to_show)
+        return model.with_drive(self.drive or model.drive)
+
     @property
     def data(self) -> str:
         """A digest of what a fit and its judge see, as they are now: see `study.changes`."""
@@ -608,8 +613,8 @@ class Study(Viewable):
     def _refuse_other_data(self, settings: Settings) -> None:
         """Refuse a result where the data are others than were read, by the study.toml of now."""
         building = building_in(self.folder / "model.toml")
-        known = self._seen_data or data_digest(self.folder, self.settings, building)
-        if other := other_than(known, data_digest(self.folder, settings, building), settings):
+        now = data_digest(self.folder, settings, building)
+        if other := other_than(self._seen_data or self.data, now, settings):
             raise StudyError(
                 f"{self.folder}: {other} have been changed meanwhile, so that this result is not "
                 f"of the present data. {_AGAIN}"

@@ -483,27 +483,20 @@ def write_settings(path: Path, settings: Settings) -> None:
     import tomlkit
 
     document = tomlkit.document()
-    document.add("schema", tomlkit.item(1))
-    document.add("title", tomlkit.item(settings.title))
-    document.add("notes", tomlkit.item(settings.notes))
-    document["notes"].comment("free text of the lab, shown in the report")
-    document.add("rig", tomlkit.item(settings.rig))
-    if settings.device:
-        document.add("device", tomlkit.item(settings.device))
-        document["device"].comment("of the building's: whose law and effects are identified")
-    if settings.law:
-        document.add("law", tomlkit.item(settings.law))
-        document["law"].comment("sought with its effects; without this line the model's is kept")
-    document.add("cut_off", tomlkit.item(settings.cut_off))
-    document["cut_off"].comment("Hz, low-pass of the low-passed errors; 0 for none")
-    if settings.rate:
-        document.add("rate", tomlkit.item(settings.rate))
-        document["rate"].comment("Hz, faster runs are decimated to it; 0 for none")
-    if settings.mask:
-        mask = tomlkit.item(True)  # read from the document it would be a bool, without comments
-        document.add("mask", mask.comment("isolated spikes count as not measured"))
-    if settings.split:
-        document.add("split", tomlkit.item(settings.split))
+    for key, value, comment in (
+        ("schema", 1, ""), ("title", settings.title, ""),
+        ("notes", settings.notes, "free text of the lab, shown in the report"),
+        ("rig", settings.rig, ""),
+        ("device", settings.device, "of the building's: whose law and effects are identified"),
+        ("law", settings.law, "sought with its effects; without this line the model's is kept"),
+        ("cut_off", settings.cut_off, "Hz, low-pass of the low-passed errors; 0 for none"),
+        ("rate", settings.rate, "Hz, faster runs are decimated to it; 0 for none"),
+        ("mask", settings.mask, "isolated spikes count as not measured"),
+        ("split", settings.split, ""),
+    ):  # fmt: skip
+        if value or key in ("title", "notes", "cut_off"):
+            item: Any = tomlkit.item(value)
+            document.add(key, item.comment(comment) if comment else item)
     runs = tomlkit.aot()
     for run in (*settings.runs, *settings.excluded):
         runs.append(run_as_toml(run))

@@ -19,7 +19,6 @@ from ..diagnosis.view import effect_text, error_text, verdict_view
 from ..errors import RecordError
 from ..learning.result import LearnedEffect
 from ..model.model import Model
-from ..model.model_file import read_model
 from ..physics.drive import DRIVES
 from ..physics.forms import joined_form
 from ..view.blocks import Block, Figure, Next, Table, Text, View, view_of
@@ -185,7 +184,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     judged = [one for one in steps if one.rms is not None]
     if not judged:
         return view
-    began = read_model(study.history.model_file(steps[0].number), study.folder, to_show=True)
+    began = study.model_of(steps[0].number, to_show=True)
     added = [name for name in model.effects if name not in began.effects]
     if not added:
         return view
