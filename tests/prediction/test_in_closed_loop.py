@@ -138,7 +138,7 @@ def test_the_command_tells_it_in_tables_and_json(
     assert main(asked) == 0
     said = capsys.readouterr().out
     assert "From the ground motion of holdout_2 alone, the model predicts the peaks" in said
-    assert "RMS, holdout_2" in said
+    assert "Peaks of holdout_2" in said
     assert main([*asked, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["role"] == "holdout"
@@ -344,4 +344,4 @@ def test_a_prediction_says_that_its_model_is_of_other_data(
     first.write_text("\n".join(first.read_text().split("\n")[:-50]) + "\n")
     assert main(["predict", str(study.folder), "--draws", "0"]) == 0
     told = capsys.readouterr().out
-    assert f"Identify it again:  bristle identify {study.folder}\n" in told
+    assert f"  bristle identify {study.folder}\n" in told
