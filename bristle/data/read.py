@@ -51,7 +51,9 @@ def files_in(folder: Path) -> list[Path]:
     found = sorted(
         path
         for path in folder.iterdir()
-        if path.is_file() and path.name[:1] not in ".~" and _ending(path) in ENDINGS
+        if path.is_file()
+        and path.name[:1] not in ".~"
+        and path.name.lower().removesuffix(".gz").endswith(ENDINGS)
     )
     if not found:
         raise RecordError(
@@ -59,10 +61,6 @@ def files_in(folder: Path) -> list[Path]:
             f"{', '.join(ENDINGS)}."
         )
     return found
-
-
-def _ending(path: Path) -> str:
-    return Path(path.name.lower().removesuffix(".gz")).suffix
 
 
 def _content(path: Path, name: str) -> bytes:

@@ -187,12 +187,16 @@ def evenly(time: Array, channels: dict[str, Array], lines: Indices, name: str, p
             f"{MAX_FILLED} samples of {_ms(step)}."
         )
     if len(breaks):
-        longest = int(np.argmax(np.diff(time)))
+        widest = int(np.argmax(np.diff(time)))
         notes.append(
             f"{len(breaks)} gap{'s' * (len(breaks) > 1)} in time, the longest from "
-            f"{time[longest]:.6g} s to {time[longest + 1]:.6g} s: cut there"
+            f"{time[widest]:.6g} s to {time[widest + 1]:.6g} s: cut there"
         )
-    sampling = _summary(made, len(time))
+    longest = max(made, key=lambda one: len(one.even))
+    sampling = Sampling(
+        float((longest.even[-1] - longest.even[0]) / (len(longest.even) - 1)), len(time), 0,
+        max(one.jitter for one in made), longest.digits, any(one.resampled for one in made),
+    )  # fmt: skip
     notes += _grid_notes(made, time, sampling)
     pieces = [piece for one in made for piece in _pieces(one, name, notes)]
     if not pieces:
@@ -239,19 +243,15 @@ def _even_stretch(time: Array, channels: dict[str, Array], step: float) -> _Stre
     return _Stretch(grid, out, known, jitter, digits, resampled, moved, sparse)
 
 
-def _summary(made: list[_Stretch], recorded: int) -> Sampling:
-    longest = max(made, key=lambda one: len(one.even))
-    step = float((longest.even[-1] - longest.even[0]) / (len(longest.even) - 1))
-    return Sampling(
-        step, recorded, 0, max(one.jitter for one in made), longest.digits,
-        any(one.resampled for one in made),
-    )  # fmt: skip
-
-
 def _grid_notes(made: list[_Stretch], time: Array, sampling: Sampling) -> list[str]:
     notes = []
     if sampling.resampled:
-        notes.append(_resampled_note(time, sampling.step))
+        spacing = np.diff(time)
+        notes.append(
+            f"spacing varies from {_ms(float(spacing.min()))} to {_ms(float(spacing.max()))}: "
+            f"resampled to even {_ms(sampling.step)}, the median, by monotone cubic interpolation "
+            "(PCHIP; switched channels keep their last value)"
+        )
     elif sampling.jitter > 1e-3:
         moved = sum(one.moved for one in made)
         taken = f", and {moved} samples are moved there by interpolation" if moved else ""
@@ -315,15 +315,6 @@ def _in_order(
     keep[double + 1] = False
     notes.append(f"{len(double)} samples that repeat the one before are left out")
     return time[keep], {key: values[keep] for key, values in channels.items()}, lines[keep]
-
-
-def _resampled_note(time: Array, step: float) -> str:
-    spacing = np.diff(time)
-    return (
-        f"spacing varies from {_ms(float(spacing.min()))} to {_ms(float(spacing.max()))}: "
-        f"resampled to even {_ms(step)}, the median, by monotone cubic interpolation (PCHIP; "
-        "switched channels keep their last value)"
-    )
 
 
 def _on_grid(

@@ -145,14 +145,10 @@ def moving_average(y: Array, step: float) -> MovingAverage | None:
     if len(level) * np.log(plain / least) < _GAIN or _is_comb(y, best):
         return None
     nulls = _depths(frequency, level, best)
-    if len(nulls) < _fewest_nulls(best) or min(nulls) < _DEPTH:
+    seen = min(2, (best - 1) // 2)  # all nulls that there are must be, two at the most
+    if len(nulls) < seen or min(nulls) < _DEPTH:
         return None
     return MovingAverage(best, len(nulls))
-
-
-def _fewest_nulls(length: int) -> int:
-    """Return how many nulls must be seen: all that there are, two at the most."""
-    return min(2, (length - 1) // 2)
 
 
 def _is_comb(y: Array, length: int) -> bool:

@@ -55,9 +55,14 @@ def read(content: bytes, name: str) -> Table:
             about[fields[0]] = fields[1:]
             header = fields[0] != "X_Value"
             if not header:
-                kept = [k for k, title in enumerate(fields) if _is_kept(k, title.strip())]
+                # Each channel may have a time before it: one of all is the first.
+                every = [title.strip() for title in fields]
+                kept = [k for k, t in enumerate(every) if not k or t not in ("X_Value", "Comment")]
                 clocks = _clocks(about, fields, kept, name)
-                titles = titles or (_titled(fields, kept, about), len(found))
+                units = _of_channels(about, "Y_Unit_Label", len(kept) - 1)
+                pairs = zip((every[k] for k in kept[1:]), units, strict=True)
+                own = [f"{title} [{unit}]" if unit else title for title, unit in pairs]
+                titles = titles or (own, len(found))
             found.append(None)
             row = 0
         else:
@@ -93,11 +98,6 @@ class _Line(NamedTuple):
     kept: list[int]
     clocks: list[_Clock]
     row: int
-
-
-def _is_kept(index: int, title: str) -> bool:
-    """Return whether a column is the time or a channel: each channel may have a time before it."""
-    return index == 0 or title not in ("X_Value", "Comment")
 
 
 def _clocks(
@@ -193,13 +193,6 @@ def _numbers_of(
     except ValueError as error:
         raise RecordError(f"{name}, line {at + 1}: {error}; numbers are right.") from None
     return numbers[0], numbers[1], steps * (count if len(steps) == 1 else 1)
-
-
-def _titled(fields: list[str], kept: list[int], about: dict[str, list[str]]) -> list[str]:
-    """Return the titles of the channels with the units that the header says."""
-    units = _of_channels(about, "Y_Unit_Label", len(kept) - 1)
-    names = [fields[k].strip() for k in kept[1:]]
-    return [f"{n} [{unit}]" if unit else n for n, unit in zip(names, units, strict=True)]
 
 
 def _cells(line: _Line, count: int, comma: bool) -> tuple[list[str], list[str]]:
