@@ -218,6 +218,6 @@ def test_counts_beside_a_scale_are_told(tmp_path: Path, capsys, ending: str) -> 
             out.update({"t": T, "disp_mm": X, "force_N": counts})
             out["force_N"].attrs["scale"] = 0.05
     assert main(["study", "new", str(tmp_path / "s"), "--data", str(file)]) == 0
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert f"run.{ending}: force_N holds int16, and scale beside it is not applied" in said
     assert "expected values in a unit, such as force_N * scale" in said
