@@ -225,7 +225,8 @@ def test_all_mistakes_are_named_at_once(write: Write) -> None:
 
 def test_a_file_beside_the_ensemble_is_found(write: Write, tmp_path: Path) -> None:
     shutil.copy(resolve_scenario("half_sine_pulse"), tmp_path / "own.toml")
-    assert read_ensemble(write(("half_sine_pulse", "own.toml"))).system.origin == tmp_path / "own.toml"
+    plan = read_ensemble(write(("half_sine_pulse", "own.toml")))
+    assert plan.system.origin == tmp_path / "own.toml"
 
 
 @pytest.mark.parametrize("name", ["nothing.toml", "el_centro_damper", ""])
