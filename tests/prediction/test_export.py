@@ -234,10 +234,10 @@ def test_on_a_building_the_fluids_mass_is_attached(tmp_path: Path) -> None:
     found = export_study(study)
     assert any("attached_mass" in note for note in found.notes)
     parts = {part.name: part for part in load_scenario(found.scenario).components.values()}
-    assert parts["structure"].parameters["attached_mass"] == 0.4
-    assert parts["structure"].parameters["duffing.k_3"] == 2e6
-    assert parts["structure"].parameters["end_stop.clearance"] == 0.04
-    assert parts["damper"].parameters["fluid_inertia.m_f"] == 0.0
+    assert parts["structure"].values["attached_mass"] == 0.4
+    assert parts["structure"].values["duffing.k_3"] == 2e6
+    assert parts["structure"].values["end_stop.clearance"] == 0.04
+    assert parts["damper"].values["fluid_inertia.m_f"] == 0.0
     inside = read_description(found.fmu, any_platform=True).variables
     assert inside["end_stop.on"].start is True
     assert inside["end_stop.clearance"].start == 0.03
