@@ -97,7 +97,7 @@ def aligned(
             return [line for lines in tables for line in (*lines, "")][:-1]
     if sum(wide) + 2 * len(wide) > WIDEST:
         return [line for row in rows for line in _stacked(header, row)]
-    titles = [_wrapped(title, width) for title, width in zip(header, wide, strict=True)]
+    titles = [_wrapped(title, max(1, width)) for title, width in zip(header, wide, strict=True)]
     high = max(map(len, titles))
     head = zip(*([""] * (high - len(one)) + one for one in titles), strict=True)
     return [

@@ -62,3 +62,8 @@ def test_a_shell_shows_the_words_and_what_has_no_figure_says_so() -> None:
     assert repr(Result()).splitlines()[0] == "<Result: The <law> misses a spring.>"
     with pytest.raises(RunError, match="nothing to draw"):
         Result().plot()
+
+
+def test_a_column_without_a_title_and_without_cells_takes_no_width() -> None:
+    table = Table(("site", "", "z [-]"), [["damper", "", "1.03"]], (2,))
+    assert terminal.lines(table) == ["  site      z [-]", "  damper     1.03"]
