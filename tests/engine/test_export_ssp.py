@@ -368,5 +368,5 @@ def test_the_package_runs_here_as_the_scenario_does(package: Path, rows: pd.Data
 def test_functions_of_osp_have_names_of_their_own() -> None:
     ends = (("d", "x_in"), ("d_x", "in"))
     wires = tuple(Connection(*end, "a", "y", 2.0, 0.0, True) for end in ends)
-    text = osp_text(System(Path("t.toml"), "t", 1.0, 0.1, "jacobi", (), wires), {})
+    text = osp_text(System("t", 1.0, 0.1, "jacobi", {}, wires), {})
     assert len(set(re.findall(r'<LinearTransformation name="([^"]*)"', text))) == len(ends)
