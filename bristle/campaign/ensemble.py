@@ -194,7 +194,15 @@ def run_left(
 def run_all(
     campaign: Campaign, runs: list[int], workers: int = 1, cluster: str | None = None
 ) -> Generator[Outcome, None, None]:
-    """Yield what becomes of runs of a campaign's draws as they end, in whatever order."""
+    """Yield what becomes of runs of a campaign's draws as they end, in whatever order.
+
+    Parameters
+    ----------
+    campaign : the system, and what is drawn for each run
+    runs : numbers of the draws
+    workers : how many processes run them here
+    cluster : address of a scheduler that runs them in their place
+    """
     if cluster is not None:
         from .cluster import run_cluster
 

@@ -292,7 +292,14 @@ class Bench:
     def same(
         self, rows: Iterable[Values], wanted: Sequence[Values], where: str = "", first: int = 0
     ) -> None:
-        """Raise UnexpectedError where two runs differ, in words that begin with `where`."""
+        """Raise UnexpectedError where two runs differ.
+
+        Parameters
+        ----------
+        rows, wanted : values of the observed variables, a row a step
+        where : words that the error begins with
+        first : step of the first row
+        """
         if difference := self.differs(rows, wanted, first):
             raise UnexpectedError(f"{where}{difference}")
 

@@ -284,8 +284,8 @@ _NAME = "relative"
 LOOSER = 8.0
 """Factor on the likeliest jerk of a difference. Where a law's friction builds up fast the likeliest
 one takes a thousandth off the displacement, which the spring of a storey turns into a force: on the
-runs of tests/identification/test_building_devices.py z of training runs is 1.08 to 1.25 with it, and 1.01
-to 1.11 with this factor."""
+runs of tests/identification/test_building_devices.py z of training runs is 1.08 to 1.25 with it,
+and 1.01 to 1.11 with this factor."""
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,7 @@ def libraries(
     BuildError
         What is wrong with the first platform that fails, once all are done.
     """
-    tell(f"compiling {name} for {len(platforms)} platform(s)")
+    tell(f"compiling {name} for {len(platforms)} platform{'s' * (len(platforms) > 1)}")
     count = Count(f"{name}: library", len(platforms))
 
     def counted(one: Platform) -> bytes:

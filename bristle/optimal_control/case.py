@@ -346,7 +346,13 @@ def with_voltage(case: Case, voltage: Array) -> System:
 def voltage_signal(
     time: Iterable[float], voltage: Iterable[float], command: str = "voltage", unit: str = "V"
 ) -> Signal:
-    """Return a command's history to the nine digits that are played and kept."""
+    """Return a command's history to the nine digits that are played and kept.
+
+    Parameters
+    ----------
+    time, voltage : instants [s] and the command at them, of equal length
+    command, unit : the command's column and unit
+    """
     times, values = (np.array([float(f"{x:.9g}") for x in row]) for row in (time, voltage))
     return Signal(times, values, unit, command, "voltage")
 

@@ -243,7 +243,14 @@ def signals_of(shaking: Excitation) -> dict[str, Signal]:
 def signal_of(
     time: NDArray[Any], values: NDArray[Any], quantity: str, unit: str, name: str = ""
 ) -> Signal:
-    """Return a signal at times that have twelve digits: what k dt has beyond them is rounding."""
+    """Return a signal at times that have twelve digits: what k dt has beyond them is rounding.
+
+    Parameters
+    ----------
+    time, values : instants [s] and samples, (n,)
+    quantity, unit : of the values
+    name : of their column; "" where the quantity is enough
+    """
     rounded = np.array([float(f"{t:.12g}") for t in time.tolist()])
     return Signal(rounded, values, unit, quantity, name)
 

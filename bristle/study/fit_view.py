@@ -378,7 +378,8 @@ def building_view(found: IdentifiedBuilding) -> View:
             Next(fmu, "makes an FMU of it"),
         ]
     return View(
-        f"{fit.building.name}: {len(levels)} level(s), masses as given.",
+        f"{fit.building.name}: stiffness and damping of {len(levels)} "
+        f"level{'s' * (len(levels) > 1)}, masses as given.",
         (
             Table(
                 ("stiffness below", "given [N/m]", "found [N/m]", "95 %"), stiffnesses, (1, 2)

@@ -102,7 +102,8 @@ def created_view(created: Created) -> View:
     ]
     wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
     return View(
-        f"{folder}: a study of {len(settings.runs)} run(s), {held} of them held out.",
+        f"{folder}: a study of {len(settings.runs)} run{'s' * (len(settings.runs) > 1)}, "
+        f"{held} of them held out.",
         (
             Table(("channel", "column", "read so because"), rows),
             *(Text(note, "note") for note in notes),

@@ -275,7 +275,8 @@ def _text(system: System, folder: Path | None) -> str:
     wires: dict[str, Any] = {}
     for wire in system.wires:
         source = f"{wire.source}.{wire.output}"
-        transformed = {"from": source, "factor": wire.factor, "offset": wire.offset}
+        transformed = {"from": source, "factor": wire.factor}
+        transformed |= {"offset": wire.offset} if wire.offset else {}
         wires[f"{wire.target}.{wire.input}"] = transformed if wire.transformed else source
     run = {"stop": system.stop, "step": system.step, "algorithm": system.algorithm}
     tables = {name: _table_of(one, folder) for name, one in system.components.items()}

@@ -134,7 +134,7 @@ def test_bare_building_diagnosed_from_start_to_end():
     assert (found.kind, found.effects) == ("effect", ("duffing",))
     assert found.sites == {"duffing": "layer"}
     assert not found.reconstructed
-    assert "duffing (layer)" in found.words
+    assert "Duffing spring (isolation layer)" in found.words
     assert said[0].startswith("looking for sensor faults")
     assert said[1].startswith("smoothing")
     answer = found.as_dict()
@@ -284,7 +284,7 @@ def test_lag_of_a_velocity_is_its_instrument():
     found = conclude({"layer": NOTHING}, VerdictContext(sensors=(lag,)))
     assert (found.kind, found.effects) == ("effect", ("velocity_sensor",))
     assert found.sites == {"velocity_sensor": "sensor"}
-    assert "velocity_sensor (sensor)" in found.words
+    assert "velocity sensor (sensor)" in found.words
 
 
 def trial(effects=(), z=1.0, train=1.0, losses=None):

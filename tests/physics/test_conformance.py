@@ -353,7 +353,7 @@ def test_a_scenario_can_switch_every_effect_on(damper: str, law: str, tmp_path: 
     for effect in joined:
         assert loaded["damper"].values[f"{effect.name}.on"] is True
         for name in effect.parameters:
-            assert f"{effect.name}.{name}" in loaded["damper"].parameters
+            assert f"{effect.name}.{name}" in loaded["damper"].values
     frames = [run(file), run(file, {f"damper.{effect.name}.on": False for effect in joined})]
     assert (frames[0]["damper.force"] != frames[1]["damper.force"]).any()
     with pytest.raises(ScenarioError, match=f"{joined[0].name}"):

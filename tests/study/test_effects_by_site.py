@@ -208,6 +208,6 @@ def test_friction_of_the_seals_is_told_as_untestable() -> None:
 def test_without_a_load_cell_the_layers_and_the_dampers_are_alike() -> None:
     twins = lookalikes(("end_stop",))
     assert list(twins) == ["end_stop@damper"]
-    assert "end_stop of the isolation layer and one of the damper" in twins["end_stop@damper"]
+    assert "end stop of the isolation layer and one of the damper" in twins["end_stop@damper"]
     assert list(lookalikes(("duffing",))) == ["gas_spring"]
     assert list(lookalikes(("base_friction",))) == ["f_c of the damper"]

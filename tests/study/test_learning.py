@@ -92,7 +92,7 @@ def test_a_unit_in_the_title_of_a_column_is_not_told_twice(study, tmp_path, caps
     files = [str(path) for path in sorted((study.folder / "data").glob("*.csv"))]
     assert main(["study", "new", str(tmp_path / "again"), "--data", *files]) == 0
     told = capsys.readouterr().out
-    assert re.search(r"^  force +force \[N\]$", told, re.MULTILINE)
+    assert re.search(r"^  force +force \[N\]  +its name", told, re.MULTILINE)
 
 
 def test_an_effect_that_is_there_already_is_refused(study):

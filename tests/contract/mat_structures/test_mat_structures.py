@@ -164,7 +164,7 @@ def test_runs_are_no_channels_of_each_other(tmp_path: Path, capsys, held: dict[s
     assert "--split restart cuts it there" in capsys.readouterr().err
     assert main([*new, "--split", "column run"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "a study of 2 run(s)" in said
+    assert "a study of 2 runs" in said
     assert "it holds 2 runs" in said
 
 

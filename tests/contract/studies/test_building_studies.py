@@ -80,5 +80,5 @@ def test_predictions_in_closed_loop_are_what_was_measured(
 def test_the_building_is_identified_alone(device_study: Path, capsys: Capture) -> None:
     asked(capsys, "identify", device_study, "--structure", "--dry-run")
     text = told(capsys, "identify", device_study, "--structure", "--dry-run")
-    assert text.startswith("tower: stiffnesses and damping of 3 level(s), masses as given.")
+    assert text.startswith("tower: stiffness and damping of 3 levels, masses as given.")
     assert "equilibrium error" in text
