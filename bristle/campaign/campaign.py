@@ -88,8 +88,12 @@ class Campaign:
     engine: Engine
     keep: tuple[Statistic, ...] | None = None
     draws: Draws | None = None
-    _read: dict[tuple[tuple[str, object], ...], System] = field(default_factory=dict, repr=False)
-    _known: dict[tuple[tuple[str, object], ...], Outcome] = field(default_factory=dict, repr=False)
+    _read: dict[tuple[tuple[str, object], ...], System] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    _known: dict[tuple[tuple[str, object], ...], Outcome] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @property
     def runs(self) -> int:

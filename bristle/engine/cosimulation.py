@@ -72,10 +72,16 @@ BLOCK = 0.1
 """Seconds of steps between two looks at Ctrl-C, progress and clock."""
 
 
-def warn(message: Message, at: float) -> None:
-    """Show what an FMU says, unless all is well; `at` [s]."""
-    if message.status != "OK":
-        logging.getLogger("bristle").warning(message.shown)
+def warner() -> Callable[[Message, float], None]:
+    """Return what shows each thing that FMUs say in a run once, unless all is well."""
+    told: set[str] = set()
+
+    def warn(message: Message, at: float) -> None:
+        if message.status != "OK" and message.shown not in told:
+            told.add(message.shown)
+            logging.getLogger("bristle").warning(message.shown)
+
+    return warn
 
 
 def ignore(message: Message, at: float) -> None:
@@ -86,13 +92,14 @@ def ignore(message: Message, at: float) -> None:
 class Cosimulation:
     """The engine that steps FMUs: built-in components as Python or as native ones.
 
-    `listen` gets what FMUs say, and the time [s]; `progress` shows a bar, on a terminal only;
+    `listen` gets what FMUs say, and the time [s]; by default warnings are shown, each once a run.
+    `progress` shows a bar, on a terminal only;
     `on_hang` ends the process where a component hangs after Ctrl-C: it gets the time [s] up to
     which rows were handed out, None where there are none.
     """
 
     fmus: str = "python"
-    listen: Callable[[Message, float], None] = warn
+    listen: Callable[[Message, float], None] | None = None
     progress: bool = False
     on_hang: Callable[[float | None], None] | None = None
     name: ClassVar[str] = "fmu"
@@ -110,7 +117,7 @@ class Cosimulation:
         paths, descriptions = self._fmus(system)
         with tempfile.TemporaryDirectory(prefix="bristle_signals_") as folder:
             parameters = _parameters(system, Path(folder))
-            with Master(system, paths, descriptions, parameters, self.listen) as master:
+            with Master(system, paths, descriptions, parameters, self.listen or warner()) as master:
                 return self._stepped(system, master, on_rows or (lambda table: None))
 
     def _fmus(self, system: System) -> tuple[dict[str, Path], dict[str, Description]]:

@@ -340,6 +340,8 @@ def with_voltage(case: Case, voltage: Array) -> System:
         title=f"{scenario.title}, the voltage of the limit",
         components=components,
         wires=(*wires, Connection(*port, name, "value")),
+        origin=None,  # it is no longer what a file holds
+        package=None,
     )
 
 

@@ -42,6 +42,27 @@ class Signal:
     quantity: str = "value"
     name: str = ""
 
+    def __post_init__(self) -> None:
+        """Refuse what a file could not hold either.
+
+        Raises
+        ------
+        PhysicsError
+            If there are not two samples at least, all finite, at rising times from 0 or later.
+        """
+        t, x = self.time, self.values
+        wrong = ""
+        if t.ndim != 1 or t.shape != x.shape or len(t) < 2:
+            wrong = (
+                f"times of shape {t.shape} and values of {x.shape}; (n,) twice, n >= 2, is right"
+            )
+        elif not (np.isfinite(t).all() and np.isfinite(x).all()):
+            wrong = "a sample is not finite; every sample needs a value"
+        elif t[0] < 0.0 or not (np.diff(t) > 0.0).all():
+            wrong = "its times do not rise from 0 s or later"
+        if wrong:
+            raise PhysicsError(f"signal {self.name or self.quantity}: {wrong}.")
+
 
 @dataclass
 class Run:
@@ -186,11 +207,15 @@ class Component:
                 numbers[name.removeprefix("building.")] = value
             elif variable is None:
                 raise ScenarioError(f'"{self.name}.{name}": {self.kind} has no such parameter.')
+            elif variable.causality not in ("parameter", "input"):
+                words = f"is {variable.causality}; only parameters and inputs can be set."
+                raise ScenarioError(f"{self.name}.{name} {words}")
             elif not isinstance(value, Signal):
                 fits = typed(variable, value)
                 if isinstance(fits, Wrong):
                     raise ScenarioError(f"{self.name}.{name} {fits.words}")
                 values[name] = fits
+                signal = None if name == self.plays else signal
             elif name != self.plays or self.path is not None:
                 raise ScenarioError(f'"{self.name}.{name}": {self.kind} plays no signal there.')
             else:
@@ -236,7 +261,8 @@ class System:
     `stop` [s] is a whole number of steps of `step` [s]; `algorithm` is one of `ALGORITHMS`, and
     components step in their order. `origin` is the file that it was read from, None where it was
     made; `package` the SSP package that file was unpacked from; `findings` the warnings and notes
-    of its check; `overrides` what was laid over the file.
+    of its check; `overrides` what was laid over the file, `changes` what `with_values` changed of
+    that.
     """
 
     title: str
@@ -249,6 +275,7 @@ class System:
     findings: tuple[Finding, ...] = field(default=(), compare=False)
     overrides: dict[str, object] = field(default_factory=dict, compare=False)
     package: Path | None = field(default=None, compare=False)
+    changes: Mapping[str, Value | Signal] = field(default_factory=dict, compare=False)
 
     @property
     def steps(self) -> int:
@@ -282,7 +309,8 @@ class System:
                 raise ScenarioError(f'"{full}": the scenario has no such component.')
             given.setdefault(name, {})[own] = value
         changed = {name: self.components[name].with_values(own) for name, own in given.items()}
-        return replace(self, components={**self.components, **changed})
+        changes = {**self.changes, **{plain_target(full): v for full, v in values.items()}}
+        return replace(self, components={**self.components, **changed}, changes=changes)
 
     def variable(self, name: str) -> Variable | None:
         """Return the variable "component.port", None where there is none."""

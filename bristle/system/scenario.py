@@ -15,12 +15,13 @@ from ..core import files
 from ..core.config import SCHEMA, Document, raised, toml_content
 from ..core.finding import Finding
 from ..core.text import nearest, unknown
+from ..data import list_ground_motions
 from ..errors import ScenarioError
 from ..fmu.description import Value
 from .advice import advise
 from .connections import check_connections
 from .library import Library, changed_title, installed, needs_title
-from .model import FILE_PARAMETERS, Component, Run, System
+from .model import FILE_PARAMETERS, Component, Part, Run, System, plain_target
 from .overrides import (
     SCENARIO,
     apply_overrides,
@@ -61,8 +62,11 @@ def load_scenario(
             return scenario
         if scenario.origin is None:
             raise ScenarioError(f"{scenario.title}: was made, and no file takes overrides.")
+        anew = {plain_target(str(name)) for name in overrides}
+        changes = {name: v for name, v in scenario.changes.items() if name not in anew}
         overrides = {**scenario.overrides, **overrides}
-        scenario = scenario.package or scenario.origin
+        file = scenario.package or scenario.origin
+        return load_scenario(file, overrides, library=library).with_values(changes)
     return _checked(scenario, *_read(resolve_scenario(scenario), overrides or {}, library))
 
 
@@ -166,7 +170,7 @@ def _judged(
     folder = Path(document.path).parent
     components = {
         part.name: Component(
-            part.name, part.kind, description, _absolute(part.values, folder), part.file,
+            part.name, part.kind, description, _absolute(part, folder), part.file,
             part.building, part.controller, part.effects, part.law, part.signal, part.step,
             part.over_step,
         )
@@ -184,11 +188,16 @@ def _judged(
     return system, found
 
 
-def _absolute(values: Mapping[str, Value], folder: Path) -> dict[str, Value]:
-    """Return values with the absolute paths of files that are named from a folder."""
-    found = dict(values)
+def _absolute(part: Part, folder: Path) -> dict[str, Value]:
+    """Return values with the absolute paths of files that are named from a folder.
+
+    A ground motion of the library goes by its name, even where there is a file of that name.
+    """
+    found = dict(part.values)
+    named = {one.name for one in list_ground_motions()} if part.kind == "GroundMotion" else set()
     for name in FILE_PARAMETERS:
-        if (value := str(found.get(name, ""))) and (folder / value).is_file():
+        value = str(found.get(name, ""))
+        if value and value not in named and exists(folder / value):
             found[name] = (folder / value).absolute().as_posix()
     return found
 

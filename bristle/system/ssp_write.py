@@ -18,6 +18,7 @@ from ..fmu.description import Value, Variable
 from ..units import DIMENSIONS, Unit, alike
 from .model import FILE_PARAMETERS, Component, Connection, System
 from .ssp_read import FMU_TYPE, NAMESPACES, OMS, OSP, OSP_SYSTEM, OWN, OWN_TYPE, STRUCTURE
+from .toml import signal_file
 
 Element = ElementTree.Element
 
@@ -293,6 +294,8 @@ def _fmu(component: Component, folder: Path, name: str, build: Build) -> Path:
         return target
     values = component.taken_values()
     files = {key: Path(str(values.pop(key))) for key in FILE_PARAMETERS if values.get(key)}
+    if component.signal is not None:
+        files[component.plays] = signal_file(component.signal, folder / f"{name}.csv")
     what = plan(
         component.made_of(),
         name=name,

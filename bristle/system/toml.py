@@ -246,7 +246,7 @@ def scenario_text(system: System) -> str:
 def save(system: System, file: Path, about: str = "") -> list[Path]:
     """Write a system as a scenario, with the signals that it plays; return the files, it first.
 
-    Files in its folder are named from there.
+    Files in its folder are named from there. A building that is data goes into a file as well.
 
     Parameters
     ----------
@@ -260,15 +260,22 @@ def save(system: System, file: Path, about: str = "") -> list[Path]:
     """
     folder = file.absolute().parent
     folder.mkdir(parents=True, exist_ok=True)
-    signals, components = [], dict(system.components)
+    made: list[Path] = []
+    components = dict(system.components)
     for name, one in system.components.items():
         if one.signal is not None:
-            signals.append(signal_file(one.signal, folder / f"{one.signal.name or name}.csv"))
-            values = {**one.values, one.plays: str(signals[-1])}
-            components[name] = replace(one, values=values, signal=None)
+            path = folder / f"{one.signal.name or name}.csv"
+            path = folder / f"{name}_{path.name}" if path in made else path
+            made.append(signal_file(one.signal, path))
+            values = {**one.values, one.plays: str(path)}
+            components[name] = one = replace(one, values=values, signal=None)
+        if one.building is not None and not isinstance(one.building, Path):
+            made.append(folder / f"{name}_building.toml")
+            write_whole(made[-1], "\n".join(toml_table(one.building)) + "\n")
+            components[name] = replace(one, building=made[-1])
     text = _text(replace(system, components=components), folder)
     write_whole(file, f"{about}\n\n{text}" if about else text)
-    return [file, *signals]
+    return [file, *made]
 
 
 def _text(system: System, folder: Path | None) -> str:

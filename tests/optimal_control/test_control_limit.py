@@ -13,10 +13,10 @@ from bristle.cli import main
 from bristle.core.files import scenarios_folder
 from bristle.engine.coupled import Coupled
 from bristle.engine.results import statistic_of
-from bristle.errors import BristleError
+from bristle.errors import BristleError, ScenarioError
 from bristle.optimal_control import Limit, case, limit, search
 from bristle.optimal_control.bound import bound_of, largest_force
-from bristle.optimal_control.case import Problem, case_of
+from bristle.optimal_control.case import Problem, case_of, with_voltage
 from bristle.optimal_control.search import descended, levelled
 from bristle.system.scenario import load_scenario
 
@@ -152,6 +152,13 @@ def test_without_any_force_the_bound_is_the_building_without_damper() -> None:
         x = p.phi @ x + p.ground_0 * ground[k] + p.ground_1 * ground[k + 1]
         most = max(most, abs(float(p.output @ x)))
     assert found == pytest.approx(most, rel=0.02)  # the bound's instants are further apart
+
+
+def test_overrides_do_not_take_the_voltage_from_what_plays_it() -> None:
+    case = case_of(load_scenario(PULSE), Y)
+    played = with_voltage(case, np.zeros(len(case.time)))
+    with pytest.raises(ScenarioError, match="was made"):
+        load_scenario(played, {"run.stop": 0.5})
 
 
 def test_the_largest_force_is_that_of_sliding_at_the_worst_speed() -> None:
