@@ -34,6 +34,9 @@ OUTSET = 4
 JACOBIANS = 12
 """Jacobians of that search."""
 
+FORM_ALONE = "its form alone explains"
+"""What stands in the sentence about a law that leaves less than the model's."""
+
 WITHIN = 0.95
 """Probability of the intervals over runs."""
 
@@ -164,8 +167,8 @@ class OtherLaw:
             else ("Without a further effect", "what is missing")
         )
         return (
-            f"{lead}, the law {plain}{bent} leaves {short_z(self.z)} {NOISE}: its form alone "
-            f"explains {100.0 * self.share:.0f} % of {rest}."
+            f"{lead}, the law {plain}{bent} leaves {short_z(self.z)} {NOISE}: {FORM_ALONE} "
+            f"{100.0 * self.share:.0f} % of {rest}."
         )
 
     def as_dict(self) -> dict[str, Any]:

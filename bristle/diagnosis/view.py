@@ -10,11 +10,12 @@ from ..comparison.names import effect_name, effect_names, site_name
 from ..core.text import percent, quantity, short_z, with_interval
 from ..data.channels import channel_unit, is_channel
 from ..identification.error import ForceError
-from ..physics.drive import Drive, text_for
+from ..physics.drive import Drive, text_for, unit_for
 from ..physics.effect import EFFECTS
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.plots import ROW, draw_ranking
 from ..view.style import Page, look
+from .law_trials import FORM_ALONE
 from .verdict import Diagnosis
 from .words import (
     FAULTS,
@@ -54,7 +55,10 @@ def diagnosis_view(found: Diagnosis) -> View:
 def verdict_view(verdict: Verdict) -> View:
     """Return the view of the content of verdict.json."""
     kind, why = str(verdict["kind"]), reasons(verdict)
-    asks = [text for text in why if "study.toml" in text]
+    # Never left to the details: what is to be done before there is a verdict, and that another law
+    # explains what is named.
+    seen = ("study.toml", FORM_ALONE)
+    asks = [one for one in why if kind == "insufficient" or any(word in one for word in seen)]
     told = [text for text in why if text not in asks]
     shown, apart = told[:_WHY], told[_WHY:]
     named = [_about(str(name), verdict) for name in verdict.get("effects") or []]
@@ -83,15 +87,15 @@ def verdict_view(verdict: Verdict) -> View:
 
 def _about(name: str, verdict: Verdict) -> str:
     """Return what an effect is, and its parameters with their 95 % intervals."""
-    known = EFFECTS[name].parameters if name in EFFECTS else {}
+    known, drive = EFFECTS[name].parameters if name in EFFECTS else {}, drive_of(verdict)
     values = {
-        own: (one["value"], one["std"], known[own].unit if own in known else "1")
+        own: (one["value"], one["std"], unit_for(known[own].unit, drive) if own in known else "1")
         for found in verdict.get("findings") or []
         for key, one in (found.get("values") or {}).items()
         for effect, _, own in [key.partition(".")]
         if effect == name
     }
-    return effect_text(name, values, drive_of(verdict))
+    return effect_text(name, values, drive)
 
 
 def effect_text(
@@ -209,6 +213,8 @@ def _trials(verdict: Verdict) -> list[Block]:
         z = [row.get("z_train"), row.get("z_holdout")]
         gain = percent(row["gain"]) if row.get("gain") is not None else "not tried"
         search = "full" if row.get("refined", True) else "short"
+        if search == "short" and (row.get("gain") or 0.0) < 0.0:
+            gain = "nothing"  # the fit was not brought to its end: it says no more than that
         site = f" ({row['site']})" if several else ""
         named_so = f"with {effect_name(row['effect'])}{site}"
         rows.append([named_so, *(map(_z, z) if known else ()), gain, search])
@@ -216,7 +222,7 @@ def _trials(verdict: Verdict) -> list[Block]:
     header = ("model", *z_columns, "error lower by", "fit")
     note = (
         "Each effect added to the model, all parameters fitted again; held-out runs decide. Short: "
-        "a first fit gained too little to go on."
+        "a first fit gained too little to go on, and was left before its end."
     )
     numbers = range(1, len(header) - 1)
     note = f"{_Z} {note}" if known else note

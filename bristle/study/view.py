@@ -103,7 +103,7 @@ def created_view(created: Created) -> View:
     wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
     return View(
         f"{folder}: a study of {len(settings.runs)} run{'s' * (len(settings.runs) > 1)}, "
-        f"{held} of them held out.",
+        f"{_held_out(len(settings.runs), held)} held out.",
         (
             Table(("channel", "column", "read so because"), rows),
             *(Text(note, "note") for note in notes),
@@ -111,6 +111,11 @@ def created_view(created: Created) -> View:
             Next(wrong, "if a column is wrong"),
         ),
     )  # fmt: skip
+
+
+def _held_out(runs: int, held: int) -> str:
+    """Return what is held out of a study's runs: of a single one its last part."""
+    return f"{held} of them" if held or runs > 1 else "its last part"
 
 
 def _column(one: Guess) -> str:
@@ -131,7 +136,8 @@ def study_view(study: Study) -> View:
         settings.title,
         (
             Text(
-                f"{study.folder}: {len(settings.runs)} runs, {held_out} of them held out"
+                f"{study.folder}: {len(roles)} run{'s' * (len(roles) > 1)}, "
+                f"{_held_out(len(roles), held_out)} held out"
                 f"{f', {test} for the test at the end' if test else ''}."
             ),
             Text(settings.excluded_text),
@@ -194,8 +200,12 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     title = f"Found and added: {effect_names(added)}."
     if verdict.get("kind") != "none":
         title, told = view.title, [Text(title, "say"), *told]
-    fall = Text(_fall(judged[0], judged[-1]))
-    rest = [one for one in view.blocks if one != Text(error_text(verdict))]
+    # The errors of earlier versions are low-passed: they and the others show no fall together.
+    alike = [one for one in judged if one.cut_off == judged[-1].cut_off]
+    fall = Text(_fall(alike[0], alike[-1], study.settings.cut_off))
+    # What a missing effect would gain stands in the verdict's sentence alone.
+    said = Text(error_text(verdict)) if verdict.get("kind") != "effect" else None
+    rest = [one for one in view.blocks if one != said]
     return view._replace(title=title, blocks=(*told, fall, *rest))
 
 
@@ -230,11 +240,19 @@ def _sizes(model: Model, effect: str) -> dict[str, tuple[float, float | None, st
     return {name: (f.value, f.std, f.unit) for name, f in model.written_of(effect).items()}
 
 
-def _fall(first: HistoryStep, last: HistoryStep) -> str:
-    """Return the sentence that tells how the error on held-out runs fell."""
+def _fall(first: HistoryStep, last: HistoryStep, cut_off: float) -> str:
+    """Return the sentence that tells how the error on held-out runs fell; of one step, what it is.
+
+    Parameters
+    ----------
+    first, last : whose errors are of the same low-pass, which is told
+    cut_off : Hz, of that low-pass where they do not tell it
+    """
     factor, unit = scale("N", max(first.rms or 0.0, last.rms or 0.0))
-    texts = [_error(one, factor, unit) for one in (first, last)]
-    return f"Force error on the held-out runs: {' -> '.join(texts)}."
+    texts = [_error(one, factor, unit) for one in ((first, last) if first != last else (last,))]
+    low = cut_off if last.cut_off is None else last.cut_off
+    below = f" below {low:g} Hz" if low else ""
+    return f"Force error{below} on the held-out runs: {' -> '.join(texts)}."
 
 
 def _error(step: HistoryStep, factor: float, unit: str) -> str:
@@ -311,13 +329,14 @@ def _then(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
             Next(command("plan", folder), "writes a test that distinguishes them"),
             Next(command("add", folder, verdict["effects"][0]), "takes the first"),
         ]
+    other_law = any(found.get("other_law") for found in verdict.get("findings") or [])
+    every = Next(command("diagnose", folder, "--law", "all"), "tries every law with its effects")
     if kind == "effect":
-        return [Next(command("add", folder, *verdict["effects"]), "puts it into the model")]
+        add = Next(command("add", folder, *verdict["effects"]), "puts it into the model")
+        return [every, add] if other_law else [add]
     if kind == "unknown":
-        other_law = any(found.get("other_law") for found in verdict.get("findings") or [])
-        every = command("diagnose", folder, "--law", "all")
         return [
-            *([Next(every, "tries every law with its effects")] if other_law else []),
+            *([every] if other_law else []),
             Next(command("learn", folder), "learns what is missing"),
             *_gaining(verdict, folder),
             Next(command("compare", folder), "shows where the error is"),

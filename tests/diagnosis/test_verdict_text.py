@@ -10,10 +10,13 @@ from bristle.core.finding import Finding
 from bristle.diagnosis.conclusion import VerdictContext, conclude
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.verdict import current
+from bristle.diagnosis.view import verdict_view
 from bristle.diagnosis.words import TONES, fault_rows, fault_texts, headline, sentences, untestable
 from bristle.errors import StudyError
 from bristle.study.history import History
 from bristle.study.study import Study
+from bristle.view import terminal
+from bristle.view.blocks import Table
 
 
 def at(site, kind="none", *effects, **more):
@@ -127,6 +130,30 @@ def test_runs_that_contradict_each_other_leave_no_verdict_where_nothing_else_is_
     assert said(storey1=bad, layer=at("layer"))["kind"] == "insufficient"
     assert said(storey1=bad, layer=at("layer", "effect", "duffing"))["kind"] == "effect"
     assert said(storey1=bad, layer=at("layer", "unknown"))["kind"] == "unknown"
+
+
+def test_all_that_is_to_be_done_for_a_verdict_is_told_without_details():
+    lacking = [f"Run {k} is at rest. {'Measure it with motion. ' * 20}".strip() for k in range(5)]
+    shown = terminal.text(verdict_view({"kind": "insufficient", "reasons": lacking}))
+    assert [k for k in range(5) if f"Run {k} is at rest" not in shown] == []
+
+
+@pytest.mark.parametrize(("drive", "unit"), [("voltage", "V"), ("current", "A")])
+def test_values_of_an_effect_have_the_unit_of_the_command(drive, unit):
+    found = {"values": {"saturation.V_s": {"value": 2.1, "std": 0.1}}}
+    verdict = {
+        "kind": "effect", "effects": ["saturation"], "findings": [found],
+        "noise_floor": {drive: 0.01},
+    }  # fmt: skip
+    assert f"V_s = 2.10 ± 0.20 {unit} (95 %)" in terminal.text(verdict_view(verdict))
+
+
+def test_a_fit_that_was_left_before_its_end_does_not_raise_the_error():
+    row = {"effect": "backlash", "z_train": 2.2, "z_holdout": 2.4, "gain": -1.3}
+    rows = [{**row, "refined": False}, {**row, "effect": "delay", "refined": True}]
+    view = verdict_view({"kind": "none", "ranking": rows})
+    (table,) = (one for one in view.every(Table) if one.title == "The evidence")
+    assert [line[-2:] for line in table.rows[1:]] == [["nothing", "short"], ["-130.0 %", "full"]]
 
 
 TOLD = {"schema": 2, "kind": "ambiguous", "effects": ["stribeck", "flattening"], "ranking": []}
