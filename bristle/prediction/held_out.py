@@ -86,19 +86,17 @@ class Proof:
         runs = "training runs (there are no held-out ones)" if self.training else "held-out runs"
         step = quantity(self.step, "s", fine=True)
         out = [
-            f"Force error on the {runs}: {self.told.text()}, as in  bristle compare .",
+            f"Force error on the {runs}, as bristle compare prints it: {self.told.text()}.",
             *self.told.beside(),
         ]
         if self.fmu is None:
             return [*out, f"The FMU was not run to confirm it: {self.why}"]
         over = "" if self.part == 1.0 else f", the first {100.0 * self.part:.2g} % of each run"
         confirmed = "confirms it" if self.agrees else "does NOT confirm it"
-        out.append(
-            f"The FMU in FMPy {confirmed}: {self.fmu.text()} at a step of {step}{over}. "
-            f"Again:  python {folder / FOLDER / CHECK}"
-        )
+        out.append(f"The FMU in FMPy {confirmed}: {self.fmu.text()} at a step of {step}{over}.")
         if self.part < 1.0 and self.expected is not None:
-            out.append(f"Over the same part the model has {self.expected.text()}.")
+            out[-1] += f" Over the same part the model has {self.expected.text()}."
+        out.append(f"Again:  python {folder / FOLDER / CHECK}")
         if self.raw is None:
             return [*out, "It was not fed with measured columns: none is the motion of the damper."]
         out.append(f"Fed with the measured columns as they are: {self.raw.text()}.")

@@ -25,7 +25,7 @@ from ..study.budget_picture import budgets, draw_budget, sentence
 from ..study.history import HistoryStep, history_steps
 from ..study.pictures import staircase_page
 from ..study.study_file import TEST
-from ..study.view import or_nothing, story_view
+from ..study.view import or_nothing, steps_table, story_view
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
@@ -307,13 +307,13 @@ def _tiles(content: Content) -> str:
     span = f"; 95 %: {low:.2f} to {high:.2f}" if now.noise_known else ""
     pairs = [
         (
-            f"z = {short_z(now.z)}",
-            f"error / noise (z) on held-out runs{span}",
-        ),
-        (
             now.error.text(now.unit),
             f"error of the {now.quantity} on held-out runs: RMS of measured less predicted, and "
             "its share of the RMS of what was measured",
+        ),
+        (
+            f"z = {short_z(now.z)}",
+            f"error / noise (z) on held-out runs; a true model has 1{span}",
         ),
     ]
     first = next((one.z for one in content.history_steps if one.z is not None), None)
@@ -397,15 +397,13 @@ def _sites(content: Content) -> list[str]:
 
 def _history(content: Content) -> str:
     with_z = [one for one in content.history_steps if one.z is not None]
-    header = ["step", "what", "z held-out", "z training", "why"]
-    rows = [
-        [str(step.number), step.what, or_nothing(one.z), or_nothing(one.z_train), step.why]
-        for step, one in zip(content.steps, content.history_steps, strict=True)
-    ]  # fmt: skip
+    table = steps_table(content.history_steps, content.study.settings.cut_off)
+    rows = [[*row, step.why] for row, step in zip(table.rows, content.steps, strict=True)]
+    table = table._replace(header=[*table.header, "why"], rows=rows)
     picture = ""
     if with_z:
         fall = " → ".join(or_nothing(one.z) for one in with_z)
-        # Their forces are low-passed, and those of the rest of the page are not: z tells it all.
+        # The forces of old steps are low-passed, those of others are not: z is the same of all.
         picture = html.figure(
             png(staircase_page([replace(one, rms=None) for one in with_z])),
             f"The staircase of the history: z on held-out runs {fall}",
@@ -413,7 +411,7 @@ def _history(content: Content) -> str:
             "those that it was fitted to (grey), over the noise floor. These data "
             "cannot distinguish a model at the green line from a true one.",
         )  # fmt: skip
-    return html.section("How the error fell", picture, html.table(header, rows, numbers=(2, 3)))
+    return html.section("How the error fell", picture, html.blocks((table,)))
 
 
 def _before_after(content: Content) -> str:
