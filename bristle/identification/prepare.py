@@ -62,7 +62,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     alone = tuple(c for c in ("displacement", "velocity") if measurement.has(c))
     needed = ("force", drive, *(alone if len(alone) == 1 else ()))
     force = measurement["force"]
-    start = start_of(motion.x, force, dt)
+    start = start_of(motion.x, motion.v, force, dt)
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, start.first, measurement.left_out(*needed),

@@ -29,6 +29,9 @@ STANDS = 0.2
 LOADED = 0.2
 """Share of its RMS that the force has at the begin of a rest under load."""
 
+STILL = 0.03
+"""Share of their RMS that speed and force have at most where a run sets out from rest: noise."""
+
 MOST = 5
 """What part of a run this may cost at most: one in so many samples."""
 
@@ -59,14 +62,19 @@ class RunStart(NamedTuple):
     rest: int = 0
 
 
-def start_of(x: Array, force: Array, dt: float) -> RunStart:
+def start_of(x: Array, v: Array, force: Array, dt: float) -> RunStart:
     """Return how a run begins.
+
+    A force of zero at a speed of zero tells that no elastic part holds anything: the run sets out
+    from rest, however soon it moves.
 
     Parameters
     ----------
-    x, force : (n,) displacement [m], force [N]
+    x, v, force : (n,) displacement [m], velocity [m/s], force [N]
     dt : sampling step [s]
     """
+    if _none_at_first(v) and _none_at_first(force):
+        return RunStart(SETTLING)
     span = float(np.ptp(x))
     rms = float(np.sqrt(np.mean(force**2)))
     stands = max(SETTLING, round(STANDS / dt))
@@ -79,6 +87,11 @@ def start_of(x: Array, force: Array, dt: float) -> RunStart:
     first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
     first = min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
     return RunStart(first, min(stands, first) if rests else 0)
+
+
+def _none_at_first(y: Array) -> bool:
+    """Return whether a signal (n,) begins at zero, as far as noise tells."""
+    return bool(abs(y[0]) <= STILL * np.sqrt(np.mean(y**2)))
 
 
 def carrying_state(law: str, effects: Sequence[str]) -> tuple[str, str]:

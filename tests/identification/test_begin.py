@@ -66,6 +66,14 @@ def test_a_run_cut_out_under_load_is_judged_once_the_bristles_have_slipped(begin
     assert float(np.sqrt(np.mean(forgetful[run.skip :] ** 2))) < 3.0 * NOISE
 
 
+def test_a_run_that_sets_out_from_rest_is_judged_from_there_however_soon_it_moves():
+    t = np.arange(3000) * DT
+    swinging = 0.01 * (1.0 - np.cos(2.0 * np.pi * 1.5 * t))
+    turning = round(0.5 / 1.5 / DT)  # the speed is zero as at first, and the bristles are bent
+    assert recorded(swinging).skip == SETTLING
+    assert recorded(swinging, turning).skip > SETTLING
+
+
 @pytest.mark.parametrize("begin", [750, 1700])
 def test_bristles_begin_with_the_load_under_which_a_run_begins(begin):
     run = recorded(stop_and_go(), begin)
