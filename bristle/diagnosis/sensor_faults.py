@@ -50,7 +50,7 @@ def as_json(fault: Finding) -> dict[str, object]:
         "channel": fault.channel, "fault": fault.kind, "value": fault.value, "std": fault.std,
         "words": fault.text, "either": fault.either, "run": fault.run, "runs": [*fault.runs],
     }  # fmt: skip
-    return {key: one for key, one in whole.items() if one not in ("", [])}
+    return {key: one for key, one in whole.items() if one or not isinstance(one, (str, list))}
 
 
 def instruments_of(sensors: Sequence[Finding]) -> tuple[str, ...]:

@@ -143,6 +143,7 @@ def test_a_force_that_is_clipped_in_one_run_names_it_and_both_ends():
     ends = f"{quantity(-0.6 * top, 'N', 4)} and {quantity(0.5 * top, 'N', 4)}"
     assert fault.text.endswith(f"in {spoilt.name}: its range ended at {ends}.")
     assert fault_rows({"sensors": [as_json(fault)]})[0][-1] == spoilt.name
+    assert as_json(replace(fault, value=np.float64(fault.value))) == as_json(fault)
 
 
 @pytest.mark.parametrize("tau", [0.004, 0.01])
