@@ -14,6 +14,7 @@ import pkgutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
@@ -25,19 +26,6 @@ narrow, and laws, effects and runs have threads of their own: both together are 
 
 _SLOW_TO_LEAVE = ("bristle.engine.instance", "numba")
 """Modules with which a process takes half a second and more to be taken down."""
-
-_FORMER = {
-    "components": "list components, and new controller NAME",
-    "effects": "list effects, new effect NAME, and check FILE",
-    "laws": "list laws, new law NAME, and check FILE",
-    "scenarios": "list scenarios, and new scenario NAME --like SCENARIO",
-    "compare --fmu": "compare-fmu FILE.fmu --data FILE",
-    "compare --closed-loop": "predict FOLDER",
-    "compare --runs": "compare FOLDER --role ROLE",
-    "plan --output": "plan FOLDER --out PLAN",
-    "study check --exclude": "study roles FOLDER --exclude RUN",
-}
-"""Commands of before, with an option or without, and what took their place."""
 
 _ANEW = "The same command begins anew."
 _AS_IT_WAS = f"The study is as it was. {_ANEW}"
@@ -113,14 +101,12 @@ def build_parser(only: str = "") -> argparse.ArgumentParser:
 
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
-    """Return the arguments of a command line; an old spelling is an error that names the new."""
+    """Return the arguments of a command line; of a misspelt command say the one that is near."""
     words = sys.argv[1:] if argv is None else argv
     known = {one.name.strip("_").replace("_", "-") for one in pkgutil.iter_modules(__path__)}
     parser = build_parser(words[0] if words and words[0] in known else "")
-    for old, new in _FORMER.items():
-        command, *option = old.split()
-        if words[:1] == [command] and set(option) <= set(words):
-            parser.error(f"bristle {old} is now bristle {new}")
+    if words and words[0] not in known and (near := get_close_matches(words[0], known, 1)):
+        parser.error(f"there is no command {words[0]}. Did you mean  bristle {near[0]}")
     return parser.parse_args(words)
 
 

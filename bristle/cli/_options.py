@@ -7,7 +7,7 @@ import importlib
 import json
 import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from fnmatch import fnmatchcase
 from functools import partial
@@ -18,8 +18,6 @@ from typing import TYPE_CHECKING, Any
 from ..errors import TrustError
 
 if TYPE_CHECKING:
-    from rich.text import Text
-
     from ..data.channels import ChannelSpec
     from ..fmu.build import Plan
     from ..view.blocks import View
@@ -243,30 +241,6 @@ def print_study_view(view: View, arguments: argparse.Namespace, *pictures: Path 
     print(terminal.text(view, details=arguments.details, elsewhere=elsewhere))
     for picture in filter(None, pictures):
         print(f"Picture: {picture}")
-
-
-def print_table(
-    heads: Sequence[str], rows: Iterable[Sequence[str | Text]], title: str | None = None, *,
-    lines: bool = False,
-) -> None:  # fmt: skip
-    """Print a table with rules, for a terminal.
-
-    Parameters
-    ----------
-    heads, rows, title : what stands in it
-    lines : whether lines stand between the rows
-    """
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=title, title_justify="left", show_lines=lines)
-    for head in heads:
-        table.add_column(Text(head))
-    for row in rows:
-        # Text, not str: rich would read units in brackets, and what an FMU says, as markup.
-        table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in row))
-    Console().print(table)
 
 
 def share_of(text: str) -> float:

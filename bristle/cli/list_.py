@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.text import tick, typed
-from ._options import add_json, add_trust, print_json, print_table
+from ..view.blocks import Table
+from ..view.terminal import lines
+from ._options import add_json, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..fmu.description import Description, Variable
@@ -89,8 +91,11 @@ def _physics(word: str, arguments: argparse.Namespace) -> int:
 
 def _in_brief(row: dict[str, Any]) -> dict[str, Any]:
     """Return the row of an effect or a law in the table of all."""
-    where = {"site": ", ".join(row["sites"])} if "sites" in row else {}
-    return {"name": row["name"], **where, "description": row["about"].removesuffix(".")}
+    about = row["about"].removesuffix(".")
+    if "sites" not in row:
+        return {"name": row["name"], "description": about}
+    site, said = ", ".join(row["sites"]), about.partition(": ")[2]  # the name stands before it
+    return {"name": row["name"], "site": site, "description": said}
 
 
 def _components() -> Rows:
@@ -178,7 +183,7 @@ def _laws() -> Rows:
 
 
 def _print(title: str, rows: Rows) -> None:
-    """Print one table: with rules on a terminal, plain columns in a pipe."""
+    """Print one table."""
     columns = [
         column
         for column in (rows[0] if rows else {})
@@ -186,16 +191,7 @@ def _print(title: str, rows: Rows) -> None:
     ]
     heads = [f"{column} [{_UNITS[column]}]" if column in _UNITS else column for column in columns]
     cells = [[_cell(row[column]) for column in columns] for row in rows]
-    if sys.stdout.isatty() and rows:
-        print_table(heads, cells, title)
-        return
-    print(title if rows else f"{title}: none")
-    if rows:
-        cells.insert(0, heads)
-    widths = [max(len(row[i]) for row in cells) for i in range(len(columns))]
-    for row in cells:
-        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        print(f"  {line}".rstrip())
+    print("\n".join(lines(Table(heads, cells, title=title)) if rows else [f"{title}: none"]))
 
 
 def _cell(value: Any) -> str:

@@ -11,8 +11,10 @@ from .blocks import Block, Formula, Next, Table, Text, View
 WIDTH = 100
 MOST = 12
 """Lines of an answer, besides its tables, notes and blank lines; the rest is with the details."""
-WIDEST = 120
-"""Of a table, before the cells of a row stand below each other."""
+READ = 30
+"""Columns that the last cell of a row needs, where it is broken into lines."""
+WIDEST = 140
+"""Of a table whose last cells have no more than that, before the cells stand below each other."""
 _wrapped = partial(wrap, break_long_words=False, break_on_hyphens=False)
 """Breaks a text into lines, and no path or command at a hyphen."""
 _NEXT = "Next:  "
@@ -76,10 +78,11 @@ def aligned(
 ) -> list[str]:
     """Return the lines of a table; `numbers` are the columns that are set right.
 
-    Of a table that is too wide titles are broken; where that is not enough, the cells of a row
-    stand below each other.
+    Of a table that is too wide titles are broken, then the last cells; where that is not enough,
+    the cells of a row stand below each other.
     """
     right = set(numbers)
+    last = len(header) - 1
     cells = [max(map(len, column), default=0) for column in zip(*rows, strict=True)]
     wide = [
         max(len(title), width)
@@ -95,17 +98,22 @@ def aligned(
             both = [[[row[0], *row[part]] for row in (header, *rows)] for part in parts]
             tables = (aligned(one[0], one[1:], range(1, len(one[0]))) for one in both)
             return [line for lines in tables for line in (*lines, "")][:-1]
-    if sum(wide) + 2 * len(wide) > WIDEST:
+    if sum(wide) + 2 * len(wide) > WIDTH and last not in right:
+        wide[last] = max(READ, WIDTH - sum(wide[:last]) - 2 * len(wide))
+    if sum(wide) + 2 * len(wide) > (WIDTH if last in right else WIDEST):
         return [line for row in rows for line in _stacked(header, row)]
     titles = [_wrapped(title, max(1, width)) for title, width in zip(header, wide, strict=True)]
     high = max(map(len, titles))
-    head = zip(*([""] * (high - len(one)) + one for one in titles), strict=True)
+    table = [*zip(*([""] * (high - len(one)) + one for one in titles), strict=True)]
+    for row in rows:
+        first, *more = _wrapped(row[last], wide[last]) or [""]
+        table += [(*row[:last], first), *((*[""] * last, line) for line in more)]
     return [
         "  " + "  ".join(
             cell.rjust(width) if k in right else cell.ljust(width)
             for k, (cell, width) in enumerate(zip(line, wide, strict=True))
         ).rstrip()
-        for line in (*head, *rows)
+        for line in table
     ]  # fmt: skip
 
 

@@ -267,3 +267,10 @@ run_and_exit()
     command = [sys.executable, str(file), "undo", "rig"]
     done = subprocess.run(command, capture_output=True, text=True, env=given, check=True)
     assert done.stdout.split() == ["False", chosen or "1"]
+
+
+def test_a_misspelt_command_is_told_the_one_that_is_near(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["diagnos", "my_rig"])
+    assert ended.value.code == 2
+    assert "Did you mean  bristle diagnose" in capsys.readouterr().err

@@ -44,17 +44,10 @@ def test_one_effect_is_told_in_full(name: str, capsys: pytest.CaptureFixture[str
 
 def test_every_effect_has_its_row(capsys: pytest.CaptureFixture[str]) -> None:
     lines = answer(capsys).splitlines()
-    assert [line.split()[0] for line in lines[2:-1]] == sorted(EFFECTS)
+    first = [line[2:].split(" ")[0] for line in lines[2:-1]]
+    assert [name for name in first if name] == sorted(EFFECTS)
     assert lines[-1] == "All of one:  bristle list effects NAME"
-
-
-def test_on_a_terminal_there_is_a_table(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "160")
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    said = answer(capsys)
-    assert all(name in said for name in EFFECTS)
+    assert max(map(len, lines)) <= 100  # the last column is broken into lines
 
 
 def test_an_unknown_effect_is_an_error_that_names_the_nearest(

@@ -23,7 +23,7 @@ def test_the_whole_list_names_everything(capsys):
     for file in stock_scenarios():
         assert f"  {file.stem} " in out
     for record in list_ground_motions():
-        assert f"  {record.name} " in out
+        assert f"\n  {record.name}\n" in out
     for effect in EFFECTS:
         assert f"  {effect} " in out
 
@@ -32,8 +32,9 @@ def test_components_have_a_line_each(capsys):
     lines = answer(capsys, "components").splitlines()
     assert lines[0] == "components"
     assert lines[1].split() == ["name", "description"]
-    assert [line.split()[0] for line in lines[2:]] == component_names()
-    assert all(len(line.split()) > 3 for line in lines[2:])
+    named = [line for line in lines[2:] if line[2] != " "]  # others go on
+    assert [line.split()[0] for line in named] == component_names()
+    assert all(len(line.split()) > 3 for line in named)
 
 
 def test_ports_have_causality_unit_and_bounds(capsys):
@@ -84,15 +85,6 @@ def test_effects_have_site_and_meaning(capsys):
     assert set(rows) == set(EFFECTS)
     assert rows["gas_spring"]["site"] == "damper"
     assert rows["gas_spring"]["about"].startswith("Gas spring")
-
-
-def test_a_terminal_gets_a_table(capsys, monkeypatch):
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    monkeypatch.setenv("COLUMNS", "200")
-    out = answer(capsys, "ports", "ConstantVoltage")
-    assert "┃" in out
-    assert "level" in out
-    assert "peak [m/s2]" in answer(capsys, "records")
 
 
 @pytest.mark.parametrize(
