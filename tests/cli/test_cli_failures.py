@@ -183,7 +183,7 @@ raise SystemExit(main(["undo", "rig"]))
         child.kill()
     assert time.perf_counter() - began < 2.0 + 1.0  # a busy machine takes its time
     assert child.returncode == 130
-    assert told.strip().splitlines() == ["interrupted"]
+    assert told.strip().splitlines()[-1] == "interrupted"  # after what is told of slow work
     deadline = time.monotonic() + 5.0
     while alive(child.pid) and time.monotonic() < deadline:
         time.sleep(0.05)
