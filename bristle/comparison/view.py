@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from ..core.text import percent, plain, scale, short_z
@@ -39,6 +39,9 @@ LOOPS = 4.6
 """Height of two rows of loops of single cycles [in]."""
 _EXCESS = "beyond noise"
 """The column that a table has where the noise is known."""
+_HALF = "half step [z]"
+_NO_STEP = 0.05
+"""What half the calculation step changes, over the noise, before it has a column."""
 _NOTE = "z: error / noise; a true model has 1."
 _SHOWN = 6  # coordinates in a table
 _TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
@@ -86,7 +89,7 @@ def run_table(comparison: Comparison) -> Table:
     known = known_of(comparison.predictions)
     names = varying(known)
     header = ["run", f"error [{unit}]", "of force", f"noise [{unit}]", "z", "fit", "VAF"]
-    header += ["half step [z]", *names]
+    header += [_HALF, *names]
     own = [[_label(name, one[name]) for name in names] for one in known]
     rows = [[*_run(run, factor), *labels] for run, labels in zip(comparison.runs, own, strict=True)]
     if len(rows) > 1:
@@ -95,7 +98,10 @@ def run_table(comparison: Comparison) -> Table:
     if comparison.sites:
         title = f"{capitalised(site_name(comparison.site))}: error on each run"
     note = f"{_NOTE} Half step: what half the calculation step changes, over the noise."
-    return _as_known(comparison, Table(header, rows, range(1, len(header)), title, note=note))
+    table = Table(header, rows, range(1, len(header)), title, note=note)
+    if all(run.numerical_z < _NO_STEP for run in (*comparison.runs, comparison.total)):
+        table = _without(table, (_HALF,))._replace(note=_NOTE)
+    return _as_known(comparison, table)
 
 
 def _label(name: str, value: Label) -> str:
@@ -157,16 +163,20 @@ def band_table(comparison: Comparison) -> Table:
 
 
 def _as_known(comparison: Comparison, table: Table) -> Table:
-    """Return a table without what only a known noise tells."""
+    """Return a table without what only a known noise tells, and what is nowhere known."""
     if comparison.noise_known:
-        return table
-    apart = ("z", _EXCESS, "half step [z]")
-    kept = [
-        k for k, name in enumerate(table.header)
-        if name not in apart and not name.startswith("noise [")
-    ]  # fmt: skip
+        empty = [
+            name for k, name in enumerate(table.header) if {row[k] for row in table.rows} == {"-"}
+        ]
+        return _without(table, empty)
+    apart = ("z", _EXCESS, _HALF, *(one for one in table.header if one.startswith("noise [")))
+    return _without(table, apart)._replace(note="" if _NOTE in table.note else table.note)
+
+
+def _without(table: Table, names: Collection[str]) -> Table:
+    """Return a table, all of whose columns but the first are numbers, without some columns."""
+    kept = [k for k, name in enumerate(table.header) if name not in names]
     return table._replace(
-        note="" if _NOTE in table.note else table.note,
         header=[table.header[k] for k in kept],
         rows=[[row[k] for k in kept] for row in table.rows],
         numbers=range(1, len(kept)),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..comparison.names import site_name
+from ..comparison.names import effect_names, site_name
 from ..comparison.view import band_table, headline, pattern_table, run_table, site_table, sites_page
 from ..core.progress import counted, tell
 from ..core.text import command, short_z
@@ -104,7 +104,7 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
                 tell("the model before its last effect")
-                before, added = against.compare(earlier), " and ".join(new)
+                before, added = against.compare(earlier), effect_names(new)
                 break
         found = [_with_error(one, against, study) for one in counted(found, "step")]
         if open_test and study.files(TEST):
@@ -403,13 +403,12 @@ def _history(content: Content) -> str:
     picture = ""
     if with_z:
         fall = " → ".join(or_nothing(one.z) for one in with_z)
-        # The forces of old steps are low-passed, those of others are not: z is the same of all.
         picture = html.figure(
-            png(staircase_page([replace(one, rms=None) for one in with_z])),
+            png(staircase_page(with_z)),
             f"The staircase of the history: z on held-out runs {fall}",
-            "The error of each model of the history, on runs that no fit has seen (blue) and on "
-            "those that it was fitted to (grey), over the noise floor. These data "
-            "cannot distinguish a model at the green line from a true one.",
+            "The error of each model of the history over the noise, on runs that no fit has seen "
+            "(blue) and on those that it was fitted to (grey); in words the error on the first. "
+            "These data cannot distinguish a model at the green line from a true one.",
         )  # fmt: skip
     return html.section("How the error fell", picture, html.blocks((table,)))
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ..comparison.names import effect_name
 from ..comparison.panels import OneCycle, chosen_cycles
 from ..comparison.predictions import run_predictions
 from ..core.text import percent, scale
@@ -62,7 +63,7 @@ def shares(found: Budgets) -> list[tuple[str, float]]:
 def sentence(found: Budgets) -> str:
     """Return the parts with their shares in words, the largest first; "" where there are none."""
     parts = sorted(shares(found), key=lambda one: -one[1])
-    told = ", ".join(f"{name} {percent(share, 0)}" for name, share in parts)
+    told = ", ".join(f"{effect_name(name)} {percent(share, 0)}" for name, share in parts)
     return f"The force consists of (RMS over that of the force): {told}." if told else ""
 
 
@@ -85,7 +86,9 @@ def draw_budget(problem: Problem, model: Model) -> Page | None:
     with look():
         bars = _BAR * len(parts) + 0.75
         above = _PANELS if cycles else 0.0
-        heading = f"{' + '.join([shown_law(model.law), *model.effects])}: the parts of its force"
+        heading = (
+            f"{' + '.join([shown_law(model.law), *map(effect_name, model.effects)])}: its force"
+        )
         said = "Stacked over single cycles; the line is their sum, the model's force."
         page = Page(_WIDTH, above + bars, heading, said if cycles else "")
         if cycles:
@@ -148,7 +151,7 @@ def _bars(axes: Axes, parts: list[tuple[str, float]], colours: dict[str, str]) -
     )  # fmt: skip
     for place, (_, share) in zip(places, parts, strict=True):
         axes.text(share, place, f" {percent(share, 0)}", va="center", fontsize=8.5, color=INK)
-    axes.set_yticks(places, [name for name, _ in parts], fontsize=9, color=INK)
+    axes.set_yticks(places, [effect_name(name) for name, _ in parts], fontsize=9, color=INK)
     axes.invert_yaxis()
     axes.tick_params(axis="y", length=0)
     axes.xaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")

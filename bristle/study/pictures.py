@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.text import quantity, short_z
+from ..core.text import percent, quantity, short_z
 from ..data.channels import DRIVE
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
@@ -254,12 +254,13 @@ def _stairs(axes: Axes, heights: Sequence[float | None], colour: str, width: flo
 def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None, unit: str) -> None:
     """Write z and error over a step, and at its riser by how much the error fell."""
     assert one.z is not None
-    z = short_z(one.z)
-    rms = "" if one.rms is None else f"  {quantity(one.rms, unit, 4)}"
-    rms += f" below {one.cut_off:g} Hz" if rms and one.cut_off else ""
+    told = [f"z = {short_z(one.z)}"]
+    if one.rms is not None and one.cut_off == 0.0:  # else it is of low-passed forces
+        share = "" if one.share is None else f" ({percent(one.share)})"
+        told.insert(0, f"{quantity(one.rms, unit)}{share}")
     # Above the higher of both lines, so that neither strikes it through.
     height = max(one.z, one.z_train or 0.0)
-    label(axes, f"z = {z}{rms}", i, height, BLUE, xytext=(0, 7), ha="center", va="bottom")
+    label(axes, ",  ".join(told), i, height, BLUE, xytext=(0, 7), ha="center", va="bottom")
     if before is None or before <= 0.0:
         return
     change = one.z / before - 1.0

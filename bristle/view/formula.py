@@ -16,6 +16,10 @@ _OPEN, _CLOSE = "<mrow><mo>(</mo>", "<mo>)</mo></mrow>"
 _RELATIONS = ("=", "<=", ">=", "<", ">", ",")
 _SUMS = ("+", "-", "−", "±", "+-")  # noqa: RUF001
 
+_ROOM = 95
+"""Characters that a line of a page has room for; a longer formula is set smaller."""
+_SMALLEST = 0.7
+
 
 def formula(text: str) -> str:
     """Return a formula as a block of MathML; what is no formula by this grammar, as code.
@@ -30,7 +34,12 @@ def formula(text: str) -> str:
         inside = _Parser(text).whole()
     except _NotAFormulaError:
         return f'<div class="formula"><code>{escape(text)}</code></div>'
-    return f'<div class="formula"><math display="block"><mrow>{inside}</mrow></math></div>'
+    size = (
+        f' style="font-size: {max(_SMALLEST, _ROOM / len(text)):.2f}em"'
+        if len(text) > _ROOM
+        else ""
+    )
+    return f'<div class="formula"><math display="block"{size}><mrow>{inside}</mrow></math></div>'
 
 
 class _NotAFormulaError(ValueError):
