@@ -144,7 +144,7 @@ def test_the_page_says_what_the_study_holds(page, folder):
 
 def test_the_sentences_are_those_of_the_comparison(page, folder):
     content = gather(Study(folder))
-    assert content.added == "gas_spring"
+    assert content.added == "gas spring"
     assert content.before is not None
     text = text_of(page)
     for sentence in content.now.sentences:
