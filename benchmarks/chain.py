@@ -107,7 +107,7 @@ def _calls_of(
         ("GetInteger", ["fault"], ctypes.c_int),
     ):
         if kind is None:
-            found.append((instance.library.function(name), step, ()))
+            found.append((instance.calls.function(name), step, ()))
             continue
         references = (ctypes.c_uint * len(ports))(*(variables[p].reference for p in ports))
         values = (kind * len(ports))()
@@ -115,5 +115,5 @@ def _calls_of(
             ctypes.c_void_p.from_param(ctypes.addressof(a)) for a in (references, values)
         )
         arguments = (component, first, ctypes.c_size_t.from_param(len(ports)), second)
-        found.append((instance.library.function(name), arguments, (references, values)))
+        found.append((instance.calls.function(name), arguments, (references, values)))
     return found

@@ -128,12 +128,12 @@ class _Calls:
             for vr, n, place in zip(self.references, sizes, places, strict=True)
         ]
         names = ("SetReal", "GetReal", "GetInteger")
-        self.functions = [instance.library.function(name) for name in names]
+        self.functions = [instance.calls.function(name) for name in names]
         kinds_of_step = (ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
         self.step_arguments = self._convert(
             (instance.component, 0.0, step, 1), kinds_of_step, prepared
         )
-        self.step = instance.library.function("DoStep")
+        self.step = instance.calls.function("DoStep")
         if not prepared:
             self.step.argtypes = kinds_of_step  # type: ignore[attr-defined]
             for function in self.functions:

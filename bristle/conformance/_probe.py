@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 
 from ..core.finding import Finding
-from .bench import Bench, Plan
-from .native import BlackBox, FatalAnswerError, MissingFunctionError, UnexpectedError
+from ..fmu.library import FatalAnswerError, MissingFunctionError, UnexpectedError
+from .bench import Bench, BlackBox, Plan
 from .probe import failed
 from .probes import PROBES
 

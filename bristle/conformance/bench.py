@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 import json
 import math
-import os
+import mmap
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -14,19 +15,25 @@ from typing import Any
 from ..core.text import listed
 from ..fmu.archive import library_member
 from ..fmu.description import Description, Value, Variable
-from ..units import Unit
-from .native import (
+from ..fmu.library import (
     DISCARD,
+    ERROR,
+    FATAL,
     OK,
+    PENDING,
     STATUS,
     WARNING,
-    BlackBox,
-    Instance,
+    FatalAnswerError,
+    Handle,
     Library,
-    LibraryFmi3,
     UnexpectedError,
-    told,
+    resources_of,
 )
+from ..units import Unit
+
+_MOST_MESSAGES = 1000
+_LAST = 3  # messages that are told of a failure
+_MOST_SAID = 270  # characters: a report says them twice
 
 
 @dataclass
@@ -39,7 +46,7 @@ class Plan:
     two runs are equal if they differ by less of a variable's largest value. `ours` says that
     bristle's rules for faults apply. `fmi3` is also known where the variables cannot be read.
     `listens` has every instance log for debugging, and `proxy` is a library that puts the numbers
-    into its messages (see `native.Library`).
+    into its messages (see `fmu.library.Library`).
     """
 
     fmu: str
@@ -70,9 +77,8 @@ class Plan:
 
     @property
     def resources(self) -> str:
-        """Return where the resources are: an URI, in FMI 3.0 a path that ends like a folder's."""
-        folder = Path(self.folder) / "resources"
-        return f"{folder}{os.sep}" if self.about.version == "3.0" else folder.as_uri()
+        """Return where the resources are, as an instance is told."""
+        return resources_of(Path(self.folder), self.about.version)
 
     @property
     def end(self) -> float:
@@ -118,6 +124,147 @@ def _description(raw: dict[str, Any]) -> Description:
     return Description(**{**raw, "variables": variables})
 
 
+def told(text: str) -> str:
+    """Return what an FMU said in one line, cut to a length that a row holds."""
+    text = " ".join(text.split())
+    rest = len(text) - _MOST_SAID
+    return f"{text[:_MOST_SAID]} ... and {rest:,} more characters" if rest > 0 else text
+
+
+class BlackBox:
+    """Remembers the call under way, and what the FMU says in it, where it outlives a crash.
+
+    Behind its text the file has the number of calls, by which the parent sees that they go on, and
+    behind that the FMU's last message.
+    """
+
+    SIZE, COUNT, SAID = 256, 8, 1024
+    """Bytes of each."""
+
+    def __init__(self, file: Path) -> None:
+        size = self.SIZE + self.COUNT + self.SAID
+        file.write_bytes(bytes(size))
+        self._calls = 0
+        self._heard = False
+        with file.open("r+b") as stream:
+            self._map = mmap.mmap(stream.fileno(), size)
+
+    def note(self, text: str) -> None:
+        """Write what happens next."""
+        size, end = self.SIZE, self.SIZE + self.COUNT
+        self._map[:size] = text.encode("ascii", "replace")[:size].ljust(size, b"\0")
+        if text not in ("", "fmi2GetStatus"):  # to ask whether a step is over is no progress
+            self._calls += 1
+            self._map[size:end] = self._calls.to_bytes(self.COUNT, "little")
+        if self._heard:
+            self._map[end:] = bytes(self.SAID)
+            self._heard = False
+
+    def hear(self, text: str) -> None:
+        """Write what the FMU says meanwhile."""
+        said = told(text).encode()[: self.SAID].ljust(self.SAID, b"\0")
+        self._map[self.SIZE + self.COUNT :] = said
+        self._heard = True
+
+    def text(self) -> str:
+        """Return what was noted last, "" if that is over."""
+        return bytes(self._map[: self.SIZE]).rstrip(b"\0").decode("ascii")
+
+    @classmethod
+    def read(cls, file: Path) -> tuple[str, str]:
+        """Return what was noted last and what was said then, "" for nothing."""
+        data = file.read_bytes() if file.exists() else b""
+        noted, said = (
+            part.rstrip(b"\0") for part in (data[: cls.SIZE], data[cls.SIZE + cls.COUNT :])
+        )
+        return noted.decode("ascii"), said.decode("utf-8", "ignore")
+
+    @classmethod
+    def calls(cls, file: Path) -> int:
+        """Return how many calls were noted."""
+        data = file.read_bytes() if file.exists() else b""
+        return int.from_bytes(data[cls.SIZE : cls.SIZE + cls.COUNT], "little")
+
+
+class WatchedLibrary(Library):
+    """A library whose calls and messages are noted; `messages` holds what its instances logged."""
+
+    def __init__(self, plan: Plan, box: BlackBox) -> None:
+        self.box = box
+        self._latest: deque[str] = deque(maxlen=_LAST)  # in the call under way
+        self._complaints: deque[str] = deque(maxlen=_LAST)
+        self._refused: list[str] = []  # with the last call that was refused
+        self._names: list[str] = []
+        self.messages: list[tuple[str, int, str, str]] = []
+        self.bad_messages = 0
+        about = plan.about
+        box.note("loading the library")
+        super().__init__(
+            Path(plan.folder) / library_member(about.identifier, about.version),
+            about.version,
+            self._log,
+            types={v.reference: v.type for v in about.variables.values()},
+            proxy=plan.proxy if plan.listens else "",
+        )
+        box.note("")
+
+    def _log(
+        self, environment: int | None, name: bytes | None, status: int, kind: bytes | None,
+        text: bytes | None,
+    ) -> None:  # fmt: skip
+        if self.fmi3:  # an instance is told apart by the environment that it passes back
+            place = (environment or 0) - 1
+            name = self._names[place].encode() if 0 <= place < len(self._names) else None
+        if name is None or text is None or not OK <= status <= PENDING:
+            self.bad_messages += 1
+        if len(self.messages) < _MOST_MESSAGES:
+            parts = [(part or b"").decode("utf-8", "replace") for part in (name, kind, text)]
+            self.messages.append((parts[0], status, parts[1], parts[2]))
+        said = (text or b"").decode("utf-8", "replace")
+        self.box.hear(said)
+        self._latest.append(said)
+        if status != OK:
+            self._complaints.append(said)
+
+    def said(self) -> list[str]:
+        """Return what the FMU said of the last call that it refused, else its last complaints."""
+        return self._refused or list(self._complaints)
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Call one function, noting it first, and return its result as it is."""
+        self.found(name)
+        self.box.note(name)
+        self._latest.clear()
+        result = super().call(name, *arguments)
+        self.box.note("")
+        return result
+
+    def status(self, name: str, *arguments: Any) -> int:
+        """Call a function that returns a status; raise FatalAnswerError for Fatal."""
+        status = super().status(name, *arguments)
+        if status in (DISCARD, ERROR, FATAL):
+            self._refused = list(self._latest)
+        if status == FATAL:
+            raise FatalAnswerError(name)
+        return status
+
+    def instantiate(
+        self, name: str, guid: str, resources: str, *, logging: bool = False, environment: int = 0
+    ) -> Handle | None:
+        """Return a new instance; see `Library`."""
+        self._names.append(name)
+        environment = len(self._names) if self.fmi3 else 0
+        made = super().instantiate(name, guid, resources, logging=logging, environment=environment)
+        self._refused = [] if made else list(self._latest)
+        return made
+
+    def close(self) -> None:
+        """Unload the library."""
+        self.box.note("unloading the library")
+        super().close()
+        self.box.note("")
+
+
 Values = list[Value]
 GOOD = (OK, WARNING)
 NAME = "bench"
@@ -134,27 +281,20 @@ class Bench:
         self.plan = plan
         self.box = box
         self.pace: dict[str, float] = {}
-        self._library: Library | None = None
+        self._library: WatchedLibrary | None = None
         if plan.description is not None:
             self.inputs = plan.variables("input", "Real")
             self.observed = plan.variables("output") or plan.variables("local")
             self._amplitudes = [_amplitude(v) for v in self.inputs]
 
     @property
-    def library(self) -> Library:
+    def library(self) -> WatchedLibrary:
         """The FMU's library, loaded at first use."""
         if self._library is None:
-            about = self.plan.about
-            file = Path(self.plan.folder) / library_member(about.identifier, about.version)
-            if about.version == "3.0":
-                types = {v.reference: v.type for v in about.variables.values()}
-                self._library = LibraryFmi3(file, self.box, types)
-            else:
-                proxy = self.plan.proxy if self.plan.listens else ""
-                self._library = Library(file, self.box, proxy)
+            self._library = WatchedLibrary(self.plan, self.box)
         return self._library
 
-    def instance(self, *, name: str = NAME, logging: bool = False) -> Instance:
+    def instance(self, *, name: str = NAME, logging: bool = False) -> Handle:
         """Return a new instance; UnexpectedError if the FMU refuses to make one."""
         made = self.library.instantiate(
             name, self.plan.about.guid, self.plan.resources,
@@ -169,22 +309,22 @@ class Bench:
         texts = () if self._library is None else self._library.said()
         return told(" / ".join(texts))
 
-    def entered(self, instance: Instance | None = None, stop: float | None = None) -> Instance:
+    def entered(self, instance: Handle | None = None, stop: float | None = None) -> Handle:
         """Return an instance in initialisation mode, a new one unless one is given; `stop` in s."""
         instance = instance or self.instance()
         good(instance.setup(self.plan.start, stop), "SetupExperiment")
         good(instance.enter(), "EnterInitializationMode")
         return instance
 
-    def under_way(self) -> Instance:
+    def under_way(self) -> Handle:
         """Return a new instance that has made two steps."""
         instance = self.ready()
         self.run(instance, 0, 2)
         return instance
 
     def ready(
-        self, instance: Instance | None = None, *, drive: bool | None = None, stop: bool = False
-    ) -> Instance:
+        self, instance: Handle | None = None, *, drive: bool | None = None, stop: bool = False
+    ) -> Handle:
         """Return an instance that has passed initialisation, a new one unless one is given."""
         instance = self.entered(instance, self.plan.end if stop else None)
         if self.plan.driven if drive is None else drive:
@@ -192,7 +332,7 @@ class Bench:
         good(instance.leave(), "ExitInitializationMode")
         return instance
 
-    def move(self, instance: Instance, k: int) -> None:
+    def move(self, instance: Handle, k: int) -> None:
         """Set all real inputs to their values of step `k`."""
         if self.inputs:
             values = [self.driven(i, k) for i in range(len(self.inputs))]
@@ -212,7 +352,7 @@ class Bench:
     def _at(self, k: float) -> str:
         return f"t = {self.time(k):g} s"
 
-    def read(self, instance: Instance, variables: Sequence[Variable] | None = None) -> Values:
+    def read(self, instance: Handle, variables: Sequence[Variable] | None = None) -> Values:
         """Return the values of variables, all observed ones if none are given."""
         variables = self.observed if variables is None else variables
         found: dict[str, Value] = {}
@@ -224,13 +364,13 @@ class Bench:
         return [found[v.name] for v in variables]
 
     def run(
-        self, instance: Instance, first: int = 0, last: int | None = None, drive: bool | None = None
+        self, instance: Handle, first: int = 0, last: int | None = None, drive: bool | None = None
     ) -> list[Values]:
         """Step an instance and return the outputs after each step.
 
         Parameters
         ----------
-        instance : Instance
+        instance : Handle
             In step mode.
         first, last : int
             Communication points where the run begins and ends; `last` None: where the plan ends.
@@ -250,7 +390,7 @@ class Bench:
             rows.append(self.read(instance))
         return rows
 
-    def step(self, instance: Instance, time: float, step: float) -> None:
+    def step(self, instance: Handle, time: float, step: float) -> None:
         """Step once; UnexpectedError unless the FMU answers OK or Warning."""
         status = instance.step(time, step)
         if status in GOOD:
@@ -259,7 +399,7 @@ class Bench:
         wish = ", and it wants the run to end" if ends else ""
         raise UnexpectedError(f"fmi2DoStep at t = {time:g} s answered {STATUS[status]}{wish}")
 
-    def whole_run(self, instance: Instance | None = None) -> list[Values]:
+    def whole_run(self, instance: Handle | None = None) -> list[Values]:
         """Return the outputs of a legal run from initialisation on, as the reference holds them."""
         instance = self.ready(instance)
         return [self.read(instance), *self.run(instance)]

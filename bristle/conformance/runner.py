@@ -18,18 +18,17 @@ from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from ..core.finding import Finding
 from ..core.progress import Count
 from ..errors import BristleError, FmuError
-from ..fmu.archive import extract, platform_folder
+from ..fmu.archive import extract
 from ..fmu.description import NATIVE, check_ports, describe, read_description, read_root
+from ..fmu.library import logger_proxy
 from ._probe import BOX, FINDING, PLAN
-from .bench import Plan
-from .native import BlackBox
+from .bench import BlackBox, Plan
 from .probe import Probe, failed, in_fmi3, noted
 from .probes import PROBES
 from .report import VERDICTS, Report, Row
@@ -255,7 +254,7 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
         plan.description = describe(root)
     except FmuError:
         return plan  # "modelDescription.xml" will say why
-    plan.proxy = "" if plan.fmi3 else _proxy()
+    plan.proxy = "" if plan.fmi3 else logger_proxy()
     plan.ours = _ours(plan, root.get("generationTool", ""))
     plan.categories = [c.get("name", "") for c in root.iterfind("LogCategories/Category")]
     experiment = root.find("DefaultExperiment")
@@ -267,16 +266,6 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     step = _time(times.get("stepSize"), 0.0)
     plan.step = step or _usual_step(plan, root)
     return plan
-
-
-def _proxy() -> str:
-    """Return fmpy's library that puts numbers into messages of printf's form, "" without it."""
-    spec = find_spec("fmpy")
-    for folder in (spec and spec.submodule_search_locations) or ():
-        found = sorted(Path(folder, "logging", platform_folder("2.0")).glob("logging.*"))
-        if found:
-            return str(found[0])
-    return ""
 
 
 def _usual_step(plan: Plan, root: ElementTree.Element) -> float:

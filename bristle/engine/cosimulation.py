@@ -22,11 +22,12 @@ from ..core.progress import Progress
 from ..errors import RunError, not_usable
 from ..fmu.build import ensure
 from ..fmu.description import Description, Value, read_description
+from ..fmu.library import FATAL, WARNING, answer_of
 from ..system.model import Component, System
 from ..system.toml import signal_file
 from . import Interrupted, OnRows, StoppedError
 from .coupling_error import bond_names, energy_residuals
-from .instance import FATAL, WARNING, Instance, Message, Unpacked, answer_of
+from .instance import Instance, Message, Unpacked
 from .macro_step import Memory, compile_loop
 from .results import Array, Table, count_steps, make_columns, times
 from .schedule import (

@@ -1,8 +1,8 @@
-"""One FMU, loaded and stepped: a class per version of FMI, both with the same methods.
+"""FMUs as loaded instances: unpacked, instantiated, initialised, with their messages collected.
 
 The master prepares its calls once, by names without a version ("DoStep", "GetFMUstate") and by
-`transfer` for values. `Fmi2` hands out the library's own functions; `Fmi3` hands out functions of
-the same arguments where the library's differ.
+`transfer` for values. `Calls` hands out the library's own functions; `CallsFmi3` hands out
+functions of the same arguments where the library's differ.
 """
 
 from __future__ import annotations
@@ -12,41 +12,38 @@ import itertools
 import os
 import sys
 import tempfile
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, Self
 
-from fmpy import fmi2, fmi3
-from fmpy.fmi1 import FMICallException
-
 from ..core.interrupt import Interrupt
+from ..core.text import listed
 from ..errors import FmuError, RunError
 from ..fmu import binary
 from ..fmu.archive import extract, library_member, platform_folder
 from ..fmu.binary import reset_at_exit
 from ..fmu.description import Description, Value, Variable
+from ..fmu.library import (
+    DISCARD,
+    ERROR,
+    FATAL,
+    NATURAL,
+    STATUS,
+    TYPES,
+    TYPES_FMI3,
+    WARNING,
+    Handle,
+    HandleFmi3,
+    Library,
+    answer_of,
+    logger_proxy,
+    resources_of,
+)
 
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
-WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
-
-_CHANGES_FOLDER = threading.Lock()
-"""Held while fmpy loads a library: the whole process works in the FMU's folder meanwhile."""
 _SLAVE_MODULE = Path("resources", "slavemodule.txt")
 """What an FMU of PythonFMU holds: it runs in the interpreter of a Python host."""
-_NATURAL = {"Real": "Float64", "Integer": "Int32"}
-"""Types of FMI 3.0 that lie in memory as the kinds of FMI 2.0 do."""
-_C_TYPES: dict[str, Any] = {
-    "Float64": ctypes.c_double, "Float32": ctypes.c_float, "Boolean": ctypes.c_bool,
-    "Int8": ctypes.c_int8, "UInt8": ctypes.c_uint8, "Int16": ctypes.c_int16,
-    "UInt16": ctypes.c_uint16, "Int32": ctypes.c_int32, "UInt32": ctypes.c_uint32,
-    "Int64": ctypes.c_int64, "UInt64": ctypes.c_uint64,
-}  # fmt: skip
-_KINDS_IN_MEMORY: dict[str, Any] = {
-    "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int,
-}  # fmt: skip
 _STATE = {name: name.replace("state", "State") for name in ("GetFMUstate", "SetFMUstate")}
 _STATE["FreeFMUstate"] = "FreeFMUState"
 
@@ -54,77 +51,21 @@ Say = Callable[[str, str], None]
 Status = Callable[..., int]
 
 
-def load(description: Description, folder: Path, name: str, callbacks: Any, say: Say) -> Binding:
-    """Return an FMU's library, loaded.
+class Calls:
+    """The functions of an FMU of FMI 2.0, for arguments that are prepared once."""
 
-    Parameters
-    ----------
-    description : Description
-    folder : Path
-        Where the FMU is unpacked.
-    name : str
-        The instance's.
-    callbacks : fmi2CallbackFunctions
-        What an FMU of FMI 2.0 calls.
-    say : callable
-        (status, text): takes the messages of an FMU of FMI 3.0, and what is said of its calls.
-
-    Raises
-    ------
-    Exception
-        The library cannot be loaded.
-    """
-    if (folder / _SLAVE_MODULE).is_file():
-        reset_at_exit()
-    given = {
-        "guid": description.guid, "modelIdentifier": description.identifier,
-        "unzipDirectory": str(folder), "instanceName": name,
-    }  # fmt: skip
-    with _CHANGES_FOLDER:
-        before = Path.cwd()
-        try:
-            if description.version == "3.0":
-                return Fmi3(given, description, say)
-            return Fmi2(given, callbacks)
-        finally:
-            os.chdir(before)  # fmpy stays in the FMU's folder where it fails
-
-
-class Fmi2:
-    """The library of an FMU of FMI 2.0."""
-
-    def __init__(self, given: dict[str, str], callbacks: Any) -> None:
-        self.slave: Any = fmi2.FMU2Slave(**given)
-        self._callbacks = callbacks
-
-    def instantiate(self) -> None:
-        """Make the instance; raise an exception if the FMU makes none."""
-        self.slave.instantiate(callbacks=self._callbacks, loggingOn=True)
-
-    def set_up(self, stop: float) -> None:
-        """Tell start and stop time [s], where that comes before parameters are set."""
-        self.slave.setupExperiment(startTime=0.0, stopTime=stop)
-
-    def enter_initialisation(self, stop: float) -> None:
-        """Enter the initialisation mode at t = 0."""
-        self.slave.enterInitializationMode()
-
-    def set(self, kind: str, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        """Set variables of one kind."""
-        getattr(self.slave, f"set{kind}")([v.reference for v in variables], values)
-
-    def get(self, kind: str, variables: Sequence[Variable]) -> list[Value]:
-        """Return the values of variables of one kind."""
-        found: list[Value] = getattr(self.slave, f"get{kind}")([v.reference for v in variables])
-        return found
+    def __init__(self, handle: Handle, inside: bool) -> None:
+        self._handle = handle
+        self._prototype = ctypes.PYFUNCTYPE if inside else ctypes.CFUNCTYPE
 
     def function(self, name: str) -> Status:
-        """Return a C function without argument conversion, for arguments prepared once.
+        """Return a C function without argument conversion, by its name without a version.
 
         An FMU that runs in this interpreter takes its lock at once, so the lock is not given up
         around the call; that saves a tenth of the call.
         """
-        return self._raw(f"fmi2{name}")
+        library = self._handle.library
+        return self._prototype(ctypes.c_int)(library.address(library.prefix + name))
 
     def transfer(self, verb: str, kind: str, variables: Sequence[Variable], address: int) -> Status:
         """Return a function that gets or sets variables of one kind at an address in memory.
@@ -133,76 +74,31 @@ class Fmi2:
 
         Parameters
         ----------
-        verb, kind : "Get" or "Set"; "Real", "Integer" or "Boolean"
+        verb, kind : "Get" or "Set"; "Real", "Integer" or "Boolean", as they lie in memory
         variables : sequence of Variable
         address : of the values, doubles or ints, in the order of the variables
         """
         return self.function(f"{verb}{kind}")
 
-    def _raw(self, name: str) -> Status:
-        address = ctypes.cast(getattr(self.slave.dll, name), ctypes.c_void_p).value
-        assert address is not None
-        inside = Path(self.slave.unzipDirectory, _SLAVE_MODULE).is_file()
-        prototype = ctypes.PYFUNCTYPE if inside else ctypes.CFUNCTYPE
-        return prototype(ctypes.c_int)(address)
 
+class CallsFmi3(Calls):
+    """Those of FMI 3.0, stepped without event mode and without early return."""
 
-class Fmi3(Fmi2):
-    """The library of an FMU of FMI 3.0, stepped without event mode and without early return."""
+    _handle: HandleFmi3
 
-    def __init__(self, given: dict[str, str], description: Description, say: Say) -> None:
-        self.slave = fmi3.FMU3Slave(**given)
-        self._description = description
+    def __init__(self, handle: HandleFmi3, inside: bool, say: Say) -> None:
+        super().__init__(handle, inside)
         self._say = say
 
-    def instantiate(self) -> None:
-        self.slave.instantiate(loggingOn=True, logMessage=self._log)
-
-    def set_up(self, stop: float) -> None:
-        """Tell nothing: the times are told as the initialisation is entered."""
-
-    def enter_initialisation(self, stop: float) -> None:
-        self.slave.enterInitializationMode(startTime=0.0, stopTime=stop)
-
-    def set(self, kind: str, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        for name, places in _by_type(variables).items():
-            given = [values[i] for i in places]
-            for i, value in zip(places, given, strict=True):
-                self._refuse_large(name, variables[i], value)
-            getattr(self.slave, f"set{name}")([variables[i].reference for i in places], given)
-
-    def _refuse_large(self, name: str, variable: Variable, value: Value) -> None:
-        """Refuse a whole number that its type would cut off: C does so without a word."""
-        if isinstance(value, int) and _C_TYPES[name](value).value != value:
-            self._say("Error", f"{variable.name} = {value} does not fit into {name}.")
-            raise FMICallException(f"fmi3Set{name}", ERROR)
-
-    def get(self, kind: str, variables: Sequence[Variable]) -> list[Value]:
-        found: list[Value] = [0] * len(variables)
-        for name, places in _by_type(variables).items():
-            references = [variables[i].reference for i in places]
-            values = getattr(self.slave, f"get{name}")(references)
-            for i, value in zip(places, values, strict=True):
-                found[i] = value
-        return found
-
     def function(self, name: str) -> Status:
-        return self._step() if name == "DoStep" else self._raw(f"fmi3{_STATE.get(name, name)}")
+        return self._step() if name == "DoStep" else super().function(_STATE.get(name, name))
 
     def transfer(self, verb: str, kind: str, variables: Sequence[Variable], address: int) -> Status:
-        """Return a function that gets or sets variables, whatever types FMI 3.0 gives them.
-
-        Parameters
-        ----------
-        verb, kind : "Get" or "Set"; "Real", "Integer" or "Boolean", as they lie in memory
-        variables : sequence of Variable
-        address : of the values, doubles or ints, in the order of the variables
-        """
-        types = _by_type(variables)
-        if list(types) == [_NATURAL.get(kind)]:
-            function = self._raw(f"fmi3{verb}{_NATURAL[kind]}")
+        types = dict(self._handle.by_type(kind, [v.reference for v in variables]))
+        if kind != "Boolean" and list(types) == [NATURAL[kind]]:  # as the kind lies in memory
+            function = self.function(verb + NATURAL[kind])
             return lambda c, references, n, values: function(c, references, n, values, n)
-        memory = (_KINDS_IN_MEMORY[kind] * len(variables)).from_address(address)
+        memory = (TYPES[kind] * len(variables)).from_address(address)
         calls = [
             self._one_type(verb, name, places, variables, memory) for name, places in types.items()
         ]
@@ -213,10 +109,10 @@ class Fmi3(Fmi2):
         memory: Any,
     ) -> Status:  # fmt: skip
         """Return a function that passes on values of one type, by way of memory of that type."""
-        function = self._raw(f"fmi3{verb}{name}")
+        function = self.function(verb + name)
         count = ctypes.c_size_t(len(places))
         references = (ctypes.c_uint * len(places))(*(variables[i].reference for i in places))
-        own = (_C_TYPES[name] * len(places))()
+        own = (TYPES_FMI3[name] * len(places))()
         real = memory._type_ is ctypes.c_double
 
         def get(component: Any) -> int:
@@ -240,7 +136,7 @@ class Fmi3(Fmi2):
         return get if verb == "Get" else set_
 
     def _step(self) -> Status:
-        function = self._raw("fmi3DoStep")
+        function = super().function("DoStep")
         event, end, early = (ctypes.c_bool() for _ in range(3))
         last = ctypes.c_double()
         answers = tuple(ctypes.byref(one) for one in (event, end, early, last))
@@ -255,34 +151,12 @@ class Fmi3(Fmi2):
 
         return step
 
-    def _log(self, _environment: Any, status: int, category: bytes, message: bytes) -> None:
-        self._say(answer_of(status), (message or b"").decode("utf-8", "replace"))
-
-
-Binding = Fmi2
-
-
-def _by_type(variables: Sequence[Variable]) -> dict[str, list[int]]:
-    """Return the places of the variables of each type; an enumeration is a long integer."""
-    found: dict[str, list[int]] = {}
-    for i, variable in enumerate(variables):
-        name = "Int64" if variable.type == "Enumeration" else variable.type
-        found.setdefault(name, []).append(i)
-    return found
-
-
-# FMUs as loaded instances: unpacked, instantiated, initialised, with their messages collected.
 
 _SHARED_PYTHON = (
     "It runs Python code and needs the symbols of libpython. Use a Python that offers them to "
     "shared libraries (built with --enable-shared, as those of Linux distributions and conda "
     "are), or start it with LD_PRELOAD=.../libpython{0}.{1}.so.1.0."
 )
-
-
-def answer_of(status: int) -> str:
-    """Return what a call has answered, in FMI's words."""
-    return STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
 
 
 @dataclass(frozen=True)
@@ -376,15 +250,22 @@ class Instance:
         self._last: deque[str] = deque(maxlen=3)
         self._refused: list[str] = []  # by what initialisation ended with: it tells later stops
         self._listen = listen
-        self._key = _register(self)
+        self._key = next(_keys)
+        self._need_binary(folder)
+        _LISTENERS[self._key] = self
         # A KeyboardInterrupt in an FMU written in Python would be told as that FMU's failure.
         with Interrupt() as interrupt, binary.LOCK:
-            self.library = self._load(folder)
             try:
-                self.library.instantiate()
-            except Exception as error:  # fmpy raises Exception itself
+                self._handle = self._made(folder)
+            except FmuError:
                 _LISTENERS.pop(self._key)
-                raise FmuError(f"{self._where()}: cannot be instantiated.{self.said()}") from error
+                raise
+        inside = (folder / _SLAVE_MODULE).is_file()
+        self.calls = (
+            CallsFmi3(self._handle, inside, self.say)
+            if isinstance(self._handle, HandleFmi3)
+            else Calls(self._handle, inside)
+        )
         if interrupt.asked:
             self.close()
             raise KeyboardInterrupt
@@ -392,18 +273,18 @@ class Instance:
     @property
     def component(self) -> int:
         """The address of the FMU's instance."""
-        return int(self.library.slave.component)
+        return self._handle.handle
 
     def initialise(self, parameters: Mapping[str, Value], stop: float) -> None:
         """Set parameters and inputs, and enter initialisation mode at t = 0."""
-        self._call(self.library.set_up, stop)
+        self._call(self._handle.setup, 0.0, stop)
         self.set(parameters)
-        self._call(self.library.enter_initialisation, stop)
+        self._call(self._handle.enter)
 
     def finish_initialisation(self) -> None:
         """Leave initialisation mode."""
         self._refused.clear()
-        self._call(self.library.slave.exitInitializationMode)
+        self._call(self._handle.leave)
         self._initialised = True
         self._last.clear()
 
@@ -413,23 +294,30 @@ class Instance:
             given: list[Value] = [values[name] for name in names]
             if kind == "Real":
                 given = [float(value) for value in given]
-            self._call(self.library.set, kind, self._variables(names), given)
+            else:
+                self._refuse_large(names, given)
+            self._call(self._handle.set, kind, self._references(names), given)
 
     def get(self, names: Iterable[str]) -> dict[str, Value]:
         """Return variables by name, one call per kind."""
         found: dict[str, Value] = {}
         for kind, group in _by_call(self.description, names).items():
-            values = self._call(self.library.get, kind, self._variables(group))
+            _, values = self._call(self._handle.get, kind, self._references(group))
             found |= zip(group, values, strict=True)
         return found
+
+    def step(self, time: float, step: float) -> None:
+        """Step from a time [s] over a step [s]."""
+        self._call(self._handle.step, time, step)
 
     def close(self) -> None:
         """Terminate and free the instance; one that answered Fatal must not be called again."""
         if not self.poisoned:
             try:
                 if self._initialised:
-                    self._call(self.library.slave.terminate)
-                self.library.slave.freeInstance()
+                    self._call(self._handle.terminate)
+                self._handle.free()
+                self._handle.library.close()
             except RunError as error:
                 self.say("Warning", str(error))
         _LISTENERS.pop(self._key, None)
@@ -452,30 +340,56 @@ class Instance:
 
     def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:
         self._last.clear()
-        try:
-            return method(*arguments)
-        except FMICallException as error:
-            self.fail(error.function, error.status)
+        answer = method(*arguments)
+        status = answer[0] if isinstance(answer, tuple) else answer
+        if status > WARNING:
+            self.fail(self._handle.library.called, status)
+        return answer
 
-    def _variables(self, names: Iterable[str]) -> list[Variable]:
-        return [self.description.variables[name] for name in names]
+    def _references(self, names: Iterable[str]) -> list[int]:
+        return [self.description.variables[name].reference for name in names]
 
-    def _load(self, folder: Path) -> Binding:
-        self._need_binary(folder)
+    def _refuse_large(self, names: Sequence[str], values: Sequence[Value]) -> None:
+        """Refuse a whole number that its type in FMI 3.0 would cut off: C does so silently."""
+        for name, value in zip(names, values, strict=True):
+            type_ = self.description.variables[name].type
+            memory = TYPES_FMI3.get(type_)
+            if memory and isinstance(value, int) and memory(value).value != value:
+                self.say("Error", f"{name} = {value} does not fit into {type_}.")
+                self.fail(f"fmi3Set{type_}", ERROR)
+
+    def _made(self, folder: Path) -> Handle:
+        """Return a new instance of the library, loaded."""
+        about = self.description
+        if (folder / _SLAVE_MODULE).is_file():
+            reset_at_exit()
         try:
-            return load(self.description, folder, self.name, _callbacks(self._key), self.say)
-        except Exception as error:  # fmpy raises Exception itself
-            _LISTENERS.pop(self._key)
+            library = Library(
+                folder / library_member(about.identifier, about.version),
+                about.version,
+                _on_message,
+                types={v.reference: v.type for v in about.variables.values()},
+                proxy=logger_proxy(),
+            )
+        except OSError as error:
             cure = ""
             if "_Py" in str(error) or "libpython" in str(error):
                 cure = "\n  " + _SHARED_PYTHON.format(*sys.version_info)
             raise FmuError(f"{self._where()}: {error}{cure}") from error
+        if missing := library.missing()[0]:
+            raise FmuError(f"{self._where()}: its library lacks {listed(missing, 3)}.")
+        made = library.instantiate(
+            self.name, about.guid, resources_of(folder, about.version), logging=True,
+            environment=self._key,
+        )  # fmt: skip
+        if made is None:
+            raise FmuError(f"{self._where()}: cannot be instantiated.{self.said()}")
+        return made
 
     def _need_binary(self, folder: Path) -> None:
         version = self.description.version
         if not (folder / library_member(self.description.identifier, version)).is_file():
             has = sorted(entry.name for entry in (folder / "binaries").glob("*")) or ["none"]
-            _LISTENERS.pop(self._key)
             raise FmuError(
                 f"{self._where()} has no binary for this platform ({platform_folder(version)}); "
                 f"it has: {', '.join(has)}.\n  A scenario of built-in components runs without "
@@ -499,39 +413,20 @@ def _by_call(description: Description, names: Iterable[str]) -> dict[str, list[s
 # all instances share it and are told apart by the environment pointer that they pass back.
 _LISTENERS: dict[int, Instance] = {}
 _keys = itertools.count(1)
-_shared: list[fmi2.fmi2CallbackFunctions] = []
-
-
-def _register(instance: Instance) -> int:
-    key = next(_keys)
-    _LISTENERS[key] = instance
-    return key
-
-
-def _callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
-    if not _shared:
-        common = fmi2.fmi2CallbackFunctions()
-        common.logger = _LOGGER
-        common.allocateMemory = fmi2.defaultCallbacks.allocateMemory
-        common.freeMemory = fmi2.defaultCallbacks.freeMemory
-        fmi2.addLoggerProxy(ctypes.byref(common))
-        _shared.append(common)
-    own = fmi2.fmi2CallbackFunctions.from_buffer_copy(_shared[0])
-    own.componentEnvironment = key
-    return own
 
 
 def _on_message(
-    environment: int | None, name: bytes | None, status: int, category: bytes, text: bytes
+    environment: int | None,
+    name: bytes | None,
+    status: int,
+    category: bytes | None,
+    text: bytes | None,
 ) -> None:
     said_by = (name or b"").decode("utf-8", "replace")
     named = [one for one in _LISTENERS.values() if one.name == said_by]  # many pass no environment
     instance = _LISTENERS.get(environment or 0, named[-1] if named else None)
+    text_, category_ = ((part or b"").decode("utf-8", "replace") for part in (text, category))
     if instance is None:  # an FMU that another part of this process has loaded through fmpy
-        fmi2.printLogMessage(environment, name or b"", status, category or b"", text or b"")
-        return
-    decoded = ((part or b"").decode("utf-8", "replace") for part in (text, category))
-    instance.say(answer_of(status), *decoded)
-
-
-_LOGGER = fmi2.fmi2CallbackLoggerTYPE(_on_message)
+        print(f"[{answer_of(status)}] {text_}")
+    else:
+        instance.say(answer_of(status), text_, category_)

@@ -236,7 +236,7 @@ def _step(
     names: dict[str, Any],
 ) -> list[str]:
     substeps = memory.nodes[operation.component].substeps
-    names[f"f{number}"] = instance.library.function("DoStep")
+    names[f"f{number}"] = instance.calls.function("DoStep")
     names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
     names[f"h{number}"] = ctypes.c_double.from_param(step / substeps)
     names["past"] = ctypes.c_int.from_param(1)  # the state before this step is not needed again
@@ -278,10 +278,10 @@ def _transfer(
     if isinstance(operation, Ramp):
         orders = (ctypes.c_int * len(order))(*[1] * len(order))
         names[f"orders{number}"] = orders  # kept as well
-        names[f"f{number}"] = instance.library.function("SetRealInputDerivatives")
+        names[f"f{number}"] = instance.calls.function("SetRealInputDerivatives")
         names[f"q{number}"] = ctypes.c_void_p.from_param(ctypes.addressof(orders))
     else:
-        names[f"f{number}"] = instance.library.transfer(verb, kind, variables, address)
+        names[f"f{number}"] = instance.calls.transfer(verb, kind, variables, address)
     names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
     names[f"v{number}"] = ctypes.c_void_p.from_param(ctypes.addressof(references))
     names[f"n{number}"] = ctypes.c_size_t.from_param(len(order))
@@ -313,7 +313,7 @@ def _state(
     lines = []
     for i, (function, given) in enumerate(calls.items()):
         names[f"f{number}_{i}"], names[f"c{number}"] = (
-            instance.library.function(function),
+            instance.calls.function(function),
             component,
         )
         names[f"p{number}_{i}"] = given

@@ -7,7 +7,6 @@ inputs.npz come in; outputs.npz or trouble.json go out.
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import signal
@@ -148,50 +147,20 @@ def _all_passes(work: Path) -> dict[str, Array]:
 def _one_pass(job: Job, description: Any, folder: Path, step: float, inputs: Array) -> Array:
     from ..engine.instance import Instance
 
-    count = inputs.shape[1]
-    begin = dict(zip(job.inputs, inputs[:, 0].tolist(), strict=True))
+    rows = np.empty((inputs.shape[1], len(job.outputs)))
+    given = [dict(zip(job.inputs, row, strict=True)) for row in inputs.T.tolist()]
     instance = Instance(Path(job.fmu).stem, description, folder, lambda message: None)
     try:
-        instance.initialise({**job.values, **begin}, (count - 1) * step)
+        instance.initialise({**job.values, **given[0]}, (len(rows) - 1) * step)
         instance.finish_initialisation()
-        instance.set(begin)
-        rows = np.empty((count, len(job.outputs)))
-        first = instance.get(job.outputs)
-        rows[0] = [float(first[name]) for name in job.outputs]
-        _time_loop(instance, job, step, np.ascontiguousarray(inputs.T), rows)
+        for k, now in enumerate(given):
+            try:
+                instance.set(now)
+                if k:
+                    instance.step((k - 1) * step, step)
+                rows[k] = [float(value) for value in instance.get(job.outputs).values()]
+            except RunError as error:
+                raise RunError(f"at t = {k * step:g} s: {error}") from None
     finally:
         instance.close()
     return rows
-
-
-def _time_loop(instance: Any, job: Job, step: float, inputs: Array, rows: Array) -> None:
-    """Fill `rows` (n, outputs) from the second on, with prepared C calls."""
-    variables = instance.description.variables
-    into = [variables[name].reference for name in job.inputs]
-    out = [variables[name].reference for name in job.outputs]
-    set_real, get_real = (instance.library.function(name) for name in ("SetReal", "GetReal"))
-    do_step = instance.library.function("DoStep")
-    component = ctypes.c_void_p(instance.component)
-    in_refs, out_refs = (ctypes.c_uint * len(into))(*into), (ctypes.c_uint * len(out))(*out)
-    n_in, n_out = ctypes.c_size_t(len(into)), ctypes.c_size_t(len(out))
-    h, past = ctypes.c_double(step), ctypes.c_int(1)
-    row = 8 * rows.shape[1]
-    width = 8 * inputs.shape[1]
-    for k in range(1, len(rows)):
-        address = ctypes.c_void_p(inputs.ctypes.data + k * width)
-        status = set_real(component, in_refs, n_in, address) if into else 0
-        if status > 1:
-            _fail(instance, "fmi2SetReal", status, k * step)
-        status = do_step(component, ctypes.c_double((k - 1) * step), h, past)
-        if status > 1:
-            _fail(instance, "fmi2DoStep", status, (k - 1) * step)
-        status = get_real(component, out_refs, n_out, ctypes.c_void_p(rows.ctypes.data + k * row))
-        if status > 1:
-            _fail(instance, "fmi2GetReal", status, k * step)
-
-
-def _fail(instance: Any, function: str, status: int, time: float) -> None:
-    try:
-        instance.fail(function, status)
-    except RunError as error:
-        raise RunError(f"at t = {time:g} s: {error}") from None

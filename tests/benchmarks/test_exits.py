@@ -6,19 +6,12 @@ import os
 import shutil
 import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from benchmarks import exits
-from bristle.engine import instance
-from bristle.errors import FmuError
-from bristle.fmu.archive import extract
 from bristle.fmu.build import ensure
-from bristle.fmu.description import read_description
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the binary ends in order")
 compiles = pytest.mark.skipif(
@@ -96,36 +89,6 @@ print("freed")
 @linux
 def test_an_fmu_may_be_freed_after_ctrl_c_in_it() -> None:
     assert run(LOAD + INTERRUPTED, "", ensure("BinghamDamper")) == (0, "")
-
-
-def test_libraries_are_loaded_one_after_the_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """fmpy changes the working folder of the process meanwhile."""
-    inside, most = [0], [0]
-
-    class Slow:
-        def __init__(self, **_: Any) -> None:
-            inside[0] += 1
-            most[0] = max(most[0], inside[0])
-            time.sleep(0.02)
-            inside[0] -= 1
-            raise OSError("enough")
-
-    monkeypatch.setattr(instance.fmi2, "FMU2Slave", Slow)
-    path = ensure("ConstantVoltage")
-    about, folder = read_description(path), extract(path, tmp_path / "one")
-
-    def load() -> None:
-        with pytest.raises(FmuError, match="enough"):
-            instance.Instance("one", about, folder, print)
-
-    threads = [threading.Thread(target=load) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert most == [1]
 
 
 def test_scripts_differ_and_each_stays_the_same() -> None:

@@ -210,9 +210,9 @@ def test_ctrl_c_while_an_fmu_is_made_is_no_failure_of_it(
 def test_python_that_offers_no_symbols_is_explained(
     scenario_of: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(**named: object) -> None:
-        raise Exception("Failed to load shared library x.so. undefined symbol: _Py_NoneStruct")
+    def refuse(*_: object, **named: object) -> None:
+        raise OSError("x.so: undefined symbol: _Py_NoneStruct")
 
-    monkeypatch.setattr("fmpy.fmi2.FMU2Slave", refuse)
+    monkeypatch.setattr("bristle.engine.instance.Library", refuse)
     with pytest.raises(FmuError, match=r"_Py_NoneStruct(?s:.)*--enable-shared.*LD_PRELOAD"):
         run(scenario_of({"ramp": "Ramp"}))

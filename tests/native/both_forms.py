@@ -14,10 +14,11 @@ from typing import Any
 
 import pytest
 
-from bristle.conformance.native import BlackBox, Instance, Library
-from bristle.fmu.archive import extract, library_member
+from bristle.conformance.bench import BlackBox, Plan, WatchedLibrary
+from bristle.fmu.archive import extract
 from bristle.fmu.build import plan
 from bristle.fmu.description import read_description
+from bristle.fmu.library import Handle, resources_of
 from bristle.fmu.slave import Slave
 from bristle.native.build import build
 from bristle.native.prepare import component_of
@@ -52,12 +53,12 @@ class Native:
         self.path = path
         self.about = read_description(path)
         self.folder = extract(path, folder() / f"{path.parent.name}_{path.stem}_unpacked")
-        file = self.folder / library_member(self.about.identifier)
-        self.library = Library(file, BlackBox(folder() / "box"))
+        about = Plan(str(path), str(self.folder), str(folder()), 60.0, self.about)
+        self.library = WatchedLibrary(about, BlackBox(folder() / "box"))
         self.messages = self.library.messages
 
-    def instance(self, name: str = "one") -> Instance:
-        resources = (self.folder / "resources").as_uri()
+    def instance(self, name: str = "one") -> Handle:
+        resources = resources_of(self.folder, self.about.version)
         made = self.library.instantiate(name, self.about.guid, resources, logging=True)
         assert made is not None
         return made

@@ -11,9 +11,9 @@ import numpy as np
 from both_forms import KINDS, Native, folder
 from numpy.typing import NDArray
 
-from bristle.conformance.native import Instance
 from bristle.engine.coupled import Coupled
 from bristle.export.composite import export_composite
+from bristle.fmu.library import Handle
 from bristle.native.build import build
 from bristle.native.zig import here
 from bristle.system.scenario import load_scenario
@@ -43,7 +43,7 @@ class Composite:
     def __init__(self, path: Path, **values: Any) -> None:
         self.form = loaded(path)
         self.form.messages.clear()
-        self.one: Instance = self.form.instance()
+        self.one: Handle = self.form.instance()
         self.variables = self.form.about.variables
         self.reals = [v for v in self.form.about.of("output") if v.kind == "Real"]
         for name, value in values.items():

@@ -10,8 +10,8 @@ import pytest
 from both_forms import Both, both, native, needs_zig
 
 from bristle.component import HELD
-from bristle.conformance.native import ERROR, Instance
 from bristle.fmu.description import Variable
+from bristle.fmu.library import ERROR, Handle
 
 pytestmark = needs_zig
 
@@ -78,7 +78,7 @@ def test_held_inputs_have_the_middle_of_the_step_and_others_its_end(
     follows(component, values)
 
 
-def started(component: str = LIGHT) -> tuple[Instance, list[Variable]]:
+def started(component: str = LIGHT) -> tuple[Handle, list[Variable]]:
     """Return a native instance in step mode, and its inputs."""
     one = native(component).instance()
     assert [one.setup(0.0, None), one.enter(), one.leave()] == [0, 0, 0]
@@ -86,7 +86,7 @@ def started(component: str = LIGHT) -> tuple[Instance, list[Variable]]:
     return one, native(component).about.of("input")
 
 
-def values_of(one: Instance, inputs: list[Variable]) -> list[Any]:
+def values_of(one: Handle, inputs: list[Variable]) -> list[Any]:
     return one.get("Real", [v.reference for v in inputs])[1]
 
 

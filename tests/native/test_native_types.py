@@ -8,7 +8,7 @@ import pytest
 from both_forms import both, needs_zig
 from fmi3_form import Three
 
-from bristle.conformance.native import ERROR, WARNING
+from bristle.fmu.library import ERROR, WARNING
 
 pytestmark = needs_zig
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ctypes import c_void_p
 
 from ...core.finding import Finding
+from ...fmu.library import Handle
 from ..bench import Bench, Plan, Values, finite, good
-from ..native import Instance
 from ..probe import passed, probe, unless_claimed
 from .order import forbidden
 
@@ -25,7 +25,7 @@ def _smooth(bench: Bench) -> list[int]:
     return [i for i, v in enumerate(bench.inputs) if v.variability == "continuous"]
 
 
-def _ramp(bench: Bench, instance: Instance, k: int, share: float) -> None:
+def _ramp(bench: Bench, instance: Handle, k: int, share: float) -> None:
     """Set a share of the derivatives that bring the inputs to their values of step k + 1."""
     for i in _smooth(bench):
         v, change = bench.inputs[i], bench.driven(i, k + 1) - bench.driven(i, k)
@@ -33,7 +33,7 @@ def _ramp(bench: Bench, instance: Instance, k: int, share: float) -> None:
         good(status, f"SetRealInputDerivatives of {v.name}")
 
 
-def _run(bench: Bench, instance: Instance, share: float, first: int, last: int) -> list[Values]:
+def _run(bench: Bench, instance: Handle, share: float, first: int, last: int) -> list[Values]:
     rows = []
     for k in range(first, last):
         bench.move(instance, k)
@@ -75,7 +75,7 @@ def input_derivatives(bench: Bench) -> Finding:
     return passed(f"{len(_smooth(bench))} inputs moved by them; zero, a reset and a state hold")
 
 
-def _replay(bench: Bench, instance: Instance) -> None:
+def _replay(bench: Bench, instance: Handle) -> None:
     """Make a step again by the derivatives in a copied state, and hold it against the first."""
     half, state = bench.plan.steps // 2, c_void_p()
     bench.move(instance, half)

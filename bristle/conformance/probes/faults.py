@@ -13,8 +13,8 @@ from ctypes import c_void_p
 from operator import methodcaller
 
 from ...core.finding import Finding
+from ...fmu.library import DISCARD, ERROR, Handle, UnexpectedError
 from ..bench import GOOD, Bench, good, not_finite, status_name
-from ..native import DISCARD, ERROR, Instance, UnexpectedError
 from ..probe import failed, passed, probe
 
 INPUT, STEP, ORDER, PARAMETER = 1, 2, 3, 5
@@ -25,7 +25,7 @@ _RULE = (
 )
 
 
-def _check(bench: Bench, instance: Instance, code: int, what: str) -> None:
+def _check(bench: Bench, instance: Handle, code: int, what: str) -> None:
     """Raise UnexpectedError unless the instance shows a fault as the rule says."""
     outputs = bench.plan.variables("output")
     values = bench.read(instance, outputs)
@@ -35,7 +35,7 @@ def _check(bench: Bench, instance: Instance, code: int, what: str) -> None:
         raise UnexpectedError(f"{what}: fault = {fault}, outputs {bad or 'finite'}")
 
 
-def _faulted(bench: Bench, act: Callable[[Instance], int], code: int, what: str) -> Instance:
+def _faulted(bench: Bench, act: Callable[[Handle], int], code: int, what: str) -> Handle:
     """Return an instance after two steps, a fault and a step that must be refused."""
     instance = bench.instance(logging=True)
     bench.ready(instance)
@@ -56,16 +56,16 @@ def _faulted(bench: Bench, act: Callable[[Instance], int], code: int, what: str)
     return instance
 
 
-def _mended(bench: Bench, instance: Instance, what: str) -> None:
+def _mended(bench: Bench, instance: Handle, what: str) -> None:
     good(instance.reset(), f"Reset after {what}")
     bench.same(bench.whole_run(instance), bench.reference(), f"reset after {what}: ")
     instance.free()
 
 
-def _feed(bench: Bench, setting: Callable[[Instance], int], what: str) -> None:
+def _feed(bench: Bench, setting: Callable[[Handle], int], what: str) -> None:
     """Set what is not finite and step on: a fault, mended by a reset."""
 
-    def act(instance: Instance) -> int:
+    def act(instance: Handle) -> int:
         status = setting(instance)
         return instance.step(bench.time(2), bench.plan.step) if status in GOOD else status
 
@@ -101,7 +101,7 @@ def fault_step(bench: Bench) -> Finding:
     """Step by what is no step."""
     for step in (0.0, -bench.plan.step, math.nan, math.inf):
 
-        def act(instance: Instance, step: float = step) -> int:
+        def act(instance: Handle, step: float = step) -> int:
             return instance.step(bench.time(2), step)
 
         _mended(bench, _faulted(bench, act, STEP, f"a step of {step}"), f"a step of {step}")

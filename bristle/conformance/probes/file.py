@@ -12,8 +12,8 @@ from pathlib import Path
 from ...core.finding import Finding
 from ...errors import FmuError
 from ...fmu.description import Variable, describe, read_root
+from ...fmu.library import UnexpectedError
 from ..bench import Bench, Plan, some
-from ..native import UnexpectedError
 from ..probe import failed, noted, passed, probe
 
 _UNIT_IN_WORDS = re.compile(r"\[.+\]|\bin the unit of\b")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ...core.finding import Finding
 from ...fmu.archive import extract
+from ...fmu.library import FatalAnswerError, Handle, UnexpectedError
 from ..bench import GOOD, Bench, Values, good
-from ..native import FatalAnswerError, Instance, UnexpectedError
 from ..probe import failed, noted, passed, probe, unless_single
 
 
@@ -36,7 +36,7 @@ def reset(bench: Bench) -> Finding:
     return passed(f"equal to a fresh instance, twice ({changed} parameters changed before)")
 
 
-def _disturb_parameters(bench: Bench, instance: Instance) -> int:
+def _disturb_parameters(bench: Bench, instance: Handle) -> int:
     """Change real parameters slightly where that is legal; return how many took it."""
     taken = 0
     for v in bench.plan.variables("parameter", "Real"):

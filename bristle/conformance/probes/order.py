@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 from ...core.finding import Finding
 from ...fmu.description import Variable
+from ...fmu.library import FatalAnswerError, Handle
 from ..bench import GOOD, Bench, finite, good, not_finite, some, status_name
-from ..native import FatalAnswerError, Instance
 from ..probe import failed, noted, passed, probe, unless_claimed, unless_single
 
 _ORDER = (
@@ -22,7 +22,7 @@ _ORDER = (
 )
 
 
-def forbidden(bench: Bench, act: Callable[[], int], instance: Instance) -> Finding:
+def forbidden(bench: Bench, act: Callable[[], int], instance: Handle) -> Finding:
     """Judge the answer to a forbidden call, and whether a later instance is unharmed."""
     try:
         status = act()

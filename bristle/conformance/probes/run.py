@@ -7,8 +7,8 @@ import time
 
 from ...core.finding import Finding
 from ...fmu.description import Value
+from ...fmu.library import DISCARD
 from ..bench import Bench, finite, good, not_finite, some
-from ..native import DISCARD
 from ..probe import failed, noted, passed, probe
 
 _MOST_STEPS = 20_000

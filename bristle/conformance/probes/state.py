@@ -7,8 +7,8 @@ from ctypes import c_void_p
 from pathlib import Path
 
 from ...core.finding import Finding
+from ...fmu.library import UnexpectedError
 from ..bench import Bench, good
-from ..native import UnexpectedError
 from ..probe import failed, noted, passed, probe, unless_claimed, unless_single
 
 _COPY, _BYTES = "canGetAndSetFMUstate", "canSerializeFMUstate"

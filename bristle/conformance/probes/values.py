@@ -9,8 +9,8 @@ from functools import partial
 
 from ...core.finding import Finding
 from ...fmu.description import Value, Variable
+from ...fmu.library import FatalAnswerError, Handle, UnexpectedError
 from ..bench import GOOD, Bench, Values, good, not_finite, some, status_name
-from ..native import FatalAnswerError, Instance, UnexpectedError
 from ..probe import failed, noted, passed, probe, unless_single
 from .order import forbidden
 
@@ -43,7 +43,7 @@ def _strange_input(bench: Bench, value: float) -> Finding:
     return passed(some(answers))
 
 
-def _answer(bench: Bench, instance: Instance, v: Variable, value: float) -> str:
+def _answer(bench: Bench, instance: Handle, v: Variable, value: float) -> str:
     bench.ready(instance, drive=False)
     bench.run(instance, 0, 2, drive=False)
     status = instance.set("Real", [v.reference], [value])
@@ -86,7 +86,7 @@ def _unused(bench: Bench) -> list[int]:
     return unused if unless_single(bench.plan) is None else unused[:1]
 
 
-def _bad_reference(bench: Bench, act: Callable[[Instance, int], int]) -> Finding:
+def _bad_reference(bench: Bench, act: Callable[[Handle, int], int]) -> Finding:
     for reference in _unused(bench):
         instance = bench.under_way()
         finding = forbidden(bench, partial(act, instance, reference), instance)
