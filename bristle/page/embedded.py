@@ -9,7 +9,7 @@ from pathlib import Path
 from ..comparison.result import Comparison
 from ..view import html
 from ..view.page_data import pack
-from .errors_view import linked
+from .study_views import linked
 
 STATIC = Path(__file__).with_name("static")
 MODULES = ("dom.mjs", "scale.mjs", "plot.mjs", "brush.mjs", "cells.mjs", "linked.mjs")

@@ -20,32 +20,13 @@ from typing import Any, BinaryIO
 from ..errors import BristleError, TrustError
 
 VIEWS = {
-    "channels": "channels_view",
-    "check": "check_view",
-    "columns": "columns_view",
-    "controllers": "controllers_view",
-    "data": "data_view",
-    "design": "design_view",
-    "errors": "errors_view",
-    "fit": "fit_view",
-    "history": "history_view",
-    "loops": "design_view.loops",
-    "module": "simulate_view.compiled",
-    "numbers": "simulate_view.numbers",
-    "preview": "channels_view.preview",
-    "residual": "errors_view.residual",
-    "scenarios": "simulate_view.choices",
-    "simulate": "simulate_view",
-    "spectrum": "simulate_view.spectrum",
-    "verdict": "verdict_view",
-    "weights": "design_view.weights",
+    "data_views": ("channels", "check", "columns", "data", "preview"),
+    "study_views": ("errors", "fit", "history", "residual", "verdict"),
+    "control_views": ("controllers", "design", "loops", "weights"),
+    "simulate_views": ("module", "numbers", "scenarios", "simulate", "spectrum"),
 }
-"""Modules with `answer(folder, arguments)`, or another function that is named.
-
-It returns bytes, or what `packing.pack` takes."""
-
-AHEAD = ("check_view", "fit_view", "errors_view", "verdict_view", "history_view")
-"""Modules that are imported behind the first answer, before anybody asks for them."""
+"""The views of each module: `NAME_view(folder, arguments)` answers, with bytes or what
+`page_data.pack` takes."""
 
 Answered = tuple[dict[str, Any], bytes]
 
@@ -79,16 +60,16 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
 
 def function_of(view: str) -> Callable[[Path, Mapping[str, Any]], Any]:
     """Return what answers a view."""
-    name, _, function = VIEWS[view].partition(".")
+    module = next(module for module, views in VIEWS.items() if view in views)
     found: Callable[[Path, Mapping[str, Any]], Any] = getattr(
-        import_module(f"{__package__}.{name}"), function or "answer"
+        import_module(f"{__package__}.{module}"), f"{view}_view"
     )
     return found
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer requests until there are no more."""
-    import_module(f"{__package__}.data_view")
+    import_module(f"{__package__}.data_views")
     for number, line in enumerate(requests):
         asked = json.loads(line)
         head, body = answer(asked["view"], Path(asked["folder"]), asked["arguments"])
@@ -97,12 +78,10 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         answers.write(body)
         answers.flush()
         if number == 0:
-            threading.Thread(target=_import_ahead, daemon=True).start()
-
-
-def _import_ahead() -> None:
-    for name in AHEAD:
-        import_module(f"{__package__}.{name}")
+            # What is asked for next is imported behind the first answer.
+            ahead = threading.Thread(target=import_module, args=(f"{__package__}.study_views",))
+            ahead.daemon = True
+            ahead.start()
 
 
 def memory() -> int:

@@ -12,7 +12,7 @@ from house_made import study_of
 from made import write_runs
 from page.served import page_on
 
-from bristle.page import controllers_view
+from bristle.page import control_views
 from bristle.page.orders import order_of
 from bristle.page.requests import RequestError
 from bristle.study import create_study
@@ -119,17 +119,17 @@ def test_a_comparison_is_run_and_shown(home: Path) -> None:
     assert not found["older"]
     after = (home / "rig" / "comparisons" / "1" / "answer.json").stat().st_mtime + 10.0
     os.utime(home / "rig" / "model.toml", (after, after))
-    assert controllers_view.answer(home / "rig", {})["comparisons"][0]["older"]
+    assert control_views.controllers_view(home / "rig", {})["comparisons"][0]["older"]
 
 
 def test_buildings_are_those_of_the_studies(home: Path, tmp_path: Path) -> None:
-    assert controllers_view.answer(home / "rig", {})["buildings"] == []
+    assert control_views.controllers_view(home / "rig", {})["buildings"] == []
     house = study_of(tmp_path)
     create_study(tmp_path / "bench", write_runs(tmp_path / "lab", 3, seconds=3.0), law="bingham")
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "study.toml").write_text("= no TOML")
     for name in ("rig", "bench"):
-        (found,) = controllers_view.answer(tmp_path / name, {})["buildings"]
+        (found,) = control_views.controllers_view(tmp_path / name, {})["buildings"]
         assert found == {"file": f"rig/{house.model().building}", "study": "rig", "device": ""}
         assert (tmp_path / found["file"]).is_file()
     asked = ASKED | {"building": found["file"]}

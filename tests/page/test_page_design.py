@@ -18,7 +18,7 @@ from page.served import page_on
 
 import bristle
 from bristle.errors import StudyError
-from bristle.page import design_view
+from bristle.page import control_views
 from bristle.page.orders import (
     FIELDS,
     MOTIONS,
@@ -142,27 +142,27 @@ def test_the_three_motions_are_named_and_others_can_be_chosen(home: Path) -> Non
     dropped = home / "uploads" / "record-7" / "mine.csv"
     dropped.parent.mkdir(parents=True)
     dropped.write_text("time [s],acceleration [m/s2]\n0.0,0.0\n0.1,1.5\n0.2,0.0\n")
-    shown = design_view.answer(home / "rig", {})
+    shown = control_views.design_view(home / "rig", {})
     assert len(set(shown["motions"])) == 3
     assert {*shown["motions"], "uploads/record-7/mine.csv"} <= set(shown["records"])
 
 
 def test_weights_are_those_of_the_task(home: Path) -> None:
     asked = {"kind": "lpv", "values": {"acceleration.gain": 2.0, "acceleration.corner": 20.0}}
-    shown = design_view.weights(home / "rig", asked)
+    shown = control_views.weights_view(home / "rig", asked)
     turn = 2.0 * np.pi * shown["frequency"]
     right = 2.0 * 20.0 / np.sqrt(turn**2 + 20.0**2)
     assert shown["acceleration_weight"] == pytest.approx(right, rel=1e-12)
     assert shown["warnings"] == []
     cheap = {"kind": "hinf", "values": {"command.gain": 0.05, "acceleration.gain": 20.0}}
-    assert design_view.weights(home / "rig", cheap)["warnings"]
+    assert control_views.weights_view(home / "rig", cheap)["warnings"]
 
 
 def test_a_study_of_another_device_is_refused(home: Path) -> None:
     study = Study(home / "rig")
-    assert design_view.refused(study) == ""
+    assert control_views.refused(study) == ""
     study.settings = replace(study.settings, device="brace")
-    assert "brace" in design_view.refused(study)
+    assert "brace" in control_views.refused(study)
 
 
 def test_designs_are_written_over_http_and_shown_unsolved(home: Path) -> None:
@@ -185,43 +185,43 @@ def test_designs_are_written_over_http_and_shown_unsolved(home: Path) -> None:
 def test_weights_are_drawn_before_the_study_has_a_folder_of_designs(tmp_path: Path) -> None:
     create_study(tmp_path / "new", write_runs(tmp_path / "lab", 3, seconds=3.0), law="bingham")
     assert not (tmp_path / "new" / "design").exists()
-    shown = design_view.weights(tmp_path / "new", {"kind": "hinf", "values": {}})
+    shown = control_views.weights_view(tmp_path / "new", {"kind": "hinf", "values": {}})
     assert len(shown["frequency"]) == len(shown["command_weight"]) > 500
-    assert design_view.answer(tmp_path / "new", {})["solves"] == []
+    assert control_views.design_view(tmp_path / "new", {})["solves"] == []
 
 
 def test_a_solve_of_an_older_model_is_told_apart(home: Path, tmp_path: Path) -> None:
     name = write_design(home / "rig", "hinf", {}, "")
     file = home / "rig" / "design" / f"{name}.toml"
     found = {"facts": {"task": read_task(file).digest()}}
-    assert not design_view._is_older(file, found)
+    assert not control_views._is_older(file, found)
     other = tmp_path / "rig" / "design" / file.name
     other.parent.mkdir(parents=True)
     other.write_text(file.read_text())
-    assert design_view._is_older(other, found)  # its model is not there
+    assert control_views._is_older(other, found)  # its model is not there
     model = (home / "rig" / "model.toml").read_text()
     (tmp_path / "rig" / "model.toml").write_text(model.replace("value = 1.3", "value = 1.7", 1))
     assert "value = 1.7" in (tmp_path / "rig" / "model.toml").read_text()
-    assert design_view._is_older(other, found)
+    assert control_views._is_older(other, found)
 
 
 def test_voltages_that_are_wrong_say_so(tmp_path: Path) -> None:
     model = tmp_path / "model.toml"
     model.write_text("")
-    assert design_view._best(tmp_path) == {}
+    assert control_views._best(tmp_path) == {}
     file = tmp_path / "design" / "passive" / "passive.json"
     file.parent.mkdir(parents=True)
     motions = [{"record": "a", "intensity": 0.2, "voltage": 1.5, "value": 3.0}]
     file.write_text(json.dumps({"motions": motions}))
-    assert design_view._best(tmp_path) == {("a", 0.2): 1.5}
+    assert control_views._best(tmp_path) == {("a", 0.2): 1.5}
     after = file.stat().st_mtime + 10.0
     os.utime(model, (after, after))  # the model has changed since
-    assert design_view._best(tmp_path) == {}
+    assert control_views._best(tmp_path) == {}
     os.utime(model, (after - 100.0, after - 100.0))
     for wrong in ({}, {"motions": 3}, {"motions": [{**motions[0], "voltage": "x"}]}):
         file.write_text(json.dumps(wrong))
         with pytest.raises(StudyError, match="optimise passive"):
-            design_view._best(tmp_path)
+            control_views._best(tmp_path)
 
 
 @pytest.mark.slow
@@ -267,5 +267,5 @@ def test_a_solve_acts_in_the_building_as_the_command_says(
             assert peak == pytest.approx(float(frame[name].abs().max()), rel=1e-12)
     for one, best in zip(loops, found["motions"], strict=True):
         assert 0.0 <= one["voltage"] <= 8.0
-        reached = one["passive"]["peaks"][design_view.OUTPUT]
+        reached = one["passive"]["peaks"][control_views.OUTPUT]
         assert reached == pytest.approx(best["value"], rel=1e-6)

@@ -14,14 +14,8 @@ from bristle.data.channels import ChannelSpec
 from bristle.errors import StudyError
 from bristle.model.model import Fact
 from bristle.page import (
-    channels_view,
-    check_view,
-    columns_view,
-    data_view,
-    errors_view,
-    fit_view,
-    history_view,
-    verdict_view,
+    data_views,
+    study_views,
 )
 from bristle.page.worker import VIEWS, answer, function_of
 from bristle.study import Study, create_study
@@ -58,9 +52,9 @@ def test_what_is_wrong_is_told_in_the_words_of_the_commands(home: Path) -> None:
 
 
 def test_view_1_has_the_runs_and_findings_of_the_data_check(home: Path) -> None:
-    shown, found = data_view.answer(home / "rig", {}), check_data(Study(home / "rig"))
+    shown, found = data_views.data_view(home / "rig", {}), check_data(Study(home / "rig"))
     assert {run["name"] for run in shown["runs"]} == {run.name for run in found.runs}
-    check = check_view.answer(home / "rig", {})
+    check = data_views.check_view(home / "rig", {})
     assert check["ok"] == found.ok
     assert {one["text"] for one in check["findings"]} >= {
         f"{one.run}: {one.text}" for one in found.findings if one.kind == "clipping"
@@ -78,15 +72,15 @@ def test_a_thinned_trace_keeps_every_extreme() -> None:
     generator = np.random.default_rng(1)
     time, y = np.arange(50_000) / 500.0, generator.standard_normal(50_000)
     y[31_234] = 9.0
-    rows = data_view.thinned(time, {"y": y})
-    assert len(rows) <= data_view.POINTS + 2
+    rows = data_views.thinned(time, {"y": y})
+    assert len(rows) <= data_views.POINTS + 2
     assert y[rows].max() == y.max()
     assert y[rows].min() == y.min()
     assert np.all(np.diff(rows) > 0)
 
 
 def test_view_3_has_the_samples_of_the_comparison(home: Path) -> None:
-    shown = unpack(pack(errors_view.answer(home / "rig", {"role": "train"})))
+    shown = unpack(pack(study_views.errors_view(home / "rig", {"role": "train"})))
     found = compare_study(Study(home / "rig"), role="train")
     assert shown["z"] == pytest.approx(found.z)
     assert shown["sentences"] == list(found.sentences)
@@ -100,33 +94,33 @@ def test_view_3_has_the_samples_of_the_comparison(home: Path) -> None:
 
 def test_view_3_opens_no_test_run(home: Path) -> None:
     with pytest.raises(StudyError, match="holdout"):
-        errors_view.answer(home / "rig", {"role": "test"})
+        study_views.errors_view(home / "rig", {"role": "test"})
 
 
 def test_view_2_has_values_with_half_of_their_intervals(home: Path, tmp_path: Path) -> None:
-    shown = fit_view.answer(home / "rig", {})
+    shown = study_views.fit_view(home / "rig", {})
     assert not shown["identified"]
     assert {row["how"] for row in shown["parameters"]} == {"assumed"}
     model = Study(home / "rig").model()
     known = model.with_values({"f_c": 1.5}, {"f_c": 0.1})
     assert isinstance(known.facts["f_c"], Fact)
-    (row,) = [row for row in fit_view.rows_of(known, {}) if row["name"] == "f_c"]
+    (row,) = [row for row in study_views.rows_of(known, {}) if row["name"] == "f_c"]
     assert (row["value"], row["half"], row["how"]) == (1.5, pytest.approx(0.196), "identified")
-    held = fit_view.rows_of(known, {"parameters": {"f_c": {"how": "not identified"}}})
+    held = study_views.rows_of(known, {"parameters": {"f_c": {"how": "not identified"}}})
     assert [row["half"] for row in held if row["name"] == "f_c"] == [None]
 
 
 def test_view_2_says_that_the_model_is_of_other_data(home: Path, tmp_path: Path) -> None:
     study = Study(shutil.copytree(home / "rig", tmp_path / "rig"))
     study.add_step("identify", "by hand", study.model())
-    assert fit_view.answer(study.folder, {})["other_data"] == ""
+    assert study_views.fit_view(study.folder, {})["other_data"] == ""
     left = study.settings.runs[0].name
     study.with_roles({left: "exclude"})
-    assert "no longer those" in fit_view.answer(study.folder, {})["other_data"]
+    assert "no longer those" in study_views.fit_view(study.folder, {})["other_data"]
 
 
 def test_view_4_says_that_nothing_was_diagnosed(home: Path) -> None:
-    assert verdict_view.answer(home / "rig", {}) == {
+    assert study_views.verdict_view(home / "rig", {}) == {
         "verdict": None, "learned": [], "plans": [],
     }  # fmt: skip
 
@@ -134,12 +128,12 @@ def test_view_4_says_that_nothing_was_diagnosed(home: Path) -> None:
 def test_view_4_has_the_residuals_without_and_with_what_was_found(
     home: Path, tmp_path: Path
 ) -> None:
-    assert errors_view.residual(home / "rig", {}) == {"effects": []}
+    assert study_views.residual_view(home / "rig", {}) == {"effects": []}
     study = Study(shutil.copytree(home / "rig", tmp_path / "rig"))
     study.model()
     refined = {"effects": ["gas_spring"], "values": {"f_c": 1.3, "gas_spring.k": 50.0}}
     study.write_verdict({"schema": 2, "kind": "unknown", "effects": [], "refined": refined})
-    shown = unpack(pack(errors_view.residual(study.folder, {})))
+    shown = unpack(pack(study_views.residual_view(study.folder, {})))
     assert (shown["effects"], shown["step"], shown["kind"]) == (["gas_spring"], None, "unknown")
     found = compare_study(study)
     assert shown["before"] == pytest.approx(found.z)
@@ -165,25 +159,25 @@ def test_view_4_draws_what_was_learned_with_its_interval(home: Path, tmp_path: P
     (folder / "reports").mkdir(exist_ok=True)
     (folder / "reports" / "learned_1.json").write_text(json.dumps(told))
     (folder / "reports" / "gone.json").write_text(json.dumps(told))  # its effect was taken out
-    (one,) = unpack(pack(verdict_view.answer(folder, {})))["learned"]
+    (one,) = unpack(pack(study_views.verdict_view(folder, {})))["learned"]
     assert (one["name"], one["form"]) == ("learned_1", "c s")
     assert one["half"] == pytest.approx([0.196, 0.098, 0.196], rel=1e-6)
     assert one["nearest"]["values"].tolist() == [-1.0, 1.0]
     (folder / "reports" / "learned_1.json").write_text(json.dumps({**told, "forms": []}))
-    (one,) = verdict_view.answer(folder, {})["learned"]
+    (one,) = study_views.verdict_view(folder, {})["learned"]
     assert "knots" not in one  # a mode is no curve
     surface = {
         **told, "forms": [], "across": "voltage", "across_unit": "V", "levels": [0.0, 8.0],
         "values": [-1.0, 0.0, 1.0, -2.0, 0.0, 2.0], "std": [0.1] * 6,
     }  # fmt: skip
     (folder / "reports" / "learned_1.json").write_text(json.dumps(surface))
-    (one,) = unpack(pack(verdict_view.answer(folder, {})))["learned"]
+    (one,) = unpack(pack(study_views.verdict_view(folder, {})))["learned"]
     assert [row.tolist() for row in one["rows"]] == [[-1.0, 0.0, 1.0], [-2.0, 0.0, 2.0]]
     assert one["levels"].tolist() == [0.0, 8.0]
 
 
 def test_view_5_has_the_steps_and_what_can_be_added(home: Path) -> None:
-    shown = history_view.answer(home / "rig", {})
+    shown = study_views.history_view(home / "rig", {})
     assert [step["what"] for step in shown["steps"]] == ["begin with bingham"]
     assert "gas_spring" in {one["name"] for one in shown["can_add"]}
     assert any(text.startswith("bristle study new") for text in shown["commands"])
@@ -192,7 +186,7 @@ def test_view_5_has_the_steps_and_what_can_be_added(home: Path) -> None:
 def test_dropped_files_are_told_apart_with_reasons(tmp_path: Path) -> None:
     write(tmp_path / "run.csv", bench_run(1, seconds=2.0))
     (tmp_path / "words.csv").write_text("a,b\nx,y\n")
-    shown = columns_view.answer(tmp_path, {})
+    shown = data_views.columns_view(tmp_path, {})
     wrong = [one for one in shown["files"] if one["error"]]
     assert [one["name"] for one in wrong] == ["words.csv"]
     assert str(tmp_path) not in wrong[0]["error"]
@@ -218,14 +212,16 @@ def test_view_1_has_the_columns_of_a_study_and_what_other_channels_would_change(
 ) -> None:
     folder = columns(tmp_path)
     before = (folder / "study.toml").read_bytes()
-    shown = channels_view.answer(folder, {})
+    shown = data_views.channels_view(folder, {})
     force = next(one for one in shown["columns"] if one["channel"] == "force")
     assert (force["text"], force["guessed_unit"], force["sign"], force["reason"]) == (
         "F [N]", "N", 1, "",
     )  # fmt: skip
     units = next(one["units"] for one in shown["known"] if one["name"] == "force")
     assert {"N", "kN", "lbf"} <= set(units)
-    told = channels_view.preview(folder, {"channels": ["force=-F [N]@kN"], "without": ["voltage"]})
+    told = data_views.preview_view(
+        folder, {"channels": ["force=-F [N]@kN"], "without": ["voltage"]}
+    )
     changes = {one["channel"]: one for one in told["changes"]}
     assert changes["force"]["after"] == '"F [N]" in kN, sign turned'
     old, new = changes["force"]["traces"]
@@ -234,9 +230,9 @@ def test_view_1_has_the_columns_of_a_study_and_what_other_channels_would_change(
     assert changes["voltage"]["traces"][1] is None
     assert told["results"] == []
     with pytest.raises(StudyError, match="no unit of this quantity"):
-        channels_view.preview(folder, {"channels": ["force=F [N]@V"]})
+        data_views.preview_view(folder, {"channels": ["force=F [N]@V"]})
     with pytest.raises(StudyError, match="given twice"):
-        channels_view.preview(folder, {"channels": ["force=F [N]@N", "force=F [N]@kN"]})
+        data_views.preview_view(folder, {"channels": ["force=F [N]@N", "force=F [N]@kN"]})
     with pytest.raises(StudyError, match="list of texts"):
-        channels_view.preview(folder, {"without": "voltage"})
+        data_views.preview_view(folder, {"without": "voltage"})
     assert (folder / "study.toml").read_bytes() == before

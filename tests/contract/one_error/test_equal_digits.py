@@ -15,7 +15,7 @@ import bristle
 from bristle.cli import main
 from bristle.diagnosis import Diagnosis
 from bristle.identification.error import ForceError
-from bristle.page import history_view
+from bristle.page import study_views
 from bristle.study.study import Study
 
 RATE, SECONDS = 250.0, 6.0
@@ -108,7 +108,7 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
     assert step.after["error_holdout"] == told["rms"]
     assert step.after["error_share_holdout"] == told["share"]
     assert "error_holdout" not in step.before
-    shown = history_view.answer(rig, {})["steps"][-1]
+    shown = study_views.history_view(rig, {})["steps"][-1]
     assert (shown["rms"], shown["share"], shown["below"]) == (told["rms"], told["share"], 0.0)
 
     assert bristle.compare(Study(rig)).error.as_dict() == told

@@ -344,7 +344,7 @@ ROWS = 20_000
 """Rows of a run that are sent; of more every second, third ... is. Peaks are those of all rows."""
 
 
-def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def simulate_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return a scenario's run with some values, and at first what can be moved.
 
     Parameters
@@ -383,25 +383,26 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def numbers(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def numbers_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a page needs to run a scenario itself, with the module that `export.web_module`
     makes.
 
     Parameters
     ----------
-    folder, arguments : as for `answer`; sliders are those of `answer` that the module can move
+    folder, arguments : as for `simulate_view`; sliders are those of its answer that the module can
+        move
 
     Raises
     ------
     ScenarioError, RecordError
-        As `answer`.
+        As `simulate_view`.
     """
     asked = asked_for(folder, {**arguments, "values": {}})
     sliders = {one["name"]: (one["low"], one["high"]) for one in _sliders(asked.load())}
     return described(Numbers(stock_file(asked.scenario), asked.given()), shown=Shown(sliders))
 
 
-def compiled(folder: Path, arguments: Mapping[str, Any]) -> bytes:
+def module_view(folder: Path, arguments: Mapping[str, Any]) -> bytes:
     """Return the WebAssembly module by which a page runs scenarios itself.
 
     It is compiled once for all scenarios, which takes a minute or two: a process of its own does
@@ -419,7 +420,7 @@ def compiled(folder: Path, arguments: Mapping[str, Any]) -> bytes:
     return module()
 
 
-def choices(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def scenarios_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return the stock scenarios by name, the studies with a damper for them, the ground motions.
 
     Parameters
@@ -435,17 +436,17 @@ def choices(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def spectrum(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def spectrum_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return the response spectra of a run's ground and floors.
 
     Parameters
     ----------
-    folder, arguments : as for `answer`
+    folder, arguments : as for `simulate_view`
 
     Raises
     ------
     ScenarioError, RecordError
-        As `answer`.
+        As `simulate_view`.
     RunError
         If no output is an acceleration of ground or floor.
     """

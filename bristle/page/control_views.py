@@ -12,8 +12,9 @@ from ..campaign.best_constant import OUTPUT, G
 from ..campaign.best_constant import SCENARIO as PASSIVE
 from ..core.config import toml_content
 from ..core.files import read_json
+from ..data import list_ground_motions
 from ..engine.coupled import Coupled
-from ..errors import DesignError, ScenarioError, StudyError
+from ..errors import BristleError, DesignError, ScenarioError, StudyError
 from ..physics.drive import VOLTAGE
 from ..physics.law import base_and_variant
 from ..study.study import Study
@@ -21,21 +22,33 @@ from ..synthesis import implausible, read_task, task_from_data
 from ..synthesis.analysis import task_curves
 from ..system.scenario import load_scenario
 from .orders import (
+    COMPARED_MOTIONS,
+    COMPARED_PEAK,
+    COMPARISONS,
     FIELDS,
     FOLDER,
     KINDS,
+    MEMBERS,
     MOTIONS,
     PEAK,
     content_of,
     design_name,
     kind_of_design,
     names_of,
+    numbers_of,
     peak_of,
     record_name,
     values_of,
 )
 from .requests import RequestError
-from .simulate_view import RunRequest, damper_of, record_of, records, stock_file
+from .simulate_views import (
+    RunRequest,
+    damper_of,
+    library_controllers,
+    record_of,
+    records,
+    stock_file,
+)
 
 ANSWER = "passive/passive.json"
 """What `bristle optimise passive` leaves in the folder of designs."""
@@ -44,7 +57,7 @@ ROWS = 3000
 JUDGED = (OUTPUT, "structure.base_displacement", "damper.force")
 
 
-def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def design_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return what view 8 shows of a study before its closed loops.
 
     Parameters
@@ -74,7 +87,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def weights(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def weights_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a task weighs, before it is solved, and what looks unmeant in it.
 
     Parameters
@@ -92,7 +105,7 @@ def weights(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {**task_curves(task), "warnings": implausible(task)}
 
 
-def loops(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def loops_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return the closed loop of a design on ground motions, and the best constant voltage's.
 
     Parameters
@@ -258,3 +271,72 @@ def _best(folder: Path) -> dict[tuple[str, float], float]:
         raise StudyError(
             f"{path}: {type(error).__name__} {error}; `bristle optimise passive` writes it anew."
         ) from None
+
+
+# View 9, Compare controllers: what can be compared, and what the comparisons found.
+
+
+COMPARISON, REPORT = "answer.json", "report.html"
+"""What `bristle controllers` leaves in its folder, beside tables."""
+SHOWN = ("command", "verdict", "notes", "header", "tables", "footnotes", "seconds")
+
+
+def controllers_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what view 9 shows of a study.
+
+    Parameters
+    ----------
+    folder : of the study
+    arguments : none are taken
+
+    Raises
+    ------
+    StudyError
+        If a file of the study is wrong.
+    """
+    peaks = {one.name: one.peak / G for one in list_ground_motions()}
+    numbers = numbers_of(folder)
+    return {
+        "records": [{"name": n, "peak": peaks.get(n)} for n in records(folder.parent)],
+        "controllers": list(library_controllers()),
+        "designs": [n for n in names_of(folder) if (folder / FOLDER / f"{n}.json").is_file()],
+        "buildings": _buildings(folder),
+        "most": {"motions": COMPARED_MOTIONS, "members": MEMBERS, "peak": COMPARED_PEAK},
+        "next": max(numbers, default=0) + 1,
+        "comparisons": [found for number in numbers if (found := _comparison(folder, number))],
+    }
+
+
+def _comparison(folder: Path, number: int) -> dict[str, Any] | None:
+    """Return a comparison with its files; None where it failed or was cancelled."""
+    own = folder / COMPARISONS / str(number)
+    file = own / COMPARISON
+    if not file.is_file():
+        return None
+    found = read_json(file)
+    older = file.stat().st_mtime_ns < (folder / "model.toml").stat().st_mtime_ns
+    files = [own / REPORT, *sorted(own.glob("*.csv"))]
+    return {
+        "number": number, "older": older, **{key: found[key] for key in SHOWN},
+        "files": [one.relative_to(folder).as_posix() for one in files if one.is_file()],
+    }  # fmt: skip
+
+
+def _buildings(folder: Path) -> list[dict[str, str]]:
+    """Return the buildings of the studies, that of this study first, with the damper's device."""
+    others = [file.parent for file in sorted(folder.parent.glob("*/study.toml"))]
+    found = []
+    for one in (folder, *(other for other in others if other != folder)):
+        if one.name.startswith("."):
+            continue
+        try:
+            study = Study(one)
+            building = study.model(to_show=True).building
+        except BristleError:
+            if one == folder:
+                raise
+            continue  # a study that cannot be read has no building; its own views say why
+        if building:
+            about = {"study": one.name, "device": study.settings.device}
+            found.append({"file": f"{one.name}/{building}", **about})
+    return found
