@@ -9,7 +9,7 @@ import re
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import pairwise, product
@@ -53,7 +53,7 @@ def refuse_amount(
     parameter = effect.parameters[name]
     low, high = parameter.bounds
     none = high if effect.amount.startswith("1/") else min(max(0.0, low), high)
-    hooks = [hook for hook in effect.hooks() if hook not in ("rate", "advance")]
+    hooks = _forces(effect)
 
     def size(at: float) -> float:
         """Return by how much the hooks differ from those of no effect, the largest of all."""
@@ -190,6 +190,7 @@ def refuse_jump(
 
 
 _STATES = ("rate", "advance")
+Made = Effect | Law
 
 
 def refuse_reads(effect: type[Effect], hook: str, q: Q, z: Any, p: Any) -> None:
@@ -310,7 +311,7 @@ def probe(effect: type[Effect]) -> None:
                         _call(effect, "advance", q._replace(dt=dt), z, values, dt < inf)
     for q, hook in product(_signals(effect), effect.hooks()):
         refuse_reads(effect, hook, q, _state(effect, q, defaults), effect.values_of(defaults))
-    _smooth_in_signals(effect, defaults)
+    _smooth_in_signals(effect, _signals(effect), defaults)
     _smooth_in_parameters(effect, defaults)
     refuse_amount(effect, _signals(effect)[1:], partial(_at_amount, effect, defaults))
     for values in corners:
@@ -369,49 +370,59 @@ def _signals(effect: type[Effect]) -> list[Q]:
     return found
 
 
-def _state(effect: type[Effect], q: Q, values: dict[str, float]) -> Any:
-    """Return the states after a few steps under a signal, from rest."""
-    z = effect.State(*(0.0 for _ in effect.states))
+def _state(made: type[Made], q: Any, values: dict[str, float], dt: float = 1e-6) -> Any:
+    """Return the states after a few steps under a signal, from rest; of `dt` [s] by their rates."""
+    z = made.State(*(0.0 for _ in made.states))
     for _ in range(3):
-        if "advance" in effect.hooks():
-            z = effect.State(*_call(effect, "advance", q, z, values))
-        elif "rate" in effect.hooks():
-            rates = _call(effect, "rate", q, z, values)
-            z = effect.State(*(s + 1e-6 * rate for s, rate in zip(z, rates, strict=False)))
+        if "advance" in made.hooks():
+            z = made.State(*_call(made, "advance", q, z, values))
+        elif "rate" in made.hooks():
+            rates = _call(made, "rate", q, z, values)
+            z = made.State(*(s + dt * rate for s, rate in zip(z, rates, strict=False)))
     return z
 
 
 def _call(
-    effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float], finite: bool = True
+    made: type[Made], hook: str, q: Any, z: Any, values: dict[str, float], finite: bool = True
 ) -> tuple[float, ...]:
     """Return what a hook gives, as a tuple; FlawError if that is not right."""
-    wanted = {"rate": len(effect.states), "advance": len(effect.states), "motion": 2}.get(hook)
-    given = (q, z, effect.values_of(values))
-    return call(getattr(effect, hook), given, wanted, partial(_place, effect, q, values), finite)
+    wanted = {"rate": len(made.states), "advance": len(made.states), "motion": 2}.get(hook)
+    p = made.values_of(values) if issubclass(made, Effect) else made.at(values, q.V)
+    place = partial(_place, q, _read_by(made), values)
+    return call(getattr(made, hook), (q, z, p), wanted, place, finite)
 
 
-def _place(effect: type[Effect], q: Q, values: dict[str, float]) -> str:
-    signals = ", ".join(f"{name} = {getattr(q, name):g}" for name in effect.needs)
+def _read_by(made: type[Made]) -> tuple[str, ...]:
+    """Return the signals that hooks read: of a law those that a rig moves."""
+    return tuple(made.needs) if issubclass(made, Effect) else ("x", "v", "V")
+
+
+def _place(q: Any, read: tuple[str, ...], values: dict[str, float]) -> str:
+    signals = ", ".join(f"{name} = {getattr(q, name):g}" for name in read)
     numbers = ", ".join(f"{name} = {value:g}" for name, value in values.items())
     return "; ".join(text for text in (signals, numbers) if text) or "any motion"
 
 
-def _smooth_in_signals(effect: type[Effect], values: dict[str, float]) -> None:
-    hooks = [hook for hook in effect.hooks() if hook not in ("rate", "advance")]
-    for signal in effect.needs:
+def _forces(made: type[Made]) -> list[str]:
+    """Return the hooks that give no states."""
+    return [hook for hook in made.hooks() if hook not in _STATES]
+
+
+def _smooth_in_signals(made: type[Made], signals: Sequence[Any], values: dict[str, float]) -> None:
+    for signal in _read_by(made):
         if signal not in RANGES:
             continue
         low = 0.0 if signal == "V" else -RANGES[signal]
-        for q, hook in product(_signals(effect)[1:7], hooks):
-            given = partial(_at_signal, effect, hook, q, _state(effect, q, values), values, signal)
-            refuse_jump(getattr(effect, hook), given, (low, RANGES[signal]), f"q.{signal}")
+        for q, hook in product(signals[1:7], _forces(made)):
+            given = partial(_at_signal, made, hook, q, _state(made, q, values), values, signal)
+            refuse_jump(getattr(made, hook), given, (low, RANGES[signal]), f"q.{signal}")
 
 
 def _at_signal(
-    effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float], signal: str,
+    made: type[Made], hook: str, q: Any, z: Any, values: dict[str, float], signal: str,
     value: float,
 ) -> tuple[float, ...]:  # fmt: skip
-    return _call(effect, hook, q._replace(**{signal: value}), z, values)
+    return _call(made, hook, q._replace(**{signal: value}), z, values)
 
 
 def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> None:
@@ -498,14 +509,14 @@ def _ways(
 
 
 def _at_parameters(
-    effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float],
+    made: type[Made], hook: str, q: Any, z: Any, values: dict[str, float],
     within: list[Within], share: float,
 ) -> tuple[float, ...]:  # fmt: skip
     """Call a hook with parameters between low and high, by decades where they span many."""
     given = dict(values)
     for name, low, high in within:
         given[name] = _between(low, high, share)
-    return _call(effect, hook, q, z, given)
+    return _call(made, hook, q, z, given)
 
 
 def _span(parameter: Parameter) -> tuple[float, float]:
@@ -552,13 +563,13 @@ def probe_law(law: type[Law]) -> None:
     defaults = {name: p.value for name, p in law.parameters.items()}
     for values in [{**defaults, **end} for end in ends(law)]:
         for q in _law_signals():
-            z = _law_state(law, q, values)
+            z = _state(law, q, values)
             for hook in law.hooks():
-                _call_law(law, hook, q, z, values)
+                _call(law, hook, q, z, values)
             if law.hook("advance"):
-                _call_law(law, "advance", q._replace(dt=0.0), z, values)
-                _call_law(law, "advance", q._replace(dt=inf), z, values, finite=False)
-    _smooth(law, defaults)
+                _call(law, "advance", q._replace(dt=0.0), z, values)
+                _call(law, "advance", q._replace(dt=inf), z, values, finite=False)
+    _law_smooth(law, defaults)
     _moving(law, defaults)
     _at_zero(law, defaults)
     for values in ends(law):
@@ -624,59 +635,18 @@ def _law_signals(factor: float = 1.0) -> list[Inputs]:
     return found
 
 
-def _law_state(law: type[Law], q: Inputs, values: dict[str, float], dt: float = 1e-6) -> Any:
-    """Return the states after a few steps under a signal, from rest; of `dt` [s] by their rates."""
-    z = law.State(*(0.0 for _ in law.states)) if law.states else ()
-    for _ in range(3 if law.states else 0):
-        if law.hook("advance"):
-            z = law.State(*_call_law(law, "advance", q, z, values))
-        else:
-            rates = _call_law(law, "rate", q, z, values)
-            z = law.State(*(s + dt * rate for s, rate in zip(z, rates, strict=False)))
-    return z
-
-
-def _call_law(
-    law: type[Law], hook: str, q: Inputs, z: Any, values: dict[str, float], finite: bool = True
-) -> tuple[float, ...]:
-    """Return what a hook gives, as a tuple; FlawError if that is not right."""
-    count = len(law.states) if hook in ("rate", "advance") else None
-    given = (q, z, law.at(values, q.V))
-    return call(getattr(law, hook), given, count, partial(_law_place, q, values), finite)
-
-
-def _law_place(q: Inputs, values: dict[str, float]) -> str:
-    numbers = ", ".join(f"{name} = {value:g}" for name, value in values.items())
-    return f"x = {q.x:g}, v = {q.v:g}, V = {q.V:g}; {numbers}"
-
-
 def _with(
     law: type[Law], hook: str, q: Inputs, z: Any, values: dict[str, float], name: str, share: float
 ) -> tuple[float, ...]:
     """Call a hook with a parameter at a share of its range."""
-    value = _between(*_span(law.parameters[name]), share)
-    return _call_law(law, hook, q, z, {**values, name: value})
+    return _at_parameters(law, hook, q, z, values, [(name, *_span(law.parameters[name]))], share)
 
 
-def _law_at_signal(
-    law: type[Law], hook: str, q: Any, z: Any, values: dict[str, float], signal: str,
-    value: float,
-) -> tuple[float, ...]:  # fmt: skip
-    return _call_law(law, hook, q._replace(**{signal: value}), z, values)
-
-
-def _forces(law: type[Law]) -> Iterator[str]:
-    return (hook for hook in law.hooks() if hook not in ("rate", "advance"))
-
-
-def _smooth(law: type[Law], values: dict[str, float]) -> None:
+def _law_smooth(law: type[Law], values: dict[str, float]) -> None:
     """Refuse hooks that jump with a signal or a parameter; the sign of the yield force may."""
+    _smooth_in_signals(law, _law_signals(), values)
     for q in _law_signals()[1:7]:
-        z = _law_state(law, q, values)
-        for signal, hook in product(("x", "v", "V"), _forces(law)):
-            given: Any = partial(_law_at_signal, law, hook, q, z, values, signal)
-            low = 0.0 if signal == "V" else -RANGES[signal]
-            refuse_jump(getattr(law, hook), given, (low, RANGES[signal]), f"q.{signal}")
+        z = _state(law, q, values)
         for name, hook in product(law.parameters, _forces(law)):
             if name not in CHOICES:
                 given = partial(_with, law, hook, q, z, values, name)
@@ -696,7 +666,7 @@ def _at_zero(law: type[Law], values: dict[str, float]) -> None:
     for name in law.linear():
         for q, hook in product(_law_signals()[1:], _forces(law)):
             try:
-                _call_law(law, hook, q, _law_state(law, q, values), {**values, name: 0.0})
+                _call(law, hook, q, _state(law, q, values), {**values, name: 0.0})
             except FlawError as flaw:
                 raise FlawError(
                     f"{hook} is not linear in {name}, for it cannot be zero. Name what the force "
@@ -709,7 +679,7 @@ def _moves(law: type[Law], name: str, values: dict[str, float]) -> bool:
     for factor, dt in product(LAW_FURTHER, (1e-6, 2e-3)):
         for q, hook in product(_law_signals(factor)[1:], law.hooks()):
             try:
-                z = _law_state(law, q, values, dt)
+                z = _state(law, q, values, dt)
                 if len({_with(law, hook, q, z, values, name, share) for share in SHARES}) > 1:
                     return True
             except FlawError:  # so far out it need not be right
