@@ -143,7 +143,7 @@ function evidence(verdict) {
     rows.length ? bars("z with each effect", rows.slice(0, 20).map((row) => ({
       name: row.site && row.site !== "damper" ? `${row.effect} (${row.site})` : row.effect, value: log(row.z_holdout),
       strong: verdict.effects.includes(row.effect), good: row.z_holdout <= 1.1 && row.gain > 0.02,
-      text: z(row.z_holdout), title: row.refined ? "searched at length" : "short search: it gains too little",
+      text: z(row.z_holdout), title: row.refined ? "fitted to the end" : "a first fit gained too little to go on",
     })), { edge: log(before), most: log(Math.max(before, 2)) }) : null,
     rows.length ? h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic, from z = 1 on the left. Green line: the model as it is. Green bar: down to the noise floor. Blue bar: named by the verdict, above the noise floor.") : null,
     blocks(verdict.details)];
