@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
+from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from answers import Capture, asked, told
+
+from bristle.cli import main
 
 TRUE_K = 111.827  # N/m, of the gas spring that the runs hide
 
@@ -118,3 +122,25 @@ def test_auto_comes_to_the_same_model(bench_study: Path, capsys: Capture) -> Non
     learnt = asked(capsys, "study", "auto", bench_study, "--law", "bingham")
     assert learnt["verdict"]["kind"] == "none"
     assert "gas_spring" in (bench_study / "model.toml").read_text()
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_what_leaves_the_screen_is_in_the_details_and_in_the_report(
+    command: str, bench_study: Path, capsys: Capture
+) -> None:
+    words = [command, str(bench_study), *(["--dry-run"] if command == "diagnose" else [])]
+    capsys.readouterr()
+    printed = []
+    for more in ([], ["--details"]):
+        assert main([*words, *more]) == 0
+        printed.append(capsys.readouterr().out.splitlines())
+    short, long = ([one for one in lines if not one.startswith("Picture:")] for lines in printed)
+    assert short.pop() == f"Details:  --details, or bristle report {bench_study}"
+    assert [line for line in short if line not in long] == []
+    assert len(long) > len(short)
+    told(capsys, "report", bench_study)
+    page = (bench_study / "reports" / "report.html").read_text()
+    text = "".join(unescape(re.sub("<[^>]+>", "", page)).split())
+    tables = (re.sub("^    what .*?: ", "  ", line) for line in long if line.startswith("  "))
+    cells = {one for line in tables for one in re.split(" {2,}", line)}
+    assert sorted(one for one in cells if "".join(one.split()) not in text) == []
