@@ -10,6 +10,7 @@ BUILT_IN = ("el_centro_1940_ns",)
 class GroundMotion(SourceSlave):
     """Ground acceleration from a record, scaled to a peak and by a factor."""
 
+    icon = "ground"
     file_of = Reading("record")
     header = HEADER
     files = ("data/ground_motions/el_centro_1940_ns.csv",)

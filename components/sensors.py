@@ -7,6 +7,7 @@ from bristle.fmu.controller import MEASURED, SampledSlave
 class Sensors(SampledSlave):
     """Sensors: bias, gain, noise, quantisation, delay and cut-off on each measured channel."""
 
+    icon = "sensors"
     functions = sensors
 
     def declare(self):

@@ -15,6 +15,7 @@ def moves(coupled, device, level):
 class Structure(ComponentSlave):
     """Building, isolated or fixed, under ground motion and the forces of devices."""
 
+    icon = "structure"
     functions = structure
 
     def declare(self):
@@ -53,7 +54,7 @@ class Structure(ComponentSlave):
             self.add_motion(device, coupled)
         self.add_parameter("attached_mass", 0.0, "kg", "adds to the damper's level", (0.0, 1e9))
         self.add_effects("structure")
-        self.take(laws.SETS.offering(*self.offered("structure")))
+        self.take(self.functions_of(laws.SETS, *self.offered("structure")))
 
     def add_motion(self, device, coupled):
         """Declare what a device shows: its motion, and the force that would hold it."""

@@ -40,6 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="file with your own effect, for a damper or a Structure; may be repeated",
     )
+    text = "effects that are in the FMU and on: gas_spring,coil_lag; all: every one, off; else none"
+    parser.add_argument("--effects", dest="offers", default="", metavar="NAMES", help=text)
     parser.add_argument("--name", help="name of the model and its file; else the component's")
     text = "folder of NAME.fmu; an older one is replaced; else the current folder"
     parser.add_argument("--out", type=Path, default=Path(), metavar="FOLDER", help=text)
@@ -51,8 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Build one FMU, unless the same stands there already; say where it is and what it offers."""
     from ..fmu.build import built_guid, plan
+    from ..fmu.component import SWITCH
     from ..fmu.description import read_description
 
+    names = [name.strip() for name in arguments.offers.split(",") if name.strip()]
+    every = names == ["all"]
     what = plan(
         arguments.component,
         name=arguments.name,
@@ -60,6 +65,8 @@ def main(arguments: argparse.Namespace) -> int:
         record=arguments.record,
         controller=arguments.controller,
         effects=arguments.effects,
+        offers=None if every else names,
+        starts={} if every else {name + SWITCH: True for name in names},
     )
     target = arguments.out / f"{what.name}.fmu"
     fresh = not arguments.native and built_guid(target) == what.guid()

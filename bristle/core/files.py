@@ -108,6 +108,11 @@ def components_folder() -> Path:
     return (root() or _PACKAGE) / "components"
 
 
+def licence_file() -> Path:
+    """Return the file with bristle's licence."""
+    return (root() or _PACKAGE) / "LICENSE"
+
+
 def scenarios_folder() -> Path:
     """Return the folder with the stock scenarios."""
     return (root() or _PACKAGE) / "scenarios"

@@ -273,11 +273,11 @@ class Layout:
     Parameters
     ----------
     scenario : System
-    offered : bool
-        Whether a component has all effects that it offers, or those that are on.
+    only_on : bool
+        Whether a component has the switches and parameters of effects that are on alone.
     """
 
-    def __init__(self, scenario: System, offered: bool = False) -> None:
+    def __init__(self, scenario: System, only_on: bool = False) -> None:
         self.names: dict[str, list[str]] = {
             kind: [] for kind in ("source", "damper", "structure", "sampled")
         }
@@ -299,9 +299,9 @@ class Layout:
         for component in scenario.components.values():
             self.names[kind_of(component, scenario)].append(component.name)
         self.slaves: dict[str, Any] = {
-            component.name: instantiated(component) for component in scenario.components.values()
+            one.name: instantiated(one, only_on) for one in scenario.components.values()
         }
-        self.dampers, self.structures = self._functions(offered)
+        self.dampers, self.structures = self._functions()
         for component in scenario.components.values():
             configure(self.slaves[component.name], component, scenario)
         self.source_of: dict[Port, Port] = {
@@ -315,7 +315,7 @@ class Layout:
             self._add_slots(component)
         self.slots.update({end: self.slots[begin] for end, begin in self.source_of.items()})
 
-    def _functions(self, offered: bool) -> tuple[Functions, Functions]:
+    def _functions(self) -> tuple[Functions, Functions]:
         """Let dampers compute with the same functions, and structures."""
         slaves = {site: [self.slaves[name] for name in self.names[site]] for site in SITES}
         own = any(one.made is not SITES[site].library for site in SITES for one in slaves[site])
@@ -323,7 +323,7 @@ class Layout:
         for site, sets in SITES.items():
             owners: set[Owner] = {LAWS[one.law].base for one in slaves[site] if site == "damper"}
             for one in slaves[site]:
-                owners |= {e for e in one._effects if offered or one[e.name + ".on"]}
+                owners |= {e for e in one._effects if e.name in one.effects_on()}
             found.append(sets.of(*owners) if own else sets.library)
             for one in slaves[site]:
                 one.take(found[-1])
@@ -511,16 +511,20 @@ def kind_of(component: Component, scenario: System) -> str:
     )
 
 
-def instantiated(component: Component) -> Slave:
-    """Return the component's Python object with the values that are set."""
+def instantiated(component: Component, only_on: bool = False) -> Slave:
+    """Return the component's Python object with the values that are set.
+
+    With `only_on` it has the switches and parameters of effects that are on alone.
+    """
     slave = catalogue.instantiate(
         component.made_of(),
         component.building,
         component.name,
         component.controller,
         component.effects,
+        offers=component.effects_on() if only_on else None,
     )
-    for name, value in component.taken_values().items():
+    for name, value in component.taken_values(only_on).items():
         index = slave._index[name]
         slave._values[index] = type(slave._values[index])(value)
         slave._set.add(index)

@@ -19,6 +19,7 @@ from bristle.fmu.component import STEP_LENGTH, ComponentSlave, Played
 class Composite(ComponentSlave):
     """A whole scenario as one component."""
 
+    icon: ClassVar[str] = "scenario"
     functions: ClassVar[Any] = composite_functions
     in_place: ClassVar[bool] = True
 

@@ -84,7 +84,7 @@ class Assembly:
         fed = cut & {(c.target, c.input) for c in whole.wires}
         left = [c for c in whole.wires if (c.target, c.input) not in cut]
         self.scenario = replace(whole, wires=tuple(left))
-        self.system = Layout(self.scenario, offered=True)
+        self.system = Layout(self.scenario, only_on=True)
         self.parts: dict[str, Any] = self.system.slaves
         open_ones = [
             Input(name, port, (name, port) not in fed)

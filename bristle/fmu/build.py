@@ -18,6 +18,7 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
@@ -28,19 +29,21 @@ from ..core.files import fmus_folder
 from ..errors import BuildError
 from ..physics.drive import VOLTAGE
 from ..physics.forms import split_form
-from ..trust import require
+from ..trust import load_file, require
 from ..user_code.load import own_laws
-from . import binary, catalogue
-from .archive import write_archive
+from . import binary, catalogue, documentation
+from .archive import DESCRIPTION, parse_xml, write_archive
+from .component import SWITCH
 from .description import Variable
 from .slave import BAKED
 
 PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
-    "errors.py", "units.py", "physics/**/*.py", "component/**/*.py",
+    "errors.py", "units.py", "version.py", "physics/**/*.py", "component/**/*.py",
     "fmu/slave.py", "fmu/model_description.py", "fmu/binary.py", "fmu/component.py",
     "fmu/damper.py", "fmu/controller.py", "fmu/own_controller.py",
 )  # fmt: skip
+_EFFECTS = "physics/effects/"
 CAPABILITIES = {
     "needsExecutionTool": True,  # a Python that the host brings
     "canHandleVariableCommunicationStepSize": True,
@@ -114,6 +117,8 @@ def _library_digest() -> str:
     for name, path in library_files():
         content.update(name.encode())
         content.update(path.read_bytes())
+    for path in documentation.sources():
+        content.update(path.read_bytes())
     return content.hexdigest()
 
 
@@ -129,6 +134,7 @@ def plan(
     controller: Path | None = None,
     drive: str = VOLTAGE.name,
     step: float | None = None,
+    offers: Iterable[str] | None = None,
 ) -> Plan:
     """Return what to build.
 
@@ -154,6 +160,9 @@ def plan(
         What commands a damper: one of `physics.drive.DRIVES`.
     step : float, optional
         Step [s] that the FMU asks for; else 2 ms.
+    offers : iterable of str, optional
+        Names of the effects that it offers besides those of `effects`; None: all of its site. A
+        component without effects takes none.
 
     Raises
     ------
@@ -192,12 +201,34 @@ def plan(
         baked["drive"] = drive
     if step is not None:
         baked["step"] = step
-    if starts:
+    if starts or offers is not None:
         known = catalogue.describe(component, building, effects=effects, drive=drive).variables
-        baked["starts"] = _checked_starts(component, known, starts)
+        if offers is not None:
+            chosen_effects = _checked_offers(component, known, offers, effects)
+            off = {key.removesuffix(SWITCH) for key in known if key.endswith(SWITCH)}
+            if off:
+                baked["effects"] = chosen_effects
+            off -= {*chosen_effects}
+            known = {key: one for key, one in known.items() if key.partition(".")[0] not in off}
+        if starts:
+            baked["starts"] = _checked_starts(component, known, starts)
     law = getattr(kind, "law", "")
     laws = tuple(file for name, file in own_laws().items() if name == split_form(law)[0])
     return Plan(chosen, path, baked, files, effects, laws)
+
+
+def _checked_offers(
+    component: str, known: Iterable[str], offers: Iterable[str], own: Iterable[Path]
+) -> list[str]:
+    """Return the names of the effects that an FMU is to offer; BuildError for what none is."""
+    there = [key.removesuffix(SWITCH) for key in known if key.endswith(SWITCH)]
+    asked = {*offers, *(load_file(path).name for path in own)}
+    for name in sorted(asked - {*there}):
+        near = get_close_matches(name, there, 1)
+        hint = f' Did you mean "{near[0]}"?' if near else ""
+        listed = ", ".join(there) or "none"
+        raise BuildError(f'{component} offers no effect "{name}". It offers: {listed}.{hint}')
+    return sorted(asked)
 
 
 def _checked_starts(
@@ -284,7 +315,7 @@ def _serve() -> None:
 
 def _build_here(what: Plan, guid: str, target: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
-        _pack(_build_loose(what, guid, Path(temporary)), target)
+        _pack(_build_loose(what, guid, Path(temporary)), target, what)
 
 
 def built_guid(path: Path) -> str | None:
@@ -310,7 +341,11 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
 
     digest = what.digest()
     package = folder / f"bristle_{digest}"
+    offered = what.baked.get("effects")
     for name, path in library_files():
+        left_out = offered is not None and path.stem not in (*offered, "__init__")
+        if left_out and name.startswith(_EFFECTS):
+            continue
         target = package / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, target)
@@ -350,13 +385,14 @@ def _write_renamed(text: str, target: Path, package: str) -> None:
     target.write_text(text, encoding="utf-8")
 
 
-def _pack(loose: Path, target: Path) -> None:
-    """Write the FMU again, in order and without times, and rename it into place."""
+def _pack(loose: Path, target: Path, what: Plan) -> None:
+    """Write the FMU again with what people see, in order, without times; rename it into place."""
     with zipfile.ZipFile(loose) as old:
         members = {name: old.read(name) for name in old.namelist()}
     if not any(name.startswith("binaries/") for name in members):
         raise BuildError(f"{target}: the installed pythonfmu holds no binaries.")
-    write_archive(target, members)
+    root = parse_xml(members[DESCRIPTION], str(target))
+    write_archive(target, {**members, **documentation.members(root, what)})
 
 
 def ensure(

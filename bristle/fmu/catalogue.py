@@ -168,6 +168,7 @@ def instantiate(
     controller: Path | None = None,
     effects: Iterable[Path] = (),
     drive: str = "",
+    offers: Iterable[str] | None = None,
 ) -> Slave:
     """Return a component as a Python object, as an FMU's binary would make it.
 
@@ -184,6 +185,8 @@ def instantiate(
         Files with effects of a user's own.
     drive : str
         What commands a damper; "": its voltage.
+    offers : iterable of str or None
+        The effects that it offers by name; None: all of its site.
 
     Raises
     ------
@@ -199,6 +202,8 @@ def instantiate(
     own = [load_file(path) for path in effects]
     if own:
         baked["own"] = [effect.name for effect in own]
+    if offers is not None:
+        baked["effects"] = sorted(offers)
     if controller:
         baked["files"] = {design_file(name, kind, controller): str(controller)}
     files: tuple[str, ...] = getattr(kind, "files", ())

@@ -10,11 +10,14 @@ from typing import Any, ClassVar, NamedTuple, Optional
 from ..component import source
 from ..physics.drive import VOLTAGE, declared_for, states_for, text_for, unit_for
 from ..physics.effect import Effect, effects_of
-from ..physics.generate import Functions
+from ..physics.generate import Functions, Owner, Sets
 from ..physics.motion_file import read_two_column
 from ..physics.parameter import Parameter
 from ..physics.signals import KINDS, PARAMETERS, read_steps
 from .slave import STEPPING, Slave
+
+SWITCH = ".on"
+"""What the name of an effect's switch ends with."""
 
 
 class EffectSlave(Slave):
@@ -30,7 +33,7 @@ class EffectSlave(Slave):
         self._effects = self.offered(site, law)
         for effect in self._effects:
             about = text_for(effect.first_line(), self.drive)
-            self.add_parameter(effect.name + ".on", False, None, about)
+            self.add_parameter(effect.name + SWITCH, False, None, about)
             for name, parameter in effect.parameters.items():
                 if name in effect.channels:
                     continue  # an input
@@ -46,7 +49,16 @@ class EffectSlave(Slave):
     def offered(self, site: str, law: str = "") -> tuple[type[Effect], ...]:
         """Return the effects that the component offers at a site."""
         own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
-        return tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
+        only = self.baked.get("effects")
+        return tuple(
+            effect
+            for effect in effects_of(site, law)
+            if (not effect.own or effect.name in own) and (only is None or effect.name in only)
+        )
+
+    def functions_of(self, sets: Sets, *owners: Owner) -> Functions:
+        """Return the functions of what is offered; all of a library only where nobody chose."""
+        return (sets.offering if self.baked.get("effects") is None else sets.of)(*owners)
 
     def take(self, made: Functions) -> None:
         """Compute with the functions of a set of laws and effects."""
@@ -59,7 +71,7 @@ class EffectSlave(Slave):
 
     def effects_on(self) -> list[str]:
         """Return the names of the effects that are switched on."""
-        return [effect.name for effect in self._effects if self[effect.name + ".on"]]
+        return [effect.name for effect in self._effects if self[effect.name + SWITCH]]
 
     def numbers(self) -> dict[str, float]:
         """Return every Real parameter by its full name, as laws and effects know it."""
@@ -246,6 +258,7 @@ class SourceSlave(ComponentSlave):
     any other), or from TIME:VALUE pairs in `pairs_of`.
     """
 
+    icon = "source"
     functions: ClassVar[Any] = source
     file_of: ClassVar[Optional[Reading]] = None  # noqa: UP045 (read by Python 3.9)
     pairs_of: ClassVar[Optional[Reading]] = None  # noqa: UP045

@@ -47,6 +47,7 @@ _CLOCK_TEXTS = {
 class SampledSlave(ComponentSlave):
     """A component that samples `MEASURED` at t = 0, h, 2h ... and holds its outputs in between."""
 
+    icon = "controller"
     changes = "discrete"
     in_place = True
     texts: ClassVar[dict[int, str]] = _CLOCK_TEXTS

@@ -33,13 +33,15 @@ def input_of(channel: str, law: str, drive: Drive) -> str:
 class DamperSlave(ComponentSlave):
     """A damper of one law, from motion and voltage to the force that resists it."""
 
+    icon = "damper"
     law: ClassVar[str] = ""
     functions: ClassVar[Any] = damper
     hidden = 1  # the friction
 
     def declare(self) -> None:
         drive = self.drive = drive_named(self.baked.get("drive", ""))
-        self.take(laws.SETS.offering(LAWS[self.law].base, *self.offered("damper", self.law)))
+        offered = self.offered("damper", self.law)
+        self.take(self.functions_of(laws.SETS, LAWS[self.law].base, *offered))
         self.description = text_for(self.description or "", drive)
         self.add_input("displacement", "m", "displacement of the rod", over_step=HELD)
         self.add_input("velocity", "m/s", "velocity of the rod", over_step=HELD)

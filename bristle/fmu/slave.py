@@ -33,8 +33,16 @@ from pythonfmu.enums import Fmi2Status
 
 from .. import units
 from ..component import OVER_STEP
+from ..version import __version__
 from .binary import hold, reset_at_exit
-from .model_description import add_dependencies, complete
+from .model_description import (
+    AUTHOR,
+    COPYRIGHT,
+    LICENSE,
+    add_dependencies,
+    complete,
+    usual_size,
+)
 
 BAKED = "baked.json"
 """Name of the resource with what a build fixes: model name, start values, building."""
@@ -94,6 +102,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     guid: Any
     fault: int
+    icon: ClassVar[str] = "component"
+    """Which of bristle's icons tools show."""
     changes: ClassVar[str] = "continuous"
     """How Real outputs change: "continuous", or "discrete" where they stand between instants."""
 
@@ -125,6 +135,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.default_experiment = DefaultExperiment(
             start_time=0.0, stop_time=10.0, step_size=self.baked.get("step", 0.002)
         )
+        self.author, self.copyright, self.license = AUTHOR, COPYRIGHT, LICENSE
+        self.version = __version__
         self.description = (type(self).__doc__ or "").strip().split("\n")[0]
         self.declare()
         text = "0, or why the component stopped: 1 input, 2 step, 3 mode, 4 state, 5 parameter"
@@ -277,6 +289,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._index[name] = index
         if unit:
             self._units[name] = units.canonical(unit)
+        if isinstance(variable, Real):
+            low, high, nominal = self._bounds.get(name, (None, None, None))
+            self._bounds[name] = (low, high, nominal or usual_size(self._units.get(name), value))
         if name.isidentifier():
             if not isinstance(getattr(type(self), name, _Slot(name)), _Slot):
                 raise TypeError(f"{type(self).__name__}: {name!r} is taken.")

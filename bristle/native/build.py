@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element, SubElement, fromstring
 
 from ..core.progress import Count, tell
 from ..errors import BuildError
+from ..fmu import documentation
 from ..fmu.archive import write_archive
 from ..fmu.build import Plan, built_guid, planned
 from ..fmu.catalogue import BuildingData
@@ -269,6 +270,7 @@ def build(
     """
     prepared, platforms = prepare(what, fmi), sorted(platforms, key=lambda one: one.name)
     members = {f"resources/{name}": path.read_bytes() for name, path in what.files.items()}
+    members |= documentation.members(fromstring(prepared.description), what)
     content = hashlib.sha256("".join([*prepared, shim_digest(fmi)]).encode())
     for name, data in sorted(members.items()):
         content.update(name.encode() + data)

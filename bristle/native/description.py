@@ -11,7 +11,8 @@ from ..component import HELD
 from ..errors import BuildError
 from ..fmu.component import STEP_LENGTH, ComponentSlave, Played, Reading
 from ..fmu.description import NATIVE
-from ..fmu.model_description import unit_definitions
+from ..fmu.model_description import type_definitions, unit_definitions
+from ..version import __version__
 
 _CAPABILITIES = {
     "needsExecutionTool": False,
@@ -40,7 +41,7 @@ def description_tree(slave: ComponentSlave, guid: str) -> Element:
     options: dict[str, Any] = {**_CAPABILITIES, "canInterpolateInputs": bool(slave._inputs)}
     root: Element = slave.to_xml(options)
     root.set("guid", guid)
-    root.set("generationTool", NATIVE)
+    root.set("generationTool", f"{NATIVE} {__version__}")
     return root
 
 
@@ -60,7 +61,10 @@ def text_of(root: Element) -> str:
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
 """What FMI 3.0 calls the types of FMI 2.0."""
 
-_ROOT = ("modelName", "description", "generationTool", "variableNamingConvention")
+_ROOT = (
+    "modelName", "description", "author", "version", "copyright", "license", "generationTool",
+    "generationDateAndTime", "variableNamingConvention",
+)  # fmt: skip
 _CAPABILITIES_FMI3 = (
     "modelIdentifier", "needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess",
     "canGetAndSetFMUstate", "canSerializeFMUstate", "canHandleVariableCommunicationStepSize",
@@ -83,7 +87,9 @@ def description_fmi3(slave: ComponentSlave, guid: str) -> str:
     kept = {key: has[key] for key in _CAPABILITIES_FMI3 if key in has}
     capabilities = {key.replace("FMUstate", "FMUState"): value for key, value in kept.items()}
     SubElement(root, "CoSimulation", capabilities)
-    root.append(unit_definitions([*slave._units.values(), "s"]))
+    names = [*slave._units.values(), "s"]
+    root.append(unit_definitions(names))
+    root.append(type_definitions(names, "Float64Type"))
     root.append(_log_categories(_part(old, "LogCategories")))
     root.append(_part(old, "DefaultExperiment"))
     variables = SubElement(root, "ModelVariables")

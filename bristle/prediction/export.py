@@ -230,6 +230,7 @@ def _damper(study: Study, model: Model, runs: Runs, notes: list[str], step: floa
         name=_model_name(study.name),
         starts=starts,
         effects=[files[name] for name in own.effects if EFFECTS[name].own],
+        offers=own.effects,
         drive=drive_named(runs.all[0].drive).name,
         step=step,
     )

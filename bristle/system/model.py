@@ -19,6 +19,7 @@ from ..core.toml_lines import KeyPath
 from ..data import ground_motion_file
 from ..errors import PhysicsError, ScenarioError
 from ..fmu.catalogue import BuildingData
+from ..fmu.component import SWITCH
 from ..fmu.description import Description, Value, Variable
 from ..physics.building import PAPER, from_data
 
@@ -177,8 +178,8 @@ class Component:
         """Return the value of a parameter: as it is set, else where it starts."""
         return self.values.get(name, self.description.variables[name].start)
 
-    def taken_values(self) -> dict[str, Value]:
-        """Return the values that an FMU is given.
+    def taken_values(self, only_on: bool = False) -> dict[str, Value]:
+        """Return the values that an FMU is given; with `only_on` none of effects that are off.
 
         A ground motion of another format is a two-column CSV in the user's cache.
 
@@ -190,7 +191,18 @@ class Component:
         values = dict(self.values)
         if self.path is None and self.kind == "GroundMotion" and values.get("record"):
             values["record"] = ground_motion_file(str(values["record"]), Path())
+        if only_on and self.path is None:
+            off = {*self._effects()} - {*self.effects_on()}
+            return {key: one for key, one in values.items() if key.partition(".")[0] not in off}
         return values
+
+    def effects_on(self) -> list[str]:
+        """Return the names of the effects that a built-in component has on."""
+        return [name for name in self._effects() if self.value(name + SWITCH)]
+
+    def _effects(self) -> list[str]:
+        names = self.description.variables
+        return [name.removesuffix(SWITCH) for name in names if name.endswith(SWITCH)]
 
     def with_values(self, given: Mapping[str, Value | Signal]) -> Component:
         """Return it with parameters, a file's signal or numbers of its building changed.

@@ -39,17 +39,20 @@ def ssd_text(system: System, sources: Sources) -> str:
     elements = _add(whole, "ssd:Elements")
     ports = {component.name: _ports(component, system) for component in system.components.values()}
     declared = _declared(ports.values())
+    boxes = _boxes(system, ports)
     for component in system.components.values():
         values = _values(component)
         element = _add(
             elements, "ssd:Component", name=component.name, type=FMU_TYPE,
             source=sources[component.name],
         )  # fmt: skip
-        _component(element, component.name, ports[component.name], values, declared)
+        box = boxes[component.name]
+        _component(element, component.name, ports[component.name], values, declared, box)
     if system.wires:
         connections = _add(whole, "ssd:Connections")
         for connection in system.wires:
             _connection(connections, connection)
+    _add(whole, "ssd:SystemGeometry", **_corners(_around(boxes.values())))
     information = _add(_annotation(whole, OMS), "oms:Annotations")
     information = _add(information, "oms:SimulationInformation")
     step = repr(system.step)
@@ -74,13 +77,18 @@ _OMS_TOLERANCE = "0.0001"
 
 def _component(
     element: Element, name: str, ports: list[Variable], values: list[tuple[Variable, Value]],
-    declared: Mapping[str, Unit],
+    declared: Mapping[str, Unit], box: Box,
 ) -> None:  # fmt: skip
     if ports:
         connectors = _add(element, "ssd:Connectors")
         for port in ports:
             connector = _add(connectors, "ssd:Connector", name=port.name, kind=port.causality)
             _add(connector, f"ssc:{_kind(port)}", **_unit(port, declared))
+            side = [one for one in ports if one.causality == port.causality]
+            height = 1.0 - (side.index(port) + 1) / (len(side) + 1)
+            at = {"x": str(float(port.causality == "output")), "y": f"{height:.4g}"}
+            _add(connector, "ssd:ConnectorGeometry", **at)
+    _add(element, "ssd:ElementGeometry", **_corners(box))
     if values:
         binding = _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding")
         found = _add(
@@ -90,6 +98,38 @@ def _component(
         for variable, value in values:
             parameter = _add(parameters, "ssv:Parameter", name=variable.name)
             _add(parameter, f"ssv:{_kind(variable)}", value=_written(value))
+
+
+Box = tuple[float, float, float, float]
+"""Left, lower, right and upper end of a drawn part."""
+_WIDTH, _GAP, _PER_PORT = 40.0, 20.0, 10.0
+
+
+def _boxes(system: System, ports: Mapping[str, list[Variable]]) -> dict[str, Box]:
+    """Return where each component is drawn: to the right of those before it that feed it."""
+    columns: dict[str, int] = {}
+    for name in system.components:
+        feeding = [columns.get(one.source, -1) for one in system.wires if one.target == name]
+        columns[name] = 1 + max(feeding, default=-1)
+    tops: dict[int, float] = {}
+    found = {}
+    for name, column in columns.items():
+        sides = [one.causality for one in ports[name]]
+        most = max(sides.count("input"), sides.count("output"))
+        left, top = column * (_WIDTH + _GAP), tops.get(column, 0.0)
+        bottom = top - _PER_PORT * (most + 1)
+        found[name] = left, bottom, left + _WIDTH, top
+        tops[column] = bottom - _GAP
+    return found
+
+
+def _around(boxes: Iterable[Box]) -> Box:
+    left, lower, right, upper = zip(*boxes, strict=True)
+    return min(left) - _GAP, min(lower) - _GAP, max(right) + _GAP, max(upper) + _GAP
+
+
+def _corners(box: Box) -> dict[str, str]:
+    return dict(zip(("x1", "y1", "x2", "y2"), map(repr, box), strict=True))
 
 
 def _connection(connections: Element, connection: Connection) -> None:
@@ -292,7 +332,7 @@ def _fmu(component: Component, folder: Path, name: str, build: Build) -> Path:
         target = folder / f"{name}.fmu"
         target.write_bytes(component.path.read_bytes())
         return target
-    values = component.taken_values()
+    values = component.taken_values(only_on=True)
     files = {key: Path(str(values.pop(key))) for key in FILE_PARAMETERS if values.get(key)}
     if component.signal is not None:
         files[component.plays] = signal_file(component.signal, folder / f"{name}.csv")
@@ -305,6 +345,7 @@ def _fmu(component: Component, folder: Path, name: str, build: Build) -> Path:
         record=files.get("record"),
         samples=files.get("file"),
         starts=values,
+        offers=component.effects_on(),
     )
     return build(what, folder)
 
@@ -320,7 +361,7 @@ def _ports(component: Component, scenario: System) -> list[Variable]:
 def _values(component: Component) -> list[tuple[Variable, Value]]:
     """Return the values that stand in the package; files of built-in ones are in their FMUs."""
     inside = FILE_PARAMETERS if component.path is None else ()
-    values = component.taken_values().items()
+    values = component.taken_values(only_on=True).items()
     variables = component.description.variables
     return [(variables[key], value) for key, value in values if key not in inside]
 

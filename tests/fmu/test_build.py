@@ -69,7 +69,8 @@ def copy_of_the_source(folder: Path) -> Path:
         shutil.copytree(
             ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.fmu")
         )
-    shutil.copyfile(ROOT / "build_fmus.py", folder / "build_fmus.py")
+    for file in ("build_fmus.py", "LICENSE"):
+        shutil.copyfile(ROOT / file, folder / file)
     return folder
 
 
