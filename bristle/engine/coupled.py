@@ -318,13 +318,14 @@ class Layout:
     def _functions(self) -> tuple[Functions, Functions]:
         """Let dampers compute with the same functions, and structures."""
         slaves = {site: [self.slaves[name] for name in self.names[site]] for site in SITES}
-        own = any(one.made is not SITES[site].library for site in SITES for one in slaves[site])
+        owners: dict[str, set[Owner]] = {site: set() for site in SITES}
+        for site, own in owners.items():
+            own |= {LAWS[one.law].base for one in slaves[site] if site == "damper"}
+            own |= {e for one in slaves[site] for e in one._effects if e.name in one.effects_on()}
+        whole = all(sets.library.have(*owners[site]) for site, sets in SITES.items())
         found = []
         for site, sets in SITES.items():
-            owners: set[Owner] = {LAWS[one.law].base for one in slaves[site] if site == "damper"}
-            for one in slaves[site]:
-                owners |= {e for e in one._effects if e.name in one.effects_on()}
-            found.append(sets.of(*owners) if own else sets.library)
+            found.append(sets.library if whole else sets.of(*owners[site]))
             for one in slaves[site]:
                 one.take(found[-1])
         return found[0], found[1]

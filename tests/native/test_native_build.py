@@ -23,6 +23,7 @@ from bristle.native.build import build as build_build
 from bristle.native.description import quoted
 from bristle.native.entrance import plain_text
 from bristle.native.zig import PLATFORMS, chosen, here
+from bristle.version import __version__
 
 pytestmark = needs_zig
 
@@ -46,6 +47,9 @@ def test_it_holds_a_library_and_what_it_reads_and_no_python() -> None:
         names = archive.namelist()
     assert names == [
         f"binaries/{here().folder}/GroundMotion{here().suffix}",
+        "documentation/index.html",
+        "documentation/licenses/license.txt",
+        "model.png",
         "modelDescription.xml",
         "resources/el_centro_1940_ns.csv",
     ]
@@ -229,4 +233,4 @@ def test_a_controller_of_ones_own_needs_no_python(
     assert about.capabilities["needsExecutionTool"] == "false"
     with zipfile.ZipFile(tmp_path / "MyController.fmu") as archive:
         root = ElementTree.fromstring(archive.read("modelDescription.xml"))
-    assert root.get("generationTool") == "bristle native"
+    assert root.get("generationTool") == f"bristle native {__version__}"

@@ -74,8 +74,12 @@ def test_folders_are_those_of_fmi_3() -> None:
     with zipfile.ZipFile(built("GroundMotion")) as archive:
         assert archive.namelist() == [
             library_member("GroundMotion", "3.0"),
+            "documentation/index.html",
+            "documentation/licenses/license.txt",
             "modelDescription.xml",
             "resources/el_centro_1940_ns.csv",
+            "terminalsAndIcons/icon.png",
+            "terminalsAndIcons/terminalsAndIcons.xml",
         ]
     assert {one.place("X", 3) for one in PLATFORMS.values()} == {
         "binaries/x86_64-linux/X.so", "binaries/x86_64-windows/X.dll",
