@@ -155,13 +155,14 @@ def test_ports_are_those_of_the_stock_damper_and_defaults_are_baked(
     stock = catalogue.describe("LuGreDamper")
     for causality in ("input", "output", "parameter"):
         assert [(v.name, v.unit) for v in described.of(causality)] == [
-            (v.name, v.unit) for v in stock.of(causality)
+            (v.name, v.unit)
+            for v in stock.of(causality)
+            if "." not in v.name or v.name.startswith("gas_spring.")
         ]
     variables = described.variables
     assert variables["gas_spring.on"].start is True
     assert variables["gas_spring.k"].start == 75.0
     assert variables["sigma_a"].start == 700.0
-    assert variables["coil_lag.on"].start is False
     assert Path(told["scenario"]).parent == tmp_path / "there"
     loaded = load_scenario(Path(told["scenario"]))
     assert loaded.step == pytest.approx(5e-4)
@@ -241,7 +242,7 @@ def test_on_a_building_the_fluids_mass_is_attached(tmp_path: Path) -> None:
     inside = read_description(found.fmu, any_platform=True).variables
     assert inside["end_stop.on"].start is True
     assert inside["end_stop.clearance"].start == 0.03
-    assert inside["duffing.on"].start is False
+    assert "duffing.on" not in inside
     frame = bristle.run(found.scenario)
     assert np.isfinite(frame["damper.force"]).all()
     assert frame["structure.base_displacement"].abs().max() > 1e-4
