@@ -9,6 +9,26 @@ from ..law import Law, Shape
 from ..parameter import Parameter
 
 
+def slid(bent: float, travel: float, slip: float) -> float:
+    """Return the deflection [m] after a travel [m] along it, exactly.
+
+    Of dz/ds = 1 - slip z.
+
+    Parameters
+    ----------
+    bent : deflection at the begin [m]
+    travel : how far it went, 0 or more [m]
+    slip : inverse of the deflection in sliding [1/m]
+    """
+    return bent + (bent - 1.0 / slip) * expm1(-slip * travel)
+
+
+def moved(bent: float, v: float, slip: float, dt: float) -> float:
+    """Return the deflection [m] after a step of dt [s] at constant velocity v [m/s], exactly."""
+    way = 1.0 if v >= 0.0 else -1.0
+    return way * slid(way * bent, abs(v) * dt, slip)
+
+
 class Dahl(Law):
     """Dahl damper: f = (f_c + f_v V) rho z + (c_0 + c_v V) v, z' = v - rho |v| z.
 
@@ -49,9 +69,4 @@ class Dahl(Law):
 
     @staticmethod
     def advance(q, z, p):
-        v, bent, slip = q.v, z.deflection, p.rho / p.slip_length
-        travel = slip * abs(v) * q.dt
-        if travel < 1e-9:
-            return (bent + (v - slip * abs(v) * bent) * q.dt,)
-        side = 1.0 if v > 0.0 else -1.0
-        return (bent + (bent - side / slip) * expm1(-travel),)
+        return (moved(z.deflection, q.v, p.rho / p.slip_length, q.dt),)

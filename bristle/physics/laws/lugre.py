@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from math import expm1
-
 from ..command import Linear
 from ..falling import EXPONENT, STANDARD, falling
 from ..law import Law, Shape
 from ..parameter import Parameter
+from .dahl import moved
 
 
 class LuGre(Law):
@@ -67,9 +66,4 @@ class LuGre(Law):
 
     @staticmethod
     def advance(q, z, p):
-        v, bent, slip = q.v, z.bristle_deflection, p.a_0 / p.slip_length
-        travel = slip * abs(v) * q.dt
-        if travel < 1e-9:
-            return (bent + (v - slip * abs(v) * bent) * q.dt,)
-        side = 1.0 if v > 0.0 else -1.0
-        return (bent + (bent - side / slip) * expm1(-travel),)
+        return (moved(z.bristle_deflection, q.v, p.a_0 / p.slip_length, q.dt),)
