@@ -26,7 +26,7 @@ LAYER = "layer"
 
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
 LITTLE = "Little beside what was found:"
-NOT_DRIVEN = "No command was recorded: if it changed during the runs, it would look like this."
+NOT_DRIVEN = "What nobody recorded, and what changed during the runs, would look like this."
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from ..core.progress import Count
 from ..core.text import short_z
 from ..identification.error import ForceError, force_error
-from ..identification.problem import Problem, steady, without
+from ..identification.problem import Problem, steady, suited, without
 from ..identification.search import in_threads, z_scale
 from ..identification.start_grid import Search, refine
 from ..identification.starts import start_models
@@ -102,7 +102,7 @@ class KeptFits(Protocol):
 def try_laws(
     train: Problem, held_out: Problem, present: Model, *, bends: bool, kept: KeptFits | None = None
 ) -> tuple[LawTrial, ...]:
-    """Return the trials of all laws and of their variants, the best on held-out runs first.
+    """Return the trials of the laws that suit the runs, with variants, the best on held-out first.
 
     Laws that `not_finite` tells are left out.
 
@@ -115,7 +115,7 @@ def try_laws(
     kept : fits that are known already, and where those that are made go
     """
     unfit = not_finite(train, present)  # which compiles all before threads ask for it
-    names = [name for name in law_names() if name not in unfit]
+    names = [name for name in suited(train, law_names()) if name not in unfit]
     count = Count("law", len(names))
     known: dict[str, float] = {}
 
@@ -205,7 +205,7 @@ def not_finite(problem: Problem, present: Model) -> list[str]:
     problem : the runs
     present : the model as it is
     """
-    models = {name: _model(name, problem, present) for name in law_names()}
+    models = {name: _model(name, problem, present) for name in suited(problem, law_names())}
     return [name for name, model in models.items() if not _is_finite(model, problem)]
 
 

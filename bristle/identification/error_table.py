@@ -22,7 +22,7 @@ from ..errors import RecordError
 from ..model.model import Model
 from ..physics.laws import base_and_variant, law_names
 from .error import ForceError, force_error
-from .problem import Problem, Run, steady, without
+from .problem import Problem, Run, steady, suited, without
 from .search import descend, in_threads
 from .start_grid import Search
 from .starts import start_models
@@ -149,10 +149,10 @@ def error_table(
     ----------
     train, holdout : the runs that laws are fitted to, and those they are judged on, if any
     cutoff : Hz, of the low-pass on measured and predicted force; 0 for none
-    laws : names of laws and of their variants; None for all
+    laws : names of laws and of their variants; None for those that suit the runs
     starts : how many starting points are tried for each
     """
-    laws = law_names() if laws is None else laws
+    laws = suited(train, law_names()) if laws is None else laws
     # The law with the most parameters takes longest: begun last, it would keep one core waiting.
     order = sorted(laws, key=lambda law: -len(base_and_variant(law)[0].parameters))
     train.bench(Model(base_and_variant(laws[0])[0].name))  # compiled before threads ask for it

@@ -20,7 +20,7 @@ from ..errors import RecordError
 from ..model.model import Model, parameter
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of
-from ..physics.laws import LAWS
+from ..physics.laws import LAWS, base_and_variant
 from ..user_code.compiled import shown
 from .histories import DamperForces
 from .run_start import carrying_state, start_under_load
@@ -639,10 +639,28 @@ def of_one_site(model: Model, effects: tuple[str, ...]) -> Model:
 
 
 def without(model: Model, names: tuple[str, ...]) -> Model:
-    """Return a model with more parameters held at zero."""
-    values = {**model.values, **dict.fromkeys(names, 0.0)}
+    """Return a model with more parameters held: at zero, where they may be."""
+    kept = {name: model.value(name) for name in names if model.bounds(name)[0] > 0.0}
+    values = {**model.values, **dict.fromkeys(names, 0.0), **kept}
     fixed = tuple(dict.fromkeys((*model.fixed, *names)))
     return replace(model, values=values, fixed=fixed)
+
+
+def uncommanded(problem: Problem) -> bool:
+    """Return whether nothing commands the damper: no command was recorded, or it is always zero."""
+    return not any(np.any(run.V) for run in problem.runs)
+
+
+def suited(problem: Problem, laws: Sequence[str]) -> tuple[str, ...]:
+    """Return those of some laws, by name, that are tried on runs where nobody names one.
+
+    All where nothing commands the damper; else those of the library that have a command, and a
+    user's own.
+    """
+    if uncommanded(problem):
+        return tuple(laws)
+    kinds = {name: base_and_variant(name)[0] for name in laws}
+    return tuple(name for name, law in kinds.items() if law.has("command") or law.base.own)
 
 
 def steady(problem: Problem) -> bool:

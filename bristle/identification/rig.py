@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..model.model import Model
@@ -286,10 +285,7 @@ def bench_rig(
         return Problem([prepared(0), *in_threads(prepared, range(1, len(measured)))])
 
     site = Site(DAMPER, problem)
-    notes: tuple[str, ...] = ()
-    if not any(run.has(channel) for run in (*train, *holdout) for channel in DRIVE):
-        notes = ("No command was recorded: if there is one, the parameters hold at its level.",)
-    return Rig(lambda _model: {DAMPER: site}, notes=notes)
+    return Rig(lambda _model: {DAMPER: site})
 
 
 def building_rig(

@@ -19,6 +19,9 @@ _COMMAND = re.compile(r"\bV(?=(_felt)?\b)")
 _NOTHING = re.compile(r"(?<!\w)\((\([^()]*\)|[^()\s]+) \+ 0 V(?:_felt)?\)| \+ 0 V(?:_felt)?\b")
 """A term of the command that is zero."""
 
+_LAG = re.compile(r"(\w+)' = .*\bV\b")
+"""The equation of a state that follows the command."""
+
 _APART = re.compile(r"[,;]\s{2,}")
 """What stands between two formulas in a line."""
 
@@ -79,7 +82,9 @@ def equations(model: Model) -> list[Equation]:
     out: list[Equation] = []
     if not law.form and law.site == "damper" and not law.idle(values):
         own = {name: text for name, text in texts.items() if "." not in name}
-        out += _with(law.name, law.__doc__ or "", own)
+        told = _with(law.name, law.__doc__ or "", own)
+        moves = [name for name in law.driven() if law.parameters[name].bounds[0] <= 0.0]
+        out += told if any(values.get(name) for name in moves) else _without_lag(told)
     for effect in model.effects:
         known = EFFECTS[plain_name(effect)]
         begin = f"{effect}."
@@ -93,6 +98,20 @@ def equations(model: Model) -> list[Equation]:
     return [
         Equation(one.of, *(_COMMAND.sub(symbol, formula) for formula in one[1:])) for one in out
     ]
+
+
+def _without_lag(told: Sequence[Equation]) -> list[Equation]:
+    """Return equations without that of a command which lags, and under which nothing moves."""
+    lags = [one for one in told if _LAG.match(one.formula)]
+    symbols = "|".join(one.formula.partition("'")[0] for one in lags)
+    return [
+        one._replace(**{
+            field: re.sub(rf"\b({symbols})\b", "V_felt", text)
+            for field, text in one._asdict().items() if field != "of"
+        })
+        for one in told
+        if one not in lags
+    ] if lags else [*told]  # fmt: skip
 
 
 def _without_zero(formula: str) -> str:

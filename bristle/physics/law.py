@@ -369,14 +369,18 @@ class Law:
 
     @classmethod
     def driven(cls) -> tuple[str, ...]:
-        """Return the names of the parameters that act through the voltage alone."""
+        """Return the names of the parameters that act through the voltage alone.
+
+        Those of forms, and the shapes of nothing else.
+        """
         names: list[str] = []
         for form in cls.command.values():
             if isinstance(form, Monotone):
                 names += cls.listed(form.table)[1:]
             else:
                 names += form.driven()
-        return tuple(names)
+        own = [name for name, one in cls.shapes.items() if one.shapes and {*one.shapes} <= {*names}]
+        return tuple(dict.fromkeys([*names, *own]))
 
     @classmethod
     def yield_parameters(cls) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from ..errors import StudyError
 from ..identification.error import ForceError
 from ..identification.error_table import LawError
 from ..identification.fit import Fit
-from ..identification.problem import Problem
+from ..identification.problem import Problem, uncommanded
+from ..identification.rig import DAMPER
 from ..identification.rig_fit import RigErrors, SiteModel
 from ..model.model import Model
 from ..physics.forms import split_form
@@ -127,9 +128,15 @@ class Identified(Viewable):
         return {**before, **own} if before else {}, {**after, **own}
 
     @property
+    def idle(self) -> tuple[str, ...]:
+        """Names of the parameters of a command, where nothing commands the damper: none is told."""
+        at_damper = self.at.site.name == DAMPER
+        return self.model.law_class.driven() if at_damper and uncommanded(self.train) else ()
+
+    @property
     def unidentified(self) -> tuple[str, ...]:
         """Names of the parameters that the data do not identify."""
-        return self.fit.unidentified
+        return tuple(name for name in self.fit.unidentified if name not in self.idle)
 
     def plot_budget(self) -> Figure:
         """Return the figure of the force budget: what the law's parts and the effects make of it.
@@ -185,7 +192,8 @@ class Identified(Viewable):
     def parameters(self) -> list[dict[str, Any]]:
         """Return one row per parameter: name, value, unit, half of its 95 % interval, how."""
         rows = []
-        for name, value in self.model.written().items():
+        told = {n: value for n, value in self.model.written().items() if n not in self.idle}
+        for name, value in told.items():
             if name in self.fit.unidentified:
                 how = "not identified"
             elif name in self.fit.std:

@@ -44,6 +44,10 @@ from .study_file import ALL, EXCLUDE, ROLES, TEST, RunFile, Settings, write_sett
 
 _REMARKS = 6
 """Remarks on files that are printed at most."""
+_NO_COMMAND = (
+    "no command was recorded: this is taken as a device that nothing commands, and laws of such "
+    "devices are tried as well. If one acts on it, its column or --level is needed"
+)
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
 
 
@@ -132,6 +136,8 @@ def make_folder(
         device=studied,
     )  # fmt: skip
     _refuse_one_role(settings.runs)
+    if rig == "bench" and not settings.drive:
+        notes.append(_NO_COMMAND)
     if settings.excluded:
         notes.append(settings.excluded_text.removesuffix("."))
     raw = [(one, of) for one, of in raw_signals(first).items() if one not in taken]

@@ -149,7 +149,6 @@ def test_what_no_damper_does_is_doubted(tmp_path: Path, title, factor, said) -> 
             "warning",
             "two levels, 0 and 5 V: saturation",
         ),
-        (lambda d: d.pop("U [V]"), "drive", "warning", "no command was recorded"),
         (
             replaced("F [N]", lambda d: np.random.default_rng(1).normal(size=len(d["F [N]"]))),
             "sign",

@@ -110,6 +110,7 @@ class FluidViscous(Law):
         "Constantinou (1991), J. Struct. Eng. 117(9), 2708-2724 (Maxwell element)"
     )
     states = {"carried": "1", "rod": "m/s"}
+    starts = {"rod": "v"}
     parameters = {
         "c": Parameter(8.0, "N", (0.0, 1e8), "force of steady motion at 0.1 m/s"),
         "alpha": Parameter(0.6, "1", (0.1, 2.0), "exponent of the speed"),

@@ -64,7 +64,7 @@ class FrictionDamper(Law):
     parameters = {
         "f_c": Parameter(5.0, "N", (0.0, 1e8), "friction force under the preload"),
         "c": Parameter(5.0, "N.s/m", (0.0, 1e8), "viscous coefficient"),
-        "k": Parameter(0.0, "N/m", (0.0, 1e9), "stiffness beside the friction"),
+        "k": Parameter(20.0, "N/m", (0.0, 1e9), "stiffness beside the friction"),
         "f_0": Parameter(0.0, "N", (-1e7, 1e7), "force at mid-stroke"),
         "rho": Parameter(1000.0, "1/m", (1.0, 1e7), "inverse of the deflection in sliding"),
         "play": Parameter(2e-4, "m", (0.0, 0.1), "half the play of the joints"),

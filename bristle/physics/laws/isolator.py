@@ -30,7 +30,7 @@ class Isolator(Law):
     parameters = {
         "q": Parameter(4.0, "N", (0.0, 1e8), "characteristic strength: the force of the lead core"),
         "k": Parameter(300.0, "N/m", (0.0, 1e10), "stiffness of the rubber"),
-        "k_3": Parameter(0.0, "N/m3", (0.0, 1e12), "hardening at large shear"),
+        "k_3": Parameter(2e5, "N/m3", (0.0, 1e12), "hardening at large shear"),
         "c": Parameter(5.0, "N.s/m", (0.0, 1e8), "viscous losses of the rubber"),
         "f_0": Parameter(0.0, "N", (-1e7, 1e7), "force at mid-stroke"),
         "rho": Parameter(800.0, "1/m", (1.0, 1e7), "inverse of the deflection at yield"),

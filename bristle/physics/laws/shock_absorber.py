@@ -85,6 +85,7 @@ class ShockAbsorber(Law):
         "33(4), 261-285"
     )
     states = {"flow": "m/s", "deflection": "m", "rod": "m/s"}
+    starts = {"flow": "v", "rod": "v"}
     parameters = {
         "c_r1": Parameter(60.0, "N.s/m", (0.0, 1e7), "rebound: damping below the knee"),
         "c_r2": Parameter(20.0, "N.s/m", (0.0, 1e7), "rebound: damping beyond the knee"),
@@ -92,10 +93,10 @@ class ShockAbsorber(Law):
         "c_c1": Parameter(20.0, "N.s/m", (0.0, 1e7), "compression: damping below the knee"),
         "c_c2": Parameter(30.0, "N.s/m", (0.0, 1e7), "compression: damping beyond the knee"),
         "v_c": Parameter(0.05, "m/s", (1e-4, 1e2), "compression: speed of the knee"),
-        "f_s": Parameter(0.8, "N", (0.0, 1e5), "friction of the seals"),
+        "f_s": Parameter(2.0, "N", (0.0, 1e5), "friction of the seals"),
         "f_0": Parameter(0.0, "N", (-1e6, 1e6), "gas force at mid-stroke"),
         "k_g": Parameter(40.0, "N/m", (0.0, 1e7), "stiffness of the gas"),
-        "k_g2": Parameter(0.0, "N/m2", (-1e9, 1e9), "growth of that stiffness to one end"),
+        "k_g2": Parameter(500.0, "N/m2", (-1e9, 1e9), "growth of that stiffness to one end"),
         "k_s": Parameter(1e4, "N/m", (1.0, 1e10), "stiffness in series with the valves"),
         "rho": Parameter(2000.0, "1/m", (1.0, 1e7), "inverse of the deflection of the seals"),
     }
