@@ -520,8 +520,6 @@ def _what_is_missing(values: Sequence[str]) -> list[str]:
         notes.append("no velocity: it follows from the displacement")
     if bench and v and not x:
         notes.append("no displacement: it follows from the velocity up to where it begins")
-    if bench and not any(drive in values for drive in DRIVE):
-        notes.append("no command: if there is one, it is constant at an unknown level")
     return notes
 
 
