@@ -18,6 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..core.interrupt import Interrupt
 from ..core.text import listed
 from ..errors import FmuError, RunError
@@ -49,6 +52,7 @@ _STATE["FreeFMUstate"] = "FreeFMUState"
 
 Say = Callable[[str, str], None]
 Status = Callable[..., int]
+Pass = Callable[[], None]
 
 
 class Calls:
@@ -305,6 +309,29 @@ class Instance:
             _, values = self._call(self._handle.get, kind, self._references(group))
             found |= zip(group, values, strict=True)
         return found
+
+    def passing(self, verb: str, names: Sequence[str], memory: NDArray[np.float64]) -> Pass:
+        """Return a call, prepared, that sets Real variables from an array (n,), or gets them.
+
+        Parameters
+        ----------
+        verb : "Set" or "Get"
+        names : of the variables
+        memory : their values, in the FMU's units
+        """
+        if not names:
+            return lambda: None
+        variables = [self.description.variables[name] for name in names]
+        address = ctypes.c_void_p(memory.ctypes.data)
+        function = self.calls.transfer(verb, "Real", variables, memory.ctypes.data)
+        references = (ctypes.c_uint * len(names))(*self._references(names))
+        component, count = ctypes.c_void_p(self.component), ctypes.c_size_t(len(names))
+
+        def call() -> None:
+            if (status := function(component, references, count, address)) > WARNING:
+                self.fail(f"{verb}Real", status)
+
+        return call
 
     def step(self, time: float, step: float) -> None:
         """Step from a time [s] over a step [s]."""

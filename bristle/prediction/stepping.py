@@ -148,17 +148,24 @@ def _one_pass(job: Job, description: Any, folder: Path, step: float, inputs: Arr
     from ..engine.instance import Instance
 
     rows = np.empty((inputs.shape[1], len(job.outputs)))
-    given = [dict(zip(job.inputs, row, strict=True)) for row in inputs.T.tolist()]
+    now, shown = np.empty(len(job.inputs)), np.empty(len(job.outputs))
+    begin = dict(zip(job.inputs, inputs[:, 0].tolist(), strict=True))
     instance = Instance(Path(job.fmu).stem, description, folder, lambda message: None)
     try:
-        instance.initialise({**job.values, **given[0]}, (len(rows) - 1) * step)
+        instance.initialise({**job.values, **begin}, (len(rows) - 1) * step)
         instance.finish_initialisation()
-        for k, now in enumerate(given):
+        give, show = (
+            instance.passing("Set", job.inputs, now),
+            instance.passing("Get", job.outputs, shown),
+        )
+        for k in range(len(rows)):
             try:
-                instance.set(now)
+                now[:] = inputs[:, k]
+                give()
                 if k:
                     instance.step((k - 1) * step, step)
-                rows[k] = [float(value) for value in instance.get(job.outputs).values()]
+                show()
+                rows[k] = shown
             except RunError as error:
                 raise RunError(f"at t = {k * step:g} s: {error}") from None
     finally:
