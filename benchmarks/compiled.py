@@ -16,7 +16,7 @@ import numpy as np
 
 from bristle.component.damper import VOLTAGE
 from bristle.core.jit import compiled
-from bristle.engine.coupled import LONGEST_SUBSTEP, Coupled, Layout
+from bristle.engine.coupled import LONGEST_SUBSTEP, Coupled, RecordLayout
 from bristle.engine.time_loop import INLINE, MAX_SWEEPS, TOLERANCE, integrate
 from bristle.system.scenario import load_scenario
 
@@ -58,8 +58,10 @@ def against_c() -> list[Row]:
     substeps = round(scenario.step / LONGEST_SUBSTEP)
     count = scenario.steps * substeps
     with tempfile.TemporaryDirectory() as folder:
-        peer = Peer(_library(compiler, Path(folder)), Layout(scenario), scenario.steps, substeps)
-        ours = _Ours(Layout(scenario), scenario.steps, substeps)
+        peer = Peer(
+            _library(compiler, Path(folder)), RecordLayout(scenario), scenario.steps, substeps
+        )
+        ours = _Ours(RecordLayout(scenario), scenario.steps, substeps)
         ours.run(LONGEST_SUBSTEP)  # compiles, or reads what was compiled
         peer.run(LONGEST_SUBSTEP)
         apart = _apart(ours.columns(), peer.columns())
@@ -123,7 +125,7 @@ def passive_peaks() -> Row:
 class _Ours:
     """The compiled time loop, run again and again into the same memory."""
 
-    def __init__(self, system: Layout, rows: int, substeps: int) -> None:
+    def __init__(self, system: RecordLayout, rows: int, substeps: int) -> None:
         self.system, self.rows, self.substeps = system, rows, substeps
         self.sweeps = 0
         self._slots = np.array(list(system.outputs.values()), dtype=np.int64)
@@ -176,7 +178,9 @@ class _Record(ctypes.Structure):
 class Peer:
     """The C program, given the same numbers as the compiled time loop."""
 
-    def __init__(self, library: ctypes.CDLL, system: Layout, rows: int, substeps: int) -> None:
+    def __init__(
+        self, library: ctypes.CDLL, system: RecordLayout, rows: int, substeps: int
+    ) -> None:
         self._loop = library.time_loop
         self._loop.restype = ctypes.c_long
         self.system, self.rows, self.substeps = system, rows, substeps

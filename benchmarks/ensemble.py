@@ -10,7 +10,7 @@ import statistics
 import time
 from collections.abc import Callable
 
-from bristle.campaign import Plan
+from bristle.campaign import EnsemblePlan
 from bristle.campaign.ensemble_file import read_ensemble
 from bristle.campaign.pool import run_local
 from bristle.engine.coupled import Coupled
@@ -71,7 +71,7 @@ def _processor_time() -> float:
     return spent.user + spent.system + spent.children_user + spent.children_system
 
 
-def _loop(plan: Plan, runs: range) -> None:
+def _loop(plan: EnsemblePlan, runs: range) -> None:
     """Run what a user would write: the scenario with values, the same numbers kept.
 
     The building stays as it is, for a loop would have to write a file for it.
@@ -84,7 +84,7 @@ def _loop(plan: Plan, runs: range) -> None:
             output.of(columns[output.column])
 
 
-def _pool(plan: Plan, runs: range, workers: int) -> None:
+def _pool(plan: EnsemblePlan, runs: range, workers: int) -> None:
     for outcome in run_local(plan.campaign(), runs, workers):
         if outcome.reason:
             raise RuntimeError(outcome.reason)

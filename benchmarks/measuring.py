@@ -26,7 +26,7 @@ from bristle.examples.rigs import (
     scales_of,
     write_csv,
 )
-from bristle.planning.limits import Signals, Test
+from bristle.planning.limits import PrescribedSignals, Test
 from bristle.planning.waveforms import Command, Waveform
 from bristle.study.steps import create_study
 
@@ -122,7 +122,7 @@ def _study(folder: Path, *, runs: int, held: int, seconds: float, rate: float) -
     return str(create_study(folder / "study", files, law="bingham", rig="bench").study.folder)
 
 
-def _sampled(planned: Signals, rate: float) -> tuple[Motion, Programme]:
+def _sampled(planned: PrescribedSignals, rate: float) -> tuple[Motion, Programme]:
     """Return motion and command at the samples alone: no state depends on what is between them."""
     rows = list(zip(planned.x.tolist(), planned.v.tolist(), planned.a.tolist(), strict=True))
     volts: list[float] = planned.V.tolist()

@@ -19,7 +19,7 @@ from bristle.core.files import scenarios_folder
 from bristle.engine.coupled import Coupled
 from bristle.errors import RecordError
 from bristle.fmu.catalogue import instantiate
-from bristle.synthesis import Damper
+from bristle.synthesis import DesignDamper
 from bristle.system.scenario import load_scenario
 
 from ._motions import DATA, NEWHALL, REPORTED, G, recorded
@@ -120,7 +120,7 @@ def closed_loop(ground: Array) -> tuple[float, float]:
     """
     c = read_controller(POLICY)
     hidden = int(c.design["motions"]["hidden"])
-    task = PolicyTask(damper=Damper("lugre"), motions=Training(synthetic=1, hidden=hidden))
+    task = PolicyTask(damper=DesignDamper("lugre"), motions=Training(synthetic=1, hidden=hidden))
     samples = ground[::PARTS].copy()
     A, B, W, scales = (np.array(each) for each in (c.A, c.B, c.W, c.C))
     policy = Policy(False, 0.0, c.n, hidden, A, B, W, scales)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from bristle.core.jit import compiled
-from bristle.engine.coupled import Coupled, Layout, linked, substeps_of
+from bristle.engine.coupled import Coupled, RecordLayout, linked, substeps_of
 from bristle.engine.time_loop import INLINE, integrate
 from bristle.errors import BuildError
 from bristle.export.web import export_web
@@ -81,7 +81,7 @@ def _compiled(name: str) -> float:
     scenario = load_scenario(name)
     found = []
     for _ in range(3):
-        system = Layout(scenario)
+        system = RecordLayout(scenario)
         substeps = substeps_of(scenario, system)
         h = scenario.step / substeps
         table = np.zeros((scenario.steps + 1, len(system.outputs)))

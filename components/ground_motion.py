@@ -1,7 +1,7 @@
 """FMU: the ground shakes as recorded."""
 
 from bristle.component import source
-from bristle.fmu.component import Reading, SourceSlave
+from bristle.fmu.component import SampleFile, SourceSlave
 from bristle.physics.motion_file import HEADER
 
 BUILT_IN = ("el_centro_1940_ns",)
@@ -11,7 +11,7 @@ class GroundMotion(SourceSlave):
     """Ground acceleration from a record, scaled to a peak and by a factor."""
 
     icon = "ground"
-    file_of = Reading("record")
+    file_of = SampleFile("record")
     header = HEADER
     files = ("data/ground_motions/el_centro_1940_ns.csv",)
 

@@ -15,7 +15,7 @@ from bristle.core.jit import compiled
 from bristle.physics import damper
 from bristle.physics.building import Building
 from bristle.physics.tuples import Setup
-from bristle.synthesis.damper import Damper
+from bristle.synthesis.damper import DesignDamper
 from bristle.synthesis.plant import structure
 
 from .adjoint import PULL_BACK, RESPOND, compute
@@ -52,12 +52,12 @@ class Loop:
     policy : Policy
     longest : int
         Samples of the longest motion.
-    given : Damper
+    given : DesignDamper
     m : int
         States of the building.
     """
 
-    def __init__(self, policy: Policy, longest: int, given: Damper, m: int) -> None:
+    def __init__(self, policy: Policy, longest: int, given: DesignDamper, m: int) -> None:
         self.policy = policy
         functions = damper.functions_of(given.kind.name, given.effects)
         self._run = compiled(functions.link(compute))
@@ -168,7 +168,9 @@ def _changed(building: Building, spread: float, random: np.random.Generator) -> 
     return building._replace(M=changed(building.M), K=changed(building.K))
 
 
-def setup_of(given: Damper, spread: float, random: np.random.Generator | None = None) -> Setup:
+def setup_of(
+    given: DesignDamper, spread: float, random: np.random.Generator | None = None
+) -> Setup:
     """Return a damper for compiled code; with `random`, one with wrong parameters."""
     values = {**given.values, **given.parameters()}
     if random is not None:

@@ -12,12 +12,12 @@ Run i depends on the seed and on i alone; a killed ensemble goes on where it was
 from __future__ import annotations
 
 from .ensemble import Ensemble, EnsembleInterrupted, ensemble
-from .ensemble_file import Plan, read_ensemble, stock_ensembles
+from .ensemble_file import EnsemblePlan, read_ensemble, stock_ensembles
 
 __all__ = [
     "Ensemble",
     "EnsembleInterrupted",
-    "Plan",
+    "EnsemblePlan",
     "ensemble",
     "read_ensemble",
     "stock_ensembles",

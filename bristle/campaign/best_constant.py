@@ -45,7 +45,7 @@ GOALS = {
 
 
 @dataclass(frozen=True)
-class Motion:
+class ScaledMotion:
     """A ground motion: a record scaled to a peak of `intensity` [g] (0: as recorded)."""
 
     record: str
@@ -72,7 +72,7 @@ class Passive(Viewable):
 
     Attributes
     ----------
-    motions : tuple of Motion
+    motions : tuple of ScaledMotion
         (m,).
     output, statistic, unit : str
         The column that is judged, "peak" or "rms" of it, and its unit.
@@ -91,7 +91,7 @@ class Passive(Viewable):
         What a reader has to know: a record that the runs do not take to its end.
     """
 
-    motions: tuple[Motion, ...]
+    motions: tuple[ScaledMotion, ...]
     output: str
     statistic: str
     unit: str
@@ -119,7 +119,7 @@ class Passive(Viewable):
 
 
 def optimise_passive(
-    motions: Iterable[Motion] | None = None,
+    motions: Iterable[ScaledMotion] | None = None,
     *,
     scenario: str | Path = SCENARIO,
     overrides: Mapping[str, object] | None = None,
@@ -132,7 +132,7 @@ def optimise_passive(
 
     Parameters
     ----------
-    motions : iterable of Motion, optional
+    motions : iterable of ScaledMotion, optional
         El Centro at 0.2, 0.4, 0.6, 0.8 g otherwise. The scenario's other values, such as a factor
         on the ground motion, stay.
     scenario : path
@@ -158,7 +158,7 @@ def optimise_passive(
     >>> found = optimise_passive([Motion("el_centro_1940_ns", 0.4)])  # doctest: +SKIP
     >>> found.best[0].voltage  # doctest: +SKIP
     """
-    chosen = tuple(motions or (Motion("el_centro_1940_ns", i) for i in INTENSITIES))
+    chosen = tuple(motions or (ScaledMotion("el_centro_1940_ns", i) for i in INTENSITIES))
     if grid < 3:
         raise ScenarioError(f"a grid of {grid} voltages is too coarse; 3 or more are right.")
     if statistic not in ("peak", "rms"):
@@ -188,7 +188,7 @@ class _Case:
     """One motion: the judged value as a function of the voltage, each voltage run once."""
 
     def __init__(
-        self, file: str | Path, overrides: Mapping[str, object], motion: Motion, output: str,
+        self, file: str | Path, overrides: Mapping[str, object], motion: ScaledMotion, output: str,
         how: str,
     ) -> None:  # fmt: skip
         base = load_scenario(file, overrides)

@@ -8,7 +8,7 @@ from math import isfinite, nan
 from typing import NamedTuple, Protocol
 
 from ..engine import Engine
-from ..engine.results import Array, Table, statistic_of
+from ..engine.results import Array, RunTable, statistic_of
 from ..errors import BristleError, ScenarioError
 from ..fmu.description import Value
 from ..model.draws import in_short
@@ -58,7 +58,7 @@ class Draws(Protocol):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """What became of a run: the kept `numbers`, all rows in a `table`, or why there are none.
 
     `reason` is "" for a run that is done. `lost` says of such a run why it could not be simulated
@@ -69,7 +69,7 @@ class Outcome:
     numbers: tuple[float, ...] = ()
     reason: str = ""
     lost: str = ""
-    table: Table | None = None
+    table: RunTable | None = None
 
 
 SYSTEMS_KEPT = 64
@@ -91,7 +91,7 @@ class Campaign:
     _read: dict[tuple[tuple[str, object], ...], System] = field(
         default_factory=dict, init=False, repr=False
     )
-    _known: dict[tuple[tuple[str, object], ...], Outcome] = field(
+    _known: dict[tuple[tuple[str, object], ...], RunOutcome] = field(
         default_factory=dict, init=False, repr=False
     )
 
@@ -100,7 +100,7 @@ class Campaign:
         """How many runs `run` has made whose numbers are kept."""
         return len(self._known)
 
-    def run(self, one: Variation) -> Outcome:
+    def run(self, one: Variation) -> RunOutcome:
         """Return what a variation gives, run once for the same values where numbers are kept.
 
         Raises
@@ -111,10 +111,10 @@ class Campaign:
             If the run fails.
         """
         if self.keep is None:
-            return Outcome(table=self.engine.run(self.varied(one.values)))
+            return RunOutcome(table=self.engine.run(self.varied(one.values)))
         key = tuple(one.values.items())
         if key not in self._known:
-            self._known[key] = Outcome(numbers=self._numbers(one.values))
+            self._known[key] = RunOutcome(numbers=self._numbers(one.values))
         return self._known[key]
 
     def prepare(self) -> None:
@@ -142,7 +142,7 @@ class Campaign:
         names = dict(anew)
         return base.with_values({n: v for n, v in values.items() if n not in names})
 
-    def outcome(self, run: int) -> Outcome:
+    def outcome(self, run: int) -> RunOutcome:
         """Return what became of a run of the draws; a failure is an outcome as well."""
         assert self.draws is not None
         more, lost = tuple[float, ...](), ""
@@ -153,12 +153,12 @@ class Campaign:
             if joined is not None:
                 more, lost = self._with_effect(joined)
         except BristleError as error:
-            return Outcome(run, reason=_one_line(error))
+            return RunOutcome(run, reason=_one_line(error))
         except Exception as error:  # whatever a user's effect or a foreign FMU raises, runs go on
-            return Outcome(run, reason=f"{type(error).__name__}: {_one_line(error)}")
+            return RunOutcome(run, reason=f"{type(error).__name__}: {_one_line(error)}")
         if wrong := self._not_finite(numbers):
-            return Outcome(run, reason=f"RunError: {wrong}.")
-        return Outcome(run, (*numbers, *more), lost=lost)
+            return RunOutcome(run, reason=f"RunError: {wrong}.")
+        return RunOutcome(run, (*numbers, *more), lost=lost)
 
     def _with_effect(self, values: Mapping[str, Value]) -> tuple[tuple[float, ...], str]:
         """Return the numbers of a run with the effect that joins it, or NaN and why not."""

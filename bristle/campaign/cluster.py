@@ -17,7 +17,7 @@ from typing import Any
 
 from ..errors import EnsembleError, RunError
 from ..version import __version__
-from .campaign import Campaign, Outcome
+from .campaign import Campaign, RunOutcome
 
 INSTALL = 'pip install "bristle[cluster]"'
 CONNECT = 10.0
@@ -34,7 +34,7 @@ _KILLED = "KilledWorker: "
 
 def run_cluster(
     campaign: Campaign, runs: Iterable[int], address: str
-) -> Generator[Outcome, None, None]:
+) -> Generator[RunOutcome, None, None]:
     """Yield what becomes of runs as they end, in whatever order.
 
     Scenario, records and components are read by the workers: they must see the same files.
@@ -120,7 +120,7 @@ def _version() -> str:
 
 def _gather(
     client: Any, shared: Any, waiting: deque[int], at_once: int
-) -> Generator[Outcome, None, None]:
+) -> Generator[RunOutcome, None, None]:
     ended: queue.Queue[Any] = queue.Queue()
     under_way: dict[Any, int] = {}
     alone = 0.0
@@ -140,7 +140,7 @@ def _gather(
         yield _outcome(under_way.pop(future.key), future)
 
 
-def outcome_of(campaign: Campaign, run: int) -> Outcome:
+def outcome_of(campaign: Campaign, run: int) -> RunOutcome:
     """Return what becomes of a run where this is called."""
     return campaign.outcome(run)
 
@@ -151,15 +151,15 @@ def _alive(client: Any) -> bool:
     return bool(client.scheduler_info(n_workers=-1)["workers"])
 
 
-def _outcome(run: int, future: Any) -> Outcome:
+def _outcome(run: int, future: Any) -> RunOutcome:
     """Return a future's outcome: what the run says of itself, or why it never could."""
     if future.status == "finished":
-        outcome: Outcome = future.result()
+        outcome: RunOutcome = future.result()
         return outcome
     if future.status == "cancelled":
         raise RunError("the connection to the cluster's scheduler is lost.")
     error = future.exception()
     if type(error).__name__ == "KilledWorker":
-        return Outcome(run, reason=f"{_KILLED}the workers that ran it have died.")
+        return RunOutcome(run, reason=f"{_KILLED}the workers that ran it have died.")
     text = " ".join(str(error).split())
-    return Outcome(run, reason=f"{type(error).__name__}: {text}")
+    return RunOutcome(run, reason=f"{type(error).__name__}: {text}")

@@ -14,8 +14,8 @@ from ..core.progress import Progress
 from ..core.text import written
 from ..errors import EnsembleError, RunError
 from ..view import Viewable
-from .campaign import Campaign, Outcome
-from .ensemble_file import Plan, read_ensemble
+from .campaign import Campaign, RunOutcome
+from .ensemble_file import EnsemblePlan, read_ensemble
 from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Ensemble(Viewable):
     (2, [])
     """
 
-    plan: Plan
+    plan: EnsemblePlan
     runs: pd.DataFrame
     quantiles: pd.DataFrame
     failures: list[Failure]
@@ -172,7 +172,11 @@ def _refuse_types(file: object, **numbers: object) -> None:
 
 
 def run_left(
-    plan: Plan, table: RunsTable, workers: int, done: Callable[[], None], cluster: str | None = None
+    plan: EnsemblePlan,
+    table: RunsTable,
+    workers: int,
+    done: Callable[[], None],
+    cluster: str | None = None,
 ) -> None:
     """Make the runs that a table lacks, here or on a cluster, and keep each in it as it ends.
 
@@ -193,7 +197,7 @@ def run_left(
 
 def run_all(
     campaign: Campaign, runs: list[int], workers: int = 1, cluster: str | None = None
-) -> Generator[Outcome, None, None]:
+) -> Generator[RunOutcome, None, None]:
     """Yield what becomes of runs of a campaign's draws as they end, in whatever order.
 
     Parameters

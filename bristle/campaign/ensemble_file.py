@@ -51,7 +51,7 @@ from ..system.toml import scenario_text
 from ..version import __version__
 from .campaign import STATISTICS, Campaign, Statistic, is_read_anew
 from .distributions import KINDS, Distribution, Value, Varied, share
-from .identified import IDENTIFIED, Identified, read_identified
+from .identified import IDENTIFIED, IdentifiedDraws, read_identified
 
 MOST_RUNS = 10_000_000
 
@@ -61,7 +61,7 @@ LEAST_RUNS = 4
 
 
 @dataclass(frozen=True)
-class Plan:
+class EnsemblePlan:
     """A checked ensemble.
 
     Attributes
@@ -76,7 +76,7 @@ class Plan:
     varied, outputs : tuple
     content : str
         Digest of the base scenario and of the files that it reads.
-    identified : Identified, optional
+    identified : IdentifiedDraws, optional
         A component whose parameters are drawn together.
     fmus : str
         "python" or "native": which FMUs the engine "fmu" steps.
@@ -91,7 +91,7 @@ class Plan:
     varied: tuple[Varied, ...]
     outputs: tuple[Statistic, ...]
     content: str = ""
-    identified: Identified | None = None
+    identified: IdentifiedDraws | None = None
     fmus: str = "python"
 
     @property
@@ -218,7 +218,9 @@ def resolve_ensemble(name: str | Path) -> Path:
     )
 
 
-def read_ensemble(name: str | Path, runs: int | None = None, *, with_limits: bool = False) -> Plan:
+def read_ensemble(
+    name: str | Path, runs: int | None = None, *, with_limits: bool = False
+) -> EnsemblePlan:
     """Return the checked plan of an ensemble file; `runs` takes the place of the file's number.
 
     Parameters
@@ -247,7 +249,7 @@ class _Ensemble:
         self.error = self.document.error
         self.given = self.document.read(_SPEC)
 
-    def plan(self, runs: int | None, with_limits: bool = False) -> Plan:
+    def plan(self, runs: int | None, with_limits: bool = False) -> EnsemblePlan:
         given, engine = self.given, str(self.given["engine"])
         if given["fmus"] == "native" and engine != "fmu":
             self.error(("fmus",), 'fmus = "native" needs engine = "fmu": no other steps FMUs.')
@@ -274,7 +276,7 @@ class _Ensemble:
         content = hashlib.sha256(scenario_text(base).encode())
         for file in _files_read(base, varied):
             content.update(file.read_bytes())
-        plan = Plan(
+        plan = EnsemblePlan(
             self.path, given["title"] or base.title, base, engine, runs or given["runs"],
             given["seed"], varied, outputs, content.hexdigest()[:16], identified,
             given["fmus"],
@@ -282,7 +284,7 @@ class _Ensemble:
         _refuse_few(plan)
         return plan
 
-    def _identified(self, base: System, with_limits: bool) -> Identified | None:
+    def _identified(self, base: System, with_limits: bool) -> IdentifiedDraws | None:
         """Return what `[identified]` says, None where there is none or it is wrong."""
         if "identified" not in self.document.data:
             if with_limits:
@@ -302,7 +304,7 @@ class _Ensemble:
             return None
 
     def _all_varied(
-        self, varied: tuple[Varied, ...], identified: Identified | None
+        self, varied: tuple[Varied, ...], identified: IdentifiedDraws | None
     ) -> tuple[Varied, ...]:
         """Return what varies, the parameters that are drawn together first."""
         joint = identified.varied() if identified is not None else ()
@@ -402,7 +404,7 @@ class _Ensemble:
         return tuple(dict.fromkeys(outputs))
 
 
-def _refuse_few(plan: Plan) -> None:
+def _refuse_few(plan: EnsemblePlan) -> None:
     """Refuse an ensemble with fewer runs than its effects need."""
     effects = len(plan.identified.left) if plan.identified is not None else 0
     if plan.runs < LEAST_RUNS * effects:

@@ -84,7 +84,7 @@ class Places:
 
 
 @dataclass(frozen=True)
-class Identified:
+class IdentifiedDraws:
     """The parameters of a component that are drawn together, and what limits leave open.
 
     `names` of the scenario ("damper.sigma_a") with their values `centre` and bounds `low`, `high`
@@ -154,7 +154,7 @@ class Identified:
 
 def read_identified(
     table: Mapping[str, Any], beside: Path, base: System, *, with_limits: bool
-) -> Identified:
+) -> IdentifiedDraws:
     """Return what `[identified]` of an ensemble file says.
 
     Parameters
@@ -193,7 +193,7 @@ def read_identified(
         tuple(float(values[k]) for k in keep) for values in (errors.centre, errors.low, errors.high)
     )
     root = tuple(tuple(map(float, errors.root[k])) for k in keep)
-    return Identified(
+    return IdentifiedDraws(
         tuple(names[k] for k in keep), centre, low, high, root, fixed, places, str(folder),
         tuple(left), tuple(notes),
     )  # fmt: skip

@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from .campaign import Campaign, Outcome
+from .campaign import Campaign, RunOutcome
 
 AHEAD = 2
 """Runs that a process has been given and not yet answered: it never waits for the next."""
@@ -37,7 +37,7 @@ class _Process:
 
 def run_local(
     campaign: Campaign, runs: Iterable[int], workers: int
-) -> Generator[Outcome, None, None]:
+) -> Generator[RunOutcome, None, None]:
     """Yield what becomes of runs as they end, in whatever order.
 
     Parameters
@@ -60,7 +60,7 @@ def run_local(
             ready = wait([p.pipe for p in processes if p.given])
             for p in [p for p in processes if p.pipe in ready]:
                 try:
-                    outcome: Outcome = p.pipe.recv()
+                    outcome: RunOutcome = p.pipe.recv()
                 except (EOFError, OSError):
                     processes.remove(p)
                     failed = _bury(p, waiting, died)
@@ -84,7 +84,7 @@ def _feed(p: _Process, waiting: deque[int]) -> None:
         p.given.append(waiting.popleft())
 
 
-def _bury(p: _Process, waiting: deque[int], died: dict[int, int]) -> Outcome | None:
+def _bury(p: _Process, waiting: deque[int], died: dict[int, int]) -> RunOutcome | None:
     """Take back a dead process's runs; return the failure of one that has killed twice."""
     p.process.join()
     p.pipe.close()
@@ -96,7 +96,7 @@ def _bury(p: _Process, waiting: deque[int], died: dict[int, int]) -> Outcome | N
         return None
     code = p.process.exitcode or 0
     how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
-    return Outcome(at, reason=f"RunError: its process ended {how}, {TRIES} times.")
+    return RunOutcome(at, reason=f"RunError: its process ended {how}, {TRIES} times.")
 
 
 def _start(campaign: Campaign, others: list[_Process]) -> _Process:

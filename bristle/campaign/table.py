@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from ..core.files import replaced_by
 from ..errors import EnsembleError, RunError
 from ..model.draws import POINT, reach, simulated_whole
-from .campaign import Outcome
-from .ensemble_file import Plan
+from .campaign import RunOutcome
+from .ensemble_file import EnsemblePlan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,10 +47,10 @@ class RunsTable:
         Run number to what became of it, those of an earlier start included.
     """
 
-    def __init__(self, plan: Plan, path: Path | None, fresh: bool = False) -> None:
+    def __init__(self, plan: EnsemblePlan, path: Path | None, fresh: bool = False) -> None:
         self.plan = plan
         self.path = path
-        self.outcomes: dict[int, Outcome] = {}
+        self.outcomes: dict[int, RunOutcome] = {}
         self._file = -1
         if path is None:
             return
@@ -75,7 +75,7 @@ class RunsTable:
         self.outcomes = {one.run: one for one in kept}
         self._rewrite()
 
-    def add(self, outcome: Outcome) -> None:
+    def add(self, outcome: RunOutcome) -> None:
         """Keep what became of a run; it is on disk when this returns.
 
         Raises
@@ -131,26 +131,26 @@ class RunsTable:
                 self._file = os.open(self.path, os.O_WRONLY | os.O_APPEND)
 
 
-def columns(plan: Plan) -> list[str]:
+def columns(plan: EnsemblePlan) -> list[str]:
     """Return the names of the table's columns."""
     varied = [one.name for one in plan.varied]
     return ["run", "status", "reason", *varied, *(EFFECT if plan.left else ()), *plan.columns]
 
 
-def _units(plan: Plan) -> dict[str, str]:
+def _units(plan: EnsemblePlan) -> dict[str, str]:
     """Return the unit of each number that is kept."""
     own = [output.unit for output in plan.outputs]
     return dict(zip(plan.columns, 2 * own if plan.left else own, strict=True))
 
 
-def _row(plan: Plan, outcome: Outcome) -> list[Any]:
+def _row(plan: EnsemblePlan, outcome: RunOutcome) -> list[Any]:
     status = FAILED if outcome.reason else DONE
     numbers = outcome.numbers or (None,) * len(plan.columns)
     drawn = [*plan.values(outcome.run).values(), *(plan.effect(outcome.run) if plan.left else ())]
     return [outcome.run, status, outcome.reason or outcome.lost, *drawn, *numbers]
 
 
-def _line(plan: Plan, outcome: Outcome) -> bytes:
+def _line(plan: EnsemblePlan, outcome: RunOutcome) -> bytes:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(
         ["" if value is None else repr(value) if isinstance(value, float) else value
@@ -159,7 +159,7 @@ def _line(plan: Plan, outcome: Outcome) -> bytes:
     return text.getvalue().encode()
 
 
-def _head(plan: Plan) -> bytes:
+def _head(plan: EnsemblePlan) -> bytes:
     names = columns(plan)
     units = [_units(plan).get(name, "") for name in names]
     titles = io.StringIO()
@@ -170,7 +170,7 @@ def _head(plan: Plan) -> bytes:
     return f"{_KIND}\n{_DIGEST}{plan.digest()}\n# title: {title}\n{titles.getvalue()}".encode()
 
 
-def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
+def _read(plan: EnsemblePlan, path: Path) -> dict[int, RunOutcome]:
     """Return the outcomes in a file; a last line that was cut short is left out.
 
     Raises
@@ -197,9 +197,9 @@ def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
             run, status, reason = int(row[0]), row[1], row[2]
             numbers = row[len(row) - len(plan.columns) :]
             if status == FAILED:
-                outcomes[run] = Outcome(run, reason=reason)
+                outcomes[run] = RunOutcome(run, reason=reason)
             else:
-                outcomes[run] = Outcome(run, tuple(map(float, numbers)), lost=reason)
+                outcomes[run] = RunOutcome(run, tuple(map(float, numbers)), lost=reason)
     except (ValueError, IndexError, csv.Error) as error:
         raise EnsembleError(
             f"{path}: damaged ({error}). Use --fresh to start again, or another folder."
@@ -226,7 +226,7 @@ class Failure:
     reason: str
 
 
-def quantiles(plan: Plan, frame: pd.DataFrame) -> pd.DataFrame:
+def quantiles(plan: EnsemblePlan, frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per output: unit, quantiles of the runs that are done, their number.
 
     Quantiles are linear between order statistics; without a run they are NaN. Effects that are
@@ -247,7 +247,7 @@ def quantiles(plan: Plan, frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, index=index, columns=titles)
 
 
-def parts(plan: Plan, frame: pd.DataFrame) -> dict[str, dict[str, float]]:
+def parts(plan: EnsemblePlan, frame: pd.DataFrame) -> dict[str, dict[str, float]]:
     """Return by output which share of the variance is from what, the largest first.
 
     "all that varies" is what the ensemble draws; the others are effects that are left open.
@@ -264,7 +264,7 @@ def parts(plan: Plan, frame: pd.DataFrame) -> dict[str, dict[str, float]]:
     return found
 
 
-def notes(plan: Plan, frame: pd.DataFrame) -> list[str]:
+def notes(plan: EnsemblePlan, frame: pd.DataFrame) -> list[str]:
     """Return what is said of effects that the quantiles do not have."""
     if plan.identified is None:
         return []
@@ -276,7 +276,9 @@ def notes(plan: Plan, frame: pd.DataFrame) -> list[str]:
     ]  # fmt: skip
 
 
-def _simulated(plan: Plan, done: pd.DataFrame) -> tuple[dict[str, list[int]], dict[str, str]]:
+def _simulated(
+    plan: EnsemblePlan, done: pd.DataFrame
+) -> tuple[dict[str, list[int]], dict[str, str]]:
     """Return the runs of each effect, and of others why they could not all be made with it."""
     tried: dict[str, list[int | str]] = {}
     made = done[plan.columns[-1]].notna()
@@ -285,7 +287,7 @@ def _simulated(plan: Plan, done: pd.DataFrame) -> tuple[dict[str, list[int]], di
     return simulated_whole(tried)
 
 
-def _reaches(plan: Plan, done: pd.DataFrame, output: str) -> dict[str, tuple[float, float]]:
+def _reaches(plan: EnsemblePlan, done: pd.DataFrame, output: str) -> dict[str, tuple[float, float]]:
     """Return by effect how far it takes an output down, and up, at 95 %."""
     changes = done[f"{output} with it"] - done[output]
     whole, _ = _simulated(plan, done)
@@ -301,9 +303,9 @@ def _widened(found: Array, reaches: list[tuple[float, float]]) -> Array:
     return np.asarray(middle + np.sign(away) * np.hypot(found - middle, more))
 
 
-def failures(outcomes: Iterable[Outcome]) -> list[Failure]:
+def failures(outcomes: Iterable[RunOutcome]) -> list[Failure]:
     """Return the failures, most frequent first; reasons that differ in numbers alone are one."""
-    found: dict[str, list[Outcome]] = {}
+    found: dict[str, list[RunOutcome]] = {}
     for outcome in sorted(outcomes, key=lambda one: one.run):
         if outcome.reason:
             found.setdefault(_NUMBER.sub("#", outcome.reason), []).append(outcome)

@@ -176,7 +176,7 @@ def _progress(arguments: argparse.Namespace) -> Iterator[None]:
     """
     from ..core import progress as snapshots
     from ..core.progress import telling, wants_lines
-    from ._line import Line
+    from ._line import ProgressLine
 
     piped = not (sys.stderr.isatty() or wants_lines())
     if arguments.quiet or (getattr(arguments, "json", False) and piped):
@@ -184,7 +184,7 @@ def _progress(arguments: argparse.Namespace) -> Iterator[None]:
             yield
         return
     take = snapshots.write if snapshots.wanted() else None
-    line = Line(f"bristle {arguments.command}")
+    line = ProgressLine(f"bristle {arguments.command}")
     with line, telling(line.say), snapshots.watched_by(take):
         yield
 

@@ -19,7 +19,7 @@ _AGAIN = 30.0
 """Seconds after which a plain line is told again, with how long it takes."""
 
 
-class Line:
+class ProgressLine:
     """Shows texts on stderr: overwritten on a terminal; in a pipe only after some silence.
 
     A context; the terminal's line is cleared at its end, and before anything is printed there. What

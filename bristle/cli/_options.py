@@ -19,7 +19,7 @@ from ..errors import TrustError
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec
-    from ..fmu.build import Plan
+    from ..fmu.build import BuildPlan
     from ..view.blocks import View
 
 
@@ -317,7 +317,7 @@ def add_native(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help=text)
 
 
-def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:
+def builder(arguments: argparse.Namespace) -> Callable[[BuildPlan, Path], Path]:
     """Return what builds a planned FMU into a folder.
 
     Raises

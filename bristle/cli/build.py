@@ -12,7 +12,7 @@ from ..core.text import command
 from ._options import add_json, add_native, add_trust, builder, print_json
 
 if TYPE_CHECKING:
-    from ..fmu.build import Plan
+    from ..fmu.build import BuildPlan
     from ..fmu.description import Description
 
 HELP = "build a component into an FMU"
@@ -82,7 +82,7 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _build(make: Callable[[Plan, Path], Path], what: Plan, target: Path) -> None:
+def _build(make: Callable[[BuildPlan, Path], Path], what: BuildPlan, target: Path) -> None:
     """Build beside the target and rename into place, so that nothing else is left there."""
     from ..errors import BuildError
 

@@ -200,7 +200,7 @@ def _cell(value: Any) -> str:
     return typed(value) if isinstance(value, float) else str(value)
 
 
-class _Kind(NamedTuple):
+class _ListedKind(NamedTuple):
     """What differs between effects and laws.
 
     `word` is "effect" or "law"; `registered` holds those that are known by name; `told` returns
@@ -215,7 +215,7 @@ class _Kind(NamedTuple):
 
 def _found(
     word: str, name: str | None, study: Path | None
-) -> tuple[_Kind, dict[str, Any] | list[dict[str, Any]], list[str]]:
+) -> tuple[_ListedKind, dict[str, Any] | list[dict[str, Any]], list[str]]:
     """Return the kind, what is told of one or of all, and why files of a study are left out.
 
     Parameters
@@ -235,15 +235,15 @@ def _found(
     return kind, told, list(left_out.values())
 
 
-def _kind(word: str) -> _Kind:
+def _kind(word: str) -> _ListedKind:
     from ..physics import effects as _registered  # noqa: F401  (importing registers them)
     from ..physics.effect import EFFECTS
     from ..physics.laws import laws_of
 
     if word == "effect":
-        return _Kind(word, EFFECTS, effect_as_dict, _print_effect)
+        return _ListedKind(word, EFFECTS, effect_as_dict, _print_effect)
     laws = {law.name: law for law in laws_of("damper")}
-    return _Kind(word, laws, law_as_dict, _print_law)
+    return _ListedKind(word, laws, law_as_dict, _print_law)
 
 
 def _read_own(study: Path | None, word: str) -> dict[str, str]:
@@ -267,7 +267,7 @@ def _refuse_untrusted(file: Path) -> None:
         raise untrusted
 
 
-def _find(name: str, kind: _Kind, left_out: dict[str, str]) -> Any:
+def _find(name: str, kind: _ListedKind, left_out: dict[str, str]) -> Any:
     """Return the one of a name; PhysicsError that names the nearest where there is none."""
     from ..core.text import unknown
     from ..errors import PhysicsError

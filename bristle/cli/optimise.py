@@ -64,7 +64,7 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Optimise, write table and figure, print what was found."""
-    from ..campaign.best_constant import INTENSITIES, Motion, optimise_passive
+    from ..campaign.best_constant import INTENSITIES, ScaledMotion, optimise_passive
     from ..errors import ScenarioError
     from ..system.overrides import parse_overrides
 
@@ -73,7 +73,7 @@ def main(arguments: argparse.Namespace) -> int:
         if not 0.0 <= intensity < 1e3:
             raise ScenarioError(f"--intensities {intensity:g}: a peak in g, 0 or more, is right.")
     found = optimise_passive(
-        [Motion(record, i) for record in arguments.motions for i in intensities],
+        [ScaledMotion(record, i) for record in arguments.motions for i in intensities],
         scenario=arguments.scenario,
         overrides=parse_overrides(arguments.overrides),
         output=arguments.output,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ..core.finding import Finding
 from ..fmu.library import FatalAnswerError, MissingFunctionError, UnexpectedError
-from .bench import Bench, BlackBox, Plan
+from .bench import Bench, BlackBox, ProbePlan
 from .probe import failed
 from .probes import PROBES
 
@@ -22,7 +22,7 @@ PLAN, FINDING, BOX = "plan.json", "finding.json", "box"
 
 def main(work: Path, name: str) -> None:
     """Try one probe; the process then ends as the FMU lets it."""
-    bench = Bench(Plan.load(work / PLAN), BlackBox(work / BOX))
+    bench = Bench(ProbePlan.load(work / PLAN), BlackBox(work / BOX))
     finding = _try(bench, name)
     text = {
         "finding": finding.as_dict("kind", "level", "text"), "pace": bench.pace,

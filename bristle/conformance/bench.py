@@ -24,8 +24,8 @@ from ..fmu.library import (
     STATUS,
     WARNING,
     FatalAnswerError,
+    FmuLibrary,
     Handle,
-    Library,
     UnexpectedError,
     resources_of,
 )
@@ -37,7 +37,7 @@ _MOST_SAID = 270  # characters: a report says them twice
 
 
 @dataclass
-class Plan:
+class ProbePlan:
     """An unpacked FMU and how to try it, as the parent tells its child processes; times in s.
 
     `steps` is how many communication steps the comparing probes take, `instances` how often
@@ -46,7 +46,7 @@ class Plan:
     two runs are equal if they differ by less of a variable's largest value. `ours` says that
     bristle's rules for faults apply. `fmi3` is also known where the variables cannot be read.
     `listens` has every instance log for debugging, and `proxy` is a library that puts the numbers
-    into its messages (see `fmu.library.Library`).
+    into its messages (see `fmu.library.FmuLibrary`).
     """
 
     fmu: str
@@ -67,7 +67,7 @@ class Plan:
     listens: bool = False
     proxy: str = ""
     categories: list[str] = field(default_factory=list)
-    beside: Plan | None = None
+    beside: ProbePlan | None = None
 
     @property
     def about(self) -> Description:
@@ -98,17 +98,17 @@ class Plan:
         file.write_text(json.dumps(asdict(self)))
 
     @staticmethod
-    def load(file: Path) -> Plan:
+    def load(file: Path) -> ProbePlan:
         """Read what `save` wrote."""
         return _plan(json.loads(file.read_text()))
 
 
-def _plan(raw: dict[str, Any]) -> Plan:
+def _plan(raw: dict[str, Any]) -> ProbePlan:
     if raw["description"] is not None:
         raw["description"] = _description(raw["description"])
     if raw["beside"] is not None:
         raw["beside"] = _plan(raw["beside"])
-    return Plan(**raw)
+    return ProbePlan(**raw)
 
 
 def _description(raw: dict[str, Any]) -> Description:
@@ -186,10 +186,10 @@ class BlackBox:
         return int.from_bytes(data[cls.SIZE : cls.SIZE + cls.COUNT], "little")
 
 
-class WatchedLibrary(Library):
+class WatchedLibrary(FmuLibrary):
     """A library whose calls and messages are noted; `messages` holds what its instances logged."""
 
-    def __init__(self, plan: Plan, box: BlackBox) -> None:
+    def __init__(self, plan: ProbePlan, box: BlackBox) -> None:
         self.box = box
         self._latest: deque[str] = deque(maxlen=_LAST)  # in the call under way
         self._complaints: deque[str] = deque(maxlen=_LAST)
@@ -251,7 +251,7 @@ class WatchedLibrary(Library):
     def instantiate(
         self, name: str, guid: str, resources: str, *, logging: bool = False, environment: int = 0
     ) -> Handle | None:
-        """Return a new instance; see `Library`."""
+        """Return a new instance; see `FmuLibrary`."""
         self._names.append(name)
         environment = len(self._names) if self.fmi3 else 0
         made = super().instantiate(name, guid, resources, logging=logging, environment=environment)
@@ -277,7 +277,7 @@ class Bench:
     take [s].
     """
 
-    def __init__(self, plan: Plan, box: BlackBox) -> None:
+    def __init__(self, plan: ProbePlan, box: BlackBox) -> None:
         self.plan = plan
         self.box = box
         self.pace: dict[str, float] = {}

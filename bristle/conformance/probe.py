@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..core.finding import Finding
-from .bench import Bench, Plan
+from .bench import Bench, ProbePlan
 
 Needs = Literal["file", "library", "run"]
 Rule = Literal["standard", "robustness", "bristle"]
@@ -31,7 +31,7 @@ class Probe:
     standard: str
     run: Callable[[Bench], Finding]
     needs: Needs
-    unless: Callable[[Plan], str | None]
+    unless: Callable[[ProbePlan], str | None]
     bare: bool
     rule: Rule
     fmi3: str = ""
@@ -47,7 +47,7 @@ def probe(
     tried: str,
     standard: str,
     needs: Needs = "run",
-    unless: Callable[[Plan], str | None] = lambda plan: None,
+    unless: Callable[[ProbePlan], str | None] = lambda plan: None,
     bare: bool = False,
     rule: Rule = "standard",
     fmi3: str = "",
@@ -99,16 +99,16 @@ def noted(seen: str) -> Finding:
     return Finding("", "note", seen)
 
 
-def unless_claimed(flag: str) -> Callable[[Plan], str | None]:
+def unless_claimed(flag: str) -> Callable[[ProbePlan], str | None]:
     """Return a condition: the probe applies to FMUs that claim a capability only."""
 
-    def unless(plan: Plan) -> str | None:
+    def unless(plan: ProbePlan) -> str | None:
         return None if plan.claims(flag) else f"{flag} is not claimed"
 
     return unless
 
 
-def unless_single(plan: Plan) -> str | None:
+def unless_single(plan: ProbePlan) -> str | None:
     """Return why an FMU may be instantiated once only, None if it may be more often."""
     flag = "canBeInstantiatedOnlyOncePerProcess"
     return f"{flag} is claimed" if plan.claims(flag) else None

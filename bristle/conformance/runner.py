@@ -28,7 +28,7 @@ from ..fmu.archive import extract
 from ..fmu.description import NATIVE, check_ports, describe, read_description, read_root
 from ..fmu.library import logger_proxy
 from ._probe import BOX, FINDING, PLAN
-from .bench import BlackBox, Plan
+from .bench import BlackBox, ProbePlan
 from .probe import Probe, failed, in_fmi3, noted
 from .probes import PROBES
 from .report import VERDICTS, Report, Row
@@ -232,7 +232,7 @@ def judge(
             return Report(str(path), _Session(plan, subprocesses, only, progress).rows())
 
 
-def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: float) -> Plan:
+def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: float) -> ProbePlan:
     """Unpack an FMU and plan how to try it.
 
     Parameters
@@ -248,7 +248,7 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     """
     work = folder / "work"
     work.mkdir(parents=True)
-    plan = Plan(str(path.resolve()), str(extract(path, folder / "fmu")), str(work), timeout)
+    plan = ProbePlan(str(path.resolve()), str(extract(path, folder / "fmu")), str(work), timeout)
     plan.fmi3 = root.get("fmiVersion") == "3.0"
     try:
         plan.description = describe(root)
@@ -268,7 +268,7 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     return plan
 
 
-def _usual_step(plan: Plan, root: ElementTree.Element) -> float:
+def _usual_step(plan: ProbePlan, root: ElementTree.Element) -> float:
     """Return a step [s] for an FMU that names none: one that it can make within the time limit."""
     step = (plan.end - plan.start) / _DEFAULT_STEPS
     simulation = root.find("CoSimulation")
@@ -287,7 +287,7 @@ def _time(text: str | None, above: float) -> float | None:
     return value if above < value < math.inf else None
 
 
-def _ours(plan: Plan, tool: str) -> bool:
+def _ours(plan: ProbePlan, tool: str) -> bool:
     """Return whether an FMU follows bristle's rule for faults: it carries its slave or its shim."""
     fault = plan.about.variables.get("fault")
     if fault is None or (fault.kind, fault.causality) != ("Integer", "output"):
@@ -299,7 +299,7 @@ def _ours(plan: Plan, tool: str) -> bool:
     return any(_BUNDLE.fullmatch(name) for name in names)
 
 
-def _companion(plan: Plan, folder: Path) -> Plan | None:
+def _companion(plan: ProbePlan, folder: Path) -> ProbePlan | None:
     """Return a trivial FMU of our own to stand beside the one in question, None without."""
     from ..fmu.build import ensure
 
@@ -317,7 +317,7 @@ class _Session:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: ProbePlan,
         subprocesses: Subprocesses,
         only: Collection[str] | None,
         progress: Callable[[str], None] | None,

@@ -24,8 +24,7 @@ from ..fmu.controller import MEASURED, invertible
 from ..fmu.description import Description, read_description
 from ..physics.building import frequencies, paper_building
 from ..physics.drive import VOLTAGE
-from ..synthesis import Damper as DesignDamper
-from ..synthesis import LqgWeights, Task, Weight, Weights, design
+from ..synthesis import DesignDamper, LqgWeights, Task, Weight, Weights, design
 from ..synthesis.design_file import task_of
 from ..synthesis.plausible import Reach, reach_of
 from ..synthesis.task import check_sample_period
@@ -40,13 +39,13 @@ from .setting import (
     OFF,
     ON,
     STRUCTURE,
-    Candidate,
-    Choice,
-    Damper,
+    CommandedDamper,
+    ComparedController,
+    ComponentTable,
+    DamperPlace,
     Folder,
     Given,
-    Part,
-    Site,
+    Selection,
     choices_of,
     number,
     plain_name,
@@ -61,7 +60,7 @@ from .setting import (
 # differs in its unit of mass alone gets the same design.
 
 
-def designed_for(kind: str, site: Site, damper: Damper) -> Controller:
+def designed_for(kind: str, site: DamperPlace, damper: CommandedDamper) -> Controller:
     """Return a controller of some kind, designed for a building and its damper.
 
     Parameters
@@ -77,7 +76,7 @@ def designed_for(kind: str, site: Site, damper: Damper) -> Controller:
     return design(task_for(kind, site, damper)).controller
 
 
-def task_for(kind: str, site: Site, damper: Damper) -> Task:
+def task_for(kind: str, site: DamperPlace, damper: CommandedDamper) -> Task:
     """Return the stock task of a kind, brought to a building and its damper.
 
     Parameters
@@ -132,7 +131,7 @@ def _moved(weight: Weight, faster: float, share: float) -> Weight:
     return Weight(scaled(weight.numerator, share), scaled(weight.denominator))
 
 
-def force_share(damper: Damper) -> float:
+def force_share(damper: CommandedDamper) -> float:
     """Return how strong a damper is beside the library's: force at its typical speed and most V.
 
     1 where its law is not known in closed form.
@@ -140,7 +139,7 @@ def force_share(damper: Damper) -> float:
     return _beside(damper, lambda one: sum(one.sliding_force(one.speed, one.v_max)))
 
 
-def slope_share(damper: Damper) -> float:
+def slope_share(damper: CommandedDamper) -> float:
     """Return how much force a volt makes beside the library's damper, at its typical speed.
 
     1 where its law is not known in closed form.
@@ -153,7 +152,7 @@ def slope_share(damper: Damper) -> float:
     return _beside(damper, per_volt)
 
 
-def _beside(damper: Damper, measure: Callable[[DesignDamper], float]) -> float:
+def _beside(damper: CommandedDamper, measure: Callable[[DesignDamper], float]) -> float:
     """Return what a measure tells of a damper over what it tells of the library's."""
     known = damper.for_design()
     if known is None or damper.usual:
@@ -165,12 +164,12 @@ def _beside(damper: Damper, measure: Callable[[DesignDamper], float]) -> float:
 class Maker:
     """Makes the candidates of one comparison: `site` and `damper` are what they are for."""
 
-    site: Site
-    damper: Damper
+    site: DamperPlace
+    damper: CommandedDamper
     folder: Folder
     _designs: dict[str, str] = field(default_factory=dict)
 
-    def candidates(self, given: Given) -> list[Candidate]:
+    def candidates(self, given: Given) -> list[ComparedController]:
         """Return the controllers of a list of texts.
 
         Parameters
@@ -194,7 +193,7 @@ class Maker:
         refuse_twice(plain, "--controller", [plain_name(name) for name in (OFF, ON, BEST, LIMIT)])
         return found
 
-    def candidate(self, choice: Choice) -> Candidate:
+    def candidate(self, choice: Selection) -> ComparedController:
         """Return the controller of one choice."""
         name = choice.as_text
         ending = Path(choice.what).suffix.lower()
@@ -214,7 +213,7 @@ class Maker:
 
     # -- kinds of choices
 
-    def _of_stock(self, choice: Choice, name: str) -> Candidate:
+    def _of_stock(self, choice: Selection, name: str) -> ComparedController:
         known = controllers()
         if choice.what not in known:
             hint = did_you_mean(choice.what, known)
@@ -236,13 +235,13 @@ class Maker:
             return self._built_in(choice.what, name, source, settings, about, carries=True)
         return self._designed(choice.what, name, settings, self._anew(kind), redesigned=True)
 
-    def _of_controller(self, choice: Choice, name: str) -> Candidate:
+    def _of_controller(self, choice: Selection, name: str) -> ComparedController:
         file = Path(choice.what)
         kind = read_controller(file).kind
         kept = self._checked(file, kind)
         return self._designed(self._component(kind), name, dict(choice.settings), kept)
 
-    def _of_design(self, choice: Choice, name: str) -> Candidate:
+    def _of_design(self, choice: Selection, name: str) -> ComparedController:
         """Design what a design file asks for; building and damper are these unless it names one."""
         file = Path(choice.what)
         document = Document(file, DesignError)
@@ -257,14 +256,14 @@ class Maker:
         self.site.check_design(found, str(file))
         return self._designed(self._component(found.kind), name, dict(choice.settings), kept)
 
-    def _of_source(self, choice: Choice, name: str) -> Candidate:
+    def _of_source(self, choice: Selection, name: str) -> ComparedController:
         with tempfile.TemporaryDirectory() as scratch:
             made = build(plan(choice.what), Path(scratch))
             kept = self.folder.keep(made)
         about = f"a component of your own, {Path(choice.what).name}"
         return self._of_file(self.folder.path / FILES / Path(kept).name, kept, choice, name, about)
 
-    def _of_fmu(self, choice: Choice, name: str) -> Candidate:
+    def _of_fmu(self, choice: Selection, name: str) -> ComparedController:
         file = Path(choice.what)
         read_description(file, any_platform=True)
         return self._of_file(file, self.folder.keep(file), choice, name, f"the FMU {file.name}")
@@ -278,7 +277,7 @@ class Maker:
         settings: dict[str, Any],
         kept: str,
         redesigned: bool = False,
-    ) -> Candidate:
+    ) -> ComparedController:
         """Return a controller with a design of its own; `kept` is its file in the folder."""
         file = self.folder.path / FILES / Path(kept).name
         kind = read_controller(file).kind
@@ -291,12 +290,12 @@ class Maker:
     def _built_in(
         self, component: str, name: str, source: dict[str, Any], settings: dict[str, Any],
         about: str = "", *, carries: bool = False, file: Path | None = None,
-    ) -> Candidate:  # fmt: skip
+    ) -> ComparedController:  # fmt: skip
         description = catalogue.describe(component, controller=file)
         parameters = {**self._suited(component, description, settings), **settings}
         period = parameters.get("sample_period", _start(description, "sample_period"))
-        return Candidate(
-            name, Part(source, parameters), self._wires(description), "voltage", True,
+        return ComparedController(
+            name, ComponentTable(source, parameters), self._wires(description), "voltage", True,
             None if period is None else number(period, "sample_period", component),
             about or "without a design: it suits any building", carries,
         )  # fmt: skip
@@ -328,7 +327,9 @@ class Maker:
             found |= {key: value for key, value in values.items() if value != there[key].start}
         return found
 
-    def _of_file(self, file: Path, kept: str, choice: Choice, name: str, about: str) -> Candidate:
+    def _of_file(
+        self, file: Path, kept: str, choice: Selection, name: str, about: str
+    ) -> ComparedController:
         """Return a controller that is an FMU."""
         description = read_description(file, any_platform=True)
         there = description.variables
@@ -355,8 +356,8 @@ class Maker:
         if "v_max" in there and "v_max" not in parameters:
             parameters |= self._suited("", _only(description, "v_max"), parameters)
         period = parameters.get("sample_period", _start(description, "sample_period"))
-        return Candidate(
-            name, Part({"fmu": kept}, parameters), wires, output, False,
+        return ComparedController(
+            name, ComponentTable({"fmu": kept}, parameters), wires, output, False,
             float(period) if isinstance(period, int | float) else None, about,
             controller_in(file) is not None,
         )  # fmt: skip

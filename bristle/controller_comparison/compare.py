@@ -17,17 +17,17 @@ from ..core.text import unknown
 from ..errors import ScenarioError
 from .candidates import Maker
 from .result import ControllerComparison, Setting, of_designs, of_engines
-from .runs import Bench, Reached, best_level, flat, limit_of, refuse_limit
+from .runs import CaseRunner, Reached, best_level, flat, limit_of, refuse_limit
 from .setting import (
     BEST,
     DAMPER,
     DEFAULT,
     OFF,
     ON,
-    Candidate,
+    ComparedController,
+    ComparedMotion,
     Folder,
     Given,
-    Motion,
     constant,
     damper_from,
     motions_of,
@@ -139,7 +139,7 @@ def compare_controllers(
         tell("designing")
         candidates = Maker(site, one, folder).candidates(controllers)
         rows = _step(candidates) if step is None else step
-        bench = Bench(site, one, folder, rows, engine, fmus, workers or cores())
+        bench = CaseRunner(site, one, folder, rows, engine, fmus, workers or cores())
         judged = _judged(bench, output, statistic)
         chosen = motions_of(motions, folder, rows)
         if limit:
@@ -169,8 +169,8 @@ class _Run:
     """The runs of a comparison, motion by motion."""
 
     def __init__(
-        self, bench: Bench, judged: Statistic, candidates: list[Candidate], grid: int, limit: bool,
-        spread: Spread | None,
+        self, bench: CaseRunner, judged: Statistic, candidates: list[ComparedController],
+        grid: int, limit: bool, spread: Spread | None,
     ) -> None:  # fmt: skip
         self.bench, self.judged, self.candidates = bench, judged, candidates
         self.grid, self.limit, self.spread = grid, limit, spread
@@ -181,7 +181,7 @@ class _Run:
         self.frames: dict[tuple[str, str], pd.DataFrame] = {}
         self.notes: list[str] = []
 
-    def motions(self, chosen: list[Motion]) -> None:
+    def motions(self, chosen: list[ComparedMotion]) -> None:
         """Run everything under all ground motions."""
         n, worst = len(chosen), len(self.candidates) + CONSTANTS
         kinds = {"run": worst + self.limit, "levels": 1, "limit": int(self.limit)}
@@ -190,7 +190,7 @@ class _Run:
         for motion in chosen:
             self._motion(motion)
 
-    def _motion(self, motion: Motion) -> None:
+    def _motion(self, motion: ComparedMotion) -> None:
         """Run everything under one ground motion."""
         # What has a clock goes first: the loop that it is compiled to serves all the others.
         clocked = sorted(self.candidates, key=lambda one: one.period is None)
@@ -207,7 +207,7 @@ class _Run:
             for candidate in [*constants, *self.candidates]:
                 self._worst(motion, candidate, self.spread)
 
-    def _constants(self, motion: Motion) -> list[Candidate]:
+    def _constants(self, motion: ComparedMotion) -> list[ComparedController]:
         """Return the constant voltages of a motion: none, the largest, the best."""
         self.stages.begins("levels", f"{motion.name}: {self.grid} constant voltages")
         levels = self.bench.levels(motion, self.grid)
@@ -225,14 +225,14 @@ class _Run:
             constant(BEST, best, "the constant voltage that is best for the motion"),
         ]
 
-    def _frame(self, motion: Motion, candidate: Candidate) -> pd.DataFrame:
+    def _frame(self, motion: ComparedMotion, candidate: ComparedController) -> pd.DataFrame:
         key = motion.name, candidate.name
         if key not in self.frames:
             self.stages.begins("run", f"{motion.name}: {candidate.name}")
             self.frames[key] = self.bench.run(motion, candidate)
         return self.frames[key]
 
-    def _row(self, motion: Motion, candidate: Candidate) -> None:
+    def _row(self, motion: ComparedMotion, candidate: ComparedController) -> None:
         frame = self._frame(motion, candidate)
         level = candidate.part.parameters.get("level") if not candidate.wires else None
         ratio = f"{DAMPER}.stroke_ratio"
@@ -246,7 +246,7 @@ class _Run:
             }
         )  # fmt: skip
 
-    def _worst(self, motion: Motion, candidate: Candidate, spread: Spread) -> None:
+    def _worst(self, motion: ComparedMotion, candidate: ComparedController, spread: Spread) -> None:
         self.stages.begins("worst", f"{motion.name}: {candidate.name}, {spread.members} members")
         nominal = self.frames[motion.name, candidate.name]
         whole = not tied(self.bench, self.candidates)
@@ -288,13 +288,13 @@ def _refuse(
         raise ScenarioError(f"--step {step:g}: a time above 0 s is right.")
 
 
-def _step(candidates: list[Candidate]) -> float:
+def _step(candidates: list[ComparedController]) -> float:
     """Return rows that fall on the controllers' instants, where they can."""
     periods = [one.period for one in candidates if one.period is not None]
     return min([STEP, *(period / ceil(period / STEP - 1e-9) for period in periods)])
 
 
-def _judged(bench: Bench, output: str, statistic: str) -> Statistic:
+def _judged(bench: CaseRunner, output: str, statistic: str) -> Statistic:
     column = output or bench.site.top
     for one in bench.outputs:
         if (one.column, one.statistic) == (column, statistic):

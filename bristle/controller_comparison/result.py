@@ -14,8 +14,17 @@ from ..campaign.campaign import Statistic
 from ..core.text import quantity
 from ..errors import not_usable
 from ..view import Viewable
-from .runs import Bench, Reached
-from .setting import BEST, LIMIT, OFF, ON, Candidate, Damper, Motion, Site
+from .runs import CaseRunner, Reached
+from .setting import (
+    BEST,
+    LIMIT,
+    OFF,
+    ON,
+    CommandedDamper,
+    ComparedController,
+    ComparedMotion,
+    DamperPlace,
+)
 from .worst_case import Spread
 
 if TYPE_CHECKING:
@@ -33,10 +42,10 @@ class Setting:
     differ, "" without.
     """
 
-    site: Site
-    damper: Damper
-    candidates: list[Candidate]
-    motions: list[Motion]
+    site: DamperPlace
+    damper: CommandedDamper
+    candidates: list[ComparedController]
+    motions: list[ComparedMotion]
     judged: Statistic
     spread: Spread | None
     folder: Path | None
@@ -183,7 +192,7 @@ class ControllerComparison(Viewable):
 # What a reader of a comparison has to know of it, in sentences.
 
 
-def of_designs(candidates: list[Candidate]) -> list[str]:
+def of_designs(candidates: list[ComparedController]) -> list[str]:
     """Say which designs were made by the comparison, and why."""
     anew = [one.name for one in candidates if one.redesigned]
     if not anew:
@@ -195,7 +204,7 @@ def of_designs(candidates: list[Candidate]) -> list[str]:
     ]
 
 
-def of_engines(bench: Bench, candidates: list[Candidate]) -> list[str]:
+def of_engines(bench: CaseRunner, candidates: list[ComparedController]) -> list[str]:
     """Say where two engines stand side by side."""
     stepped = [one.name for one in candidates if bench.engine_of(one) == "fmu"]
     if not stepped or len(stepped) == len(candidates):

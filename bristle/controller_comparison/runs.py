@@ -16,7 +16,7 @@ import numpy as np
 
 from ..campaign.campaign import Statistic
 from ..campaign.ensemble import run_left
-from ..campaign.ensemble_file import Plan, read_ensemble
+from ..campaign.ensemble_file import EnsemblePlan, read_ensemble
 from ..campaign.table import RunsTable
 from ..core.files import cache_folder
 from ..core.progress import Count, listening
@@ -41,12 +41,12 @@ from .setting import (
     ON,
     SCENARIOS,
     STRUCTURE,
-    Candidate,
-    Damper,
+    CommandedDamper,
+    ComparedController,
+    ComparedMotion,
+    ComponentTable,
+    DamperPlace,
     Folder,
-    Motion,
-    Part,
-    Site,
     constant,
     ensemble_text,
     plain_name,
@@ -61,7 +61,7 @@ SEED = 1
 
 
 @dataclass(frozen=True)
-class Bench:
+class CaseRunner:
     """What all runs of a comparison share.
 
     Attributes
@@ -80,8 +80,8 @@ class Bench:
         Warnings of the scenarios' checks, as they come.
     """
 
-    site: Site
-    damper: Damper
+    site: DamperPlace
+    damper: CommandedDamper
     folder: Folder
     step: float
     engine: str
@@ -99,17 +99,22 @@ class Bench:
         """Column that has the command; controllers differ in what they call theirs."""
         return f"{CONTROLLER}.voltage"
 
-    def engine_of(self, candidate: Candidate) -> str:
+    def engine_of(self, candidate: ComparedController) -> str:
         """Return the engine that runs a controller."""
         foreign = str(self.damper.part.source.get("fmu", "")).endswith(".fmu")
         return "fmu" if foreign or not candidate.built_in else self.engine
 
-    def columns(self, candidate: Candidate) -> dict[str, str]:
+    def columns(self, candidate: ComparedController) -> dict[str, str]:
         """Return the column of a run for each column of the comparison."""
         own = f"{CONTROLLER}.{candidate.output}"
         return {o.column: own if o.column == self.command else o.column for o in self.outputs}
 
-    def text(self, motion: Motion, candidate: Candidate, sensors: Part | None = None) -> str:
+    def text(
+        self,
+        motion: ComparedMotion,
+        candidate: ComparedController,
+        sensors: ComponentTable | None = None,
+    ) -> str:
         """Return the text of a scenario.
 
         Parameters
@@ -140,12 +145,12 @@ class Bench:
         run = {"stop": motion.stop, "step": self.step, "algorithm": "midpoint"}
         return tables_text(title, run, {name: one.table for name, one in parts.items()}, wires)
 
-    def write(self, motion: Motion, candidate: Candidate) -> Path:
+    def write(self, motion: ComparedMotion, candidate: ComparedController) -> Path:
         """Write the scenario of a case; return its file."""
         file = self.folder.at(SCENARIOS, motion.name, f"{plain_name(candidate.name)}.toml")
         return self.folder.write(file, self.text(motion, candidate))
 
-    def run(self, motion: Motion, candidate: Candidate) -> pd.DataFrame:
+    def run(self, motion: ComparedMotion, candidate: ComparedController) -> pd.DataFrame:
         """Return a case's run: the comparison's columns, and what figures show, by time [s].
 
         Raises
@@ -181,7 +186,7 @@ class Bench:
         return {o.name: o.of(frame[o.column].to_numpy()) for o in self.outputs}
 
     def many(
-        self, file: Path, candidate: Candidate, scenario: Path, runs: int,
+        self, file: Path, candidate: ComparedController, scenario: Path, runs: int,
         tables: Mapping[str, Mapping[str, Any]],
     ) -> tuple[pd.DataFrame, int]:  # fmt: skip
         """Write an ensemble and run it; return what is kept of its runs, and how many failed.
@@ -220,7 +225,7 @@ class Bench:
         frame = pd.DataFrame([rows[k] for k in sorted(rows)], index=sorted(rows), columns=titles)
         return frame, failed
 
-    def levels(self, motion: Motion, count: int) -> pd.DataFrame:
+    def levels(self, motion: ComparedMotion, count: int) -> pd.DataFrame:
         """Return what is kept of a motion's runs at constant voltages, by the voltage [V].
 
         Parameters
@@ -249,7 +254,7 @@ class Bench:
 
 
 @contextmanager
-def _continued(plan: Plan, path: Path, goes_on: bool) -> Iterator[RunsTable]:
+def _continued(plan: EnsemblePlan, path: Path, goes_on: bool) -> Iterator[RunsTable]:
     """Yield the table of an ensemble's runs, with those of before where it `goes_on`."""
     try:
         table = RunsTable(plan, path, fresh=not goes_on)
@@ -310,7 +315,7 @@ class Reached(NamedTuple):
     kept: bool
 
 
-def refuse_limit(bench: Bench, motion: Motion, judged: Statistic) -> None:
+def refuse_limit(bench: CaseRunner, motion: ComparedMotion, judged: Statistic) -> None:
     """Refuse a case that has no limit, before the work for it is done.
 
     Raises
@@ -328,8 +333,8 @@ def refuse_limit(bench: Bench, motion: Motion, judged: Statistic) -> None:
 
 
 def limit_of(
-    bench: Bench, motion: Motion, judged: Statistic, starts: int = 3
-) -> tuple[Candidate, Reached]:
+    bench: CaseRunner, motion: ComparedMotion, judged: Statistic, starts: int = 3
+) -> tuple[ComparedController, Reached]:
     """Return the voltage that reaches a motion's limit as a controller, and what is known of it.
 
     Parameters
@@ -366,15 +371,15 @@ def limit_of(
     bench.folder.write(path, "")
     signal_file(voltage_signal(found["time"], found["voltage"]), path)
     said = f"{ABOVE}/{LIMITS}/{plain_name(motion.name)}/{path.name}"
-    part = Part({"fmu": "SignalSource"}, {"kind": "csv", "file": said})
+    part = ComponentTable({"fmu": "SignalSource"}, {"kind": "csv", "file": said})
     about = "the voltage that reaches the limit, the ground motion known in advance"
     reached = Reached(
         found["value"], found["bound"], found["agreeing"], found["starts"], found["sure"], kept
     )
-    return Candidate(LIMIT, part, {}, "value", True, None, about), reached
+    return ComparedController(LIMIT, part, {}, "value", True, None, about), reached
 
 
-def _limit_digest(bench: Bench, text: str, judged: Statistic, starts: int) -> str:
+def _limit_digest(bench: CaseRunner, text: str, judged: Statistic, starts: int) -> str:
     """Return what stands for all that decides a limit: scenario, files that it reads, goal."""
     content = hashlib.sha256(f"{__version__}/{judged.name}/{starts}/".encode())
     content.update(re.sub(r"^title = .*$", "", text, flags=re.MULTILINE).encode())

@@ -27,7 +27,7 @@ from ..model.model_file import read_model
 from ..physics.building import PAPER, Building, Device, Ports, frequencies, paper_building
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from ..physics.laws import LAWS, laws_of
-from ..synthesis import Damper as DesignDamper
+from ..synthesis import DesignDamper
 from ..system.from_model import source_of, values_of
 from ..system.library import damper_of, law_of
 from ..system.overrides import parse_override
@@ -42,7 +42,7 @@ _SETTING = re.compile(r",(?=\s*[A-Za-z_][\w.]*\s*=)")
 _ENDINGS = (".json", ".toml", ".py", ".fmu", ".csv", ".at2", ".txt")
 
 
-class Choice(NamedTuple):
+class Selection(NamedTuple):
     """A thing that was chosen.
 
     `what` is a name or a file, `settings` its values, `label` what tables call it.
@@ -66,7 +66,7 @@ class Choice(NamedTuple):
         return self.label or " ".join([name, *values])
 
 
-def choice_of(text: object, where: str, label: str = "") -> Choice:
+def choice_of(text: object, where: str, label: str = "") -> Selection:
     """Return what a text chooses.
 
     Parameters
@@ -91,10 +91,10 @@ def choice_of(text: object, where: str, label: str = "") -> Choice:
         settings[name] = value
     chosen = label or str(settings.pop("label", ""))
     settings.pop("label", None)
-    return Choice(what, settings, chosen)
+    return Selection(what, settings, chosen)
 
 
-def choices_of(given: Given, where: str) -> list[Choice]:
+def choices_of(given: Given, where: str) -> list[Selection]:
     """Return what a list of texts, or a mapping of labels to texts, chooses.
 
     Raises
@@ -151,7 +151,7 @@ ABOVE = "../.."
 """From a scenario, which lies two folders deep, to the comparison's folder."""
 
 
-class Part(NamedTuple):
+class ComponentTable(NamedTuple):
     """A component of a scenario: what it is made from (`fmu`, `law` ...), and its parameters."""
 
     source: dict[str, Any]
@@ -257,14 +257,14 @@ _MOTION_INPUTS = ("displacement", "velocity")
 
 
 @dataclass(frozen=True)
-class Damper:
+class CommandedDamper:
     """A damper whose command controllers set.
 
     Attributes
     ----------
     name : str
         In texts.
-    part : Part
+    part : ComponentTable
         Its component in the scenarios.
     drive : Drive
         What commands it.
@@ -281,7 +281,7 @@ class Damper:
     """
 
     name: str
-    part: Part
+    part: ComponentTable
     drive: Drive
     most: float
     law: str
@@ -310,7 +310,7 @@ class Damper:
         return DesignDamper(self.law, {**self.values, **own}, self.effects, self.most)
 
 
-def damper_from(given: str | Path, folder: Folder) -> Damper:
+def damper_from(given: str | Path, folder: Folder) -> CommandedDamper:
     """Return the damper that a text chooses.
 
     Parameters
@@ -346,13 +346,15 @@ def damper_from(given: str | Path, folder: Folder) -> Damper:
     )
 
 
-def _from_law(choice: Choice, law: str | Path, folder: Folder) -> Damper:
+def _from_law(choice: Selection, law: str | Path, folder: Folder) -> CommandedDamper:
     found = damper_of(law)
     source = {"law": folder.keep(law) if isinstance(law, Path) else law}
     return _built_in(choice, source, found.name, catalogue.describe(found.component))
 
 
-def _built_in(choice: Choice, source: dict[str, Any], law: str, description: Description) -> Damper:
+def _built_in(
+    choice: Selection, source: dict[str, Any], law: str, description: Description
+) -> CommandedDamper:
     declared = LAWS[law].parameters
     values = {
         name: number(choice.settings.get(name, parameter.value), name, f"--damper {choice.what}")
@@ -360,13 +362,13 @@ def _built_in(choice: Choice, source: dict[str, Any], law: str, description: Des
     }
     on = [name[:-3] for name, value in choice.settings.items() if name.endswith(".on") and value]
     most = _most(choice.what, choice.settings, description, VOLTAGE)
-    return Damper(
-        choice.as_text, Part(source, dict(choice.settings)), VOLTAGE, most, law,
+    return CommandedDamper(
+        choice.as_text, ComponentTable(source, dict(choice.settings)), VOLTAGE, most, law,
         values, tuple(on),
     )  # fmt: skip
 
 
-def _from_model(choice: Choice, path: Path, folder: Folder) -> Damper:
+def _from_model(choice: Selection, path: Path, folder: Folder) -> CommandedDamper:
     """Return the damper of a model.toml, by itself or in the folder of a study."""
     file = path / "model.toml" if path.is_dir() else path
     model = read_model(file)
@@ -385,9 +387,10 @@ def _from_model(choice: Choice, path: Path, folder: Folder) -> Damper:
         for name in LAWS[law].parameters if name in values
     }  # fmt: skip
     name = choice.label or (path.resolve().name if path.is_dir() else file.stem)
-    return Damper(
-        name, Part(source, values), VOLTAGE, _most(choice.what, values, description, VOLTAGE), law,
-        own, tuple(inside.effects), tuple(_model_notes(model, name)),
+    return CommandedDamper(
+        name, ComponentTable(source, values), VOLTAGE,
+        _most(choice.what, values, description, VOLTAGE), law, own, tuple(inside.effects),
+        tuple(_model_notes(model, name)),
     )  # fmt: skip
 
 
@@ -402,7 +405,7 @@ def _model_notes(model: Model, name: str) -> Iterable[str]:
         yield f"Effects of {name}'s model that are not in the damper are left out."
 
 
-def _from_fmu(choice: Choice, path: Path, folder: Folder) -> Damper:
+def _from_fmu(choice: Selection, path: Path, folder: Folder) -> CommandedDamper:
     description = read_description(path, any_platform=True)
     there = description.variables
     inputs = {name for name, v in there.items() if v.causality == "input"}
@@ -423,8 +426,8 @@ def _from_fmu(choice: Choice, path: Path, folder: Folder) -> Damper:
     notes = ["The law of the damper's FMU is not known: its parameters are not varied."]
     if drive is not VOLTAGE:
         notes.append(f"1 V of a controller counts as 1 {drive.unit} of the damper's {drive.name}.")
-    return Damper(
-        choice.as_text, Part({"fmu": folder.keep(path)}, dict(choice.settings)),
+    return CommandedDamper(
+        choice.as_text, ComponentTable({"fmu": folder.keep(path)}, dict(choice.settings)),
         drive, _most(choice.what, choice.settings, description, drive), "", {}, (), tuple(notes),
     )  # fmt: skip
 
@@ -450,14 +453,14 @@ CONSTANT = "ConstantVoltage"
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ComparedController:
     """A controller as it stands in the scenarios.
 
     Attributes
     ----------
     name : str
         In tables.
-    part : Part
+    part : ComponentTable
         Its component.
     wires : mapping
         Its inputs to the columns that feed them.
@@ -476,7 +479,7 @@ class Candidate:
     """
 
     name: str
-    part: Part
+    part: ComponentTable
     wires: Mapping[str, str]
     output: str
     built_in: bool
@@ -486,10 +489,10 @@ class Candidate:
     redesigned: bool = False
 
 
-def constant(name: str, level: float, about: str) -> Candidate:
+def constant(name: str, level: float, about: str) -> ComparedController:
     """Return a constant voltage [V] as a candidate."""
-    part = Part({"fmu": CONSTANT}, {"level": level})
-    return Candidate(name, part, {}, "voltage", True, None, about)
+    part = ComponentTable({"fmu": CONSTANT}, {"level": level})
+    return ComparedController(name, part, {}, "voltage", True, None, about)
 
 
 # The ground motions of a comparison: stock names, or files with their scale.
@@ -499,14 +502,14 @@ _MOTION_KEYS = ("peak", "factor", "start", "stop")
 
 
 @dataclass(frozen=True)
-class Motion:
+class ComparedMotion:
     """A ground motion as it shakes the building.
 
     Attributes
     ----------
     name : str
         In tables.
-    part : Part
+    part : ComponentTable
         The GroundMotion of its scenarios.
     stop : float
         End of the runs [s].
@@ -517,13 +520,13 @@ class Motion:
     """
 
     name: str
-    part: Part
+    part: ComponentTable
     stop: float
     peak: float
     source: str
 
 
-def motions_of(given: Sequence[str | Path], folder: Folder, step: float) -> list[Motion]:
+def motions_of(given: Sequence[str | Path], folder: Folder, step: float) -> list[ComparedMotion]:
     """Return the ground motions, their files kept in the comparison's folder.
 
     Parameters
@@ -548,7 +551,7 @@ def motions_of(given: Sequence[str | Path], folder: Folder, step: float) -> list
     return found
 
 
-def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
+def _motion(choice: Selection, folder: Folder, step: float) -> ComparedMotion:
     for key in choice.settings:
         if key not in _MOTION_KEYS:
             raise ScenarioError(f"--motions {choice.what}: {unknown('setting', key, _MOTION_KEYS)}")
@@ -571,15 +574,15 @@ def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
     if not scaled > 0.0:
         raise ScenarioError(f"--motions {choice.what}: the ground does not move; check its factor.")
     own = record if record in names else folder.keep(Path(record))
-    return Motion(
+    return ComparedMotion(
         choice.label or _motion_name(Path(record).stem if record not in names else record, values),
-        Part({"fmu": "GroundMotion"}, {"record": own, **values}),
+        ComponentTable({"fmu": "GroundMotion"}, {"record": own, **values}),
         round(ceil(stop / step - 1e-9) * step, 9), scaled,
         motion.source if record in names else Path(record).name,
     )  # fmt: skip
 
 
-def _motion_value(choice: Choice, key: str) -> float:
+def _motion_value(choice: Selection, key: str) -> float:
     value: Value = choice.settings[key]
     if isinstance(value, str) and key == "peak" and (found := _IN_G.fullmatch(value.strip())):
         try:
@@ -606,7 +609,7 @@ STRUCTURE, DAMPER, CONTROLLER, GROUND = "structure", "damper", "controller", "gr
 
 
 @dataclass(frozen=True)
-class Site:
+class DamperPlace:
     """A building, and the place of the damper that controllers command.
 
     `data` is the content of its file; `part` the Structure of the scenarios; `file` the
@@ -616,7 +619,7 @@ class Site:
     building: Building
     data: dict[str, Any]
     device: Device
-    part: Part
+    part: ComponentTable
     file: Path | None = None
     notes: tuple[str, ...] = ()
 
@@ -702,7 +705,7 @@ class Site:
         )
 
 
-def site_from(file: str | Path | None, device: str, folder: Folder) -> Site:
+def site_from(file: str | Path | None, device: str, folder: Folder) -> DamperPlace:
     """Return the building of a file, None for the library's own, with the damper's place.
 
     Parameters
@@ -720,8 +723,8 @@ def site_from(file: str | Path | None, device: str, folder: Folder) -> Site:
         If the building has several devices and none is named.
     """
     if file is None:
-        part = Part({"fmu": "Structure"}, {})
-        return Site(paper_building(), PAPER, paper_building().device(device), part)
+        part = ComponentTable({"fmu": "Structure"}, {})
+        return DamperPlace(paper_building(), PAPER, paper_building().device(device), part)
     building = read_building(file)
     names = [one.name for one in building.devices]
     if not device and len(names) == 1:
@@ -735,11 +738,11 @@ def site_from(file: str | Path | None, device: str, folder: Folder) -> Site:
     notes = [f"No damper acts at {name}: its force is 0." for name in idle]
     source = {"fmu": "Structure", "building": folder.keep(Path(file))}
     parameters = {building.device(name).ports.force: 0.0 for name in idle}
-    return Site(
+    return DamperPlace(
         building,
         toml_content(Path(file)),
         building.device(device),
-        Part(source, parameters),
+        ComponentTable(source, parameters),
         Path(file),
         tuple(notes),
     )

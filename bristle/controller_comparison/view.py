@@ -57,7 +57,7 @@ def motion_table(found: ControllerComparison, motion: str) -> Table:
     return Table(titles, rows(found, motion), range(1, len(titles)), motion, strong, note)
 
 
-class Column(NamedTuple):
+class ReportColumn(NamedTuple):
     """A column of numbers: heading and unit, and the outputs of which it shows the largest."""
 
     heading: str
@@ -66,7 +66,7 @@ class Column(NamedTuple):
     outputs: tuple[str, ...]
 
 
-def columns(found: ControllerComparison) -> list[Column]:
+def columns(found: ControllerComparison) -> list[ReportColumn]:
     """Return the columns that every motion's table has."""
     site = found.setting.site
     shown: list[tuple[str, tuple[str, ...]]] = [
@@ -83,10 +83,10 @@ def columns(found: ControllerComparison) -> list[Column]:
     return [_column(found, heading, outputs) for heading, outputs in shown]
 
 
-def _column(found: ControllerComparison, heading: str, outputs: tuple[str, ...]) -> Column:
+def _column(found: ControllerComparison, heading: str, outputs: tuple[str, ...]) -> ReportColumn:
     unit = found.units[outputs[0]]
     factor, said = scale(unit, float(found.table[list(outputs)].to_numpy().max()))
-    return Column(heading, said.replace("s2", "s²"), factor, outputs)
+    return ReportColumn(heading, said.replace("s2", "s²"), factor, outputs)
 
 
 def header(found: ControllerComparison) -> list[str]:
@@ -98,7 +98,7 @@ def header(found: ControllerComparison) -> list[str]:
     return ["", *titles]
 
 
-def _judged(found: ControllerComparison) -> Column:
+def _judged(found: ControllerComparison) -> ReportColumn:
     return _column(found, "", (found.setting.judged.name,))
 
 

@@ -15,8 +15,17 @@ from ..errors import ScenarioError
 from ..fmu.controller import SAMPLE_PERIOD
 from ..physics.laws import LAWS
 from ..system.scenario import load_scenario
-from .runs import SEED, SENSORS, Bench
-from .setting import DAMPER, ENSEMBLES, FILES, STRUCTURE, Candidate, Motion, Part, plain_name
+from .runs import SEED, SENSORS, CaseRunner
+from .setting import (
+    DAMPER,
+    ENSEMBLES,
+    FILES,
+    STRUCTURE,
+    ComparedController,
+    ComparedMotion,
+    ComponentTable,
+    plain_name,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,9 +86,9 @@ class Spread:
 
 
 def worst_of(
-    bench: Bench,
-    motion: Motion,
-    candidate: Candidate,
+    bench: CaseRunner,
+    motion: ComparedMotion,
+    candidate: ComparedController,
     nominal: pd.DataFrame,
     spread: Spread,
     building: bool = True,
@@ -115,18 +124,18 @@ def worst_of(
     return most, failed
 
 
-def tied(bench: Bench, candidates: list[Candidate]) -> list[str]:
+def tied(bench: CaseRunner, candidates: list[ComparedController]) -> list[str]:
     """Return the controllers with which no other building can be run: FMUs refuse it."""
     return [one.name for one in candidates if one.carries and bench.engine_of(one) == "fmu"]
 
 
-def varied(bench: Bench, candidates: list[Candidate], spread: Spread) -> str:
+def varied(bench: CaseRunner, candidates: list[ComparedController], spread: Spread) -> str:
     """Return in words what varies in a comparison."""
     building = "masses" in bench.site.data and not tied(bench, candidates)
     return spread.text(building, bool(bench.damper.law))
 
 
-def unvaried(bench: Bench, candidates: list[Candidate], spread: Spread) -> list[str]:
+def unvaried(bench: CaseRunner, candidates: list[ComparedController], spread: Spread) -> list[str]:
     """Return what is not varied, a sentence each."""
     names = tied(bench, candidates)
     if not spread.share:
@@ -143,8 +152,8 @@ def unvaried(bench: Bench, candidates: list[Candidate], spread: Spread) -> list[
 
 
 def _sensors(
-    bench: Bench, candidate: Candidate, nominal: pd.DataFrame, spread: Spread
-) -> Part | None:
+    bench: CaseRunner, candidate: ComparedController, nominal: pd.DataFrame, spread: Spread
+) -> ComponentTable | None:
     """Return the instruments of a controller, None where it measures nothing."""
     sensed = [name for name in candidate.wires if name in bench.site.measured]
     if not sensed or not (spread.noise or spread.delay):
@@ -156,11 +165,15 @@ def _sensors(
         values = nominal[column].to_numpy()
         deviation = spread.noise * float(np.sqrt(np.mean(np.square(values))))
         parameters[f"{name}.noise_density"] = float(f"{deviation * sqrt(2.0 * period):.6g}")
-    return Part({"fmu": "Sensors"}, parameters)
+    return ComponentTable({"fmu": "Sensors"}, parameters)
 
 
 def _varied(
-    bench: Bench, candidate: Candidate, motion: Motion, spread: Spread, building: bool
+    bench: CaseRunner,
+    candidate: ComparedController,
+    motion: ComparedMotion,
+    spread: Spread,
+    building: bool,
 ) -> dict[str, Any]:
     """Return what varies of building and damper, as an ensemble file has it."""
     found: dict[str, Any] = {}
@@ -198,7 +211,11 @@ def _around(value: float, spread: Spread) -> dict[str, list[float]]:
 
 
 def _written(
-    bench: Bench, motion: Motion, values: dict[str, float], candidate: Candidate, spread: Spread
+    bench: CaseRunner,
+    motion: ComparedMotion,
+    values: dict[str, float],
+    candidate: ComparedController,
+    spread: Spread,
 ) -> list[str]:
     """Write the members' buildings as files: an FMU contains its building; return their names."""
     system = load_scenario(bench.write(motion, candidate))

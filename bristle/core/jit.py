@@ -110,7 +110,7 @@ def _record(typing: Any, kind: Any, values: Any) -> Any:
     return made(kind, values), code
 
 
-class _Told(event.Listener):  # type: ignore[misc]
+class _CompileEvents(event.Listener):  # type: ignore[misc]
     """Tells that numba compiles, which may take a minute; what it finds on disk it only reads."""
 
     def on_start(self, event: Any) -> None:
@@ -120,7 +120,7 @@ class _Told(event.Listener):  # type: ignore[misc]
         pass
 
 
-event.register("numba:compile", _Told())
+event.register("numba:compile", _CompileEvents())
 
 # numba asks for the folder of its cache in a global of its own, more than once per function.
 _FOLDER = Lock()

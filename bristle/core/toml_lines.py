@@ -21,7 +21,7 @@ _TEXT = re.compile(
 _PLAIN = re.compile(r"[^,\[\]{}#\n]+")
 
 
-class Key(NamedTuple):
+class TextKey(NamedTuple):
     """One key of a text; `ends` is False for the leading parts of a dotted key or header."""
 
     path: KeyPath
@@ -74,10 +74,10 @@ class _Scanner:
         self.text = text.replace("\r\n", "\n")
         self.position = 0
         self.starts = [0] + [match.end() for match in re.finditer("\n", self.text)]
-        self.keys: list[Key] = []
+        self.keys: list[TextKey] = []
         self.counts: dict[KeyPath, int] = {}  # items so far of each array of tables
 
-    def scan(self) -> list[Key]:
+    def scan(self) -> list[TextKey]:
         table: KeyPath = ()
         while self._next():
             if self._take("[["):
@@ -114,9 +114,9 @@ class _Scanner:
         """Note a dotted key and its leading parts; return its path."""
         for part in parts[:-1]:
             base = (*base, part)
-            self.keys.append(Key(base, line, ends=False))
+            self.keys.append(TextKey(base, line, ends=False))
         base = (*base, parts[-1])
-        self.keys.append(Key(base, line, ends=True))
+        self.keys.append(TextKey(base, line, ends=True))
         return base
 
     def _key_parts(self) -> list[str]:
@@ -138,11 +138,11 @@ class _Scanner:
             path = (*path, part)
             last = depth == len(parts)
             if last and array:
-                self.keys.append(Key(path, line, ends=False))
+                self.keys.append(TextKey(path, line, ends=False))
                 self.counts[path] = self.counts.get(path, 0) + 1
             if path in self.counts:
                 path = (*path, self.counts[path] - 1)
-            self.keys.append(Key(path, line, ends=last))
+            self.keys.append(TextKey(path, line, ends=last))
         return path
 
     def _pair(self, table: KeyPath) -> None:
@@ -162,7 +162,7 @@ class _Scanner:
         elif self._take("["):
             index = 0
             while self._next() not in ("]", ""):
-                self.keys.append(Key((*path, index), self._line(), ends=True))
+                self.keys.append(TextKey((*path, index), self._line(), ends=True))
                 self._value((*path, index))
                 self._next()
                 self._take(",")

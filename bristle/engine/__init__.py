@@ -14,9 +14,9 @@ from ..errors import RunError
 
 if TYPE_CHECKING:
     from ..system.model import System
-    from .results import Table
+    from .results import RunTable
 
-OnRows = Callable[["Table"], None]
+OnRows = Callable[["RunTable"], None]
 """Takes the rows of a run that are new."""
 
 
@@ -30,7 +30,7 @@ class Engine(Protocol):
     def refuses(self, system: System) -> str:
         """Return why it cannot run a system, "" if it can."""
 
-    def run(self, system: System, on_rows: OnRows | None = None) -> Table:
+    def run(self, system: System, on_rows: OnRows | None = None) -> RunTable:
         """Return every output at every step in SI, t = 0 included.
 
         Parameters
@@ -52,7 +52,7 @@ class Engine(Protocol):
 class StoppedError(RunError):
     """A run that had to stop; `table` holds the rows before."""
 
-    def __init__(self, text: str, table: Table) -> None:
+    def __init__(self, text: str, table: RunTable) -> None:
         super().__init__(text)
         self.table = table
 
@@ -63,7 +63,7 @@ class Interrupted(KeyboardInterrupt):
     They are all of them where it was `whole`.
     """
 
-    def __init__(self, table: Table, whole: bool) -> None:
+    def __init__(self, table: RunTable, whole: bool) -> None:
         super().__init__("interrupted")
         self.table = table
         self.whole = whole

@@ -29,16 +29,16 @@ from . import Interrupted, OnRows, StoppedError
 from .coupling_error import bond_names, energy_residuals
 from .instance import Instance, Message, Unpacked
 from .macro_step import Memory, compile_loop
-from .results import Array, Table, count_steps, make_columns, times
+from .results import Array, RunTable, count_steps, make_columns, times
 from .schedule import (
+    DoStep,
     Node,
     Operation,
     Port,
     Ramp,
-    Read,
+    ReadOutputs,
     Restore,
     Save,
-    Step,
     find_loop,
     kind_of,
     make_nodes,
@@ -49,8 +49,8 @@ SETTLE = 100
 """Rounds in which the values at t = 0 must settle where outputs and inputs follow each other."""
 
 VERBS = {
-    Step: "doStep",
-    Read: "reading its outputs",
+    DoStep: "doStep",
+    ReadOutputs: "reading its outputs",
     Ramp: "setting the derivatives of its inputs",
     Save: "getting its state",
     Restore: "setting its state",
@@ -113,7 +113,7 @@ class Cosimulation:
         """Return "": it steps whatever has an FMU."""
         return ""
 
-    def run(self, system: System, on_rows: OnRows | None = None) -> Table:
+    def run(self, system: System, on_rows: OnRows | None = None) -> RunTable:
         """Return every output at every step; see `Engine`."""
         paths, descriptions = self._fmus(system)
         with tempfile.TemporaryDirectory(prefix="bristle_signals_") as folder:
@@ -136,7 +136,7 @@ class Cosimulation:
             paths[name], descriptions[name] = path, read_description(path, any_platform=True)
         return paths, descriptions
 
-    def _stepped(self, system: System, master: Master, on_rows: OnRows) -> Table:
+    def _stepped(self, system: System, master: Master, on_rows: OnRows) -> RunTable:
         given = 0
         stopped: RunError | None = None
 
@@ -308,7 +308,7 @@ class Master:
         last = min(first + count, self.steps)
         self._loop(times(first, last, self.step).tolist())
 
-    def table(self, first: int = 0) -> Table:
+    def table(self, first: int = 0) -> RunTable:
         """Return the rows from `first` on."""
         if self._rows:
             self._blocks.append(self._memory.columns(self._rows))
@@ -324,7 +324,7 @@ class Master:
         for column, port in zip(self.columns, self._ports(), strict=True):
             parts = [block[port][start:] for block, start in blocks]
             values[column.name] = np.concatenate(parts).astype(column.dtype)
-        return Table(
+        return RunTable(
             times(first, self._collected, self.step), self.columns, values, dict(self.made)
         )
 

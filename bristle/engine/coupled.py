@@ -34,7 +34,7 @@ from .records import (
     lay_structure,
     substeps_in,
 )
-from .results import Table, make_columns, times
+from .results import RunTable, make_columns, times
 
 Array = NDArray[Any]
 
@@ -259,7 +259,7 @@ SITES = {"damper": damper_laws.SETS, "structure": structure_laws.SETS}
 """Where effects are in the time loop, with the functions that there are."""
 
 
-class Layout:
+class RecordLayout:
     """A scenario's components as configured objects, and the slots of their signals.
 
     Attributes
@@ -564,18 +564,18 @@ class Coupled:
     def refuses(self, system: System) -> str:
         """Return why it cannot run a system, "" if it can."""
         try:
-            Layout(system)
+            RecordLayout(system)
         except BristleError as error:
             return str(error)
         return ""
 
-    def run(self, system: System, on_rows: OnRows | None = None) -> Table:
+    def run(self, system: System, on_rows: OnRows | None = None) -> RunTable:
         """Return every output at every step; see `Engine`.
 
         A run stops if a value is not finite any more, or motion and forces do not agree; the text
         names the component and the time.
         """
-        layout = Layout(system)
+        layout = RecordLayout(system)
         rows, substeps = system.steps, substeps_of(system, layout, self.longest)
         h = system.step / substeps
         found = np.zeros((rows + 1, len(layout.outputs)))
@@ -601,7 +601,7 @@ class Coupled:
         columns = make_columns(system)
         of = dict(zip(layout.outputs, found[:filled].T, strict=True))
         values = {c.name: of[c.name].astype(c.dtype, copy=False) for c in columns}
-        table = Table(times(0, filled, system.step), columns, values)
+        table = RunTable(times(0, filled, system.step), columns, values)
         if on_rows is not None:
             on_rows(table)
         if what:
@@ -612,7 +612,7 @@ class Coupled:
         return table
 
 
-def substeps_of(scenario: System, layout: Layout, longest: float = LONGEST_SUBSTEP) -> int:
+def substeps_of(scenario: System, layout: RecordLayout, longest: float = LONGEST_SUBSTEP) -> int:
     """Return into how many substeps a step is cut: at best so that instants fall on their ends.
 
     Parameters

@@ -23,7 +23,7 @@ from ..system.parameters import told_over_step
 from ..system.toml import STEP_TOLERANCE, scenario_text
 from ..units import alike, parse
 from . import Engine
-from .results import Table, judged_by, reals, to_frame
+from .results import RunTable, judged_by, reals, to_frame
 from .schedule import Node, Port, held_inputs
 
 if TYPE_CHECKING:
@@ -545,7 +545,7 @@ def _is_unit(variable: Variable, unit: str) -> bool:
 
 
 def energy_residuals(
-    nodes: Sequence[Node], algorithm: str, step: float, table: Table
+    nodes: Sequence[Node], algorithm: str, step: float, table: RunTable
 ) -> dict[str, float]:
     """Return how much energy the coupling makes or loses in each power bond.
 
@@ -578,7 +578,7 @@ def energy_residuals(
     return residuals
 
 
-def _values(nodes: Sequence[Node], port: Port, table: Table) -> Array:
+def _values(nodes: Sequence[Node], port: Port, table: RunTable) -> Array:
     values: Array = table.values[_column(nodes, port)]
     return values
 

@@ -37,9 +37,9 @@ from ..fmu.library import (
     TYPES,
     TYPES_FMI3,
     WARNING,
+    FmuLibrary,
     Handle,
     HandleFmi3,
-    Library,
     answer_of,
     logger_proxy,
     resources_of,
@@ -391,7 +391,7 @@ class Instance:
         if (folder / _SLAVE_MODULE).is_file():
             reset_at_exit()
         try:
-            library = Library(
+            library = FmuLibrary(
                 folder / library_member(about.identifier, about.version),
                 about.version,
                 _on_message,

@@ -24,17 +24,17 @@ from .schedule import (
     MIDDLE,
     NEWEST,
     PAST,
+    DoStep,
     Keep,
     Node,
     Operation,
     Port,
     Ramp,
-    Read,
+    ReadOutputs,
     Restore,
     Save,
     Schedule,
     Shift,
-    Step,
     Write,
     kind_of,
 )
@@ -86,13 +86,15 @@ class Memory:
         self.views: dict[str, memoryview[Any]] = {"Real": view[: total // 8 * 8].cast("d")}
         self.views["Integer"] = self.views["Boolean"] = view[: total // 4 * 4].cast("i")
 
-    def place(self, operation: Read | Write | Ramp) -> tuple[tuple[str, ...], int, list[str]]:
+    def place(
+        self, operation: ReadOutputs | Write | Ramp
+    ) -> tuple[tuple[str, ...], int, list[str]]:
         """Return the order of the names in a call, its offset, and the lines that gather before.
 
         In these lines m is the view of the kind of values, whole that of whole numbers.
         """
         node, size = self.nodes[operation.component], _SIZE[operation.kind]
-        if isinstance(operation, Read):
+        if isinstance(operation, ReadOutputs):
             ports = [(operation.component, name) for name in operation.names]
         else:
             ports = [node.sources[name] for name in operation.names]
@@ -101,19 +103,19 @@ class Memory:
         )
         names = tuple(name for _, name in places)
         offsets = [offset for offset, _ in places]
-        changed = {} if isinstance(operation, Read) else node.transformed
+        changed = {} if isinstance(operation, ReadOutputs) else node.transformed
         whole = {
             name
             for port, name in zip(ports, operation.names, strict=True)
             if operation.kind == "Real" and self._kind(port) != "Real"
         }
-        plain = isinstance(operation, Read) or (
+        plain = isinstance(operation, ReadOutputs) or (
             isinstance(operation, Write) and not (operation.values or operation.if_changed)
         )
         plain = plain and not (changed.keys() | whole) & set(names)
         if plain and all(offset == offsets[0] + i * size for i, offset in enumerate(offsets)):
             return names, offsets[0], []
-        if isinstance(operation, Read):
+        if isinstance(operation, ReadOutputs):
             raise AssertionError(f"outputs of one call are not neighbours: {names}")
         forms = _forms(operation)
         start = self._gathered
@@ -202,7 +204,7 @@ def compile_loop(
         number = str(place)
         names[f"o{number}"] = operation
         instance = instances[operation.component]
-        if isinstance(operation, Step):
+        if isinstance(operation, DoStep):
             body += _step(number, operation, instance, step, memory, names)
         elif isinstance(operation, Save | Restore):
             body += _state(number, operation, instance, names)
@@ -229,7 +231,7 @@ def compile_loop(
 
 def _step(
     number: str,
-    operation: Step,
+    operation: DoStep,
     instance: Instance,
     step: float,
     memory: Memory,
@@ -263,7 +265,7 @@ def _forms(operation: Write | Ramp) -> dict[str, str]:
 
 def _transfer(
     number: str,
-    operation: Read | Write | Ramp,
+    operation: ReadOutputs | Write | Ramp,
     instance: Instance,
     memory: Memory,
     names: dict[str, Any],
@@ -273,7 +275,7 @@ def _transfer(
     references = (ctypes.c_uint * len(order))(*(variable.reference for variable in variables))
     names[f"r{number}"] = references  # kept: its address is used below
     kind = _FUNCTION[operation.kind]
-    verb = "Get" if isinstance(operation, Read) else "Set"
+    verb = "Get" if isinstance(operation, ReadOutputs) else "Set"
     address = memory.address(offset)
     if isinstance(operation, Ramp):
         orders = (ctypes.c_int * len(order))(*[1] * len(order))
@@ -328,7 +330,7 @@ def _keep(operation: Keep | Shift, memory: Memory) -> list[str]:
 
 def _setting(schedule: Schedule) -> list[Write | Ramp]:
     """Return the operations that set inputs, for which values may be gathered."""
-    inside = [one for o in schedule.operations if isinstance(o, Step) for one in o.along]
+    inside = [one for o in schedule.operations if isinstance(o, DoStep) for one in o.along]
     return [*inside, *(o for o in schedule.operations if isinstance(o, Write | Ramp))]
 
 

@@ -43,7 +43,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)
-class Column:
+class OutputColumn:
     """A column of results: "damper.force", its kind in FMI's words, its unit or None."""
 
     name: str
@@ -62,14 +62,14 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class RunTable:
     """Rows of results: `time` [s] of shape (n,), and one array of shape (n,) per column.
 
     `made` is what the engine knows of how they were made.
     """
 
     time: Array
-    columns: tuple[Column, ...]
+    columns: tuple[OutputColumn, ...]
     values: dict[str, Array]
     made: dict[str, Any] = field(default_factory=dict)
 
@@ -77,7 +77,7 @@ class Table:
         return self.time if name == "time" else self.values[name]
 
 
-def to_frame(table: Table, made: Mapping[str, Any], complete: bool = True) -> Results:
+def to_frame(table: RunTable, made: Mapping[str, Any], complete: bool = True) -> Results:
     """Return a table as a pandas frame that draws itself.
 
     Its index is the time [s]; `attrs["units"]` maps columns (and "time") to units,
@@ -89,15 +89,15 @@ def to_frame(table: Table, made: Mapping[str, Any], complete: bool = True) -> Re
     return frame
 
 
-def from_frame(frame: pd.DataFrame) -> Table:
+def from_frame(frame: pd.DataFrame) -> RunTable:
     """Return the table of a frame that `to_frame` made."""
     kinds = {"f": "Real", "i": "Integer", "b": "Boolean"}
     units = frame.attrs.get("units", {})
     columns = tuple(
-        Column(str(name), kinds[frame[name].dtype.kind], units.get(name)) for name in frame
+        OutputColumn(str(name), kinds[frame[name].dtype.kind], units.get(name)) for name in frame
     )
     values = {column.name: frame[column.name].to_numpy() for column in columns}
-    return Table(frame.index.to_numpy(), columns, values)
+    return RunTable(frame.index.to_numpy(), columns, values)
 
 
 class CsvWriter:
@@ -109,7 +109,7 @@ class CsvWriter:
     ----------
     path : Path
         The file.
-    table : Table
+    table : RunTable
         The columns, and the first rows.
     made : mapping
         How the results are made; `scenario` is a text of several lines.
@@ -120,7 +120,7 @@ class CsvWriter:
         The file cannot be written, now or later; the text says what is kept.
     """
 
-    def __init__(self, path: Path, table: Table, made: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, table: RunTable, made: Mapping[str, Any]) -> None:
         self.path = path
         head = _head(table.columns, made)
         self._place = len(f"{_KIND}\n".encode())
@@ -136,7 +136,7 @@ class CsvWriter:
         """Close the file; without `finish` it stays marked incomplete."""
         self._file.close()
 
-    def write(self, table: Table) -> None:
+    def write(self, table: RunTable) -> None:
         """Append rows; a line is written whole or, when the disk is full, taken back."""
         end = self._file.seek(0, os.SEEK_END)
         lines = memoryview(_lines(table))
@@ -274,7 +274,7 @@ def _fixed(value: float | None) -> str:
     return f"{value:24.16e}" if known else f"{'null':>24}"
 
 
-def _head(columns: tuple[Column, ...], made: Mapping[str, Any]) -> str:
+def _head(columns: tuple[OutputColumn, ...], made: Mapping[str, Any]) -> str:
     twice = ("wall_time", "energy_residual")
     known = {k: v for k, v in made.items() if k not in (*twice, "scenario")}
     for key, kinds in (("integers", ("Integer", "Enumeration")), ("booleans", ("Boolean",))):
@@ -289,7 +289,7 @@ def _head(columns: tuple[Column, ...], made: Mapping[str, Any]) -> str:
     return f"{_KIND}\n{status}{''.join(lines)}{_SCENARIO}\n{scenario}{titles.getvalue()}"
 
 
-def _lines(table: Table) -> bytes:
+def _lines(table: RunTable) -> bytes:
     import pyarrow as pa
     from pyarrow.csv import WriteOptions, write_csv
 
@@ -328,13 +328,15 @@ def _read_csv(path: Path) -> Results:
     kinds = dict.fromkeys(made.pop("integers"), "Integer")
     kinds |= dict.fromkeys(made.pop("booleans"), "Boolean")
     matches = [match for title in titles if (match := _NAMED.fullmatch(title))]
-    columns = tuple(Column(m["name"], kinds.get(m["name"], "Real"), m["unit"]) for m in matches)
+    columns = tuple(
+        OutputColumn(m["name"], kinds.get(m["name"], "Real"), m["unit"]) for m in matches
+    )
     types = {"time": pa.float64()}
     types |= {c.name: pa.type_for_alias(c.dtype.replace("float64", "double")) for c in columns}
     options = ConvertOptions(column_types=types)
     read = read_csv(body, ReadOptions(column_names=list(types)), convert_options=options)
     values = {name: read[name].to_numpy(zero_copy_only=False) for name in read.column_names}
-    return to_frame(Table(values.pop("time"), columns, values), made, complete)
+    return to_frame(RunTable(values.pop("time"), columns, values), made, complete)
 
 
 def _read_parquet(path: Path) -> Results:
@@ -345,11 +347,11 @@ def _read_parquet(path: Path) -> Results:
     kinds = {"float64": "Real", "int64": "Integer", "bool": "Boolean"}
     values = {name: read[name].to_numpy() for name in read.column_names}
     columns = tuple(
-        Column(f.name, kinds[str(values[f.name].dtype)], f.metadata[b"unit"].decode() or None)
+        OutputColumn(f.name, kinds[str(values[f.name].dtype)], f.metadata[b"unit"].decode() or None)
         for f in read.schema
         if f.name != "time"
     )
-    return to_frame(Table(values.pop("time"), columns, values), about["made"], about["complete"])
+    return to_frame(RunTable(values.pop("time"), columns, values), about["made"], about["complete"])
 
 
 # What feeds the inputs of a run, by the connections of the scenario that its results hold.
@@ -446,13 +448,13 @@ class Results(pd.DataFrame, Viewable):
 
 def make_columns(
     system: System, descriptions: Mapping[str, Description] | None = None
-) -> tuple[Column, ...]:
+) -> tuple[OutputColumn, ...]:
     """Return the columns of the results: every output but texts, in the order of the file.
 
     `descriptions` are those of the FMUs that are stepped; else the scenario's own.
     """
     return tuple(
-        Column(f"{name}.{variable.name}", variable.kind, variable.unit)
+        OutputColumn(f"{name}.{variable.name}", variable.kind, variable.unit)
         for name, component in system.components.items()
         for variable in (descriptions or {}).get(name, component.description).of("output")
         if variable.kind != "String"

@@ -24,7 +24,7 @@ from ..version import __version__
 from . import Engine, Interrupted, StoppedError
 from .cosimulation import Cosimulation, ignore
 from .coupling_error import Again, again_by, as_data, estimate
-from .results import CsvWriter, Results, Table, cannot_write, to_frame, write_parquet
+from .results import CsvWriter, Results, RunTable, cannot_write, to_frame, write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,7 +71,7 @@ class Output:
         """The number of rows that are on disk."""
         return self._writer.rows if self._writer else 0
 
-    def begin(self, table: Table, made: Mapping[str, Any], remarks: Iterable[str] = ()) -> None:
+    def begin(self, table: RunTable, made: Mapping[str, Any], remarks: Iterable[str] = ()) -> None:
         """Write the first rows and log remarks; from now on there is a file that can be read."""
         self.begun = True
         if self.folder is None:
@@ -87,7 +87,7 @@ class Output:
         for line in remarks:
             self.log(line)
 
-    def write(self, table: Table) -> None:
+    def write(self, table: RunTable) -> None:
         """Append rows to a CSV file; a Parquet file is written whole at the end."""
         if self._writer:
             self._writer.write(table)
@@ -318,7 +318,7 @@ def _kept(system: System, engine: Engine, output: Output) -> Results:
         "scenario": scenario_text(system),
     }
 
-    def keep(rows: Table) -> None:
+    def keep(rows: RunTable) -> None:
         if output.begun:
             output.write(rows)
         else:
@@ -355,7 +355,7 @@ def _kept(system: System, engine: Engine, output: Output) -> Results:
     raise RunInterrupted(f"interrupted. {kept}", frame)
 
 
-def _judge_stroke(name: str, table: Table, output: Output) -> None:
+def _judge_stroke(name: str, table: RunTable, output: Output) -> None:
     ratio = table[name]
     if ratio.max() > 1:
         first = table.time[(ratio > 1).argmax()]

@@ -114,7 +114,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Step:
+class DoStep:
     """Let a component step.
 
     `along` sets inputs before each of its substeps, where it has several.
@@ -125,7 +125,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Read:
+class ReadOutputs:
     """Read outputs of one component and kind in one call; they are neighbours in memory."""
 
     component: int
@@ -191,7 +191,7 @@ class Restore:
     component: int
 
 
-Operation = Step | Read | Write | Ramp | Keep | Shift | Save | Restore
+Operation = DoStep | ReadOutputs | Write | Ramp | Keep | Shift | Save | Restore
 
 
 @dataclass(frozen=True)
@@ -219,7 +219,7 @@ def kind_of(variable: Variable) -> str:
 
 def reads(component: int, node: Node, names: Iterable[str]) -> list[Operation]:
     """Return the calls that read these outputs of a component."""
-    return [Read(component, *group) for group in _by_kind(node.outputs, names)]
+    return [ReadOutputs(component, *group) for group in _by_kind(node.outputs, names)]
 
 
 def writes(component: int, node: Node, values: Mapping[str, str]) -> list[Write]:
@@ -508,7 +508,7 @@ class _Plan:
     def _substeps(self, c: int, along: Sequence[str]) -> None:
         """Let a component step, and have these inputs arrive at their newest value with it."""
         given = writes(c, self.nodes[c], dict.fromkeys(along, ALONG))
-        self.operations.append(Step(c, tuple(given)))
+        self.operations.append(DoStep(c, tuple(given)))
         self._written.update({(c, name): self._clock for name in along})
 
     def _ramped_by_others(self, c: int) -> tuple[str, ...]:
@@ -656,7 +656,7 @@ def _jacobi(nodes: Sequence[Node]) -> Schedule:
         [o for o in node.outputs if (c, o) in passed_on or (c, o) not in refresh.outputs]
         for c, node in enumerate(nodes)
     ]
-    operations: list[Operation] = [Step(c) for c in range(len(nodes))]
+    operations: list[Operation] = [DoStep(c) for c in range(len(nodes))]
     for c, node in enumerate(nodes):
         operations += reads(c, node, early[c])
     for c, node in enumerate(nodes):

@@ -131,7 +131,7 @@ def run_figure(frame: pd.DataFrame, path: str | Path, *, title: str = "") -> Non
 
 def draw_run(frame: pd.DataFrame, title: str = "") -> Page:
     """Return the figure of a run, drawn and not yet written; see `run_figure`."""
-    run = _Run(frame)
+    run = _DrawnRun(frame)
     histories, loops = run.histories(), run.loops()
     others = run.others()
     histories += others[:_MOST_OTHERS]
@@ -166,7 +166,7 @@ def _draw_histories(figure: Drawn, grid: GridSpec, histories: list[Draw]) -> Non
 
 
 @dataclass(frozen=True)
-class _Run:
+class _DrawnRun:
     """What can be drawn of a frame of results; `shown` are the outputs that panels have so far."""
 
     frame: pd.DataFrame

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from ..component import HELD, LINEAR, controller, damper, sensors, source, structure
-from ..engine.coupled import LONGEST_SUBSTEP, Layout
+from ..engine.coupled import LONGEST_SUBSTEP, RecordLayout
 from ..engine.records import MEASURED, NOWHERE
 from ..errors import ScenarioError
 from ..fmu import catalogue
-from ..fmu.build import PACKAGE, Plan
-from ..fmu.component import Played, Reading, SourceSlave
+from ..fmu.build import PACKAGE, BuildPlan
+from ..fmu.component import Played, SampleFile, SourceSlave
 from ..physics.linear import packed
 from ..system.library import run_name
 from ..system.model import System
@@ -63,7 +63,7 @@ class Assembly:
     ----------
     scenario : System
         As it is left, without what feeds the inputs that are named.
-    system : Layout
+    system : RecordLayout
     inputs : list of Input
 
     Raises
@@ -84,7 +84,7 @@ class Assembly:
         fed = cut & {(c.target, c.input) for c in whole.wires}
         left = [c for c in whole.wires if (c.target, c.input) not in cut]
         self.scenario = replace(whole, wires=tuple(left))
-        self.system = Layout(self.scenario, only_on=True)
+        self.system = RecordLayout(self.scenario, only_on=True)
         self.parts: dict[str, Any] = self.system.slaves
         open_ones = [
             Input(name, port, (name, port) not in fed)
@@ -279,11 +279,11 @@ def _free_name(path: Path, taken: Mapping[str, Path]) -> str:
     return name
 
 
-def _of_part(part: str, reading: Reading | None) -> Reading | None:
+def _of_part(part: str, reading: SampleFile | None) -> SampleFile | None:
     if reading is None:
         return None
     chooser = f"{part}.{reading.chooser}" if reading.chooser else ""
-    return Reading(f"{part}.{reading.parameter}", chooser, reading.word)
+    return SampleFile(f"{part}.{reading.parameter}", chooser, reading.word)
 
 
 _COMPONENT = Path(__file__).with_name("component.py")
@@ -292,7 +292,7 @@ _COMPONENT = Path(__file__).with_name("component.py")
 def export_composite(
     scenario: str | Path,
     folder: Path,
-    build: Callable[[Plan, Path], Path],
+    build: Callable[[BuildPlan, Path], Path],
     overrides: Mapping[str, object] | None = None,
     inputs: Iterable[str] = (),
 ) -> Path:
@@ -320,7 +320,7 @@ def export_composite(
 
 def plan_of(
     scenario: str | Path, overrides: Mapping[str, object] | None = None, inputs: Iterable[str] = ()
-) -> Plan:
+) -> BuildPlan:
     """Return what to build; parameters and errors are those of `export_composite`."""
     file, named = resolve_scenario(scenario), list(inputs)
     given = (overrides or {}).items()
@@ -334,4 +334,4 @@ def plan_of(
     laws = dict.fromkeys(part.law.file for part in parts if part.law and part.law.file)
     baked = {"name": name, "scenario": str(file), "overrides": chosen, "inputs": named}
     files = {f"{name}.csv": path for name, path in assembly.files.items()}
-    return Plan(name, _COMPONENT, baked, files, tuple(effects), tuple(laws))
+    return BuildPlan(name, _COMPONENT, baked, files, tuple(effects), tuple(laws))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from ..component import controller, damper, sensors, source, structure
 from ..engine import records
-from ..engine.coupled import Layout, linked, room
+from ..engine.coupled import RecordLayout, linked, room
 from ..engine.records import (
     lay_controller,
     lay_damper,
@@ -315,7 +315,7 @@ SOURCE_SIZE, DAMPER_SIZE, STRUCTURE_SIZE, SAMPLED_SIZE = (
 )
 
 
-def fitted(system: Layout) -> Link:
+def fitted(system: RecordLayout) -> Link:
     """Return what fits functions of a whole scenario to the laws and effects of its components."""
     damper = records.damper_record(system.dampers.slots)
     structure = records.structure_record(system.structures.slots)

@@ -20,10 +20,10 @@ from ..fmu.build import plan
 from ..fmu.description import Variable
 from ..native import zig
 from ..native.build import SHIM, functions_text, keep, shim_digest, shim_sources
-from ..native.prepare import GUID, Prepared, prepare
+from ..native.prepare import GUID, PreparedComponent, prepare
 from ..system.model import Component, System
 from ..view.html import escape, page
-from .web_module import Numbers, Slider, module
+from .web_module import PageNumbers, Slider, module
 
 LOADERS = Path(__file__).parent
 """Folder with the loaders, and what pages are made of."""
@@ -108,7 +108,7 @@ def export_web(
     BuildError
         If zig is not installed, or the folder cannot be written.
     """
-    numbers = Numbers(file, overrides)
+    numbers = PageNumbers(file, overrides)
     description, wasm = described(numbers, sliders, shown), module(numbers.system)
     title = description["title"]
     contents: dict[str, str | bytes] = {
@@ -121,7 +121,7 @@ def export_web(
 
 
 def chosen(
-    numbers: Numbers,
+    numbers: PageNumbers,
     sliders: Mapping[str, Range] | None,
     among: Sequence[str] | Mapping[str, Range] = (),
 ) -> list[Slider]:
@@ -195,13 +195,13 @@ def _own_numbers(component: Component) -> list[Variable]:
 
 
 def described(
-    numbers: Numbers, named: Mapping[str, Range] | None = None, shown: Shown = NOTHING_MORE
+    numbers: PageNumbers, named: Mapping[str, Range] | None = None, shown: Shown = NOTHING_MORE
 ) -> dict[str, Any]:
     """Return what the loader reads, as plain data: see bristle.d.mts.
 
     Parameters
     ----------
-    numbers : Numbers
+    numbers : PageNumbers
         Of the scenario.
     named, shown
         As `sliders` and `shown` of `export_web`.
@@ -295,7 +295,7 @@ def export_component(name: str, folder: Path) -> list[Path]:
     return write_files(folder, contents)
 
 
-def _module(prepared: Prepared, guid: str, text: Path) -> bytes:
+def _module(prepared: PreparedComponent, guid: str, text: Path) -> bytes:
     content = hashlib.sha256(f"{zig.tools_web()} {guid}".encode()).hexdigest()[:24]
 
     def link(path: Path) -> None:

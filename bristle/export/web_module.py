@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..core.jit import RefusedError, library_text
 from ..core.progress import tell
 from ..engine import records, time_loop
-from ..engine.coupled import Layout, linked, substeps_of
+from ..engine.coupled import RecordLayout, linked, substeps_of
 from ..errors import BristleError, BuildError, ScenarioError
 from ..fmu.description import Variable
 from ..native import zig
@@ -70,7 +70,7 @@ class Slider:
     moved: tuple[Moved, ...]
 
 
-class Numbers:
+class PageNumbers:
     """What the time loop reads of a scenario, as bytes.
 
     Parameters
@@ -80,7 +80,7 @@ class Numbers:
 
     Attributes
     ----------
-    scenario, system : System, Layout
+    scenario, system : System, RecordLayout
     rows, substeps, h : int, int, float
         Rows behind the first, substeps of each, a substep [s].
     names, units : list of str
@@ -92,7 +92,7 @@ class Numbers:
 
     def __init__(self, file: str | Path, overrides: Mapping[str, object] | None = None) -> None:
         scenario = load_scenario(file, overrides)
-        system = self.system = Layout(scenario)
+        system = self.system = RecordLayout(scenario)
         self._file, self._overrides = file, dict(overrides or {})
         self.scenario, self.rows = scenario, scenario.steps
         self.substeps = substeps_of(scenario, system)
@@ -147,14 +147,14 @@ class Numbers:
         text = variable.description
         return Slider(name, variable.unit or "", text, value, low, high, moved)
 
-    def _with(self, name: str, value: float) -> Numbers:
-        numbers = Numbers(self._file, {**self._overrides, name: value})
+    def _with(self, name: str, value: float) -> PageNumbers:
+        numbers = PageNumbers(self._file, {**self._overrides, name: value})
         if (numbers.substeps, numbers.places) != (self.substeps, self.places):
             raise ScenarioError(f"{name} changes how the run is computed: no slider can move it.")
         return numbers
 
     def _moved(
-        self, name: str, values: Sequence[float], found: Sequence[Numbers]
+        self, name: str, values: Sequence[float], found: Sequence[PageNumbers]
     ) -> tuple[Moved, ...]:
         rest = np.array([np.frombuffer(one.data, dtype=np.uint8) for one in found])
         places = self._floats
@@ -219,12 +219,12 @@ SOURCE = Path(__file__).with_name("march.c")
 SITES = {"damper": damper.SETS, "structure": structure.SETS}
 
 
-def module(system: Layout | None = None) -> bytes:
+def module(system: RecordLayout | None = None) -> bytes:
     """Return the module, compiled if it is not in the cache: a minute or two, once.
 
     Parameters
     ----------
-    system : Layout, optional
+    system : RecordLayout, optional
         What it is to run, where a law or effect is not of the library.
 
     Raises

@@ -55,7 +55,7 @@ _NAMESPACE = UUID("7c0b8c8e-3d0f-5d0a-9b55-62726973746c")
 
 
 @dataclass(frozen=True)
-class Plan:
+class BuildPlan:
     """Everything that decides an FMU's bytes.
 
     `name` is the model's name, `component` its source; `baked` goes into the FMU as JSON, `files`
@@ -94,7 +94,7 @@ class Plan:
         }  # fmt: skip
 
     @classmethod
-    def from_data(cls, data: Mapping[str, Any]) -> Plan:
+    def from_data(cls, data: Mapping[str, Any]) -> BuildPlan:
         """Return the plan that `as_data` gave."""
         files = {name: Path(path) for name, path in data["files"].items()}
         effects, laws = (tuple(map(Path, data[key])) for key in ("effects", "laws"))
@@ -135,7 +135,7 @@ def plan(
     drive: str = VOLTAGE.name,
     step: float | None = None,
     offers: Iterable[str] | None = None,
-) -> Plan:
+) -> BuildPlan:
     """Return what to build.
 
     Parameters
@@ -214,7 +214,7 @@ def plan(
             baked["starts"] = _checked_starts(component, known, starts)
     law = getattr(kind, "law", "")
     laws = tuple(file for name, file in own_laws().items() if name == split_form(law)[0])
-    return Plan(chosen, path, baked, files, effects, laws)
+    return BuildPlan(chosen, path, baked, files, effects, laws)
 
 
 def _checked_offers(
@@ -259,7 +259,7 @@ def _only(right: str, component: str, what: str) -> None:
         raise BuildError(f"{what} goes into {right}, not into {component}.")
 
 
-def build(what: Plan, folder: Path) -> Path:
+def build(what: BuildPlan, folder: Path) -> Path:
     """Build an FMU into a folder, unless the same one stands there; return its path.
 
     Raises
@@ -294,7 +294,7 @@ def _pythonfmu_is_whole() -> bool:
     return (Path(pythonfmu.__file__).parent / "resources" / "binaries").is_dir()
 
 
-def _build_elsewhere(what: Plan, guid: str, target: Path) -> None:
+def _build_elsewhere(what: BuildPlan, guid: str, target: Path) -> None:
     """Build in a fresh interpreter, where no FMU was loaded."""
     order = {"plan": what.as_data(), "guid": guid, "target": str(target)}
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
@@ -310,10 +310,10 @@ def _build_elsewhere(what: Plan, guid: str, target: Path) -> None:
 def _serve() -> None:
     """Build what stands on the standard input; the other end of `_build_elsewhere`."""
     order = json.load(sys.stdin)
-    _build_here(Plan.from_data(order["plan"]), order["guid"], Path(order["target"]))
+    _build_here(BuildPlan.from_data(order["plan"]), order["guid"], Path(order["target"]))
 
 
-def _build_here(what: Plan, guid: str, target: Path) -> None:
+def _build_here(what: BuildPlan, guid: str, target: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
         _pack(_build_loose(what, guid, Path(temporary)), target, what)
 
@@ -335,7 +335,7 @@ def _write_own(path: Path, folder: Path, package: str) -> None:
     _write_renamed(text, folder / path.name, package)
 
 
-def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
+def _build_loose(what: BuildPlan, guid: str, folder: Path) -> Path:
     """Lay the sources out, let pythonfmu build; return its FMU, still with times in it."""
     from pythonfmu.builder import FmuBuilder
 
@@ -428,7 +428,7 @@ def planned(
     building: catalogue.BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
-) -> Plan:
+) -> BuildPlan:
     """Return the plan of what `ensure` builds.
 
     Parameters

@@ -81,7 +81,7 @@ class EffectSlave(Slave):
         }
 
 
-class Reading(NamedTuple):
+class SampleFile(NamedTuple):
     """A parameter, a text, that samples are read from where another one is a certain word.
 
     Without a `chooser` it always is.
@@ -98,8 +98,8 @@ class Played(NamedTuple):
     The CSV's header is `header`; None: `time [s]` and any other.
     """
 
-    file: Optional[Reading]  # noqa: UP045 (read by Python 3.9)
-    pairs: Optional[Reading]  # noqa: UP045
+    file: Optional[SampleFile]  # noqa: UP045 (read by Python 3.9)
+    pairs: Optional[SampleFile]  # noqa: UP045
     header: Optional[str]  # noqa: UP045
 
 
@@ -260,8 +260,8 @@ class SourceSlave(ComponentSlave):
 
     icon = "source"
     functions: ClassVar[Any] = source
-    file_of: ClassVar[Optional[Reading]] = None  # noqa: UP045 (read by Python 3.9)
-    pairs_of: ClassVar[Optional[Reading]] = None  # noqa: UP045
+    file_of: ClassVar[Optional[SampleFile]] = None  # noqa: UP045 (read by Python 3.9)
+    pairs_of: ClassVar[Optional[SampleFile]] = None  # noqa: UP045
     header: ClassVar[Optional[str]] = None  # noqa: UP045
     signal: Optional[tuple[list[float], list[float]]] = None  # noqa: UP045
     """Times [s] and values that are played in place of a file."""
@@ -281,7 +281,7 @@ class SourceSlave(ComponentSlave):
             return read_steps(self[self.pairs_of.parameter])
         return [0.0], [0.0]
 
-    def _is_read(self, reading: Reading) -> bool:
+    def _is_read(self, reading: SampleFile) -> bool:
         return not reading.chooser or self[reading.chooser] == reading.word
 
     def made_constants(self) -> Any:
@@ -311,8 +311,8 @@ class SignalSlave(SourceSlave):
     """Parameters of a test signal, and what follows from them."""
 
     rated = False
-    file_of = Reading("file", "kind", "csv")
-    pairs_of = Reading("steps", "kind", "steps")
+    file_of = SampleFile("file", "kind", "csv")
+    pairs_of = SampleFile("steps", "kind", "steps")
     texts: ClassVar[dict[int, str]] = {
         source.NO_KIND: f"kind {{kind!r}} is none of {', '.join(KINDS)}.",
         source.JUMPS: ("kind 'steps' jumps: no velocity fits it. Take csv with ramps instead."),

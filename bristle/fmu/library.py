@@ -228,7 +228,7 @@ def _logger(heard: Heard) -> Any:
     return _LOGGER(heard)
 
 
-class Library:
+class FmuLibrary:
     """A loaded FMU library.
 
     Parameters
@@ -362,7 +362,7 @@ class Handle:
 
     _output_slopes = "GetRealOutputDerivatives"
 
-    def __init__(self, library: Library, handle: int) -> None:
+    def __init__(self, library: FmuLibrary, handle: int) -> None:
         self.library = library
         self.handle = handle
 
@@ -507,7 +507,7 @@ class HandleFmi3(Handle):
 
     _output_slopes = "GetOutputDerivatives"
 
-    def __init__(self, library: Library, handle: int) -> None:
+    def __init__(self, library: FmuLibrary, handle: int) -> None:
         super().__init__(library, handle)
         self._start = 0.0
         self._stop: float | None = None

@@ -17,7 +17,7 @@ from ..core.progress import Count, tell
 from ..errors import BuildError
 from ..fmu import documentation
 from ..fmu.archive import write_archive
-from ..fmu.build import Plan, built_guid, planned
+from ..fmu.build import BuildPlan, built_guid, planned
 from ..fmu.catalogue import BuildingData
 from . import zig
 from .description import text_of
@@ -47,12 +47,12 @@ def shim_digest(fmi: int = 2) -> str:
     return content.hexdigest()
 
 
-def functions_text(what: Plan, functions: str) -> Path:
+def functions_text(what: BuildPlan, functions: str) -> Path:
     """Return the file with the C of a component's functions, compiled if need be.
 
     Parameters
     ----------
-    what : Plan
+    what : BuildPlan
     functions : str
         Their digest.
 
@@ -246,13 +246,17 @@ _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 
 
 def build(
-    what: Plan, folder: Path, platforms: Sequence[Platform], fmi: int = 2, sources: bool = False
+    what: BuildPlan,
+    folder: Path,
+    platforms: Sequence[Platform],
+    fmi: int = 2,
+    sources: bool = False,
 ) -> Path:
     """Build a native FMU into a folder, unless the same one stands there; return its path.
 
     Parameters
     ----------
-    what : Plan
+    what : BuildPlan
         As for the FMU that runs in Python.
     folder : Path
     platforms : sequence of Platform

@@ -169,7 +169,7 @@ def _unsigned(kind: Type) -> str:
     return "bool" if kind == "i1" else "uintptr_t" if kind == "ptr" else f"uint{str(kind)[1:]}_t"
 
 
-class Line(NamedTuple):
+class CLine(NamedTuple):
     """A statement: its text, the variable that it does no more than set, the label that it is."""
 
     text: str
@@ -177,7 +177,7 @@ class Line(NamedTuple):
     label: str = ""
 
 
-def needed(lines: list[Line]) -> list[Line]:
+def needed(lines: list[CLine]) -> list[CLine]:
     """Return the lines without those that set what nothing reads."""
     while True:
         words = [set(re.findall(r"\w+", one.text)) for one in lines]
@@ -282,17 +282,17 @@ class _Body:
                 self._block = f"%{line.split(':')[0]}"
             named.append((self._block, line))
         declared = [self._note_phi(*one) for one in named if _PHI.match(one[1])]
-        found: list[Line] = []
+        found: list[CLine] = []
         for self._block, line in named:
             self._target = ""
             if not line.startswith(" "):
-                found.append(Line(f"{self._given.locals.of(self._block)}: ;", label=self._block))
+                found.append(CLine(f"{self._given.locals.of(self._block)}: ;", label=self._block))
             elif _PHI.match(line):
                 name = self._given.locals.of(line.split()[0])
-                found.append(Line(f"    {name} = {name}_next;"))
+                found.append(CLine(f"    {name} = {name}_next;"))
             else:
                 said = self._statement(line.strip())
-                found.append(Line(f"    {said}", self._target))
+                found.append(CLine(f"    {said}", self._target))
         jumped = [one for one in found if not one.label or one.label in self._jumped]
         return declared + [one.text for one in needed(jumped)]
 

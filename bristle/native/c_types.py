@@ -68,7 +68,7 @@ _LITERAL = {"true", "false", "null", "undef", "poison", "zeroinitializer", "c"}
 
 
 @dataclass(frozen=True)
-class Structure:
+class CStructure:
     """A type with parts."""
 
     parts: tuple[Type, ...]
@@ -82,7 +82,7 @@ class Items:
     item: Type
 
 
-Type = str | Structure | Items
+Type = str | CStructure | Items
 """A plain type by its name in LLVM's text, or one that is made of others."""
 
 
@@ -109,7 +109,7 @@ class Types:
             while not tokens.passed("}"):
                 parts.append(self.read(tokens))
                 tokens.passed(",")
-            return Structure(tuple(parts))
+            return CStructure(tuple(parts))
         if word == "[":
             count = int(tokens.take())
             tokens.expect("x")
@@ -171,7 +171,7 @@ def part_of(kind: Type, index: str) -> tuple[Type, str]:
     """
     if isinstance(kind, Items):
         return kind.item, f".at[{index}]"
-    if isinstance(kind, Structure):
+    if isinstance(kind, CStructure):
         return kind.parts[int(index)], f".f{index}"
     raise ValueError(f"{kind} has no parts")
 

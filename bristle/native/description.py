@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..component import HELD
 from ..errors import BuildError
-from ..fmu.component import STEP_LENGTH, ComponentSlave, Played, Reading
+from ..fmu.component import STEP_LENGTH, ComponentSlave, Played, SampleFile
 from ..fmu.description import NATIVE
 from ..fmu.model_description import type_definitions, unit_definitions
 from ..version import __version__
@@ -289,7 +289,7 @@ def _signal(one: Played, names: dict[str, int]) -> str:
     return f"    {{{_choice(one.file, names)}, {_choice(one.pairs, names)}, {header}}},\n"
 
 
-def _choice(reading: Reading | None, names: dict[str, int]) -> str:
+def _choice(reading: SampleFile | None, names: dict[str, int]) -> str:
     """Return from which String a signal is read, and where another one has which word."""
     if reading is None:
         return '{-1, -1, ""}'

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from ..core.jit import digest
 from ..errors import BristleError, BuildError
 from ..fmu import catalogue
-from ..fmu.build import PACKAGE, Plan
+from ..fmu.build import PACKAGE, BuildPlan
 from ..fmu.component import ComponentSlave
 from ..fmu.controller import SampledSlave
 from ..fmu.own_controller import COMPILED_MAY_USE, OwnController
@@ -37,7 +37,7 @@ COMPILER = {
 """Environment of the process that compiles: its text is the same on every machine."""
 
 
-class Prepared(NamedTuple):
+class PreparedComponent(NamedTuple):
     """A component's model description and C tables, `GUID` in both; the digest of its functions."""
 
     description: str
@@ -45,12 +45,12 @@ class Prepared(NamedTuple):
     functions: str
 
 
-def prepare(what: Plan, fmi: int = 2) -> Prepared:
+def prepare(what: BuildPlan, fmi: int = 2) -> PreparedComponent:
     """Return what Python knows of a planned component.
 
     Parameters
     ----------
-    what : Plan
+    what : BuildPlan
     fmi : int
         2 or 3: the version of FMI that the description follows.
 
@@ -65,15 +65,15 @@ def prepare(what: Plan, fmi: int = 2) -> Prepared:
     except ValueError as error:  # what a component says of a design that it cannot take
         raise BuildError(f"{what.name}: {error}") from error
     about = description_fmi3 if fmi == 3 else description
-    return Prepared(about(slave, GUID), made, _digest_of(slave))
+    return PreparedComponent(about(slave, GUID), made, _digest_of(slave))
 
 
-def compile_functions(what: Plan, functions: str, target: Path) -> None:
+def compile_functions(what: BuildPlan, functions: str, target: Path) -> None:
     """Write the C of a planned component's functions.
 
     Parameters
     ----------
-    what : Plan
+    what : BuildPlan
     functions : str
         Their digest.
     target : Path
@@ -87,7 +87,7 @@ def compile_functions(what: Plan, functions: str, target: Path) -> None:
     answer_of("bristle.native.prepare", order, what.name)
 
 
-def component_of(what: Plan) -> ComponentSlave:
+def component_of(what: BuildPlan) -> ComponentSlave:
     """Return a planned component as a Python object.
 
     Raises
@@ -163,7 +163,7 @@ def _text(slave: ComponentSlave, files: Sequence[Path]) -> str:
 def serve() -> None:
     """Do what stands on the standard input; the other end of `compile_functions`."""
     order: dict[str, Any] = json.load(sys.stdin)
-    what = Plan.from_data(order["plan"])
+    what = BuildPlan.from_data(order["plan"])
     try:
         slave = component_of(what)
         if _digest_of(slave) != order["functions"]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky
 
-from .case import Case, Problem, room
+from .case import Case, ControlProblem, room
 from .response import V_0, V_1, VOLTAGE_0, VOLTAGE_1, damper_end
 
 Array = NDArray[np.float64]
@@ -50,12 +50,12 @@ def largest_force(case: Case, speed: float) -> float:
     return most
 
 
-def bound_of(problem: Problem, statistic: str, most: float) -> float | None:
+def bound_of(problem: ControlProblem, statistic: str, most: float) -> float | None:
     """Return what no force within the rules gives less than; None where the solver finds none.
 
     Parameters
     ----------
-    problem : Problem
+    problem : ControlProblem
     statistic : "peak" or "rms"
     most : largest force [N]
     """
@@ -99,7 +99,7 @@ def bound_of(problem: Problem, statistic: str, most: float) -> float | None:
     return found
 
 
-def _without_damper(problem: Problem) -> Array:
+def _without_damper(problem: ControlProblem) -> Array:
     """Return the states (N + 1, m) of the building under the ground motion alone."""
     plant, ground = problem.case.plant, problem.case.ground
     x = np.zeros((problem.last + 1, len(plant.phi)))

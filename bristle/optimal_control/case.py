@@ -16,7 +16,7 @@ from ..component.damper import REMEMBERED
 from ..component.structure import Constants
 from ..core.jit import compiled
 from ..core.text import unknown
-from ..engine.coupled import Layout
+from ..engine.coupled import RecordLayout
 from ..errors import ScenarioError, not_usable
 from ..fmu import catalogue
 from ..physics import damper as damper_laws
@@ -25,7 +25,7 @@ from ..physics.generate import Functions
 from ..physics.tuples import Setup
 from ..system.model import Component, Connection, Signal, System
 from .horizon import PULL_BACK, RECEDE, RESPOND, SLOPES, START, Horizon, compute
-from .response import STATES, TRIED, VOLTAGE_0, X_0, Course, Gradient, Plant
+from .response import STATES, TRIED, VOLTAGE_0, X_0, Course, DrivenPlant, Gradient
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Case:
         Names of the components, and of the damper's input that is free.
     output, unit : str
         The output that is judged, "component.port", and its unit.
-    plant, setup : Plant, Setup
+    plant, setup : DrivenPlant, Setup
     functions : Functions
         Of the damper.
     ground : (N + 1,) array
@@ -75,7 +75,7 @@ class Case:
     command: str
     output: str
     unit: str
-    plant: Plant
+    plant: DrivenPlant
     setup: Setup
     functions: Functions
     ground: Array
@@ -104,7 +104,7 @@ def case_of(scenario: System, output: str) -> Case:
         the structure is not linear; if there is no such output of the structure; if a component
         cannot be compiled.
     """
-    system = Layout(scenario)
+    system = RecordLayout(scenario)
     building, damper = (_only(system, kind, scenario) for kind in ("structure", "damper"))
     slave, law = system.slaves[building], system.slaves[damper]
     _refuse_effects(slave, scenario, building)
@@ -141,7 +141,7 @@ def _refuse_effects(slave: Any, scenario: System, building: str) -> None:
         )
 
 
-def _unit_of(output: str, scenario: System, system: Layout, building: str) -> str:
+def _unit_of(output: str, scenario: System, system: RecordLayout, building: str) -> str:
     """Return the unit of an output of the structure."""
     if output not in system.outputs or not output.startswith(f"{building}."):
         known = [name for name in system.outputs if name.startswith(f"{building}.")]
@@ -172,7 +172,7 @@ def _compilable(setup: Any) -> Setup:
     return given
 
 
-def _only(system: Layout, kind: str, scenario: System) -> str:
+def _only(system: RecordLayout, kind: str, scenario: System) -> str:
     found = system.names[kind]
     if len(found) != 1:
         listed = f" ({', '.join(found)})" if found else ""
@@ -183,7 +183,9 @@ def _only(system: Layout, kind: str, scenario: System) -> str:
     return found[0]
 
 
-def _refuse_other_forces(scenario: System, system: Layout, building: str, pushed: str) -> None:
+def _refuse_other_forces(
+    scenario: System, system: RecordLayout, building: str, pushed: str
+) -> None:
     """Refuse forces on the structure besides the damper's."""
     slave = system.slaves[building]
     for index in slave._inputs:
@@ -205,7 +207,7 @@ def _step(scenario: System, frequency: float) -> float:
     return whole * scenario.step
 
 
-def _ground(system: Layout, building: str, h: float, scenario: System) -> Array:
+def _ground(system: RecordLayout, building: str, h: float, scenario: System) -> Array:
     name, _ = system.source_of.get((building, "ground_acceleration"), ("", ""))
     if name not in system.names["source"]:
         raise ScenarioError(
@@ -230,9 +232,11 @@ def _ground(system: Layout, building: str, h: float, scenario: System) -> Array:
     return found
 
 
-def _plant(slave: Any, h: float, port: int, felt: list[str], output: str, signed: bool) -> Plant:
+def _plant(
+    slave: Any, h: float, port: int, felt: list[str], output: str, signed: bool
+) -> DrivenPlant:
     """Return the matrices of a structure, found by trying each state and input in turn."""
-    tried = _Tried(slave, h)
+    tried = _UnitResponse(slave, h)
     m, names = tried.states, [slave.vars[index].name for index in slave._outputs]
     rows = np.array([tried.shown(j, 0) for j in range(m)]).T
     displacement, velocity = rows[names.index(felt[0])], rows[names.index(felt[1])]
@@ -241,14 +245,14 @@ def _plant(slave: Any, h: float, port: int, felt: list[str], output: str, signed
         force_0, force_1 = np.zeros(m), force_0 + force_1
     at = names.index(output)
     gain = float(velocity @ (force_0 + force_1))
-    return Plant(
+    return DrivenPlant(
         h, np.array([tried.stepped(j, 0, 0) for j in range(m)]).T.copy(), tried.stepped(-1, 0, 0),
         tried.stepped(-1, 0, 1), force_0, force_1, displacement.copy(), velocity.copy(),
         rows[at].copy(), float(tried.shown(-1, port)[at]), float(tried.shown(-1, 0)[at]), -h / gain,
     )  # fmt: skip
 
 
-class _Tried:
+class _UnitResponse:
     """A linear structure, one state or one input of which is 1 and all else 0."""
 
     def __init__(self, slave: Any, h: float) -> None:
@@ -365,7 +369,7 @@ ROUNDING = 1e-15
 """Least change by which a derivative is told, in the unit of what changes."""
 
 
-class Problem:
+class ControlProblem:
     """The response of a case to a voltage history, within a window from its begin.
 
     Parameters

@@ -22,7 +22,7 @@ from ..system.scenario import load_scenario
 from ..system.toml import save
 from ..view import Viewable
 from .bound import FASTER, bound_of, largest_force
-from .case import SCENARIO_FILE, Case, Problem, case_of, refuse_folder, with_voltage
+from .case import SCENARIO_FILE, Case, ControlProblem, case_of, refuse_folder, with_voltage
 from .search import descended, foreseen, levelled
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def limit(
     loaded = load_scenario(scenario, overrides)
     case = case_of(loaded, output)
     tell("compiling the laws, once")
-    whole = Problem(case)
+    whole = ControlProblem(case)
     levels = np.linspace(0.0, case.v_max, LEVELS).tolist()
     constant = {V: statistic_of(whole.respond(whole.level(V)), statistic) for V in levels}
     if not np.isfinite([*constant.values()]).all():
@@ -224,7 +224,7 @@ def _checked(statistic: str, previews: Iterable[float], starts: int) -> list[flo
     return seen
 
 
-def _window(whole: Problem, voltage: float) -> int:
+def _window(whole: ControlProblem, voltage: float) -> int:
     """Return the instant behind which nothing large happens under a constant voltage [V]."""
     case, size = whole.case, np.abs(whole.respond(whole.level(voltage)))
     large = np.flatnonzero(size > QUIET * size.max())
@@ -233,13 +233,13 @@ def _window(whole: Problem, voltage: float) -> int:
 
 
 def _searched_from_all(
-    whole: Problem, last: int, statistic: str, rest: float, starts: int
-) -> tuple[Problem, list[tuple[Start, Array]]]:
+    whole: ControlProblem, last: int, statistic: str, rest: float, starts: int
+) -> tuple[ControlProblem, list[tuple[Start, Array]]]:
     """Search up to an instant from all starts; return that problem, and what came out, best first.
 
     Parameters
     ----------
-    whole : Problem of the whole motion
+    whole : ControlProblem of the whole motion
     last : instant
     statistic : "peak" or "rms"
     rest : voltage behind that instant, and the first start [V]
@@ -247,7 +247,7 @@ def _searched_from_all(
     """
     case = whole.case
     every = max(1, round(1.0 / (case.frequency * NODES_PER_PERIOD * case.plant.h)))
-    problem = Problem(case, every, last)
+    problem = ControlProblem(case, every, last)
     begins = _begins(problem, rest, starts)
     count, found = Count("search", len(begins)), []
     for name, values in begins.items():
@@ -256,7 +256,7 @@ def _searched_from_all(
     return problem, sorted(found, key=lambda one: one[0].value)
 
 
-def _begins(problem: Problem, best: float, count: int) -> dict[str, Array]:
+def _begins(problem: ControlProblem, best: float, count: int) -> dict[str, Array]:
     """Return where searches begin, by name: constant voltages, then random ones."""
     n, v_max = len(problem.nodes), problem.case.v_max
     known = {f"{V:g} {problem.case.command_unit}": V for V in (best, 0.125 * v_max, v_max)}
@@ -268,7 +268,12 @@ def _begins(problem: Problem, best: float, count: int) -> dict[str, Array]:
 
 
 def _searched(
-    problem: Problem, whole: Problem, name: str, values: Array, statistic: str, rest: float
+    problem: ControlProblem,
+    whole: ControlProblem,
+    name: str,
+    values: Array,
+    statistic: str,
+    rest: float,
 ) -> tuple[Start, Array]:
     """Search from voltages (n,) at the nodes; return what came out, and the voltage (N + 1,)."""
     begin = _continued(problem, problem.between(values), rest)
@@ -280,14 +285,19 @@ def _searched(
     return Start(name, before, statistic_of(whole.respond(voltage), statistic)), voltage
 
 
-def _continued(problem: Problem, voltage: Array, rest: float) -> Array:
+def _continued(problem: ControlProblem, voltage: Array, rest: float) -> Array:
     """Return a voltage (n,) at all instants of a case: behind the window it is `rest` [V]."""
     tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
     return np.append(voltage, tail)
 
 
 def _seen_ahead(
-    problem: Problem, whole: Problem, seconds: float, rest: float, least: float, statistic: str
+    problem: ControlProblem,
+    whole: ControlProblem,
+    seconds: float,
+    rest: float,
+    least: float,
+    statistic: str,
 ) -> float:
     """Return what a receding horizon reaches; the cost is never told by less than 2 % of least."""
     voltage = foreseen(problem, seconds, rest, 0.02 * least, statistic)
@@ -295,7 +305,7 @@ def _seen_ahead(
 
 
 def _bound(
-    problem: Problem, whole: Problem, voltage: Array, statistic: str
+    problem: ControlProblem, whole: ControlProblem, voltage: Array, statistic: str
 ) -> tuple[float | None, float]:
     """Return the lower bound, None where effects of the damper allow none; the largest force."""
     tell("a lower bound")

@@ -23,7 +23,7 @@ X_0, V_0, X_1, V_1, VOLTAGE_0, VOLTAGE_1, TRIED, STATES = range(8)
 from here on its states."""
 
 
-class Plant(NamedTuple):
+class DrivenPlant(NamedTuple):
     """A building over a step of `h` [s], with m states, and the damper's place in it.
 
     Attributes
@@ -95,7 +95,7 @@ def start(plant: Any, setup: Any, voltage: Any, course: Course) -> None:
 
     Parameters
     ----------
-    plant, setup, course : Plant, Setup, Course
+    plant, setup, course : DrivenPlant, Setup, Course
     voltage : (N + 1,) V
     """
     x, v = dot(plant.displacement, course.x[0]), dot(plant.velocity, course.x[0])
@@ -110,7 +110,7 @@ def settled_force(
 
     Parameters
     ----------
-    plant, setup : Plant, Setup
+    plant, setup : DrivenPlant, Setup
     course : Course; the damper's states at instant k + 1 are filled
     k : the step's number
     scale : largest force so far [N]
@@ -146,7 +146,7 @@ def respond(
 
     Parameters
     ----------
-    plant, setup : Plant, Setup
+    plant, setup : DrivenPlant, Setup
     ground, voltage : (N + 1,) m/s2 and V at the instants, linear between
     first, last : instants
     course : Course
@@ -272,7 +272,7 @@ def pull_back(plant: Any, weights: Any, first: int, last: int, gradient: Gradien
 
     Parameters
     ----------
-    plant : Plant
+    plant : DrivenPlant
     weights : (N + 1,) of the outputs at the instants
     first, last : instants
     gradient : Gradient; `by_voltage` is filled

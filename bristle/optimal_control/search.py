@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog, minimize
 
 from ..engine.results import statistic_of
-from .case import Problem
+from .case import ControlProblem
 from .horizon import Horizon
 
 Array = NDArray[np.float64]
@@ -36,12 +36,12 @@ GAIN = 1e-3
 """Share of the peak that a linear program must promise."""
 
 
-def descended(problem: Problem, values: Array, statistic: str) -> Array:
+def descended(problem: ControlProblem, values: Array, statistic: str) -> Array:
     """Return the voltages (n,) at the nodes that lower a statistic from those given.
 
     Parameters
     ----------
-    problem : Problem
+    problem : ControlProblem
     values : (n,) V, where the search begins
     statistic : "peak" or "rms"
     """
@@ -50,7 +50,7 @@ def descended(problem: Problem, values: Array, statistic: str) -> Array:
     return values
 
 
-def _descend(problem: Problem, values: Array, norm: float) -> Array:
+def _descend(problem: ControlProblem, values: Array, norm: float) -> Array:
     scale = float(np.abs(problem.respond(problem.between(values))).max()) or 1.0
     v_max = problem.case.v_max
 
@@ -76,7 +76,7 @@ def _descend(problem: Problem, values: Array, norm: float) -> Array:
     return better
 
 
-def levelled(problem: Problem, values: Array) -> tuple[Array, float]:
+def levelled(problem: ControlProblem, values: Array) -> tuple[Array, float]:
     """Return the voltages (n,) at the nodes after linear programs, and the peak with them.
 
     Parameters
@@ -132,7 +132,7 @@ def _swings(y: Array, least: float, nodes: NDArray[np.int64]) -> NDArray[np.int6
     return found
 
 
-def _row(problem: Problem, k: int, sign: float) -> Array:
+def _row(problem: ControlProblem, k: int, sign: float) -> Array:
     """Return what the voltages at the nodes (n,) do to |y| at instant k."""
     weights = np.zeros(problem.last + 1)
     weights[k] = sign
@@ -173,12 +173,14 @@ POWERS = (2.0, 8.0)
 is the better: what is not seen may be larger than all that is."""
 
 
-def foreseen(problem: Problem, seconds: float, start: float, least: float, statistic: str) -> Array:
+def foreseen(
+    problem: ControlProblem, seconds: float, start: float, least: float, statistic: str
+) -> Array:
     """Return the voltage (N + 1,) [V] of a receding horizon at the instants of a problem.
 
     Parameters
     ----------
-    problem : Problem
+    problem : ControlProblem
     seconds : for which the ground motion is seen ahead [s]
     start : voltage at the begin [V]
     least : size of the output that counts for nothing
@@ -191,7 +193,9 @@ def foreseen(problem: Problem, seconds: float, start: float, least: float, stati
     return min(found, key=lambda voltage: statistic_of(problem.respond(voltage), statistic))
 
 
-def _receded(problem: Problem, seconds: float, start: float, least: float, power: float) -> Array:
+def _receded(
+    problem: ControlProblem, seconds: float, start: float, least: float, power: float
+) -> Array:
     case = problem.case
     h, period = case.plant.h, 1.0 / case.frequency
     every = max(1, round(period / DECISIONS / h))

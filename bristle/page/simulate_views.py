@@ -20,7 +20,7 @@ from ..engine.coupled import Coupled
 from ..engine.results import accelerations, spectra
 from ..errors import BristleError, ScenarioError
 from ..export.web import Shown, described, offered
-from ..export.web_module import Numbers, module
+from ..export.web_module import PageNumbers, module
 from ..fmu import catalogue
 from ..fmu.catalogue import component_of_law
 from ..fmu.controller import ControllerSlave
@@ -399,7 +399,7 @@ def numbers_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """
     asked = asked_for(folder, {**arguments, "values": {}})
     sliders = {one["name"]: (one["low"], one["high"]) for one in _sliders(asked.load())}
-    return described(Numbers(stock_file(asked.scenario), asked.given()), shown=Shown(sliders))
+    return described(PageNumbers(stock_file(asked.scenario), asked.given()), shown=Shown(sliders))
 
 
 def module_view(folder: Path, arguments: Mapping[str, Any]) -> bytes:

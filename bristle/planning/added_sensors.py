@@ -30,7 +30,7 @@ Show = Callable[[list[Measurement]], Sites]
 
 
 @dataclass(frozen=True)
-class Added:
+class AddedSensors:
     """What a sensor would change most of what the tests show.
 
     `channel` of the sensor; `outcome` with the tests alone (`now`) and with the sensor too
@@ -95,7 +95,7 @@ def added_sensors(
     tests: Sequence[SimulatedTest],
     then: Mapping[str, Sequence[Information]],
     rows: Sequence[Outcome],
-) -> list[Added]:
+) -> list[AddedSensors]:
     """Return what sensors that the study lacks would add, the most useful one first.
 
     Those that help by `HELPS` or more; of others the best one alone.
@@ -161,7 +161,7 @@ def _told(
     values: Mapping[Key, float],
     stand: Mapping[str, Stated],
     rows: Sequence[Outcome],
-) -> Added:
+) -> AddedSensors:
     """Return what a sensor helps with most: what it settles, or else its largest factor."""
     settled = [
         key
@@ -184,7 +184,7 @@ def _told(
         row = replace(row, now=needed / (factor * values[best]), then=needed / values[best])
     else:
         row = replace(row, now=row.then, then=row.then / factor)
-    return Added(channel, row, factor, bool(settled))
+    return AddedSensors(channel, row, factor, bool(settled))
 
 
 def _visible(row: Outcome, purposes: Purposes, name: str, sizes: tuple[float, float]) -> Outcome:

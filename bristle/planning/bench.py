@@ -22,9 +22,9 @@ from .limits import RigLimits, limits_of_runs, with_given
 from .outcome import Outcome, outcomes
 from .plan import Plan
 from .questions import (
-    Measured,
     PlanRequest,
     Purposes,
+    RunsAtHand,
     SizedRival,
     Stated,
     cost_of,
@@ -71,7 +71,7 @@ def plan_study(
     rig = with_given(limits_of_runs(runs), limits or {})
     request = request if request is not None and not request.nothing else default_request(study)
     purposes = _purposes(request, opened, rig, study.drive)
-    measured = Measured(opened.problem.runs, opened.held_out.runs)
+    measured = RunsAtHand(opened.problem.runs, opened.held_out.runs)
     found = stated(purposes, opened.searched, measured, max(opened.before.z, 1.0), seed)
     tell("looking at tests")
     planner = Planner(

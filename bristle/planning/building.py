@@ -26,13 +26,21 @@ from ..physics.effect import plain_name
 from ..prediction.model_system import BuildingWithFile
 from ..study.rig import building_of
 from ..study.study import Study
-from .added_sensors import Added, added_sensors, place_of
+from .added_sensors import AddedSensors, added_sensors, place_of
 from .folder import PlannedRun
 from .information import DRAWS, Goal, Information
-from .limits import RESERVE, SLOWEST, ZERO, RigLimits, Signals, with_given
+from .limits import RESERVE, SLOWEST, ZERO, PrescribedSignals, RigLimits, with_given
 from .outcome import Outcome, outcomes
 from .plan import Plan
-from .questions import Measured, PlanRequest, Stated, cost_of, misfit_note, note_of_missing, stated
+from .questions import (
+    PlanRequest,
+    RunsAtHand,
+    Stated,
+    cost_of,
+    misfit_note,
+    note_of_missing,
+    stated,
+)
 from .shaking_table import ShakingTable, TablePlanner
 from .site_questions import SiteRequest, default_requests, largest_motion, of_one_force, purposes_at
 from .waveforms import Waveform, displacement_of, records_at_hand, scalable
@@ -57,14 +65,14 @@ class BuildingPlan(Plan):
     ----------
     predicted : tuple of (n,) arrays
         The displacement of the first level [m] in each test, simulated with the study's model.
-    sensors : tuple of Added
+    sensors : tuple of AddedSensors
         What sensors that the study lacks would show besides, the most useful one first.
     level : str
         The first level.
     """
 
     predicted: tuple[Array, ...] = field(default=(), repr=False)
-    sensors: tuple[Added, ...] = ()
+    sensors: tuple[AddedSensors, ...] = ()
     level: str = "base"
     rig: ClassVar[str] = "structure"
 
@@ -127,7 +135,7 @@ class BuildingPlan(Plan):
         return {**super().as_dict(), "sensors": [one.as_dict() for one in self.sensors]}
 
 
-def _words(motion: Waveform, signals: Signals) -> str:
+def _words(motion: Waveform, signals: PrescribedSignals) -> str:
     """Return a ground motion in words, a recorded one with its scale."""
     peak = quantity(float(np.max(np.abs(signals.a))), "m/s2")
     if motion.kind != "record":
@@ -331,7 +339,7 @@ def _notes(study: Study, sites: Mapping[str, Prepared]) -> tuple[str, ...]:
 
 
 def _stated(purposes: Any, opened: Prepared, seed: int) -> Stated:
-    measured = Measured(opened.problem.runs, opened.held_out.runs)
+    measured = RunsAtHand(opened.problem.runs, opened.held_out.runs)
     return stated(purposes, opened.searched, measured, max(opened.before.z, 1.0), seed)
 
 

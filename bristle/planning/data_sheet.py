@@ -23,9 +23,9 @@ from .limits import RigLimits, Test, limits_given, read_sheet, with_given
 from .plan import Plan
 from .questions import (
     NONE,
-    Measured,
     PlanRequest,
     Purposes,
+    RunsAtHand,
     SizedRival,
     able_beside,
     law_rivals,
@@ -142,7 +142,7 @@ def plan_new(
         None if request.learn is None else open_parts(model, rig.limits, request.learn, rig.drive)
     )
     purposes = Purposes(model, effects, others, parameters, parts, drive=rig.drive)
-    found = stated(purposes, problem, Measured(), 1.0, seed)
+    found = stated(purposes, problem, RunsAtHand(), 1.0, seed)
     planner = Planner(
         found.goal, rig.limits, stand_in.noise, stand_in.draws, 1.0 / stand_in.dt, None, seed,
         rig.drive,

@@ -18,7 +18,7 @@ from ..identification.problem import Expected, Problem, Run, residuals
 from ..identification.start_grid import Search
 from ..learning.signals import ALONG
 from ..model.model import Model
-from .limits import RESERVE, RigLimits, Signals, Test
+from .limits import RESERVE, PrescribedSignals, RigLimits, Test
 
 # Parts without a form, along a coordinate: what runs must cover for a curve to be learned.
 
@@ -406,7 +406,7 @@ class JudgedTest:
     """
 
     test: Test
-    signals: Signals
+    signals: PrescribedSignals
     shown: tuple[Evidence, ...]
     held_out: bool = False
 

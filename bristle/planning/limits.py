@@ -193,7 +193,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Signals:
+class PrescribedSignals:
     """What a test prescribes: `time`, `x`, `v`, `a`, `V` (n,) [s, m, m/s, m/s2, the command]."""
 
     time: Array
@@ -222,7 +222,7 @@ class Test:
     share: float = 1.0
     seconds: float = 12.0
 
-    def signals(self, limits: RigLimits, rate: float = 0.0) -> Signals:
+    def signals(self, limits: RigLimits, rate: float = 0.0) -> PrescribedSignals:
         """Return what the test prescribes within the limits, but for those of force and heat.
 
         Parameters
@@ -242,9 +242,9 @@ class Test:
             levels = np.array(sorted(limits.levels))
             V = levels[np.argmin(np.abs(V[:, None] - levels), axis=1)]
         V = limited(V, float(t[1]), "slew", RESERVE * limits.slew)
-        return Signals(t, size * x, size * v, size * a, V)
+        return PrescribedSignals(t, size * x, size * v, size * a, V)
 
-    def words(self, signals: Signals, drive: Drive | None) -> str:
+    def words(self, signals: PrescribedSignals, drive: Drive | None) -> str:
         """Return the test in words; `drive` is the command's channel, None where there is none."""
         motion = self.motion.words(quantity(float(np.max(np.abs(signals.x))), "m"))
         if drive is None:

@@ -12,7 +12,7 @@ from ..view.style import BLUE, GREEN, VERMILION, Page, look
 
 if TYPE_CHECKING:
     from .folder import PlannedRun
-    from .limits import Signals
+    from .limits import PrescribedSignals
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ SHOWN = 4000
 """Samples per line: more are not seen."""
 
 
-def draw_test(run: PlannedRun, signals: Signals, drive: str) -> Page:
+def draw_test(run: PlannedRun, signals: PrescribedSignals, drive: str) -> Page:
     """Return the picture of a planned test: motion and command over time, speed over stroke."""
     every = max(1, len(signals.time) // SHOWN)
     commanded = drive in DRIVES

@@ -17,7 +17,7 @@ from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS, plain_name
 from ..view import Viewable
 from .folder import PlanFolder, PlannedRun, write_plan
-from .limits import RigLimits, Signals, Test
+from .limits import PrescribedSignals, RigLimits, Test
 from .outcome import HEADER, NEAR, OUTCOMES, Outcome
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Plan(Viewable):
         The study's name, "" before the first measurement.
     tests : tuple of Test
         The tests, in order.
-    signals : tuple of Signals
+    signals : tuple of PrescribedSignals
         What each prescribes, at the controller's rate.
     outcomes : tuple of Outcome
         What they will show, beside what the runs at hand show.
@@ -85,7 +85,7 @@ class Plan(Viewable):
 
     study: str
     tests: tuple[Test, ...]
-    signals: tuple[Signals, ...] = field(repr=False)
+    signals: tuple[PrescribedSignals, ...] = field(repr=False)
     outcomes: tuple[Outcome, ...]
     limits: RigLimits
     drive: str

@@ -289,7 +289,7 @@ LEAST = 1e-3
 
 
 @dataclass(frozen=True)
-class Figure:
+class AskedFigure:
     """A number that a plan makes smaller.
 
     `purpose` one of PURPOSES; `name` of effect, pair, parameter or coordinate; `value` of it, in
@@ -309,7 +309,7 @@ class Figure:
 
 def seen(
     known: Information, rule: DecisionRule = BENCH, least: Mapping[str, float] | None = None
-) -> list[Figure]:
+) -> list[AskedFigure]:
     """Return from what size each effect would be named, over the size that was asked for.
 
     Parameters
@@ -324,7 +324,7 @@ def seen(
     wanted = named_distance(known.told.samples, held_out, rule) if held_out else inf
     left, kept = known.distances(), known.kept()
     return [
-        Figure(
+        AskedFigure(
             "see", name,
             wanted / left[name] if kept[name] > LEAST and left[name] > 0.0 else inf,
             max(SEEN, least.get(name, 0.0)),
@@ -333,37 +333,37 @@ def seen(
     ]  # fmt: skip
 
 
-def separated(known: Sequence[Information], rule: DecisionRule = BENCH) -> list[Figure]:
+def separated(known: Sequence[Information], rule: DecisionRule = BENCH) -> list[AskedFigure]:
     """Return by how much rivals are too near to be told apart: 1 where a verdict just can."""
     apart: dict[str, float] = {}
     for one in known:
         for name, distance in one.distances().items():
             apart[name] = min(apart.get(name, inf), distance)
     return [
-        Figure(
+        AskedFigure(
             "separate", name, rule.separating_sigma / distance if distance else inf, 1.0 / ENOUGH
         )
         for name, distance in apart.items()
     ]
 
 
-def sharpened(known: Information, names: Sequence[str]) -> list[Figure]:
+def sharpened(known: Information, names: Sequence[str]) -> list[AskedFigure]:
     """Return the standard deviation of each parameter, over its size."""
     found = known.deviations()
-    return [Figure("sharpen", name, found[name], SMALL) for name in names or found]
+    return [AskedFigure("sharpen", name, found[name], SMALL) for name in names or found]
 
 
-def learned(known: Information) -> list[Figure]:
+def learned(known: Information) -> list[AskedFigure]:
     """Return how well a part without a form is held: over all the rig can do, or by coordinate."""
     if known.typical is not None:
-        return [Figure("learn", "force", known.of_force(), HELD)]
+        return [AskedFigure("learn", "force", known.of_force(), HELD)]
     return [
-        Figure("learn", name, float(np.sqrt(np.mean(spread**2))), HELD)
+        AskedFigure("learn", name, float(np.sqrt(np.mean(spread**2))), HELD)
         for name, spread in known.of_bases().items()
     ]
 
 
-def cost_of(figures: Sequence[Figure]) -> float:
+def cost_of(figures: Sequence[AskedFigure]) -> float:
     """Return what a plan is to make small: the mean of each purpose's figures, of all purposes."""
     purposes = {one.purpose for one in figures}
     parts = [float(np.mean([f.cost for f in figures if f.purpose == one])) for one in purposes]
@@ -380,7 +380,7 @@ UNSURE = 0.02
 
 
 @dataclass(frozen=True)
-class Measured:
+class RunsAtHand:
     """The runs at hand; none of them before the first measurement."""
 
     train: Sequence[Run] = ()
@@ -416,7 +416,7 @@ class Purposes:
         own = Question(self.model, rivals, bases)
         return [own, *self.rivals]
 
-    def figures(self, known: Sequence[Information]) -> list[Figure]:
+    def figures(self, known: Sequence[Information]) -> list[AskedFigure]:
         """Return what a plan makes smaller, of what runs say of the questions."""
         own, *rivals = known
         least = {one.sized.name: one.least / one.size for one in self.effects}
@@ -439,7 +439,9 @@ class Stated:
     goal: Goal = field(repr=False)
 
 
-def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, seed: int) -> Stated:
+def stated(
+    purposes: Purposes, problem: Problem, measured: RunsAtHand, z: float, seed: int
+) -> Stated:
     """Return the goal that purposes are.
 
     Parameters
@@ -470,7 +472,7 @@ def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, s
     return Stated(purposes, asked, known, goal)
 
 
-def _known(asked: PreparedQuestion, measured: Measured) -> Information:
+def _known(asked: PreparedQuestion, measured: RunsAtHand) -> Information:
     train, held_out = (asked.evidence(runs) for runs in (measured.train, measured.held_out))
     return Information(asked.question, train + held_out.judging())
 

@@ -19,7 +19,7 @@ from ..errors import StudyError
 from ..identification.problem import Run
 from ..identification.search import in_threads
 from .information import Goal, JudgedTest, PreparedQuestion, roles_of
-from .limits import RESERVE, RigLimits, Signals, Test
+from .limits import RESERVE, PrescribedSignals, RigLimits, Test
 from .waveforms import Command, Waveform
 
 Array = NDArray[np.float64]
@@ -185,7 +185,7 @@ class Planner:
         shown = (asked.evidence([self._recorded(asked, run)]) for asked in self.goal.asked)
         return JudgedTest(test, signals, tuple(shown))
 
-    def _run(self, signals: Signals) -> Run:
+    def _run(self, signals: PrescribedSignals) -> Run:
         count = len(signals.x)
         turns = -(-count // self.errors.shape[1])
         draws = np.tile(self.errors, (1, turns, 1))[:, :count]

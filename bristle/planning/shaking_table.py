@@ -24,7 +24,7 @@ from ..prediction.model_system import BuildingWithFile, Excitation, signals_of
 from ..prediction.monte_carlo import Simulator
 from .data_sheet import NOISE
 from .information import JudgedTest
-from .limits import RESERVE, RigLimits, Signals, Test
+from .limits import RESERVE, PrescribedSignals, RigLimits, Test
 from .search import LEAST, Planner
 from .waveforms import Waveform
 
@@ -39,7 +39,7 @@ class SimulatedTest:
     `signals` what it prescribes; `columns` every output; `held_out` whether it is to judge by.
     """
 
-    signals: Signals
+    signals: PrescribedSignals
     columns: Columns
     held_out: bool
 
@@ -84,17 +84,17 @@ class ShakingTable:
         """The channel of the command, "" where none was measured."""
         return self.like.drive
 
-    def response(self, signals: Signals) -> Columns | None:
+    def response(self, signals: PrescribedSignals) -> Columns | None:
         """Return every output (n,) of the simulation in SI; None where it has no solution."""
         with self._one_at_a_time:
             found = self._ready(signals).tried(signals_of(self._shaking(signals)))
             return None if isinstance(found, RunError) else found
 
-    def _shaking(self, signals: Signals) -> Excitation:
+    def _shaking(self, signals: PrescribedSignals) -> Excitation:
         command = signals.V if self.drive else None
         return Excitation("plan", signals.time, signals.a, command, drive=VOLTAGE)
 
-    def _ready(self, signals: Signals) -> Simulator:
+    def _ready(self, signals: PrescribedSignals) -> Simulator:
         """Return what simulates a test of that length, made once."""
         count = len(signals.time)
         if count not in self._made:
@@ -132,7 +132,7 @@ class ShakingTable:
         )
 
     def measured(
-        self, signals: Signals, columns: Columns, more: Sequence[str] = (), seed: int = 0
+        self, signals: PrescribedSignals, columns: Columns, more: Sequence[str] = (), seed: int = 0
     ) -> Measurement:
         """Return a test as it would be measured: the study's channels, with noise.
 
@@ -240,7 +240,9 @@ class TablePlanner(Planner):
             test = test.smaller(max(STEEP, GENTLE / most))
         return None
 
-    def _judged(self, test: Test, signals: Signals, columns: Columns) -> JudgedTest | None:
+    def _judged(
+        self, test: Test, signals: PrescribedSignals, columns: Columns
+    ) -> JudgedTest | None:
         """Return a test that keeps the limits as it would be seen, None where nothing moves."""
         assert self.table is not None
         assert self.show is not None

@@ -28,7 +28,7 @@ from ..identification.run_start import SETTLING as SETTLED
 from ..identification.smoothing import posterior_draws, smooth, smooth_drive
 from ..units import conversion, parse
 from .fmu_ports import Port, PortMap, map_ports
-from .stepping import Job, step_through
+from .stepping import SteppingJob, step_through
 
 # Whether an FMU's output has the unit and the sign that it is taken to have, from the numbers.
 
@@ -123,7 +123,7 @@ _KINEMATIC = ("displacement", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, eq=False)
-class Signals:
+class FedSignals:
     """One piece of a measurement as an FMU is fed: values (n,) in SI, smoothed where they can be.
 
     `errors` name to (d, n): draws of what is left uncertain; `raw` the channels as measured, with
@@ -146,7 +146,7 @@ class Signals:
 
 def signals_of(
     table: Table, channels: Mapping[str, ChannelSpec], rig: str, seed: int = 0
-) -> tuple[list[Signals], list[str]]:
+) -> tuple[list[FedSignals], list[str]]:
     """Return the pieces of a table as an FMU is fed, and what was guessed and done.
 
     Columns that are no known channel are there under their own names, if they have a unit.
@@ -221,7 +221,7 @@ def _time(table: Table, spec: ChannelSpec | None) -> Array:
 def _signals(
     name: str, dt: float, raw: dict[str, Array], unit: dict[str, str],
     channels: Mapping[str, ChannelSpec], seed: int,
-) -> Signals:  # fmt: skip
+) -> FedSignals:  # fmt: skip
     """Return one piece: its motion smoothed, its drive without noise, draws of what is left."""
     n, unit = len(next(iter(raw.values()))), dict(unit)
     generator = np.random.default_rng(seed)
@@ -255,7 +255,7 @@ def _signals(
         if one not in errors:
             errors[one] = generator.standard_normal((DRAWS, n)) * noise.get(one, 0.0)
     kept = {a: b for a, b in rates.items() if a in values and b in values}
-    return Signals(name, dt, values, unit, errors, raw, noise, kept, tuple(derived), untold)
+    return FedSignals(name, dt, values, unit, errors, raw, noise, kept, tuple(derived), untold)
 
 
 def kind_of(name: str) -> str:
@@ -353,8 +353,8 @@ def compare_fmu(
 
 
 def _job(
-    path: Path, pieces: list[Signals], ports: PortMap, given: dict[str, Value]
-) -> tuple[Job, list[dict[str, Array]]]:
+    path: Path, pieces: list[FedSignals], ports: PortMap, given: dict[str, Value]
+) -> tuple[SteppingJob, list[dict[str, Array]]]:
     """Return the passes per piece: at the finest step, at twice that, as measured, and the draws.
 
     Held inputs cost accuracy in proportion to the step: at that of the measurement it would be
@@ -387,11 +387,11 @@ def _job(
             add(piece.dt, {name: y + piece.errors[name][d] for name, y in piece.values.items()})
     names = tuple(port.name for port in ports.inputs)
     outputs = tuple(port.name for port in ports.outputs)
-    return Job(str(path.resolve()), dict(given), names, outputs, tuple(steps)), passes
+    return SteppingJob(str(path.resolve()), dict(given), names, outputs, tuple(steps)), passes
 
 
 def _predictions(
-    pieces: list[Signals], ports: PortMap, found: list[dict[str, Array]], notes: list[str]
+    pieces: list[FedSignals], ports: PortMap, found: list[dict[str, Array]], notes: list[str]
 ) -> dict[str, list[RunPrediction]]:
     """Return per output the pieces held against it."""
     per = 3 + DRAWS
@@ -407,7 +407,7 @@ def _predictions(
 
 
 def _one(
-    piece: Signals, name: str, signal: str, unit: str, rows: list[Array], ports: PortMap,
+    piece: FedSignals, name: str, signal: str, unit: str, rows: list[Array], ports: PortMap,
     notes: list[str],
 ) -> RunPrediction:  # fmt: skip
     predicted, coarser = rows[0][:: 2**HALVINGS], rows[1][:: 2 ** (HALVINGS - 1)]
@@ -433,7 +433,7 @@ def _one(
     )  # fmt: skip
 
 
-def _coordinates(piece: Signals, signal: str, ports: PortMap) -> dict[str, Array]:
+def _coordinates(piece: FedSignals, signal: str, ports: PortMap) -> dict[str, Array]:
     """Return the coordinates of a piece: of its motion, and every input besides."""
     get = piece.values.get
     prefix = "" if "velocity" in piece.values else "base_"

@@ -16,7 +16,7 @@ import numpy as np
 from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.measurement import Measurement
 from ..errors import RecordError, StudyError
-from ..fmu.build import Plan, build, plan
+from ..fmu.build import BuildPlan, build, plan
 from ..fmu.catalogue import component_of_law
 from ..identification.problem import following
 from ..identification.rig import DAMPER
@@ -41,7 +41,7 @@ from .model_system import (
     shaking_of,
 )
 
-Build = Callable[[Plan, Path], Path]
+Build = Callable[[BuildPlan, Path], Path]
 
 
 @dataclass(frozen=True, repr=False)
@@ -219,7 +219,9 @@ def _signals(damper: Model) -> Collection[str]:
     return following(damper.effects)
 
 
-def _damper(study: Study, model: Model, runs: Runs, notes: list[str], step: float | None) -> Plan:
+def _damper(
+    study: Study, model: Model, runs: Runs, notes: list[str], step: float | None
+) -> BuildPlan:
     """Plan the damper with the model's values as its defaults."""
     own = _bare(study, model, notes)
     starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}

@@ -121,7 +121,7 @@ def _match(
     variable: Variable,
     ports: Mapping[str, Variable],
     signals: Mapping[str, str],
-    given: Mapping[str, Given],
+    given: Mapping[str, GivenPort],
     *,
     by_unit: bool,
 ) -> Port | None:
@@ -143,7 +143,7 @@ def _match(
     return None
 
 
-class Given(NamedTuple):
+class GivenPort(NamedTuple):
     """What `--map PORT=-CHANNEL@UNIT` says; `unit` "" and `sign` 0 where it does not."""
 
     signal: str
@@ -151,15 +151,15 @@ class Given(NamedTuple):
     sign: int = 0
 
 
-def _given(name: str, text: str) -> Given:
+def _given(name: str, text: str) -> GivenPort:
     signal, _, unit = text.strip().partition("@")
     sign = {"-": -1, "+": 1}.get(signal[:1], 0)
     if unit and unit_or_none(unit) is None:
         raise FmuError(f'--map {name}={text}: "{unit}" is no unit that is known.')
-    return Given(signal[abs(sign) :].strip(), unit, sign)
+    return GivenPort(signal[abs(sign) :].strip(), unit, sign)
 
 
-def _as_given(variable: Variable, given: Given, signals: Mapping[str, str]) -> Port:
+def _as_given(variable: Variable, given: GivenPort, signals: Mapping[str, str]) -> Port:
     reason, unit = "as given", given.unit or unit_of(variable) or ""
     if not unit:
         unit = signals[given.signal]
@@ -273,7 +273,7 @@ def _check_given(
     description: Description,
     ports: Mapping[str, Variable],
     signals: Mapping[str, str],
-    given: Mapping[str, Given],
+    given: Mapping[str, GivenPort],
     values: Mapping[str, object],
 ) -> None:
     wrong = []

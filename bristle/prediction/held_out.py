@@ -39,7 +39,7 @@ from ..model.model import Model
 from ..physics.drive import drive_named
 from ..physics.effect import EFFECTS
 from .model_system import start_values
-from .stepping import Job, step_through
+from .stepping import SteppingJob, step_through
 
 Array = NDArray[np.float64]
 
@@ -273,7 +273,9 @@ def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proo
             values = start_values(held.damper, fed, run)
             names, job = tuple(inputs), (step,) * len(passes)
             found = step_through(
-                Job(str(fmu.resolve()), dict(values), names, ("force",), job), passes, timeout
+                SteppingJob(str(fmu.resolve()), dict(values), names, ("force",), job),
+                passes,
+                timeout,
             )
             every = per // (run.finer.parts if run.finer else 1)
             for errors, rows in zip((own, raw), found, strict=False):

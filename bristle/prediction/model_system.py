@@ -98,7 +98,7 @@ def _forces_of_devices(measurement: Measurement) -> dict[str, Array]:
     return {one[0]: measurement[name] for name, one in found.items() if one and one[1] == "force"}
 
 
-class Loads(NamedTuple):
+class ModelLoads(NamedTuple):
     """What a model makes of a building beside its damper.
 
     Parameters of the `structure` and of the `damper` that follow from their joint; `notes`; and the
@@ -111,7 +111,7 @@ class Loads(NamedTuple):
     effects: tuple[Path, ...] = ()
 
 
-def loads(model: Model, building: Building, bench: bool = False) -> Loads:
+def loads(model: Model, building: Building, bench: bool = False) -> ModelLoads:
     """Return what a model's effects make of the structure, and what the damper has to know of it.
 
     Parameters
@@ -145,7 +145,7 @@ def loads(model: Model, building: Building, bench: bool = False) -> Loads:
         damper["moving_mass"] = mass
     files = own_effects()
     effects = tuple(files[name] for name in layer.effects if EFFECTS[name].own)
-    return Loads(structure, damper, tuple(notes), effects)
+    return ModelLoads(structure, damper, tuple(notes), effects)
 
 
 def masses(damper: Model) -> list[str]:
@@ -154,7 +154,7 @@ def masses(damper: Model) -> list[str]:
 
 
 def building_system(
-    title: str, house: BuildingWithFile, shaking: Excitation, own: Loads, damper: DamperTable
+    title: str, house: BuildingWithFile, shaking: Excitation, own: ModelLoads, damper: DamperTable
 ) -> System:
     """Return a building with its damper under a ground motion, as a system.
 

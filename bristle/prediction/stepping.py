@@ -35,7 +35,7 @@ _BOOT = (
 
 
 @dataclass(frozen=True)
-class Job:
+class SteppingJob:
     """What to step: the FMU, values to set before, Real inputs and outputs by name.
 
     `steps` are those [s] of the passes, each a run of a new instance from t = 0.
@@ -49,7 +49,7 @@ class Job:
 
 
 def step_through(
-    job: Job, passes: Sequence[Mapping[str, Array]], timeout: float
+    job: SteppingJob, passes: Sequence[Mapping[str, Array]], timeout: float
 ) -> list[dict[str, Array]]:
     """Return the outputs (n,) of each pass, from inputs (n,) in the FMU's units.
 
@@ -129,7 +129,7 @@ def _all_passes(work: Path) -> dict[str, Array]:
     from ..fmu.description import read_description
 
     data = json.loads((work / "job.json").read_text())
-    job = Job(
+    job = SteppingJob(
         data["fmu"], data["values"], tuple(data["inputs"]), tuple(data["outputs"]),
         tuple(data["steps"]),
     )  # fmt: skip
@@ -144,7 +144,9 @@ def _all_passes(work: Path) -> dict[str, Array]:
     return found
 
 
-def _one_pass(job: Job, description: Any, folder: Path, step: float, inputs: Array) -> Array:
+def _one_pass(
+    job: SteppingJob, description: Any, folder: Path, step: float, inputs: Array
+) -> Array:
     from ..engine.instance import Instance
 
     rows = np.empty((inputs.shape[1], len(job.outputs)))

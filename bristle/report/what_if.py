@@ -54,10 +54,10 @@ def what_if_section(study: Study) -> str:
         If the study has no model, or its scenario cannot be compiled.
     """
     from ..export.web import body, described
-    from ..export.web_module import Numbers, module
+    from ..export.web_module import PageNumbers, module
 
     with movable(study) as found:
-        numbers = Numbers(found.scenario)
+        numbers = PageNumbers(found.scenario)
         description = described(numbers, shown=found.shown)
     return html.section(
         f"What if: the model in {found.run}, with other numbers",

@@ -18,7 +18,7 @@ from ..component.controller_file import Controller, read_controller
 from ..core.config import SCHEMA
 from ..core.text import written
 from ..errors import DesignError
-from .damper import Damper
+from .damper import DesignDamper
 from .design_file import damper_from_model, read_task, task_from_data
 from .plausible import implausible
 from .result import DesignResult
@@ -27,7 +27,7 @@ from .weights import LqgWeights, Weight, Weights
 
 __all__ = [
     "Controller",
-    "Damper",
+    "DesignDamper",
     "DesignResult",
     "LqgWeights",
     "Scheduling",

@@ -35,7 +35,7 @@ _NUDGE = 1e-3
 
 
 @dataclass(frozen=True)
-class Damper:
+class DesignDamper:
     """A damper model: law, parameters, effects.
 
     Attributes
@@ -132,7 +132,7 @@ class Damper:
         }
 
 
-def coefficients(damper: Damper, r: Array, eps: float) -> tuple[Array, Array]:
+def coefficients(damper: DesignDamper, r: Array, eps: float) -> tuple[Array, Array]:
     """Return d(r) [N s/m] and b(r) [N/V] at speeds r (k,) [m/s].
 
         d = Y_0/(r + eps) + F_0/r,   b = r (Y_V/(r + eps) + F_V/r)
@@ -159,7 +159,7 @@ def coefficients(damper: Damper, r: Array, eps: float) -> tuple[Array, Array]:
     return d, b
 
 
-def stiffness(damper: Damper) -> float:
+def stiffness(damper: DesignDamper) -> float:
     """Return the force per displacement [N/m] that the damper's effects add: a gas spring's."""
     on = _parallel(damper)
     if not on:
@@ -171,7 +171,7 @@ def stiffness(damper: Damper) -> float:
     return (force[1] - force[0]) / (4.0 * _NUDGE)
 
 
-def spring(damper: Damper) -> float:
+def spring(damper: DesignDamper) -> float:
     """Return the force per displacement [N/m] of the law itself: an accumulator's."""
     law, values = damper.kind, damper.parameters()
     elastic = law.hook("elastic")
@@ -185,12 +185,12 @@ def spring(damper: Damper) -> float:
     return float(force[1] - force[0]) / (2.0 * _NUDGE)
 
 
-def _parallel(damper: Damper) -> tuple[str, ...]:
+def _parallel(damper: DesignDamper) -> tuple[str, ...]:
     """Return the effects that are on and not in series with the fluid."""
     return tuple(name for name in damper.effects if "motion" not in EFFECTS[name].hooks())
 
 
-def _added(damper: Damper, top: float) -> tuple[Array, Array, Array]:
+def _added(damper: DesignDamper, top: float) -> tuple[Array, Array, Array]:
     """Return speeds (k,), and what the effects add there to the force at 0 V and at v_max [N]."""
     speeds = np.geomspace(min(1e-2 * damper.speed, 1e-2 * top), top, _SPEEDS)
     forces = []
@@ -206,7 +206,7 @@ def _added(damper: Damper, top: float) -> tuple[Array, Array, Array]:
     return speeds, forces[0], forces[1]
 
 
-def _slid(damper: Damper, v: float, V: float, x: float, effects: tuple[str, ...]) -> float:
+def _slid(damper: DesignDamper, v: float, V: float, x: float, effects: tuple[str, ...]) -> float:
     """Return the mean force [N] of sliding past x [m] at v [m/s] and V [V], once settled."""
     p = damper.parameters()
     start = {

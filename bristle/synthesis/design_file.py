@@ -44,7 +44,7 @@ from ..errors import BristleError, DesignError, PhysicsError, StudyError
 from ..model.model_file import read_model
 from ..physics.building import Building, paper_building
 from ..physics.laws import DEFAULT_OF_DESIGN
-from .damper import Damper
+from .damper import DesignDamper
 from .plant import Share
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
@@ -172,7 +172,7 @@ def task_of(document: Document, folder: Path, place: tuple[Building, str] | None
 
 def damper_from_model(
     path: str | Path, v_max: float = 8.0, known_to: float | None = None
-) -> Damper:
+) -> DesignDamper:
     """Return the damper of a model.toml: its law with the effects that act in a damper.
 
     Parameters
@@ -192,7 +192,7 @@ def damper_from_model(
         raise DesignError(str(error)) from None
     inside = model.at("damper", bench=not model.building)
     try:
-        return Damper(model.law, inside.values, inside.effects, v_max, known_to)
+        return DesignDamper(model.law, inside.values, inside.effects, v_max, known_to)
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from None
 
@@ -202,7 +202,7 @@ def _damper(document: Document, found: Mapping[str, Any], folder: Path) -> Any:
     limits = {name: found[name] for name in ("v_max", "known_to") if found[name] is not None}
     if not model:
         values = found["law"], found["parameters"], found["effects"]
-        return _made(document, ("damper",), Damper, *values, **limits)
+        return _made(document, ("damper",), DesignDamper, *values, **limits)
     if {"law", "parameters", "effects"} & set(table):
         words = "[damper]: give either model or law, parameters, effects."
         document.error(("damper", "model"), words)

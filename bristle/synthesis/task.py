@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..component.controller_file import KINDS
 from ..errors import DesignError
 from ..physics.building import Building, Device, frequencies, paper_building
-from .damper import Damper, spring, stiffness
+from .damper import DesignDamper, spring, stiffness
 from .lmi import VARIES
 from .plant import Share, check_building, with_share
 from .weights import LqgWeights, Weights
@@ -137,7 +137,7 @@ class Task:
     kind: str
     title: str = ""
     building: Building = field(default_factory=paper_building)
-    damper: Damper = field(default_factory=Damper)
+    damper: DesignDamper = field(default_factory=DesignDamper)
     weights: Weights = field(default_factory=Weights)
     scheduling: Scheduling = field(default_factory=Scheduling)
     lqg: LqgWeights = field(default_factory=LqgWeights)

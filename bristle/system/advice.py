@@ -15,7 +15,7 @@ from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, laws_of
 from .library import Library
-from .model import Connection, Part, Run
+from .model import Connection, Part, RunSettings
 from .parameters import check_rod
 
 # The step from which the coupling of a mass with a damper is unstable, for each algorithm.
@@ -140,7 +140,7 @@ def own_velocity(force: str) -> str:
 
 
 def advise(
-    run: Run,
+    run: RunSettings,
     parts: Mapping[str, Part],
     wires: Sequence[Connection],
     library: Library,
@@ -150,7 +150,7 @@ def advise(
 
     Parameters
     ----------
-    run : Run
+    run : RunSettings
         As far as it could be read.
     parts : mapping
         Name to component, in the order of the file.
@@ -193,7 +193,7 @@ def _instances(network: Network, document: Document) -> None:
             first.setdefault(part.file, part.name)
 
 
-def _order(run: Run, network: Network, document: Document) -> None:
+def _order(run: RunSettings, network: Network, document: Document) -> None:
     """Unless all step at once the ground motion must have moved on before the structure steps."""
     if run.algorithm == "jacobi":
         return
@@ -208,7 +208,7 @@ def _order(run: Run, network: Network, document: Document) -> None:
             )
 
 
-def _rollback(run: Run, network: Network, document: Document) -> None:
+def _rollback(run: RunSettings, network: Network, document: Document) -> None:
     """What is to step again must go back first: each FMU of a loop needs its state in and out."""
     if run.algorithm != "midpoint-iterated":
         return
@@ -368,7 +368,7 @@ def slopes(damper: Part, level: float) -> tuple[float, float]:
 
 
 def _coupling(
-    run: Run, structure: Part, network: Network, library: Library, document: Document
+    run: RunSettings, structure: Part, network: Network, library: Library, document: Document
 ) -> None:
     """Warn where a damper's mass terms or the step make the explicit coupling unstable.
 
@@ -407,8 +407,8 @@ def _other_motion(
 
 
 def _stability(
-    run: Run, structure: Part, dampers: list[tuple[Part, Drive]], mass: float, network: Network,
-    document: Document,
+    run: RunSettings, structure: Part, dampers: list[tuple[Part, Drive]], mass: float,
+    network: Network, document: Document,
 ) -> None:  # fmt: skip
     """Warn where dampers that drive one mass [kg] make the coupling unstable at the run's step."""
     c, k = 0.0, 0.0

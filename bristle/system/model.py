@@ -66,7 +66,7 @@ class Signal:
 
 
 @dataclass
-class Run:
+class RunSettings:
     """The run as far as it could be read; None where it could not."""
 
     stop: float | None = None

@@ -20,7 +20,16 @@ from ..physics.forms import TABLE_FORM
 from ..physics.motion_file import read_two_column
 from ..physics.signals import KINDS, PARAMETERS, STEPS, TAKEN, read_steps
 from .library import Library
-from .model import FILE_PARAMETERS, Component, Part, Run, Signal, Wrong, existing_file, typed
+from .model import (
+    FILE_PARAMETERS,
+    Component,
+    Part,
+    RunSettings,
+    Signal,
+    Wrong,
+    existing_file,
+    typed,
+)
 
 # Checks of built-in test signals: their samples, parameters that do nothing, rods that jump.
 
@@ -79,14 +88,14 @@ def _check_steps(part: Part, document: Document) -> None:
         document.error(path, f"{part.name}.{error}")
 
 
-def check_rod(part: Part, run: Run, document: Document) -> None:
+def check_rod(part: Part, run: RunSettings, document: Document) -> None:
     """Warn of a prescribed motion that jumps: its velocity shows nothing of it.
 
     Parameters
     ----------
     part : Part
         Any component; one that is no built-in motion of a rod is passed over.
-    run : Run
+    run : RunSettings
         Its stop says what is reached.
     document : Document
         Takes what is found.

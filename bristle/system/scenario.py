@@ -21,7 +21,7 @@ from ..fmu.description import Value
 from .advice import advise
 from .connections import check_connections
 from .library import Library, changed_title, installed, needs_title
-from .model import FILE_PARAMETERS, Component, Part, Run, System, plain_target
+from .model import FILE_PARAMETERS, Component, Part, RunSettings, System, plain_target
 from .overrides import (
     SCENARIO,
     apply_overrides,
@@ -156,7 +156,7 @@ def _judged(
     for note in notes:
         if ("run", note.kind) not in document.overridden:
             document.note((), note.text)
-    run, title = Run(**read["run"]), read["title"]
+    run, title = RunSettings(**read["run"]), read["title"]
     parts = check_components(document, read["components"], library)
     check_steps(run, parts.values(), document)
     wires = check_connections(document, read["connections"], parts)

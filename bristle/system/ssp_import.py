@@ -24,11 +24,11 @@ from .model import ALGORITHMS
 from .ssp_read import (
     SAME,
     Block,
+    BoundValue,
     Change,
-    Given,
     Joint,
     Package,
-    Structure,
+    SystemStructure,
     after,
     convert,
     open_package,
@@ -68,7 +68,7 @@ class _Network:
 
     blocks: dict[Names, Block] = field(default_factory=dict)
     feeding: dict[Port, list[tuple[Port, Joint]]] = field(default_factory=dict)
-    given: dict[Port, Given] = field(default_factory=dict)
+    given: dict[Port, BoundValue] = field(default_factory=dict)
 
 
 class _Flattener:
@@ -76,7 +76,7 @@ class _Flattener:
 
     Parameters
     ----------
-    structure : Structure
+    structure : SystemStructure
     package : Package
         For messages; its notes take what is left aside.
     describe : callable
@@ -89,7 +89,10 @@ class _Flattener:
     """
 
     def __init__(
-        self, structure: Structure, package: Package, describe: Callable[[str, str], Description]
+        self,
+        structure: SystemStructure,
+        package: Package,
+        describe: Callable[[str, str], Description],
     ) -> None:
         self.package = package
         self.net = _Network()
@@ -223,7 +226,7 @@ class _Flattener:
             text = f'"{_shown(target)}" is fed twice, first by <{first}; one is right.'
             raise self.package.error(joint.where, text)
 
-    def _give(self, path: Names, given: Given) -> None:
+    def _give(self, path: Names, given: BoundValue) -> None:
         target = self._named(path, given.name)
         if target is None:
             self.package.note(given.where, f'nothing is called "{given.name}": left aside.')
@@ -555,7 +558,9 @@ def _typed(variable: Variable, value: Value) -> Value:
     return value
 
 
-def _times(structure: Structure, fmus: Iterable[Path], notes: list[Finding]) -> tuple[float, float]:
+def _times(
+    structure: SystemStructure, fmus: Iterable[Path], notes: list[Finding]
+) -> tuple[float, float]:
     """Return stop and step [s]: the package's, else what its FMUs say, else the usual ones."""
     stop, step = structure.stop, structure.step
     if stop is None or step is None:

@@ -247,7 +247,7 @@ _INTEGER = re.compile(r"Integer|U?Int(8|16|32|64)")
 
 
 @dataclass(frozen=True)
-class Given:
+class BoundValue:
     """A value that a package gives to what is called `name` where it is bound.
 
     `unit` is the value's own; `change` comes after the conversion of units, or in its place where
@@ -262,7 +262,9 @@ class Given:
     converts: bool = True
 
 
-def read_bindings(element: Element, package: Package, file: str, where: str) -> tuple[Given, ...]:
+def read_bindings(
+    element: Element, package: Package, file: str, where: str
+) -> tuple[BoundValue, ...]:
     """Return the values bound to a system or component, those that win last.
 
     Parameters
@@ -272,7 +274,7 @@ def read_bindings(element: Element, package: Package, file: str, where: str) -> 
     file : the member in which it stands
     where : file and element, for messages
     """
-    found: list[Given] = []
+    found: list[BoundValue] = []
     for binding in children(child(element, "ParameterBindings"), "ParameterBinding"):
         inside = f"{where} <ParameterBinding>"
         kind = binding.get("type", "application/x-ssp-parameter-set")
@@ -286,7 +288,7 @@ def read_bindings(element: Element, package: Package, file: str, where: str) -> 
     return tuple(found)
 
 
-def _set(binding: Element, package: Package, file: str, where: str) -> list[Given]:
+def _set(binding: Element, package: Package, file: str, where: str) -> list[BoundValue]:
     source = binding.get("source")
     values = child(binding, "ParameterValues")
     if source:
@@ -307,7 +309,7 @@ def _set(binding: Element, package: Package, file: str, where: str) -> list[Give
     for parameter in children(child(found, "Parameters"), "Parameter"):
         inside = f'{file}: <Parameter "{parameter.get("name", "")}">'
         given += [
-            Given(
+            BoundValue(
                 parameter.get("name", ""),
                 _value(entry, items, package, inside),
                 measure(entry.get("unit"), units),
@@ -349,8 +351,8 @@ def _value(
 
 
 def _mapped(
-    given: list[Given], mapping: Element, package: Package, file: str, where: str
-) -> list[Given]:
+    given: list[BoundValue], mapping: Element, package: Package, file: str, where: str
+) -> list[BoundValue]:
     """Return values under the names that a mapping gives them; others are left aside."""
     source = mapping.get("source")
     found: Element | None = child(mapping, "ParameterMapping")
@@ -418,7 +420,7 @@ class Block:
 
     where: str
     connectors: dict[str, Connector]
-    values: tuple[Given, ...]
+    values: tuple[BoundValue, ...]
     units: dict[str, Measure]
     source: str | None = None
     elements: dict[str, Block] = field(default_factory=dict)
@@ -426,7 +428,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Structure:
+class SystemStructure:
     """A package as it stands: name, root system; stop, step [s], algorithm where they are told."""
 
     name: str
@@ -436,7 +438,7 @@ class Structure:
     algorithm: str | None
 
 
-def read_structure(package: Package) -> Structure:
+def read_structure(package: Package) -> SystemStructure:
     """Return what a package holds, of SSP 1.0 or 2.0.
 
     Raises
@@ -456,7 +458,7 @@ def read_structure(package: Package) -> Structure:
         stop = number(experiment, "stopTime", 0.0, package, where) or None
     step, algorithm = _told(root, package)
     system = _read_file(root, package, STRUCTURE, ())
-    return Structure(root.get("name", ""), system, stop, step, algorithm)
+    return SystemStructure(root.get("name", ""), system, stop, step, algorithm)
 
 
 def _told(root: Element, package: Package) -> tuple[float | None, str | None]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..fmu.build import Plan, build, plan
+from ..fmu.build import BuildPlan, build, plan
 from ..fmu.description import Value, Variable
 from ..units import DIMENSIONS, Unit, alike
 from .model import FILE_PARAMETERS, Component, Connection, System
@@ -264,7 +264,7 @@ def _text(root: Element) -> str:
 # so are its values: tools differ in what they make of a package's own.
 
 RESOURCES = "resources"
-Build = Callable[[Plan, Path], Path]
+Build = Callable[[BuildPlan, Path], Path]
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 

@@ -16,7 +16,7 @@ from ..core.toml_write import toml_key, toml_table, toml_value
 from ..errors import BristleError, PhysicsError, TrustError
 from ..physics.forms import split_form
 from .library import Library
-from .model import Component, Part, Run, Signal, System, existing_file
+from .model import Component, Part, RunSettings, Signal, System, existing_file
 from .overrides import COMPONENT, LAW_KEYS, MADE_FROM, SCENARIO, flatten
 from .parameters import check_parameter, check_storeys, check_together, choose_law, choose_over_step
 
@@ -30,7 +30,7 @@ NAME = re.compile(r"[^\W\d][\w-]*")
 RESERVED = ("schema", *SCENARIO.keys, "time")
 
 
-def check_steps(run: Run, parts: Iterable[Part], document: Document) -> None:
+def check_steps(run: RunSettings, parts: Iterable[Part], document: Document) -> None:
     """Check that stop is a whole number of steps, not too many, and each component's own step."""
     parts = list(parts)
     for part in parts:

@@ -18,7 +18,7 @@ from bristle.component.control_laws import hidden_units, policy_inputs, voltage_
 from bristle.data.ground_motion import GroundMotion
 from bristle.errors import DesignError
 from bristle.physics.building import paper_building
-from bristle.synthesis import Damper
+from bristle.synthesis import DesignDamper
 from bristle.synthesis.plant import structure
 
 H = 0.002
@@ -110,7 +110,7 @@ def test_the_derivative_is_that_of_the_response(law: str, monkeypatch: pytest.Mo
     monkeypatch.setattr(policy_design, "descend", caught)
     with pytest.raises(DesignError, match="enough"):
         policy_design.design_policy(
-            PolicyTask(damper=Damper(law), motions=Training(synthetic=8, hidden=3))
+            PolicyTask(damper=DesignDamper(law), motions=Training(synthetic=8, hidden=3))
         )
     (loop, runs), random = found[0], np.random.default_rng(1)
     weights = loop.constant(0.25)
@@ -130,7 +130,9 @@ def test_the_derivative_is_that_of_the_response(law: str, monkeypatch: pytest.Mo
 
 @pytest.mark.slow
 def test_a_short_training_beats_clipped_optimal_control_on_motions_held_out() -> None:
-    task = PolicyTask(damper=Damper("lugre"), motions=Training(synthetic=24, rounds=30, hidden=6))
+    task = PolicyTask(
+        damper=DesignDamper("lugre"), motions=Training(synthetic=24, rounds=30, hidden=6)
+    )
     result = policy_design.design_policy(task)
     facts = result.facts
     assert facts["peak_ratio"] < 0.9

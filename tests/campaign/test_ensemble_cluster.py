@@ -14,7 +14,7 @@ import pytest
 
 import bristle
 from bristle.campaign import cluster, read_ensemble
-from bristle.campaign.campaign import Campaign, Outcome
+from bristle.campaign.campaign import Campaign, RunOutcome
 from bristle.cli import main
 from bristle.errors import EnsembleError
 
@@ -57,7 +57,7 @@ def test_another_version_on_a_worker_is_named(
         bristle.ensemble(write(), cluster=local.scheduler_address)
 
 
-def _slow(campaign: Campaign, run: int) -> Outcome:
+def _slow(campaign: Campaign, run: int) -> RunOutcome:
     """Kill the worker at run 5, the first time; take a moment otherwise."""
     import time
 
@@ -66,7 +66,7 @@ def _slow(campaign: Campaign, run: int) -> Outcome:
         marker.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     time.sleep(0.02)
-    return Outcome(run, (float(run), 0.0, 0.0))
+    return RunOutcome(run, (float(run), 0.0, 0.0))
 
 
 def test_a_lost_worker_loses_no_finished_run(
@@ -86,10 +86,10 @@ def test_a_lost_worker_loses_no_finished_run(
 def test_a_run_that_kills_every_worker_is_a_failure(
     write: Write, local: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def deadly(campaign: object, run: int) -> Outcome:
+    def deadly(campaign: object, run: int) -> RunOutcome:
         if run == 3:
             os.kill(os.getpid(), signal.SIGKILL)
-        return Outcome(run, (0.0, 0.0, 0.0))
+        return RunOutcome(run, (0.0, 0.0, 0.0))
 
     monkeypatch.setattr(deadly, "__module__", "__main__")
     monkeypatch.setattr(cluster, "outcome_of", deadly)

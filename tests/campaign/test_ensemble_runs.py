@@ -16,12 +16,12 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle.campaign import Plan, read_ensemble
-from bristle.campaign.campaign import Campaign, Outcome, Statistic
+from bristle.campaign import EnsemblePlan, read_ensemble
+from bristle.campaign.campaign import Campaign, RunOutcome, Statistic
 from bristle.campaign.table import LEVELS, RunsTable, failures
 from bristle.core import files
 from bristle.engine.coupled import Coupled
-from bristle.engine.results import Table
+from bristle.engine.results import RunTable
 from bristle.errors import EnsembleError, RunError, ScenarioError
 from bristle.system.model import System
 
@@ -172,17 +172,21 @@ def test_failures_are_counted_with_their_reasons(write: Write, tmp_path: Path) -
 
 
 def test_reasons_that_differ_in_numbers_are_one() -> None:
-    outcomes = [Outcome(4, reason="at 2.5 s"), Outcome(1, reason="at 3e-2 s"), Outcome(2, (1.0,))]
+    outcomes = [
+        RunOutcome(4, reason="at 2.5 s"),
+        RunOutcome(1, reason="at 3e-2 s"),
+        RunOutcome(2, (1.0,)),
+    ]
     assert [(f.count, f.run, f.reason) for f in failures(outcomes)] == [(2, 1, "at 3e-2 s")]
 
 
 def test_what_a_component_raises_is_a_failed_run(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken(self: Coupled, system: System) -> Table:
+    def broken(self: Coupled, system: System) -> RunTable:
         raise ZeroDivisionError("somebody's effect")
 
-    def lost(self: Coupled, system: System) -> Table:
+    def lost(self: Coupled, system: System) -> RunTable:
         table = made(self, system)
         table["structure.floor2_acceleration_absolute"][-1] = float("nan")
         return table
@@ -214,15 +218,15 @@ def test_statistics(how: str, number: float) -> None:
     assert Statistic("a.b", how).of(values) == pytest.approx(number)
 
 
-def _dies(campaign: Campaign, run: int) -> Outcome:
+def _dies(campaign: Campaign, run: int) -> RunOutcome:
     """Kill the process at run 3 always, at run 6 the first time."""
-    assert isinstance(campaign.draws, Plan)
+    assert isinstance(campaign.draws, EnsemblePlan)
     marker = campaign.draws.file.parent / "died_at_6"
     if run == 3 or (run == 6 and not marker.exists()):
         if run == 6:
             marker.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return Outcome(run, (float(run), 0.0, 0.0))
+    return RunOutcome(run, (float(run), 0.0, 0.0))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")

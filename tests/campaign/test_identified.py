@@ -16,7 +16,7 @@ from bristle.campaign.identified import Places
 from bristle.campaign.table import LEVELS, VARIES, notes, quantiles
 from bristle.cli import main
 from bristle.engine.coupled import Coupled
-from bristle.engine.results import Table
+from bristle.engine.results import RunTable
 from bristle.errors import BristleError, EnsembleError, RunError
 from bristle.model.model import Model, new_model
 from bristle.model.model_file import model_text
@@ -157,7 +157,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, above: float, error: Exception) -> 
     """Let runs with a gas spring stiffer than `above` [N/m] fail."""
     made = Coupled.run
 
-    def run(self: Coupled, system: System, on_rows: Any = None) -> Table:
+    def run(self: Coupled, system: System, on_rows: Any = None) -> RunTable:
         if float(system.components["damper"].values.get("gas_spring.k", 0.0)) > above:
             raise error
         return made(self, system, on_rows)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.campaign.best_constant import Motion, Passive, optimise_passive
+from bristle.campaign.best_constant import Passive, ScaledMotion, optimise_passive
 from bristle.cli import main
 from bristle.errors import BristleError
 
@@ -89,7 +89,7 @@ def test_a_notebook_shows_table_and_figure() -> None:
 
 def test_rms_of_another_output() -> None:
     found = optimise_passive(
-        [Motion("el_centro_1940_ns", 0.4)],
+        [ScaledMotion("el_centro_1940_ns", 0.4)],
         overrides={"run.stop": 6.0},
         output="structure.drift1",
         statistic="rms",
@@ -104,7 +104,7 @@ def test_a_record_as_recorded_and_another_v_max(tmp_path: Path) -> None:
     record = tmp_path / "shake.csv"
     record.write_text("time [s],acceleration [m/s2]\n0.0,0.0\n0.1,1.5\n0.2,0.0\n")
     found = optimise_passive(
-        [Motion(str(record), 0.0)], overrides={"run.stop": 1.0, "damper.v_max": 2.0}, grid=3
+        [ScaledMotion(str(record), 0.0)], overrides={"run.stop": 1.0, "damper.v_max": 2.0}, grid=3
     )
     assert found.grid.tolist() == [0.0, 1.0, 2.0]
     assert found.motions[0].name == "shake"

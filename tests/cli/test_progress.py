@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from bristle.cli import _line
-from bristle.cli._line import Line
+from bristle.cli._line import ProgressLine
 from bristle.core import progress
 from bristle.core.progress import Count, Progress, Stages, counted, listening, tell, telling
 
@@ -56,7 +56,7 @@ def test_a_pipe_gets_few_plain_lines(
 ) -> None:
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    with Line() as line, telling(line.say):
+    with ProgressLine() as line, telling(line.say):
         for k in range(240):
             now[0] = 0.1 * k
             tell(f"step {k}")
@@ -73,7 +73,7 @@ def test_what_takes_long_is_told_though_nothing_more_is_said(
 ) -> None:
     monkeypatch.setattr(_line, "_PLAIN_AFTER", 0.3)
     monkeypatch.setattr(_line, "_AGAIN", 1.0)
-    with Line() as line, telling(line.say):
+    with ProgressLine() as line, telling(line.say):
         tell("compiling the laws, once")
         time.sleep(2.5)
     first, second, *_ = capsys.readouterr().err.splitlines()
@@ -86,7 +86,7 @@ def test_a_program_that_asks_for_lines_gets_every_text_at_once(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(progress.LINES, "lines")
-    with Line() as line, telling(line.say):
+    with ProgressLine() as line, telling(line.say):
         for text in ("reading", "fitting", "fitting", "judging"):
             tell(text)
     assert capsys.readouterr().err.splitlines() == ["reading ...", "fitting ...", "judging ..."]
@@ -101,7 +101,7 @@ def test_a_terminal_has_one_line_that_is_gone_before_the_answer(
     with open(theirs, "w", closefd=False) as stream:
         monkeypatch.setattr(sys, "stderr", stream)
         monkeypatch.setattr(sys, "stdout", stream)
-        with Line() as line, telling(line.say):
+        with ProgressLine() as line, telling(line.say):
             tell("one")
             tell("two")
             print("the answer", flush=True)
@@ -202,7 +202,7 @@ def test_questions_and_warnings_stand_alone_on_the_terminal(
     ours, theirs = pty.openpty()
     with open(theirs, "w", closefd=False) as stream:
         monkeypatch.setattr(sys, "stderr", stream)
-        with Line("bristle run") as line, telling(line.say):
+        with ProgressLine("bristle run") as line, telling(line.say):
             tell("")
             print("Run it? [y/N] ", end="", file=sys.stderr, flush=True)
             time.sleep(1.2)

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bristle.campaign import pool
-from bristle.campaign.campaign import Outcome
+from bristle.campaign.campaign import RunOutcome
 from bristle.controller_comparison import Spread, compare_controllers
 
 MOTION = "el_centro_1940_ns,peak=0.4g,factor=0.45,stop=2,label=weak"
@@ -32,7 +32,7 @@ def test_an_interrupted_comparison_makes_no_run_of_its_ensembles_twice(
     most = [6]
     own = pool.run_local
 
-    def counted(*given: Any) -> Iterator[Outcome]:
+    def counted(*given: Any) -> Iterator[RunOutcome]:
         for outcome in own(*given):
             if made[0] == most[0]:
                 raise KeyboardInterrupt

@@ -17,7 +17,7 @@ from bristle.data.measurement import (
     read_measurements,
 )
 from bristle.data.table import from_arrays
-from bristle.engine.results import Column, Table, to_frame, write_csv, write_parquet
+from bristle.engine.results import OutputColumn, RunTable, to_frame, write_csv, write_parquet
 from bristle.errors import RecordError
 
 N = 1000
@@ -230,12 +230,12 @@ def test_results_of_bristle_are_measurements(tmp_path: Path) -> None:
         "damper.fault": np.zeros(N, dtype=np.int64),
     }
     kinds = (
-        Column("structure.base_displacement", "Real", "m"),
-        Column("damper.force", "Real", "N"),
-        Column("damper.fault", "Integer"),
+        OutputColumn("structure.base_displacement", "Real", "m"),
+        OutputColumn("damper.force", "Real", "N"),
+        OutputColumn("damper.fault", "Integer"),
     )
     made = {"scenario": "schema = 1\n", "version": "0", "wall_time": 1.0}
-    frame = to_frame(Table(TIME, kinds, values), made, complete=False)
+    frame = to_frame(RunTable(TIME, kinds, values), made, complete=False)
     write_csv(frame, tmp_path / "results.csv")
     write_parquet(frame, tmp_path / "results.parquet")
     specs = {

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 import pytest
 
 from bristle.engine.schedule import (
+    DoStep,
     Keep,
     Node,
     Ramp,
-    Read,
+    ReadOutputs,
     Restore,
     Save,
     Schedule,
     Shift,
-    Step,
     Write,
     find_loop,
     make_schedule,
@@ -59,10 +59,10 @@ LOOP = [GROUND, STRUCTURE, VOLTAGE, DAMPER]
 
 def calls(schedule: Schedule) -> list[tuple[object, ...]]:
     """Return the operations in short: (kind, component, names)."""
-    verbs = {Read: "get", Write: "set", Ramp: "ramp", Keep: "keep", Shift: "shift"}
+    verbs = {ReadOutputs: "get", Write: "set", Ramp: "ramp", Keep: "keep", Shift: "shift"}
     found: list[tuple[object, ...]] = []
     for o in schedule.operations:
-        if isinstance(o, Step | Save | Restore):
+        if isinstance(o, DoStep | Save | Restore):
             found.append((type(o).__name__.lower(), o.component))
         elif isinstance(o, Write) and o.values:
             each = (f"{n}:{v}" for n, v in zip(o.names, o.values, strict=True))
@@ -162,7 +162,9 @@ def test_chain_against_the_order_is_refreshed_link_by_link() -> None:
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
 def test_every_output_is_read_and_has_a_place(algorithm: str) -> None:
     schedule = make_schedule(LOOP, algorithm)
-    read = {(o.component, n) for o in schedule.operations if isinstance(o, Read) for n in o.names}
+    read = {
+        (o.component, n) for o in schedule.operations if isinstance(o, ReadOutputs) for n in o.names
+    }
     written = {
         (o.component, n) for o in schedule.operations if isinstance(o, Write) for n in o.names
     }

@@ -13,9 +13,9 @@ import pytest
 
 from bristle.engine import results
 from bristle.engine.results import (
-    Column,
     CsvWriter,
-    Table,
+    OutputColumn,
+    RunTable,
     from_frame,
     load_results,
     to_frame,
@@ -39,16 +39,16 @@ AWKWARD = [0.1 + 0.2, -0.0, 5e-324, 1.7976931348623157e308, np.nan, np.inf, -np.
 def frame() -> pd.DataFrame:
     n = len(AWKWARD)
     columns = (
-        Column("damper.force", "Real", "N"),
-        Column("damper.stroke_ratio", "Real", "1"),
-        Column("source.value", "Real"),
-        Column("foreign.x[1,2]", "Real", "N.s/(m.V)"),
-        Column("damper.fault", "Integer"),
-        Column("foreign.on", "Boolean"),
+        OutputColumn("damper.force", "Real", "N"),
+        OutputColumn("damper.stroke_ratio", "Real", "1"),
+        OutputColumn("source.value", "Real"),
+        OutputColumn("foreign.x[1,2]", "Real", "N.s/(m.V)"),
+        OutputColumn("damper.fault", "Integer"),
+        OutputColumn("foreign.on", "Boolean"),
     )
     arrays = [np.array(AWKWARD), np.zeros(n), np.ones(n), np.arange(n) / 7, np.arange(n)]
     values = {c.name: a for c, a in zip(columns, [*arrays, np.arange(n) % 2 == 0], strict=True)}
-    return to_frame(Table(np.arange(n) * 0.1, columns, values), MADE)
+    return to_frame(RunTable(np.arange(n) * 0.1, columns, values), MADE)
 
 
 @pytest.mark.parametrize(("write", "name"), [(write_csv, "r.csv"), (write_parquet, "r.parquet")])
@@ -104,9 +104,9 @@ def test_csv_that_grows_is_readable_at_any_moment(frame: pd.DataFrame, tmp_path:
     assert load_results(path).attrs == frame.attrs
 
 
-def part(table: Table, first: int, last: int) -> Table:
+def part(table: RunTable, first: int, last: int) -> RunTable:
     values = {name: array[first:last] for name, array in table.values.items()}
-    return Table(table.time[first:last], table.columns, values)
+    return RunTable(table.time[first:last], table.columns, values)
 
 
 @pytest.mark.parametrize("lost", [1, 7, 40])
@@ -196,15 +196,15 @@ def test_disk_that_fills_on_the_way_keeps_whole_lines(frame: pd.DataFrame, tmp_p
 
 def test_csv_of_a_whole_run_is_fast(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
-    columns = tuple(Column(f"c.{i}", "Real", "m") for i in range(25))
-    table = Table(
+    columns = tuple(OutputColumn(f"c.{i}", "Real", "m") for i in range(25))
+    table = RunTable(
         np.arange(17_500) / 500, columns, {c.name: rng.normal(size=17_500) for c in columns}
     )
     best = min(_timed(table, tmp_path / "r.csv") for _ in range(3))
     assert best <= 0.5
 
 
-def _timed(table: Table, path: Path) -> float:
+def _timed(table: RunTable, path: Path) -> float:
     before = time.process_time()
     CsvWriter(path, table, MADE).close()
     return time.process_time() - before

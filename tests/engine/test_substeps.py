@@ -13,7 +13,7 @@ from toys import Maker
 
 from bristle import run
 from bristle.component import HELD, LINEAR, SAMPLED
-from bristle.engine.schedule import ALONG, Node, Step, Write, make_schedule
+from bristle.engine.schedule import ALONG, DoStep, Node, Write, make_schedule
 
 SEQUENTIAL = ("gauss-seidel", "midpoint", "midpoint-iterated")
 H, PARTS = 0.1, 4
@@ -113,7 +113,7 @@ def test_only_inputs_of_components_with_substeps_are_set_inside_of_them() -> Non
 
     def inside(node: Node) -> list[tuple[Write, ...]]:
         schedule = make_schedule([LOOP[0], node, *LOOP[2:]], "gauss-seidel")
-        return [o.along for o in schedule.operations if isinstance(o, Step) and o.along]
+        return [o.along for o in schedule.operations if isinstance(o, DoStep) and o.along]
 
     assert inside(structure) == []
     wanted = Write(1, "Real", ("a_g",), (ALONG,))

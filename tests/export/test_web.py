@@ -17,7 +17,7 @@ from bristle.cli import main
 from bristle.engine.coupled import Coupled
 from bristle.errors import BuildError, ScenarioError
 from bristle.export.web import body, chosen, described, export_component, export_web
-from bristle.export.web_module import Numbers, Slider
+from bristle.export.web_module import PageNumbers, Slider
 from bristle.fmu import catalogue
 from bristle.native import zig
 from bristle.system.scenario import load_scenario, stock_scenarios
@@ -35,11 +35,11 @@ needs_tools = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def numbers() -> Numbers:
-    return Numbers(PASSIVE)
+def numbers() -> PageNumbers:
+    return PageNumbers(PASSIVE)
 
 
-def moved(numbers: Numbers, slider: Slider, value: float) -> bytes:
+def moved(numbers: PageNumbers, slider: Slider, value: float) -> bytes:
     """Return the numbers as the loader moves them."""
     data = bytearray(numbers.data)
     for at, offset, slope in slider.moved:
@@ -57,10 +57,10 @@ def moved(numbers: Numbers, slider: Slider, value: float) -> bytes:
     ],
 )
 def test_a_slider_gives_the_numbers_of_the_scenario_with_that_value(
-    numbers: Numbers, name: str, value: float
+    numbers: PageNumbers, name: str, value: float
 ) -> None:
     slider = numbers.slider(name, 0.5 * value, 1.2 * value)
-    other = Numbers(PASSIVE, {name: value})
+    other = PageNumbers(PASSIVE, {name: value})
     found = np.frombuffer(moved(numbers, slider, value), dtype=np.uint8)
     right = np.frombuffer(other.data, dtype=np.uint8)
     at = [one.at for one in slider.moved]
@@ -73,36 +73,36 @@ def test_a_slider_gives_the_numbers_of_the_scenario_with_that_value(
     assert np.array_equal(found[same], right[same])
 
 
-def test_a_mass_is_refused_for_the_matrices_follow_it_otherwise(numbers: Numbers) -> None:
+def test_a_mass_is_refused_for_the_matrices_follow_it_otherwise(numbers: PageNumbers) -> None:
     with pytest.raises(ScenarioError, match=r"structure\.attached_mass: .* in proportion"):
         numbers.slider("structure.attached_mass", 0.0, 5.0)
 
 
 @pytest.mark.parametrize("name", ["damper.nosuch", "nobody.level", "damper.force", "ground.record"])
-def test_what_is_no_number_of_a_component_is_refused(numbers: Numbers, name: str) -> None:
+def test_what_is_no_number_of_a_component_is_refused(numbers: PageNumbers, name: str) -> None:
     with pytest.raises(ScenarioError, match="no component has a number"):
         numbers.slider(name)
 
 
-def test_a_slider_without_room_is_refused(numbers: Numbers) -> None:
+def test_a_slider_without_room_is_refused(numbers: PageNumbers) -> None:
     with pytest.raises(ScenarioError, match=r"from 3 to 3 moves nothing"):
         numbers.slider("voltage.level", 3.0, 3.0)
 
 
 def test_a_slider_that_does_not_hold_the_value_of_the_scenario_is_refused(
-    numbers: Numbers,
+    numbers: PageNumbers,
 ) -> None:
     # The page begins there, and could not run any value of another slider.
     with pytest.raises(ScenarioError, match=r"voltage\.level is 4 V .* from 5 to 8"):
         chosen(numbers, {"voltage.level": (5.0, 8.0)})
 
 
-def test_two_sliders_that_move_one_number_are_refused(numbers: Numbers) -> None:
+def test_two_sliders_that_move_one_number_are_refused(numbers: PageNumbers) -> None:
     with pytest.raises(ScenarioError, match=r"ground\.factor and ground\.peak move the same"):
         chosen(numbers, {"ground.peak": (None, None), "ground.factor": (None, None)})
 
 
-def test_by_itself_a_page_moves_what_is_set_and_the_law(numbers: Numbers) -> None:
+def test_by_itself_a_page_moves_what_is_set_and_the_law(numbers: PageNumbers) -> None:
     names = [slider.name for slider in chosen(numbers, None)]
     assert names[:2] == ["ground.peak", "voltage.level"]
     assert {"damper.sigma_a", "damper.sigma_2"} < set(names)
@@ -152,7 +152,7 @@ def test_what_would_do_nothing_is_refused(
     assert text in capsys.readouterr().err
 
 
-def test_the_page_needs_no_other_file(numbers: Numbers) -> None:
+def test_the_page_needs_no_other_file(numbers: PageNumbers) -> None:
     page = body(b"\0asm", described(numbers, {"voltage.level": (0.0, 8.0)}))
     script = page.partition('<script type="module">')[2]
     assert not re.search(r"^(import|export) ", script, re.MULTILINE)

@@ -24,7 +24,7 @@ from kinds import ONE_OF_EACH
 
 from bristle.errors import BuildError, PhysicsError, RecordError
 from bristle.fmu import catalogue
-from bristle.fmu.build import Plan, build, build_all, built_guid, ensure, plan
+from bristle.fmu.build import BuildPlan, build, build_all, built_guid, ensure, plan
 
 ROOT = Path(__file__).resolve().parents[2]
 each_component = pytest.mark.parametrize("component", COMPONENTS)
@@ -249,7 +249,9 @@ def test_an_edited_component_lives_beside_the_other(write: Any, tmp_path: Path) 
     source = first.component.read_text(encoding="utf-8")
     edited = write(source.replace('"level", 4.0', '"level", 8.0'), "constant_voltage.py")
     assert edited.read_text(encoding="utf-8") != source
-    second = build(Plan("ConstantVoltage", edited, {"name": "ConstantVoltage"}), tmp_path / "b")
+    second = build(
+        BuildPlan("ConstantVoltage", edited, {"name": "ConstantVoltage"}), tmp_path / "b"
+    )
     assert two_builds([str(built("ConstantVoltage")), str(second)], [{}, {}], "voltage") == [4, 8]
 
 

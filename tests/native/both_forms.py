@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from bristle.conformance.bench import BlackBox, Plan, WatchedLibrary
+from bristle.conformance.bench import BlackBox, ProbePlan, WatchedLibrary
 from bristle.fmu.archive import extract
 from bristle.fmu.build import plan
 from bristle.fmu.description import read_description
@@ -53,7 +53,7 @@ class Native:
         self.path = path
         self.about = read_description(path)
         self.folder = extract(path, folder() / f"{path.parent.name}_{path.stem}_unpacked")
-        about = Plan(str(path), str(self.folder), str(folder()), 60.0, self.about)
+        about = ProbePlan(str(path), str(self.folder), str(folder()), 60.0, self.about)
         self.library = WatchedLibrary(about, BlackBox(folder() / "box"))
         self.messages = self.library.messages
 

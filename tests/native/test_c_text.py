@@ -16,7 +16,7 @@ import pytest
 from bristle.core.jit import library_text
 from bristle.errors import BuildError
 from bristle.native import zig
-from bristle.native.c_functions import Line, c_text, needed
+from bristle.native.c_functions import CLine, c_text, needed
 from bristle.native.entrance import NAME, plain_text
 from bristle.native.zig import here
 
@@ -141,5 +141,5 @@ def test_constants_are_kept_and_what_python_needs_is_not() -> None:
 
 
 def test_what_nothing_reads_is_left_out() -> None:
-    lines = [Line("a = 1;", "a"), Line("b = a;", "b"), Line("f(c);"), Line("c = 2;", "c")]
+    lines = [CLine("a = 1;", "a"), CLine("b = a;", "b"), CLine("f(c);"), CLine("c = 2;", "c")]
     assert [one.text for one in needed(lines)] == ["f(c);", "c = 2;"]

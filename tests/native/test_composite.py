@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.engine.coupled import Layout, symmetric_eigenvalues
+from bristle.engine.coupled import RecordLayout, symmetric_eigenvalues
 from bristle.errors import BuildError, ScenarioError, StudyError
 from bristle.export import composite_functions
 from bristle.export.composite import Assembly, plan_of
@@ -26,7 +26,7 @@ SWITCHED = "el_centro_0p6g_lpv_sensors"
 def test_outputs_are_those_of_a_run_and_parameters_those_of_the_parts(scenario: Path) -> None:
     slave = component_of(plan_of(scenario))
     named = {v.name for v in slave.vars.values() if v.causality.name == "output"}
-    system = Layout(load_scenario(scenario))
+    system = RecordLayout(load_scenario(scenario))
     assert named == {*system.outputs, "fault"}
     parameters = {
         f"{part.name}.{name}"

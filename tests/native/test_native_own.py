@@ -8,7 +8,7 @@ import pytest
 from both_forms import Both, Native, folder, needs_zig
 
 from bristle.cli import main
-from bristle.fmu.build import Plan, plan
+from bristle.fmu.build import BuildPlan, plan
 from bristle.native.build import build
 from bristle.native.prepare import component_of, prepare
 from bristle.native.zig import here
@@ -17,7 +17,7 @@ from bristle.user_code.load import load_file
 pytestmark = [needs_zig, pytest.mark.slow]
 
 
-def difference(what: Plan, **values: object) -> float:
+def difference(what: BuildPlan, **values: object) -> float:
     """Return the largest difference between both forms of what is planned."""
     pair = Both(Native(build(what, folder() / "own", [here()])), component_of(what), **values)
     pair.begin()

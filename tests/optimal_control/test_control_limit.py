@@ -16,7 +16,7 @@ from bristle.engine.results import statistic_of
 from bristle.errors import BristleError, ScenarioError
 from bristle.optimal_control import Limit, case, limit, search
 from bristle.optimal_control.bound import bound_of, largest_force
-from bristle.optimal_control.case import Problem, case_of, with_voltage
+from bristle.optimal_control.case import ControlProblem, case_of, with_voltage
 from bristle.optimal_control.search import descended, levelled
 from bristle.system.scenario import load_scenario
 
@@ -51,10 +51,12 @@ def in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(case, "compiled", lambda function: function)
 
 
-def made(stop: float, every: int = 1, output: str = Y, **values: object) -> Problem:
+def made(stop: float, every: int = 1, output: str = Y, **values: object) -> ControlProblem:
     """Return the problem of a half-sine pulse; `damper__x` sets `damper.x`."""
     overrides = {name.replace("__", "."): value for name, value in values.items()}
-    return Problem(case_of(load_scenario(PULSE, {"run.stop": stop, **overrides}), output), every)
+    return ControlProblem(
+        case_of(load_scenario(PULSE, {"run.stop": stop, **overrides}), output), every
+    )
 
 
 @pytest.mark.usefixtures("in_python")
@@ -73,7 +75,7 @@ def test_the_response_is_that_of_the_coupled_engine(fmu: str, output: str, apart
     scenario = load_scenario(PULSE, values)
     whole = Coupled().run(scenario)[output]
     case = case_of(scenario, output)
-    one = Problem(case)
+    one = ControlProblem(case)
     steps = round(scenario.step / case.plant.h)
     y = one.respond(one.level(3.0))[::steps]
     assert np.abs(y - whole).max() < apart * np.abs(whole).max()
@@ -85,7 +87,7 @@ def test_a_damper_between_floors_is_felt_and_pushes_there(tmp_path: Path) -> Non
     building = scenarios_folder() / "buildings" / "damper_in_first_storey.toml"
     file.write_text(BRACE.replace("FILE", building.as_posix()))
     scenario = load_scenario(file)
-    one = Problem(case_of(scenario, Y))
+    one = ControlProblem(case_of(scenario, Y))
     whole = Coupled().run(scenario)[Y]
     assert np.abs(one.respond(one.level(3.0)) - whole).max() < 2e-3 * np.abs(whole).max()
 

@@ -21,11 +21,11 @@ from bristle.data.measurement import Measurement
 from bristle.errors import RecordError, StudyError
 from bristle.examples.make import Choice, make_building
 from bristle.examples.perform import perform_plan
-from bristle.planning.added_sensors import Added
+from bristle.planning.added_sensors import AddedSensors
 from bristle.planning.building import ONE_FORCE, BuildingPlan, limits_of_shaking
 from bristle.planning.folder import ROLES, read_plan
 from bristle.planning.information import Goal
-from bristle.planning.limits import RESERVE, RigLimits, Signals, Test, read_rig
+from bristle.planning.limits import RESERVE, PrescribedSignals, RigLimits, Test, read_rig
 from bristle.planning.outcome import Outcome
 from bristle.planning.shaking_table import Columns, ShakingTable, TablePlanner
 from bristle.planning.site_questions import are_twins, default_requests, twins_of
@@ -104,7 +104,7 @@ def table(run: Measurement, noise: dict[str, float] | None = None) -> ShakingTab
     return ShakingTable(model, BuildingWithFile(TOWER), run, std, 5.0)
 
 
-def response(signals: Signals, size: float = 0.1) -> dict[str, Array]:
+def response(signals: PrescribedSignals, size: float = 0.1) -> dict[str, Array]:
     """Return a response in proportion to the ground: the base moves by `size` m per m/s2."""
     out = {"damper.force": 10.0 * signals.a}
     for k, level in enumerate(("base", "floor1")):
@@ -114,7 +114,7 @@ def response(signals: Signals, size: float = 0.1) -> dict[str, Array]:
     return out
 
 
-def shaking(size: float = 1.0, rate: float = 0.0) -> Signals:
+def shaking(size: float = 1.0, rate: float = 0.0) -> PrescribedSignals:
     motion = Waveform("sweep", 0.5, 8.0)
     return Test(motion, Command("held", 0.0, 3.0), size, 10.0).signals(LIMITS, rate)
 
@@ -155,7 +155,7 @@ class Still(ShakingTable):
 
     size = 0.1
 
-    def response(self, signals: Signals) -> Columns | None:
+    def response(self, signals: PrescribedSignals) -> Columns | None:
         return response(signals, self.size)
 
 
@@ -259,12 +259,12 @@ PAIR = Outcome("separate", "damper: gas_spring or duffing", ONE_FORCE, "std", 0.
     ("added", "said"),
     [
         (
-            Added("force", PAIR, np.inf, True),
+            AddedSensors("force", PAIR, np.inf, True),
             "A load cell at the damper would settle gas_spring or duffing: with it they are 310 "
             "std apart; a verdict needs 4.",
         ),
         (
-            Added(
+            AddedSensors(
                 "floor1_displacement",
                 Outcome("see", "storey1: storey_softening", "d_half", "m", 0.04, 0.09), 2.2, False,
             ),
@@ -272,7 +272,7 @@ PAIR = Outcome("separate", "damper: gas_spring or duffing", ONE_FORCE, "std", 0.
             "1: d_half 90 mm in place of 40 mm.",
         ),
         (
-            Added(
+            AddedSensors(
                 "base_acceleration_absolute",
                 Outcome("sharpen", "layer: k", "standard deviation", "%", 0.004, 0.003), 1.3, False,
             ),
@@ -281,7 +281,7 @@ PAIR = Outcome("separate", "damper: gas_spring or duffing", ONE_FORCE, "std", 0.
         ),
     ],
 )  # fmt: skip
-def test_a_sensor_is_told_with_what_it_shows(added: Added, said: str) -> None:
+def test_a_sensor_is_told_with_what_it_shows(added: AddedSensors, said: str) -> None:
     assert added.sentence() == said
 
 
@@ -294,7 +294,7 @@ def a_plan(**changed: Any) -> BuildingPlan:
     signals = tuple(shaking(one.share) for one in tests)
     rows = (replace(PAIR, settled=False),)
     base = tuple(0.001 * one.a for one in signals)
-    given = {"predicted": base, "sensors": (Added("force", PAIR, np.inf, True),)} | changed
+    given = {"predicted": base, "sensors": (AddedSensors("force", PAIR, np.inf, True),)} | changed
     roles = ("train", "holdout")
     return BuildingPlan(
         "tower", tuple(tests), signals, rows, LIMITS, "voltage", 1.0, roles, **given

@@ -36,10 +36,10 @@ from bristle.planning.limits import RigLimits, Test
 from bristle.planning.outcome import Outcome, outcomes
 from bristle.planning.questions import (
     LEAST,
-    Figure,
-    Measured,
+    AskedFigure,
     PlanRequest,
     Purposes,
+    RunsAtHand,
     cost_of,
     default_request,
     effects_beside,
@@ -205,8 +205,8 @@ def test_a_verdict_needs_half_of_the_tests_and_parameters_a_quarter() -> None:
 
 
 def test_a_figure_costs_nothing_below_what_is_enough() -> None:
-    assert Figure("see", "gas_spring", 0.1, 0.2).cost == 0.0
-    assert cost_of([Figure("see", "a", 0.4, 0.2), Figure("sharpen", "b", 0.2, 0.2)]) > 0.0
+    assert AskedFigure("see", "gas_spring", 0.1, 0.2).cost == 0.0
+    assert cost_of([AskedFigure("see", "a", 0.4, 0.2), AskedFigure("sharpen", "b", 0.2, 0.2)]) > 0.0
 
 
 def test_a_plan_of_a_new_rig_keeps_its_limits_and_sees_what_it_is_for(sheet: Path) -> None:
@@ -300,7 +300,7 @@ def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Stu
     assert opened is not None
     names = ["delay", "stribeck", "saturation"]
     purposes = Purposes(opened.before.model, tuple(effects_beside(opened, names)))
-    measured = Measured(opened.problem.runs, opened.held_out.runs)
+    measured = RunsAtHand(opened.problem.runs, opened.held_out.runs)
     found = stated(purposes, opened.searched, measured, 1.0, seed=1)
     rows = outcomes(purposes, found.asked, found.known, found.known)  # no further test
     for row, one in zip(rows, purposes.effects, strict=True):

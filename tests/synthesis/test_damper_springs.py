@@ -8,22 +8,24 @@ from scipy import linalg
 
 from bristle.physics.building import paper_building
 from bristle.synthesis import Task, design
-from bristle.synthesis.damper import Damper, coefficients
+from bristle.synthesis.damper import DesignDamper, coefficients
 from bristle.synthesis.kinds import plants_at
 from bristle.synthesis.plant import structure
 
 GRID = np.array([0.0, 0.01, 0.1, 0.3])
-GAS = Damper("lugre", {"gas_spring.k": 400.0}, ("gas_spring",))
+GAS = DesignDamper("lugre", {"gas_spring.k": 400.0}, ("gas_spring",))
 
 
 @pytest.mark.parametrize("law", ["bouc_wen", "tanh"])
 def test_the_force_of_an_accumulator_at_mid_stroke_damps_nothing(law: str) -> None:
-    plain, offset = (coefficients(Damper(law, {"f_0": f_0}), GRID, 0.005) for f_0 in (0.0, 2.0))
+    plain, offset = (
+        coefficients(DesignDamper(law, {"f_0": f_0}), GRID, 0.005) for f_0 in (0.0, 2.0)
+    )
     assert np.allclose(offset, plain, rtol=1e-6, atol=1e-6)
 
 
 def test_a_voltage_meets_the_spring_of_the_law_a_force_does_not() -> None:
-    damper = Damper("bouc_wen", {"k": 150.0, "f_0": 1.0})
+    damper = DesignDamper("bouc_wen", {"k": 150.0, "f_0": 1.0})
     assert [Task(kind, damper=damper).stiffness for kind in ("lpv", "hinf", "lqg")] == [
         pytest.approx(150.0), 0.0, 0.0,
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from bristle.component.controller_file import parse_controller
 from bristle.errors import DesignError
 from bristle.physics.building import Building, from_data, paper_building
 from bristle.synthesis import (
-    Damper,
+    DesignDamper,
     DesignResult,
     LqgWeights,
     Task,
@@ -151,7 +151,7 @@ def test_a_task_that_cannot_be_is_refused(wrong: dict[str, object], message: str
 )
 def test_a_damper_that_cannot_be_is_refused(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(DesignError, match=message):
-        Damper(**wrong)  # type: ignore[arg-type]
+        DesignDamper(**wrong)  # type: ignore[arg-type]
 
 
 def scaled_building(factor: float) -> Building:

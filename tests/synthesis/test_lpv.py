@@ -10,7 +10,7 @@ from scipy import linalg
 
 from bristle.component.controller_file import Controller
 from bristle.errors import DesignError
-from bristle.synthesis import Damper, DesignResult, Scheduling, Task, design, lmi
+from bristle.synthesis import DesignDamper, DesignResult, Scheduling, Task, design, lmi
 from bristle.synthesis.analysis import least_gamma, responses
 from bristle.synthesis.kinds import gammas, plants_at, units_for
 from bristle.synthesis.plant import balancing
@@ -183,12 +183,12 @@ def test_a_grid_that_cannot_be_is_refused(wrong: dict[str, object], message: str
 
 def test_a_grid_beyond_the_dampers_data_is_refused() -> None:
     with pytest.raises(DesignError, match=r"beyond the 0\.2 m/s"):
-        Task("lpv", damper=Damper(known_to=0.2))
-    Task("hinf", damper=Damper(known_to=0.2))  # which has no grid
+        Task("lpv", damper=DesignDamper(known_to=0.2))
+    Task("hinf", damper=DesignDamper(known_to=0.2))  # which has no grid
 
 
 def test_a_damper_without_authority_is_refused() -> None:
-    damper = Damper(values={"f_v": 0.0, "c_v": 0.0})
+    damper = DesignDamper(values={"f_v": 0.0, "c_v": 0.0})
     with pytest.raises(DesignError, match="voltage has no effect on the force"):
         design(Task("lpv", damper=damper))
 

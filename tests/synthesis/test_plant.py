@@ -11,7 +11,7 @@ import pytest
 from bristle.errors import DesignError
 from bristle.physics.building import Building, frequencies, from_data, paper_building
 from bristle.synthesis.analysis import gains, hinf_norm, least_gamma
-from bristle.synthesis.damper import Damper, coefficients, stiffness
+from bristle.synthesis.damper import DesignDamper, coefficients, stiffness
 from bristle.synthesis.plant import (
     Plant,
     StateSpace,
@@ -69,7 +69,7 @@ def test_balanced_states_have_equal_diagonal_gramians(plant: Plant) -> None:
 
 
 def test_damping_and_gain_over_speed() -> None:
-    d, b = coefficients(Damper(), GRID, 0.005)
+    d, b = coefficients(DesignDamper(), GRID, 0.005)
     published_d = [360, 147.31973, 88.78794, 42.42242, 17.12568, 8.44241, 4.26233]
     published_b = [0, 0.67464, 0.81115, 0.84605, 0.81048, 0.80489, 0.8164]
     assert d == pytest.approx(published_d, abs=6e-6)
@@ -77,38 +77,38 @@ def test_damping_and_gain_over_speed() -> None:
 
 
 def test_both_laws_slide_alike() -> None:
-    bingham = coefficients(Damper("bingham"), GRID, 0.005)
-    assert np.allclose(coefficients(Damper("lugre"), GRID, 0.005), bingham, rtol=1e-12)
+    bingham = coefficients(DesignDamper("bingham"), GRID, 0.005)
+    assert np.allclose(coefficients(DesignDamper("lugre"), GRID, 0.005), bingham, rtol=1e-12)
 
 
 def test_a_design_takes_the_form_of_the_command_from_the_model() -> None:
-    line = coefficients(Damper("bingham"), GRID, 0.005)
-    table = coefficients(Damper("bingham[table 0 8]"), GRID, 0.005)
+    line = coefficients(DesignDamper("bingham"), GRID, 0.005)
+    table = coefficients(DesignDamper("bingham[table 0 8]"), GRID, 0.005)
     assert np.allclose(table, line, rtol=1e-12)  # its defaults lie on the line
-    bent = Damper("bingham[quadratic]", {"yield_force_bend": -0.05})
+    bent = DesignDamper("bingham[quadratic]", {"yield_force_bend": -0.05})
     d, b = coefficients(bent, GRID, 0.005)
     assert np.allclose(d, line[0])
     assert (b[1:] < 0.7 * line[1][1:]).all()
     with pytest.raises(DesignError, match="law"):
-        Damper("nobody[quadratic]")
+        DesignDamper("nobody[quadratic]")
 
 
 def test_the_standard_law_does_not_fall_with_speed() -> None:
-    d, b = coefficients(Damper("bingham_standard"), GRID, 0.005)
+    d, b = coefficients(DesignDamper("bingham_standard"), GRID, 0.005)
     assert d == pytest.approx(1.3 / (GRID + 0.005) + 100.0)
     assert b == pytest.approx(GRID * (0.83 / (GRID + 0.005) + 20.0))
 
 
 def test_open_loop_norms_over_speed() -> None:
     published = [6.0234, 2.9185, 2.4998, 3.7119, 7.6941, 13.639, 22.170]
-    d, b = coefficients(Damper(), GRID, 0.005)
+    d, b = coefficients(DesignDamper(), GRID, 0.005)
     norms = [hinf_norm(p.open_loop()) for p in family(paper_building(), Weights(), b, d)]
     assert norms == pytest.approx(published, rel=1e-3)
 
 
 def test_a_family_is_its_members() -> None:
     building = full_mass_building()
-    d, b = coefficients(Damper(), GRID, 0.005)
+    d, b = coefficients(DesignDamper(), GRID, 0.005)
     for plant, damping, gain in zip(family(building, Weights(), b, d, 80.0), d, b, strict=True):
         alone = generalized(building, Weights(), float(gain), float(damping), 80.0)
         for one, other in zip(plant, alone, strict=True):
@@ -127,14 +127,14 @@ def test_structure_has_the_buildings_frequencies_and_statics() -> None:
 
 
 def test_effects_of_a_damper_enter_its_sliding() -> None:
-    plain = coefficients(Damper("lugre"), GRID, 0.005)
-    gas = Damper("lugre", {"gas_spring.k": 60.0, "gas_spring.preload": 2.0}, ("gas_spring",))
+    plain = coefficients(DesignDamper("lugre"), GRID, 0.005)
+    gas = DesignDamper("lugre", {"gas_spring.k": 60.0, "gas_spring.preload": 2.0}, ("gas_spring",))
     assert np.allclose(coefficients(gas, GRID, 0.005), plain, rtol=1e-6, atol=1e-9)
     assert stiffness(gas) == pytest.approx(60.0, rel=1e-6)
-    assert stiffness(Damper()) == 0.0
-    lag = Damper("lugre", {}, ("coil_lag", "mount_compliance"))  # neither matters in sliding
+    assert stiffness(DesignDamper()) == 0.0
+    lag = DesignDamper("lugre", {}, ("coil_lag", "mount_compliance"))  # neither matters in sliding
     assert np.allclose(coefficients(lag, GRID, 0.005), plain, rtol=1e-6, atol=1e-9)
-    stuck = coefficients(Damper("bingham", {}, ("stribeck",)), GRID, 0.005)
+    stuck = coefficients(DesignDamper("bingham", {}, ("stribeck",)), GRID, 0.005)
     assert stuck[0][0] > 1.05 * plain[0][0]
     assert stuck[0][-1] == pytest.approx(plain[0][-1], rel=0.02)
 

@@ -11,7 +11,15 @@ from bristle.cli import main
 from bristle.component.controller_file import KINDS
 from bristle.errors import DesignError
 from bristle.physics.building import frequencies, paper_building
-from bristle.synthesis import Damper, LqgWeights, Scheduling, Task, Weight, Weights, implausible
+from bristle.synthesis import (
+    DesignDamper,
+    LqgWeights,
+    Scheduling,
+    Task,
+    Weight,
+    Weights,
+    implausible,
+)
 
 FASTEST = frequencies(paper_building())[-1]
 MILLION = 1e6
@@ -98,7 +106,7 @@ def _times(matrix: object, factor: float) -> tuple[tuple[float, ...], ...]:
 
 
 def test_a_slower_damper_has_a_shorter_grid() -> None:
-    slow = Damper(values={"v_n": 0.002})
+    slow = DesignDamper(values={"v_n": 0.002})
     (text,) = implausible(Task("lpv", damper=slow))
     assert "0.002 to 0.1 m/s" in text
 

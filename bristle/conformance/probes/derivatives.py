@@ -6,7 +6,7 @@ from ctypes import c_void_p
 
 from ...core.finding import Finding
 from ...fmu.library import Handle
-from ..bench import Bench, Plan, Values, finite, good
+from ..bench import Bench, ProbePlan, Values, finite, good
 from ..probe import passed, probe, unless_claimed
 from .order import forbidden
 
@@ -14,7 +14,7 @@ _FLAG = "canInterpolateInputs"
 _NO_CALL = "FMI 3.0 has no call for derivatives of inputs, but intermediate updates of their values"
 
 
-def _unless(plan: Plan) -> str | None:
+def _unless(plan: ProbePlan) -> str | None:
     if reason := unless_claimed(_FLAG)(plan):
         return reason
     return None if plan.variables("input", "Real") else "there is no real input"

@@ -13,7 +13,7 @@ from ...core.finding import Finding
 from ...errors import FmuError
 from ...fmu.description import Variable, describe, read_root
 from ...fmu.library import UnexpectedError
-from ..bench import Bench, Plan, some
+from ..bench import Bench, ProbePlan, some
 from ..probe import failed, noted, passed, probe
 
 _UNIT_IN_WORDS = re.compile(r"\[.+\]|\bin the unit of\b")
@@ -24,7 +24,7 @@ def _root(bench: Bench) -> ElementTree.Element:
     return read_root(Path(bench.plan.fmu), any_platform=True)
 
 
-def _unreadable(plan: Plan) -> str | None:
+def _unreadable(plan: ProbePlan) -> str | None:
     return None if plan.description is not None else "the variables cannot be read"
 
 
