@@ -385,7 +385,7 @@ def _write_renamed(text: str, target: Path, package: str) -> None:
     target.write_text(text, encoding="utf-8")
 
 
-def _pack(loose: Path, target: Path, what: Plan) -> None:
+def _pack(loose: Path, target: Path, what: BuildPlan) -> None:
     """Write the FMU again with what people see, in order, without times; rename it into place."""
     with zipfile.ZipFile(loose) as old:
         members = {name: old.read(name) for name in old.namelist()}

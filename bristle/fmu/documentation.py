@@ -18,7 +18,7 @@ from .component import SWITCH
 from .description import Variable, describe
 
 if TYPE_CHECKING:
-    from .build import Plan
+    from .build import BuildPlan
 
 _ICONS = Path(__file__).resolve().parent / "icons"
 _STYLE = (
@@ -41,14 +41,14 @@ def sources() -> list[Path]:
     return [Path(__file__), licence_file(), *sorted(_ICONS.iterdir())]
 
 
-def members(root: Element, what: Plan) -> dict[str, bytes]:
+def members(root: Element, what: BuildPlan) -> dict[str, bytes]:
     """Return what goes into an FMU's archive for a person to see, by its path there.
 
     Parameters
     ----------
     root : Element
         The model description, of FMI 2.0 or 3.0.
-    what : Plan
+    what : BuildPlan
         What is built.
     """
     kind = catalogue.component_class(what.component)
@@ -67,7 +67,7 @@ def members(root: Element, what: Plan) -> dict[str, bytes]:
     }
 
 
-def _page(root: Element, kind: Any, what: Plan) -> str:
+def _page(root: Element, kind: Any, what: BuildPlan) -> str:
     """Return the page about an FMU."""
     about = describe(root)
     name = escape(root.get("modelName", ""))
