@@ -1,6 +1,6 @@
 """What was measured: ground motions, measurements, and the checks of both.
 
-Ground motions are built in, come from an extra package, or from the user's AT2 and CSV files.
+Ground motions are built in, come from an extra package, or from the user's files.
 """
 
 from __future__ import annotations

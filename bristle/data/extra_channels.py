@@ -18,8 +18,8 @@ from ..core.text import plain
 from ..errors import RecordError, UnitError
 from ..units import conversion, parse, same_dimension, si_unit
 from .channels import DRIVE, PLAIN, UNITS, ChannelSpec, is_channel, meaning, of_a_sensor
-from .columns import Column
 from .table import Table
+from .titles import Column
 
 MIN_VALUES = 20
 """Values of such a channel in a run, at least."""

@@ -6,6 +6,7 @@ import hashlib
 import os
 import re
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -16,9 +17,24 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.text import listed
 from ..errors import PhysicsError, RecordError
-from ..physics.motion_file import HEADER, LARGEST, is_two_column, parse_two_column, read_text
-from . import at2, columns, fema, synthetic
+from ..physics.motion_file import (
+    HEADER,
+    LARGEST,
+    check_times,
+    is_two_column,
+    read_two_column,
+    shortened,
+)
+from . import fema, formats, synthetic
+from .channels import ChannelSpec, meaning, quantity_of_unit
 from .listing import Listing
+from .read import content_of
+from .table import Table
+from .titles import Column
+
+_RIGHT = 'A header with units is, for example, "time [s],acceleration [m/s2]" or "time_s,acc_g".'
+_CALENDAR = 1e8
+"""Begin of a time [s] from which on it is that of a calendar."""
 
 _EL_CENTRO = Listing(
     "el_centro_1940_ns",
@@ -69,7 +85,8 @@ def read_ground_motion(record: str, folder: Path) -> GroundMotion:
     Parameters
     ----------
     record : str
-        A name of `list_ground_motions`, or the path of a PEER AT2 or CSV file.
+        A name of `list_ground_motions`, or the path of a file: one of an archive (AT2, ESM,
+        K-NET, COSMOS, SMC), or any table with a time and an acceleration, such as CSV.
     folder : Path
         What a relative path is relative to.
 
@@ -100,7 +117,7 @@ def ground_motion_file(record: str, folder: Path) -> str:
     Parameters
     ----------
     record : str
-        As in a scenario: a name of `list_ground_motions`, or the path of an AT2 or CSV file.
+        As in a scenario: a name of `list_ground_motions`, or the path of a file.
     folder : Path
         What a relative path is relative to: the scenario's folder.
 
@@ -152,26 +169,77 @@ def _what_there_is() -> str:
     more = f"; some need: {needs}" if needs else ""
     return (
         f"There are {listed(row.name for row in rows)} (all: bristle list records{more}), or the "
-        f'path of a PEER AT2 file, or of a CSV with units in its header, as in "{HEADER}".'
+        f"path of a file of an archive (AT2, ESM, K-NET, COSMOS, SMC), or of a table such as CSV with "
+        f'units in its header, as in "{HEADER}".'
     )
 
 
 def _from_file(path: Path, name: str, source: str) -> tuple[GroundMotion, bool]:
     """Return a file's ground motion, and whether an FMU can read the file as it is."""
+    content = content_of(path)
+    begin = content[:4096].decode("utf-8-sig", "ignore")
+    # An FMU unpacks nothing, and takes no more than that.
+    ready = is_two_column(begin) and path.stat().st_size == len(content) <= LARGEST
+    if ready:
+        with suppress(PhysicsError):  # quoted numbers, decimal commas: a table like others
+            times, values = read_two_column(path)
+            return GroundMotion(np.array(times), np.array(values), name, source), True
+    table = formats.read(content, path.suffix.lower(), str(path))
+    time, acceleration = _columns_of(table)
+    return GroundMotion(time, acceleration, name, "; ".join((source, *table.remarks))), False
+
+
+def _columns_of(table: Table) -> tuple[Array, Array]:
+    """Return times (n,) s and accelerations (n,) m/s2 of the columns that are meant."""
+    from .measurement import in_si
+
+    if all(one.text == f"column {one.index + 1}" for one in table.columns):
+        raise RecordError(f"{table.source}: the columns have no names and no units. {_RIGHT}")
+    called = {"time": ("time", "t"), "acceleration": ("ground_acceleration",)}
+    time, acceleration = (
+        in_si(table, channel, ChannelSpec(_column_of(table, quantity, called[quantity]).text))
+        for quantity, channel in (("time", "time"), ("acceleration", "ground_acceleration"))
+    )
+    for k in np.flatnonzero(~(np.isfinite(time) & np.isfinite(acceleration)))[:1]:
+        raise RecordError(
+            f"{table.source}, {table.where(int(k))}: a value is missing or not finite. "
+            "Every sample of a ground motion needs one."
+        )
+    if len(time) and time[0] > _CALENDAR:  # days of a spreadsheet, seconds since 1970
+        time = time - time[0]
     try:
-        # Only the title lines of an AT2 file can hold more than ASCII, and no number is there.
-        is_at2 = path.suffix.lower() == ".at2"
-        text = read_text(path, "latin-1" if is_at2 else "utf-8-sig")
-        ready = False
-        if is_at2 or at2.looks_like(text):
-            time, acceleration = at2.parse(text, str(path))
-        else:
-            ready = is_two_column(text)
-            parse = parse_two_column if ready else columns.parse
-            time, acceleration = parse(text, str(path))
+        check_times(time.tolist(), table.lines.tolist(), table.source)
     except PhysicsError as error:
         raise RecordError(str(error)) from None
-    return GroundMotion(np.array(time), np.array(acceleration), name, source), ready
+    return time, acceleration
+
+
+def _column_of(table: Table, quantity: str, called: tuple[str, ...]) -> Column:
+    """Return the one column of a quantity, or the one that is called so."""
+    fitting = [one for one in table.columns if quantity_of_unit(one.stated) == quantity]
+    named = [one for one in fitting if one.name.rpartition(".")[2].lower() in called]
+    if len(named) == 1 or len(fitting) == 1:
+        return (named or fitting)[0]
+    if fitting:
+        several = listed([f'"{one.text}"' for one in fitting])
+        # Who takes the advice keeps the numbers: the unit is that of the column.
+        units = dict.fromkeys(one.stated for one in fitting)
+        right = " or ".join(f'"{called[0]} [{unit}]"' for unit in units)
+        own = ", in its own unit" if len(units) > 1 else ""
+        raise RecordError(
+            f"{table.source}: {several} could all be the {quantity}. Call the one that is meant "
+            f"{right}{own}."
+        )
+    for one in table.columns:
+        meant = meaning(one.name, None)
+        if meant is not None and meant.quantity == quantity and one.unit is None:
+            what = f": {one.problem}" if one.problem else " has no unit."
+            raise RecordError(f'{table.source}: "{one.text}"{what} {_RIGHT}')
+    there = shortened(", ".join(f'"{one.text}"' for one in table.columns))
+    raise RecordError(
+        f"{table.source}: no column is a{'n'[: quantity[0] == 'a']} {quantity} with a unit; there "
+        f"are {there}. {_RIGHT}"
+    )
 
 
 def _cached(motion: GroundMotion) -> Path:

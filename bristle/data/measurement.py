@@ -327,7 +327,7 @@ def measurements_of(
         if channel == "time":
             continue
         units[channel] = channel_unit(channel)
-        values[channel] = _in_si(table, channel, spec)
+        values[channel] = in_si(table, channel, spec)
     labels = dict(known.labels)
     warm = values.pop(TEMPERATURE, None)
     if warm is not None:
@@ -423,10 +423,10 @@ def _time(table: Table, spec: ChannelSpec | None) -> Array:
             f"{table.source}: {why}. Name one in [channels.time], or give the sampling step there: "
             "step = 0.002  # s"
         )
-    return _in_si(table, "time", spec)
+    return in_si(table, "time", spec)
 
 
-def _in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
+def in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
     """Return a column in the channel's SI unit."""
     column = table.find(spec.column)
     if column.text in table.not_numeric:

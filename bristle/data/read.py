@@ -35,9 +35,7 @@ def read_table(path: Path | str) -> Table:
         file, the line where there is one, and what would be right.
     """
     path = Path(path)
-    name = str(path)
-    content = _content(path, name)
-    return formats.read(content, path.suffix.lower(), name)
+    return formats.read(content_of(path), path.suffix.lower(), str(path))
 
 
 def files_in(folder: Path) -> list[Path]:
@@ -63,8 +61,15 @@ def files_in(folder: Path) -> list[Path]:
     return found
 
 
-def _content(path: Path, name: str) -> bytes:
-    """Return a file's bytes, decompressed, after refusing what is too large."""
+def content_of(path: Path) -> bytes:
+    """Return a file's bytes, decompressed.
+
+    Raises
+    ------
+    RecordError
+        If there is no such file, it cannot be read, is empty or too large.
+    """
+    name = str(path)
     try:
         if not path.is_file():
             what = "this is a folder" if path.is_dir() else "there is no such file"

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ..core.arrays import Array, Indices
 from ..core.text import listed
 from ..errors import RecordError
-from .columns import Column
-from .titles import titles
+from .titles import Column, titles
 
 if TYPE_CHECKING:
     import pandas as pd

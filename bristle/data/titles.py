@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ..errors import UnitError
 from ..units import Unit
 from ..units import parse as parse_unit
 from .channels import meaning, of_a_sensor, quantity_of_unit
-from .columns import Column, column
 
+_BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
+_A_G = "the g can be the unit or stand for ground. Write a_g [m/s2], or acc [g]."
 _PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
 _BRACKET = re.compile(r".*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]")
 _BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
@@ -22,6 +23,54 @@ _TEMPERATURE = re.compile(
     rf"|(?:,| in) (?:{_DEGREES.pattern}))\s*"
 )
 _NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none", "ts", "rn")
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column: where it stands, its text in the header, and what that means.
+
+    `unit` is None where the text gives none that can be read; `problem` then says why, if it
+    gives one at all, and `written` is that of a row of units. `doubt` is what speaks against how
+    its values were read.
+    """
+
+    index: int
+    text: str
+    name: str
+    unit: Unit | None
+    problem: str = ""
+    written: str = ""
+    doubt: str = ""
+
+    @property
+    def stated(self) -> str:
+        """The name of its unit, "" where it has none."""
+        return self.unit.name if self.unit else ""
+
+
+def column(index: int, text: str) -> Column:
+    """Return a column from its text in the header."""
+    text = text.strip().strip('"').strip()
+    match = _BRACKETS.fullmatch(text)
+    if match:
+        spelled = match["square"] if match["square"] is not None else match["round"]
+        try:
+            return Column(index, text, match["name"], parse_unit(spelled))
+        except UnitError as error:
+            return Column(index, text, match["name"], None, str(error))
+    parts = text.split("_")
+    # The longest ending that is a unit: `velocity_mm_s` is in mm/s, not in s.
+    for size in (2, 1):
+        name, ending = "_".join(parts[:-size]), parts[-size:]
+        if not name or not all(re.match(r"[A-Za-z%]", part) for part in ending):
+            continue
+        if len(name) == 1 and ending == ["g"]:
+            return Column(index, text, text, None, _A_G)
+        try:
+            return Column(index, text, name, parse_unit("/".join(ending)))
+        except UnitError:
+            continue
+    return Column(index, text, text, None)
 
 
 def title(index: int, text: str) -> Column:
@@ -264,5 +313,6 @@ _SPELLINGS = {
     "lbf": "lbs, lb, lbf",
     "in": "inch, in",
     "g": "g's",
+    "Gal": "gal, gals",
 }
 _RENAMED = {text: unit for unit, texts in _SPELLINGS.items() for text in texts.split(", ")}

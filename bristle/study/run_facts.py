@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 from ..core.text import listed, quantity
 from ..data.channels import DRIVE, PLAIN, TEMPERATURE, UNITS, Label, label_text, meaning
-from ..data.columns import Column
 from ..data.formats.delimited import decoded
-from ..data.titles import title, unit_or_none
+from ..data.titles import Column, title, unit_or_none
 from ..data.tone import (
     Tone,
     amplitude_fits,

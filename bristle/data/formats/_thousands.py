@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core.arrays import Array, Flags
 from ...core.text import plain
-from ..columns import Column
+from ..titles import Column
 from ._rows import Body, Layout, is_grouped, plain_number, without_groups
 
 _EVEN = 0.9  # by what factor a column is more even with groups than with decimals

@@ -17,9 +17,8 @@ from ...core.text import listed
 from ...errors import RecordError
 from ...physics.motion_file import shortened, without_end_mark
 from ...units import parse as parse_unit
-from ..columns import Column
 from ..table import Table
-from ..titles import is_unit_row, title_rows, titles
+from ..titles import Column, is_unit_row, title_rows, titles
 from ._instants import seconds_of
 from ._rows import Body, Layout, is_comment, is_grouped, read_fast, read_slow, state_of
 from ._thousands import read_groups

@@ -15,9 +15,9 @@ import numpy as np
 from ...core.text import plain
 from ...units import parse as parse_unit
 from ..channels import TEMPERATURE, ChannelSpec, device_channel, meaning, quantity_of_unit
-from ..columns import Column
 from ..extra_channels import raw_signals, unit_as_written
 from ..table import Table
+from ..titles import Column
 from .by_data import bench_guesses, fit_signs, fit_units
 from .by_name import Search, candidate_of, joined, structure_guesses
 

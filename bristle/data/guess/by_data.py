@@ -11,9 +11,9 @@ from ...core.arrays import Array
 from ...core.text import listed
 from ...units import parse
 from ..channels import DRIVE
-from ..columns import Column
 from ..noise import is_switched
 from ..relation import Relation, derivative_relation, power_factor, tells_sign
+from ..titles import Column
 from .by_name import Candidate, Search, joined, usable, velocity_of
 
 _SHOWN = 3  # columns of many that are told

@@ -17,9 +17,9 @@ from ..channels import (
     of_a_sensor,
     quantity_of_unit,
 )
-from ..columns import Column
 from ..relation import differentiated
 from ..table import Table
+from ..titles import Column
 
 
 @dataclass
