@@ -169,7 +169,7 @@ def _what_there_is() -> str:
     more = f"; some need: {needs}" if needs else ""
     return (
         f"There are {listed(row.name for row in rows)} (all: bristle list records{more}), or the "
-        f"path of a file of an archive (AT2, ESM, K-NET, COSMOS, SMC), or of a table such as CSV with "
+        f"path of an archive's file (AT2, ESM, K-NET, COSMOS, SMC), or of a table such as CSV with "
         f'units in its header, as in "{HEADER}".'
     )
 
