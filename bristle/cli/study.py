@@ -328,8 +328,10 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add what is known of whole runs, and how files hold them."""
     add_run_facts(parser)
-    text = "files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'"
+    text = "files hold several runs: 'restart' of the time, 'rests', 'column TITLE', or 'sheets'"
     parser.add_argument("--split", default="", metavar="HOW", help=text)
+    text = "sheet of a workbook, else the likeliest; '*' for all with the same columns, each a run"
+    parser.add_argument("--sheet", default="", metavar="NAME", help=text)
     text = "decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on"
     parser.add_argument("--rate", type=float, metavar="HZ", help=text)
     parser.add_argument("--mask", action="store_true", help="treat isolated spikes as not measured")
@@ -353,8 +355,13 @@ def _new(arguments: argparse.Namespace) -> int:
     table = arguments.runs
     files = [file for file in files_of(arguments.data) if table is None or Path(file) != table]
     test = test_files(arguments.test, files)
+    split = arguments.split
+    if arguments.sheet:
+        if split:
+            raise StudyError("--sheet and --split exclude each other.")
+        split = "sheets" if arguments.sheet == "*" else f"sheet {arguments.sheet}"
     choices = RunChoices(
-        arguments.level, arguments.label, table, arguments.split, arguments.rate, arguments.mask,
+        arguments.level, arguments.label, table, split, arguments.rate, arguments.mask,
         test,
     )  # fmt: skip
     created = create_study(

@@ -188,7 +188,7 @@ class Meaning(NamedTuple):
 
 
 _QUANTITIES = {
-    "time": "time t zeit tempo temps tiempo timestamp elapsed zeitstempel clock",
+    "time": "time t zeit tempo temps tiempo timestamp elapsed zeitstempel clock micros millis",
     "displacement": "displacement disp displ displac x position pos stroke weg hub lvdt travel "
     "deslocamento posicao curso auslenkung deflection extension crosshead d y s piston desloc "
     "deplacement course",

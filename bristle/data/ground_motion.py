@@ -33,8 +33,6 @@ from .table import Table
 from .titles import Column
 
 _RIGHT = 'A header with units is, for example, "time [s],acceleration [m/s2]" or "time_s,acc_g".'
-_CALENDAR = 1e8
-"""Begin of a time [s] from which on it is that of a calendar."""
 
 _EL_CENTRO = Listing(
     "el_centro_1940_ns",
@@ -191,7 +189,7 @@ def _from_file(path: Path, name: str, source: str) -> tuple[GroundMotion, bool]:
 
 def _columns_of(table: Table) -> tuple[Array, Array]:
     """Return times (n,) s and accelerations (n,) m/s2 of the columns that are meant."""
-    from .measurement import in_si
+    from .measurement import from_first, in_si
 
     if all(one.text == f"column {one.index + 1}" for one in table.columns):
         raise RecordError(f"{table.source}: the columns have no names and no units. {_RIGHT}")
@@ -205,8 +203,7 @@ def _columns_of(table: Table) -> tuple[Array, Array]:
             f"{table.source}, {table.where(int(k))}: a value is missing or not finite. "
             "Every sample of a ground motion needs one."
         )
-    if len(time) and time[0] > _CALENDAR:  # days of a spreadsheet, seconds since 1970
-        time = time - time[0]
+    time = from_first(time)
     try:
         check_times(time.tolist(), table.lines.tolist(), table.source)
     except PhysicsError as error:

@@ -34,6 +34,7 @@ from .extra_channels import Extra, found_in, read_extra
 from .guess import guess_channels, specs, too_few_rows
 from .left_out import MASKED, MISSING, SATURATED, any_of, occurring
 from .noise import KNOWN, Noise, Spike, estimate_noise, quietest, spikes_of, spikes_text
+from .pieces import pieces_of
 from .read import read_table
 from .sampling import Even, Sampling, evenly
 from .table import Table, table_from_frame
@@ -64,6 +65,8 @@ class Known:
     extra: Mapping[str, ChannelSpec] = field(default_factory=dict)
 
 
+_CALENDAR = 1e8
+"""Begin of a time [s] from which on it is that of a calendar."""
 _ABSURD = 1e15  # in any SI unit; some recorders write 1e30 where a value is missing
 
 
@@ -262,7 +265,7 @@ class Measurement:
 def read_measurements(
     paths: Iterable[Path | str], channels: Mapping[str, ChannelSpec] | None = None
 ) -> list[Measurement]:
-    """Return the measurements in files, one per file, or one per piece where values are missing.
+    """Return the measurements in files: one per run, or one per piece where values are missing.
 
     Parameters
     ----------
@@ -275,7 +278,9 @@ def read_measurements(
     RecordError
         If a file cannot be read, a channel is not there or has no unit, or times are not in order.
     """
-    return [one for path in paths for one in measurements_of(read_table(path), channels)]
+    tables = [read_table(path) for path in paths]
+    pieces = [piece for table in tables for piece in pieces_of(table, table.split, {})]
+    return [one for piece in pieces for one in measurements_of(piece, channels)]
 
 
 def read_measurement(
@@ -423,7 +428,16 @@ def _time(table: Table, spec: ChannelSpec | None) -> Array:
             f"{table.source}: {why}. Name one in [channels.time], or give the sampling step there: "
             "step = 0.002  # s"
         )
-    return in_si(table, "time", spec)
+    return from_first(in_si(table, "time", spec))
+
+
+def from_first(time: Array) -> Array:
+    """Return times (n,) s as they are, those of a calendar since the first.
+
+    They are large, and of their digits few are left for what lies between two samples.
+    """
+    known = time[np.isfinite(time)]
+    return time - known[0] if known.size and known[0] > _CALENDAR else time
 
 
 def in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:

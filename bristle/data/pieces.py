@@ -14,7 +14,10 @@ from .channels import ChannelSpec
 from .noise import SHORTEST, stretches
 from .table import Table
 
-RIGHT = 'expected "restart", "rests" or "column TITLE".'
+RIGHT = 'expected "restart", "rests", "column TITLE", "sheets" or "sheet NAME".'
+
+SHEET = "sheet"
+"""Title of the column that tells the sheets of a workbook apart."""
 
 STANDS = 0.01
 """Share of the usual top speed below which a rig rests."""
@@ -26,8 +29,14 @@ RESTS = 1.0
 def wrong_split(split: str) -> str:
     """Return what is wrong with how files are to be cut, "" where nothing is."""
     kind, _, title = split.partition(" ")
-    right = title.strip() if kind == "column" else kind in ("restart", "rests") and not title
-    return "" if right else RIGHT
+    if kind in ("column", "sheet"):
+        return "" if title.strip() else RIGHT
+    return "" if kind in ("restart", "rests", "sheets") and not title else RIGHT
+
+
+def holds_several(split: str) -> bool:
+    """Return whether files hold several runs each: not where nothing but a sheet is chosen."""
+    return bool(split) and not split.startswith("sheet ")
 
 
 def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> list[Table]:
@@ -39,7 +48,8 @@ def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> 
     ----------
     table : the whole file
     split : "restart" where time goes back, "column TITLE" where the number in a column changes,
-        "rests" in the middle of rests of a second or more
+        "rests" in the middle of rests of a second or more, "sheets" where a workbook's next sheet
+        begins; "" or "sheet NAME" for one run
     channels : where channels are; the time is needed, and for rests a motion
 
     Raises
@@ -47,12 +57,15 @@ def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> 
     RecordError
         If nothing separates runs, or a column that is needed is not there.
     """
+    if not holds_several(split):
+        return [table]
     if wrong_split(split):
         raise RecordError(f"{table.source}: split = {split!r}; {RIGHT}")
     kind, _, title = split.partition(" ")
     if kind == "restart":
         cuts = np.flatnonzero(np.diff(_filled(_values(table, "time", channels))) < 0.0) + 1
-    elif kind == "column":
+    elif kind in ("column", "sheets"):
+        title = title or SHEET
         cuts = np.flatnonzero(np.diff(_filled(_numbers(table, title.strip()))) != 0.0) + 1
     else:
         cuts = _rests(table, channels)
@@ -61,6 +74,7 @@ def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> 
         why = {
             "restart": "its time never goes back",
             "column": f'"{title.strip()}" never changes',
+            "sheets": "one sheet alone has these columns",
             "rests": f"nothing rests for {RESTS:g} s between two motions",
         }[kind]
         if len(cuts):

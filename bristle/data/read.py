@@ -25,8 +25,13 @@ ENDINGS = (
 """Endings of the files that a folder of measurements is taken to consist of."""
 
 
-def read_table(path: Path | str) -> Table:
+def read_table(path: Path | str, split: str = "") -> Table:
     """Return the table in a file, whatever its format.
+
+    Parameters
+    ----------
+    path : of the file
+    split : how files hold runs, of which "sheet NAME" and "sheets" tell what of a workbook is read
 
     Raises
     ------
@@ -35,7 +40,9 @@ def read_table(path: Path | str) -> Table:
         file, the line where there is one, and what would be right.
     """
     path = Path(path)
-    return formats.read(content_of(path), path.suffix.lower(), str(path))
+    kind, _, title = split.partition(" ")
+    sheet = {"sheet": title.strip(), "sheets": "*"}.get(kind, "")
+    return formats.read(content_of(path), path.suffix.lower(), str(path), sheet)
 
 
 def files_in(folder: Path) -> list[Path]:

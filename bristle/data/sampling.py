@@ -54,10 +54,15 @@ def even_grid(time: Array, step: float, tolerated: float) -> tuple[Array, Indice
 
 def _digits(time: Array) -> float:
     """Return the step on which times are written [s], 0 where none is seen."""
-    for power in range(7):
-        unit = 10.0**-power
-        if np.abs(time / unit - np.round(time / unit)).max() < 1e-4:
-            return unit
+    widest = 1.01 * float(np.diff(time).max())
+    # Seconds, and parts of a day, which take all digits that a number has.
+    for size, powers, off in ((1.0, 7, 1e-4), (86400.0, 10, 5e-3)):
+        for power in range(powers):
+            unit = size * 10.0**-power
+            if unit > widest:  # of different times two are a step apart at least
+                continue
+            if np.abs(time / unit - np.round(time / unit)).max() < off:
+                return unit
     return 0.0
 
 
@@ -112,6 +117,11 @@ MAX_FILLED = 3
 """Samples in a row that are filled by interpolation; a longer gap cuts the measurement."""
 _TOLERATED = 0.02  # share of the step by which a time may be off before all is resampled
 _MOVED = 0.02  # share of samples that may be off by more before all are interpolated
+
+_AROUND = 8
+"""Samples on each side that tell how far a channel goes from one to the next."""
+_AS_USUAL = 2.0
+"""How much further it may go where it goes on."""
 
 LOST = "lie in no piece"
 """How a note says that samples are not read at all, for too many are missing around them."""
@@ -292,10 +302,19 @@ def _in_order(
     back = np.flatnonzero(spacing < 0.0)
     if len(back):
         k = int(back[0])
+        # What is advised leads on: there are runs to cut, or channels that go on as on one clock.
+        parts = [part for part in np.split(lines, back + 1) if len(part) >= SHORTEST]
+        way = []
+        if len(parts) > 1:
+            way.append("If the file holds several runs, --split restart cuts it there.")
+        if all(goes_on(values, back) for values in channels.values()):
+            way.append(
+                "All channels go on there: if the time is wrong, --step S, the sampling step in s, "
+                "takes its place."
+            )
         raise RecordError(
             f"{name}, {place} {lines[k + 1]}: time goes back, from {time[k]:.9g} s to "
-            f"{time[k + 1]:.9g} s. If the file holds several runs, --split restart cuts it there; "
-            "if a counter begins again there, --step S, the sampling step in s, takes its place."
+            f"{time[k + 1]:.9g} s. {' '.join(way) or 'Times that increase are right.'}"
         )
     double = np.flatnonzero(spacing == 0.0)
     if not len(double):
@@ -308,13 +327,30 @@ def _in_order(
         if not same:
             raise RecordError(
                 f"{name}, {place} {lines[k + 1]}: the time {time[k]:.9g} s appears twice with "
-                f"different values ({len(double)} such times in all). Were times written with too "
-                "few digits?"
+                f"different values ({len(double)} such times in all). If times were written with "
+                "too few digits, --step S, the sampling step in s, takes their place."
             )
     keep = np.ones(len(time), dtype=bool)
     keep[double + 1] = False
     notes.append(f"{len(double)} samples that repeat the one before are left out")
     return time[keep], {key: values[keep] for key, values in channels.items()}, lines[keep]
+
+
+def goes_on(values: Array, places: Indices) -> bool:
+    """Return whether a channel goes on from samples to those behind them as it does around them.
+
+    Parameters
+    ----------
+    values : (n,) of the channel, NaN where one is missing
+    places : (m,) index of the last sample before each place
+    """
+    jumps = np.abs(np.diff(values))
+    for k in places.tolist():
+        around = np.concatenate([jumps[max(k - _AROUND, 0) : k], jumps[k + 1 : k + 1 + _AROUND]])
+        usual = float(np.nanmax(around, initial=0.0))
+        if jumps[k] > _AS_USUAL * usual + 1e-3 * float(np.nanmax(np.abs(values), initial=0.0)):
+            return False
+    return True
 
 
 def _on_grid(

@@ -29,7 +29,8 @@ class Table:
     `values` maps a column's text, its title in the file, to (n,) floats, NaN where a value is
     missing. `not_numeric` says of a column that holds text where it is. `lines` (n,) is the line
     of the file, or the row, that each sample is from, called `place`. `remarks` are the notes that
-    who makes a study reads at once: what of the file is not read, or moved in time.
+    who makes a study reads at once: what of the file is not read, or moved in time. `split` cuts
+    the runs that a file holds one below the other, "" where it holds one; see `pieces`.
     """
 
     source: str
@@ -40,6 +41,7 @@ class Table:
     not_numeric: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    split: str = ""
 
     @property
     def rows(self) -> int:
@@ -152,6 +154,29 @@ def from_arrays(
     return Table(
         source, columns, values, np.arange(1, size + 1), "row", not_numeric, notes, remarks
     )
+
+
+def one_below_the_other(tables: Sequence[Table], source: str, title: str) -> Table:
+    """Return the columns that all tables have, of one after the other, and one of their numbers.
+
+    Parameters
+    ----------
+    tables : the runs of a file
+    source : the file, for messages
+    title : what the column of the numbers is called, from 1; `split` of what is returned names it
+    """
+    first = tables[0]
+    alike = [one for one in first.columns if all(one.text in table.values for table in tables)]
+    data = {one.text: np.concatenate([table.values[one.text] for table in tables]) for one in alike}
+    numbers = [np.full(table.rows, number) for number, table in enumerate(tables, 1)]
+    title = next(text for text in (title, f"{title} of file") if text not in data)
+    units = {one.text: one.unit.name for one in alike if one.unit}
+    remarks = dict.fromkeys(remark for table in tables for remark in table.remarks)
+    notes = dict.fromkeys(note for table in tables for note in table.notes)
+    joined = from_arrays(
+        {**data, title: np.concatenate(numbers)}, source, {**units}, tuple(notes), tuple(remarks)
+    )
+    return replace(joined, split=f"column {title}")
 
 
 def _numbers(array: NDArray[Any]) -> Array | None:

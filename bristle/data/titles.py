@@ -22,7 +22,7 @@ _TEMPERATURE = re.compile(
     rf"(?P<name>.*?\S)\s*(?:[\[(]\s*(?:{_DEGREES.pattern})\s*[\])]|[_/] ?(?:{_DEGREES.pattern})"
     rf"|(?:,| in) (?:{_DEGREES.pattern}))\s*"
 )
-_NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none", "ts", "rn")
+_NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none", "ts", "rn", "no.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,8 @@ def titles(
         found = title(index, text)
         if met[text] > 1:
             found = replace(found, text=f"{text} ({met[text]})")
-        if units is not None and units[index].strip().lower() not in _NOTHING:
+        bare = "" if units is None or _is_time(units[index]) else units[index].strip()
+        if units is not None and bare.lower() not in _NOTHING:
             found = _in_unit(found, units[index].strip().strip('"').strip())
         for row in others if units is None else ():
             found = _undenied(found, title(index, row[index]))
@@ -207,17 +208,30 @@ def title_rows(rows: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     pairs = [
         (_fit(names, units), t == u - 1, t, u)
         for u, units in enumerate(rows)
-        if len(rows) > 1 and is_unit_row(units) and not _denies_time(units, rows)
+        if len(rows) > 1
+        and is_unit_row(_without_time(units, rows))
+        and not _denies_time(units, rows)
         for t, names in enumerate(rows)
         if t != u
     ]
-    if pairs:
-        *_, names, units = max(pairs)
-        return names, units
     last = len(rows) - 1
     told = [_score(row) for row in rows]
+    if pairs:
+        *_, names, units = max(pairs)
+        # Titles that have their own units tell more than a row of ranges or modes above them.
+        if told[names] + sum(row_unit(text) is not None for text in rows[units]) >= max(told):
+            return names, units
     able = [k for k, row in enumerate(rows) if told[k] >= told[last] and any(map(_is_time, row))]
     return max(able, key=lambda k: told[k], default=last), None
+
+
+def _without_time(units: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return a row without the word "Time" where another one says so too, as loggers write it."""
+    others = [row for row in rows if row is not units]
+    return [
+        "" if _is_time(text) and any(_is_time(row[k]) for row in others) else text
+        for k, text in enumerate(units)
+    ]
 
 
 def _fit(names: Sequence[str], units: Sequence[str]) -> int:
@@ -240,7 +254,8 @@ def _score(names: Sequence[str]) -> int:
 
 
 def _is_time(name: str) -> bool:
-    meant = meaning(title(0, name).name, None)
+    found = title(0, name)
+    meant = meaning(found.name, found.stated)
     return meant is not None and meant.quantity == "time"
 
 

@@ -18,6 +18,7 @@ from scipy.signal import correlate, correlation_lags
 from ..core.text import plain, scale
 from ..data.channels import channel_unit
 from ..data.measurement import Measurement, measurements_of
+from ..data.pieces import holds_several
 from ..data.read import read_table
 from ..errors import StudyError
 from ..study.study import Study
@@ -195,14 +196,14 @@ def performed(study: Study, files: Sequence[Path | str], plan: PlanFolder) -> Pe
             f'the plan is for a rig "{plan.rig}", and the study is of a "{rig}". A plan for this '
             "rig is right."
         )
-    if study.settings.split:
+    if holds_several(study.settings.split):
         raise StudyError(
             f"{study.folder}: its files hold several runs each (split in study.toml); a plan goes "
             "with files of one run. Leave --plan out."
         )
     runs = [
         max(
-            measurements_of(read_table(file), channels, estimate=False),
+            measurements_of(read_table(file, study.settings.split), channels, estimate=False),
             key=lambda one: one.duration,
         )
         for file in files

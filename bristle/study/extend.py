@@ -13,7 +13,7 @@ from ..core.text import listed
 from ..data.channels import DRIVE
 from ..data.guess import Guess
 from ..data.measurement import measurements_of
-from ..data.pieces import pieces_of
+from ..data.pieces import holds_several, pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
@@ -73,7 +73,7 @@ def extend_study(
     """
     paths, choices = [Path(file) for file in files], choices or RunChoices()
     _refuse_names(study, paths)
-    tables = [read_table(path) for path in counted(paths, "reading file")]
+    tables = [read_table(path, study.settings.split) for path in counted(paths, "reading file")]
     first, columns = _columns(study)
     for table in tables:
         refuse_other_columns(table, columns, first)
@@ -97,7 +97,7 @@ def extend_study(
 
 def _tones(study: Study, tables: Sequence[Table]) -> list[Tone | None]:
     """Return the tone of the motion in each file; None where files hold several runs."""
-    if study.settings.split:
+    if holds_several(study.settings.split):
         return [None] * len(tables)
     read = [measurements_of(table, study.settings.channels, estimate=False) for table in tables]
     return [tone_of(runs[0]) if len(runs) == 1 else None for runs in read]
@@ -122,7 +122,7 @@ def _refuse_names(study: Study, paths: Sequence[Path]) -> None:
 
 def _columns(study: Study) -> tuple[Table, list[Guess]]:
     """Return the table of the study's first run, and the columns that the study reads."""
-    first = read_table(study.folder / study.settings.runs[0].file)
+    first = read_table(study.folder / study.settings.runs[0].file, study.settings.split)
     return first, [
         Guess(name, first.find(spec.column).text, spec.unit, spec.sign, "")
         for name, spec in study.settings.channels.items()
@@ -151,7 +151,7 @@ def _roles(
 
 def _numbers(table: Table, split: str, study: Study) -> list[int]:
     """Return the numbers of the runs in a file; 0 where it holds one."""
-    if not split:
+    if not holds_several(split):
         return [0]
     return list(range(1, 1 + len(list(pieces_of(table, split, study.settings.channels)))))
 

@@ -25,7 +25,7 @@ from ..data.decimate import FAST, RATE
 from ..data.extra_channels import found_in, raw_signals
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
 from ..data.measurement import measurements_of
-from ..data.pieces import pieces_of
+from ..data.pieces import holds_several, pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
@@ -99,7 +99,11 @@ def make_folder(
     studied = "" if house is None else house.studied
     devices = [] if house is None else [one.name for one in house.devices]
     _refuse_no_device(channels or {}, devices)
-    tables = [read_table(Path(file)) for file in counted(files, "reading file")]
+    split = choices.split
+    tables = [read_table(Path(file), split) for file in counted(files, "reading file")]
+    found_split = {table.split for table in tables}
+    if not split and len(found_split) == 1 and found_split != {""}:
+        split = found_split.pop()
     closed = for_test([Path(file) for file in files], choices)
     first = tables[closed.index(False)]  # a guess is a choice, which no test run may see
     seen = guess_channels(first, rig, levels, devices)
@@ -114,7 +118,7 @@ def make_folder(
     ignored = [guess.column for guess in seen if guess.channel in without]
     extra = found_in(first, [*taken, *ignored], specs)
     names = _names([Path(file) for file in files])
-    found = _parts(names, tables, specs, choices.split)
+    found = _parts(names, tables, specs, split)
     is_test = dict(zip(names, closed, strict=True))
     about, notes = facts_of(
         [Path(file) for file in files], choices, _commanded(specs, studied),
@@ -130,7 +134,7 @@ def make_folder(
     settings = Settings(
         title or folder.name, rig, tuple(run for run in every if run.role != EXCLUDE),
         specs, comments={guess.channel: _comment(guess) for guess in guesses},
-        mask=choices.mask, split=choices.split, law=ALL if law is None and rig == "bench" else "",
+        mask=choices.mask, split=split, law=ALL if law is None and rig == "bench" else "",
         excluded=tuple(run for run in every if run.role == EXCLUDE),
         rate=_rate([one for one in found if not is_test[one.file]], choices, notes), extra=extra,
         device=studied,
@@ -207,12 +211,12 @@ def _parts(
     """Return the runs in the files, each read once, so that what is wrong is told now."""
     out = []
     for name, table in zip(names, tables, strict=True):
-        for number, piece in enumerate(pieces_of(table, split, specs) if split else [table], 1):
+        for number, piece in enumerate(pieces_of(table, split, specs), 1):
             read = measurements_of(piece, specs, estimate=False)
             digests = tuple(one.digest() for one in read)
             tone = tone_of(read[0]) if len(read) == 1 else None
             rate = read[0].sampling.rate
-            out.append(_Part(name, number if split else 0, digests, rate, tone))
+            out.append(_Part(name, number if holds_several(split) else 0, digests, rate, tone))
     return out
 
 

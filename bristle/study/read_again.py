@@ -129,7 +129,7 @@ def proposed(
 def first_table(folder: Path, settings: Settings) -> Table:
     """Return the first file of a study that is no test run's, as it is read."""
     runs = [run for run in settings.runs if run.role != TEST]
-    return read_table(folder / (runs or settings.runs)[0].file)
+    return read_table(folder / (runs or settings.runs)[0].file, settings.split)
 
 
 def devices_of(folder: Path, settings: Settings) -> tuple[list[str], list[str]]:
@@ -391,7 +391,7 @@ def _refuse_unreadable(folder: Path, made: Proposal) -> None:
         if one.after is not None and one.after.step is None
     ]
     for file in dict.fromkeys(run.file for run in settings.runs):
-        refuse_other_columns(read_table(folder / file), columns, first)
+        refuse_other_columns(read_table(folder / file, settings.split), columns, first)
     read_runs(folder, settings)
 
 

@@ -192,9 +192,8 @@ def read_runs(folder: Path, settings: Settings, role: str | None = None) -> list
     for run in chosen:
         if run.file not in tables:
             count.begins(run.file)
-            table = read_table(folder / run.file)
-            split = settings.split
-            tables[run.file] = pieces_of(table, split, settings.channels) if split else [table]
+            table = read_table(folder / run.file, settings.split)
+            tables[run.file] = pieces_of(table, settings.split, settings.channels)
         name = names[run.file, run.piece]
         found += _measured(folder, settings, run, name, tables[run.file])
     return found

@@ -28,7 +28,7 @@ from ..data.channels import (
 )
 from ..data.corrections import FAULTS, LIMITS, Correction, after, wrong_value
 from ..data.extra_channels import refused_name
-from ..data.pieces import wrong_split
+from ..data.pieces import holds_several, wrong_split
 from ..errors import PhysicsError, RecordError, StudyError, UnitError
 from ..units import same_dimension
 
@@ -387,7 +387,7 @@ def read_settings(path: Path) -> Settings:
     if device and rig == RIGS[0]:
         words = 'device goes with rig = "structure": it is one of a building\'s.'
         document.error(("device",), words)
-    every = read_runs(document, found.pop("runs"), path.parent, bool(found["split"]))
+    every = read_runs(document, found.pop("runs"), path.parent, holds_several(str(found["split"])))
     runs = tuple(run for run in every if run.role != EXCLUDE)
     excluded = tuple(run for run in every if run.role == EXCLUDE)
     if every and not runs:

@@ -525,7 +525,7 @@ def test_a_file_of_one_run_cannot_be_cut(tmp_path: Path) -> None:
     assert wrong_split("halves")
     assert wrong_split("column ")
     assert not wrong_split("column test no")
-    with pytest.raises(RecordError, match='"restart", "rests" or "column TITLE"'):
+    with pytest.raises(RecordError, match='"restart", "rests", "column TITLE", "sheets"'):
         pieces_of(table, "halves", where)
 
 

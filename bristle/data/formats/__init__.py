@@ -2,7 +2,8 @@
 
 A module has two functions: `recognises(content, suffix)` says whether a file's bytes, or the ending
 of its name (".mat"), are of its format; `read(content, name)` returns the `Table` in it, or raises
-RecordError with `name`, the place in the file and what would be right. The first module that
+RecordError with `name`, the place in the file and what would be right; where a file has sheets,
+`read_sheet(content, name, sheet)` reads one, or all. The first module that
 recognises a file reads it, in the order of `ORDER` (0 where a module has none) and of their names:
 formats that are known and not read come behind those that are (`unread`, 1), delimited text last
 (2), for it takes whatever is left. A helper's name begins with an underscore.
@@ -18,6 +19,7 @@ from typing import Any
 
 from ...errors import RecordError
 from ..table import Table, without_codes
+from ._times import in_order
 
 INSTALL = "pip install 'bristle[formats]'"
 
@@ -30,7 +32,7 @@ def formats() -> tuple[ModuleType, ...]:
     return tuple(sorted(modules, key=lambda module: int(getattr(module, "ORDER", 0))))
 
 
-def read(content: bytes, suffix: str, name: str) -> Table:
+def read(content: bytes, suffix: str, name: str, sheet: str = "") -> Table:
     """Return the table in a file's bytes.
 
     Parameters
@@ -38,15 +40,18 @@ def read(content: bytes, suffix: str, name: str) -> Table:
     content : the file, decompressed
     suffix : the ending of its name in lower case, with the dot
     name : what messages call it
+    sheet : of a workbook, the title of the sheet, "*" for all that hold runs; "" for the likeliest
 
     Raises
     ------
     RecordError
-        If the file is damaged or of a format that is not read.
+        If the file is damaged, of a format that is not read, or has no such sheet.
     """
     module = next(one for one in formats() if one.recognises(content, suffix))
-    table: Table = module.read(content, name)
-    return without_codes(table)
+    if sheet and not hasattr(module, "read_sheet"):
+        raise RecordError(f"{name}: this is no workbook, and has no sheet to choose.")
+    table: Table = module.read_sheet(content, name, sheet) if sheet else module.read(content, name)
+    return in_order(without_codes(table))
 
 
 def library(module: str, name: str, what: str) -> Any:

@@ -121,7 +121,9 @@ def _kind(values: Array, texts: Callable[[Flags], list[str]], mark: str) -> str:
     own = _numbers(texts(finite), mark)
     with_decimals = _unevenness(np.array([plain_number(text.replace(mark, ".")) for text in own]))
     with_groups = _unevenness(np.array([plain_number(text.replace(mark, "")) for text in own]))
-    return "groups" if with_groups < _EVEN * with_decimals else "decimal"
+    if with_groups < _EVEN * with_decimals:
+        return "groups"
+    return "decimal" if with_decimals < _EVEN * with_groups else "open"
 
 
 def _whole(values: Array) -> Flags:

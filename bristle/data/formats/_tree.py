@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, TypeAlias
 
@@ -22,14 +22,17 @@ from ...errors import RecordError
 from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
 from ..noise import SHORTEST
-from ..table import Table, from_arrays
+from ..table import Table, from_arrays, one_below_the_other
 from ..titles import title, unit_or_none
 from ._one_time import Series, by_length, on_one_time
 
 AnyArray: TypeAlias = NDArray[Any]
 
 _STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step")
-_RATES = ("fs", "rate", "samplerate", "sample_rate", "sampling_rate", "fsample", "f_s")
+_RATES = (
+    "fs", "rate", "samplerate", "sample_rate", "sampling_rate", "samplingrate", "fsample", "f_s",
+    "samplefrequency", "sample_frequency", "samplingfrequency", "sampling_frequency", "samplefreq",
+)  # fmt: skip
 _STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
 TELL_TIME = frozenset((*_STEPS, *_RATES, *_STARTS))
 """Names, in small letters, of numbers beside a channel that tell its time."""
@@ -37,7 +40,7 @@ _TIMES = ("t", "time", "tout", "zeit")
 _NAMES = ("name", "label", "signalname", "channelname")
 _VALUES = ("data", "values", "value", "samples", "signal", "y")
 _UNITS = ("unit", "units")
-_TELLS_NAMES = re.compile(r"name|label|header|channel|column|title|signal", re.IGNORECASE)
+_TELLS_NAMES = re.compile(r"name|label|header|hdr|channel|column|title|signal", re.IGNORECASE)
 _TELLS_UNITS = re.compile(r"unit|einheit", re.IGNORECASE)
 TELLS_SCALE = re.compile(r"scal(?:e|ing)|factor|sensitivity|lsb", re.IGNORECASE)
 
@@ -203,26 +206,19 @@ def _run_by_run(beside: _Found, runs: _Runs, tree: Mapping[str, Node], name: str
         inside = _Found(scalars=dict(beside.scalars))
         _scope(inside, "", node if isinstance(node, dict) else {**texts, runs.called: node})
         tables.append(_one_table(inside, f"{name}, {called}"))
-    first = tables[0]
-    alike = [one for one in first.columns if all(one.text in table.values for table in tables)]
-    data = {one.text: np.concatenate([table.values[one.text] for table in tables]) for one in alike}
-    numbers = [np.full(table.rows, number) for number, table in enumerate(tables, 1)]
-    units = {one.text: one.unit.name for one in alike if one.unit}
-    lost = {one.text for table in tables for one in table.columns} - set(data)
+    joined = one_below_the_other(tables, name, "run")
+    lost = {one.text for table in tables for one in table.columns} - set(joined.values)
+    title = joined.split.removeprefix("column ")
     remarks = [
         f"it holds {len(runs.nodes)} runs ({listed(runs.nodes, 4)}), here one below the other: "
-        "--split 'column run' cuts them",
-        *dict.fromkeys(remark for table in tables for remark in table.remarks),
+        f'"{title}" tells them apart',
+        *joined.remarks,
     ]
     if lost:
         remarks.append(f"not in all runs, and left out: {listed(sorted(lost))}")
     if others := [*beside.loose, *(key for _, _, data in beside.clocks for key in data)]:
         remarks.append(f"beside the runs, and left out: {listed(others)}")
-    notes = tuple(dict.fromkeys(note for table in tables for note in table.notes))
-    title_free = next(text for text in ("run", "run of file") if text not in data)
-    return from_arrays(
-        {**data, title_free: np.concatenate(numbers)}, name, {**dict(units)}, notes, tuple(remarks)
-    )
+    return replace(joined, remarks=tuple(remarks))
 
 
 def _one_table(found: _Found, name: str) -> Table:
@@ -362,7 +358,17 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     _note_counts(found, fields, long)
     own: dict[int, dict[str, AnyArray]] = {}
     added = []
+    paired: set[str] = set()
     for one, array in vectors.items():
+        # Each signal may have its time beside it: Data1_time_force and Data1_force.
+        signal = re.sub("_?time", "", one, flags=re.IGNORECASE) if _is_time_name(one) else one
+        if signal != one and _rises(array) and len(vectors.get(signal, ())) == len(array):
+            its = found.named(_unit_beside(fields, signal), paths[signal], long[signal])
+            found.clocks.append((found.free(paths[one], long[one]), array, {its: vectors[signal]}))
+            paired |= {one, signal}
+    for one, array in vectors.items():
+        if one in paired:
+            continue
         called = found.named(_unit_beside(fields, one), paths[one], long[one])
         if _is_time_name(names[one]) and len(array) not in own and _rises(array):
             own[len(array)] = {}
@@ -429,10 +435,12 @@ def _add_simulink(found: _Found, key: str, node: dict[str, Any], signals: Any) -
         return False
     data: dict[str, AnyArray] = {}
     for number, one in enumerate(every, 1):
-        label = one.get("label")
-        names = [label.strip()] if isinstance(label, str) else _texts(label)
+        names = next((own for of in ("label", "title") if any(own := _texts(one.get(of)))), [])
         place = f"{key}.signals({number}).values" if len(every) > 1 else key
         columns = list(_columns(one["values"].array))
+        if len(names) == 1 < len(columns):  # of a bus: "<force [N]>, <x [mm]>"
+            parts = [text.strip(" <>") for text in names[0].split(",")]
+            names = parts if len(parts) == len(columns) else names
         if len(names) != len(columns) or not all(names):
             base = names[0] if len(names) == 1 and names[0] else place
             several = len(columns) > 1
@@ -574,19 +582,22 @@ def _for_columns(
 
     One less than columns are those of the others, where the first is a time.
     """
-    for one, node in fields.items():
+    beside = [*fields.items()]
+    beside += [pair for node in fields.values() if isinstance(node, dict) for pair in node.items()]
+    for one, node in beside:
         texts = _texts(node) if tells.search(one) else []
         if len(texts) == 1:
-            texts = [text.strip() for text in re.split(r"[,;|\t\n]", texts[0])]
+            texts = [text.strip() for text in re.split(r"[,;|\t\n]|\s{2,}", texts[0])]
         if len(texts) < 2:
             continue
         if len(texts) == count:
             return texts
         if len(texts) == count - 1 and first_rises:
             return ["time" if tells is _TELLS_NAMES else "", *texts]
-        found.remarks.append(
-            f"{one} has {len(texts)} texts, and {key} {count} columns: it is not used"
-        )
+        if one in fields:
+            found.remarks.append(
+                f"{one} has {len(texts)} texts, and {key} {count} columns: it is not used"
+            )
     return []
 
 

@@ -13,6 +13,7 @@ from itertools import islice
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import listed
 from ...errors import RecordError
 from ...physics.motion_file import shortened, without_end_mark
@@ -42,7 +43,7 @@ def recognises(content: bytes, suffix: str) -> bool:
 def read(content: bytes, name: str) -> Table:
     """Return the table in a delimited text.
 
-    Columns are parted by commas, semicolons, tabs or blanks; decimals have points, or commas
+    Columns are parted by commas, semicolons, tabs, bars or blanks; decimals have points, or commas
     where columns are not parted by commas. Lines that begin with `#` or `%` are comments.
 
     Raises
@@ -76,7 +77,7 @@ def _refuse_channels_as_rows(lines: list[str], name: str) -> None:
     if max(map(len, lines)) < 2 * _WIDE:
         return
     full = [line for line in lines if line.strip() and not is_comment(line)]
-    for delimiter in (";", "\t", ",", None):
+    for delimiter in (";", "\t", "|", ",", None):
         wide = max((len(line.split(delimiter)) for line in full), default=0)
         if wide < max(_WIDE, 4 * len(full)):
             continue
@@ -145,7 +146,7 @@ def _find_layout(lines: list[str], name: str) -> Layout:
     spread = full[len(full) // 2 : -1 : max(1, len(full) // 120)]
     middle += [_without_ends(lines[k]) for k in spread]
     best: tuple[float, Layout] | None = None
-    for delimiter in (";", "\t", ",", ""):
+    for delimiter in (";", "\t", "|", ",", ""):
         quoted = any('"' in row for row in middle)
         for comma in (False, True) if delimiter != "," or quoted else (False,):
             found = _try_layout(middle, delimiter, comma)
@@ -167,7 +168,7 @@ def _try_layout(rows: list[str], delimiter: str, comma: bool) -> tuple[float, La
     split = [layout.split(row) for row in rows]
     count, often = Counter(map(len, split)).most_common(1)[0]
     # One column is a layout of its own only where nothing parts the text.
-    if count < 2 and (delimiter != "" or any(";" in row or "\t" in row for row in rows)):
+    if count < 2 and (delimiter != "" or any(mark in row for row in rows for mark in ";\t|")):
         return None
     same = [fields for fields in split if len(fields) == count]
     states = [[state_of(fields[k], comma) for fields in same] for k in range(count)]
@@ -241,7 +242,8 @@ def _header(
     at, of_units = title_rows([fields for _, fields in block])
     k, names = block[at]
     if fitting:
-        if sum(state_of(one, layout.comma) == "number" for one in names) > wide / 2:
+        numbers = sum(state_of(one, layout.comma) == "number" for one in names)
+        if of_units is None and numbers > wide / 2:
             raise RecordError(
                 f'{name}, line {k + 1}: "{shortened(above[k].strip())}" is neither titles nor a '
                 "row of numbers like those below it. Correct or remove it."
@@ -369,5 +371,16 @@ def _instants(
         body.values[index] = seconds
         del body.not_numeric[index]
         out[index] = replace(columns[index], unit=parse_unit("s"), problem="", written="")
-        body.notes.append(f'"{columns[index].text}" holds instants: taken as s since the first')
+        told = "taken as s since the first"
+        part = next((k for k, one in enumerate(columns) if one.name.lower() == "ms"), None)
+        if part is not None and _are_thousandths(body.values[part], seconds):
+            body.values[index] = seconds + (body.values[part] - body.values[part][0]) / 1e3
+            told += f', with the ms of "{columns[part].text}"'
+        body.notes.append(f'"{columns[index].text}" holds instants: {told}')
     return tuple(out)
+
+
+def _are_thousandths(values: Array, seconds: Array) -> bool:
+    """Return whether values (n,) are the ms in whole seconds (n,)."""
+    whole = bool((values == np.round(values)).all() and (seconds == np.round(seconds)).all())
+    return whole and float(values.min()) >= 0.0 and float(values.max()) < 1e3

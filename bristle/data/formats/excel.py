@@ -20,7 +20,8 @@ from ...errors import RecordError
 from ...units import parse as parse_unit
 from ..channels import meaning, quantity_of_unit
 from ..noise import SHORTEST
-from ..table import Table
+from ..pieces import SHEET
+from ..table import Table, one_below_the_other
 from ..titles import title_rows
 from . import delimited, library
 
@@ -53,15 +54,26 @@ def recognises(content: bytes, suffix: str) -> bool:
 
 
 def read(content: bytes, name: str) -> Table:
-    """Return the table in a workbook: the values of the sheet that holds a measurement.
+    """Return the table in the sheet of a workbook that holds a measurement; see `read_sheet`."""
+    return read_sheet(content, name, "")
+
+
+def read_sheet(content: bytes, name: str, sheet: str) -> Table:
+    """Return the table in a workbook: the values of a sheet.
 
     Of formulas the values count that were stored with them. Macros are not run.
+
+    Parameters
+    ----------
+    content, name : the file, and what messages call it
+    sheet : its title; "" for the one that holds a measurement, "*" for all with the columns of
+        that one, one below the other
 
     Raises
     ------
     RecordError
-        If openpyxl is not installed, the file is damaged, no sheet holds rows of numbers, cells of
-        the table are merged, or formulas have no stored values.
+        If openpyxl is not installed, the file is damaged, no sheet holds rows of numbers or is
+        called so, cells of the table are merged, or formulas have no stored values.
     """
     openpyxl = library("openpyxl", name, "an Excel workbook")
     try:
@@ -73,7 +85,7 @@ def read(content: bytes, name: str) -> Table:
             read = [
                 _Sheet(one.title, archive.read(one._worksheet_path.lstrip("/")), _text(one),
                        f'{name}, sheet "{one.title}"')
-                for one in book.worksheets if one.sheet_state == "visible"
+                for one in book.worksheets if one.sheet_state == "visible" or one.title == sheet
             ]  # fmt: skip
     # A damaged file surfaces as any of these from the library's own parsing.
     except (
@@ -81,18 +93,36 @@ def read(content: bytes, name: str) -> Table:
         IndexError, AttributeError, MemoryError, EOFError,
     ) as error:  # fmt: skip
         raise RecordError(f"{name}: no Excel workbook, or damaged ({error}).") from None
-    notes = ["the workbook holds macros, which are not run"] if macros else []
-    sheet, table, others = _chosen(read, name)
-    _refuse_without_values(sheet.part, sheet.where)
-    lines = ["", *delimited.lines_of(sheet.text)]
-    first = int(table.lines[0])
-    _refuse_merged(sheet.part, table, lines[1:first], sheet.where)
-    cells = next(book[sheet.title].iter_rows(min_row=first, max_row=first))
-    forms = [_QUOTED.sub("", cell.number_format or "") for cell in cells]
-    table = _in_percent(table, {k for k, form in enumerate(forms) if "%" in form})
+    notes = ("the workbook holds macros, which are not run",) if macros else ()
+    if sheet not in ("", "*", *(one.title for one in read)):
+        there = listed(f'"{one.title}"' for one in read)
+        raise RecordError(f'{name}: no sheet is called "{sheet}"; there are {there}.')
+    able, others = _chosen([one for one in read if sheet in ("", "*", one.title)], name)
+    others |= {one.title: f'"{one.title}"' for one in read if one.title not in others}
+    titles = [column.text for column in able[0][1].columns]
+    alike = [
+        one
+        for one in sorted(able, key=lambda one: read.index(one[0]))
+        if [column.text for column in one[1].columns] == titles and one[1].rows >= SHORTEST
+    ]
+    able = alike if sheet == "*" and alike else able[:1]
+    tables = [_finished(book, *one) for one in able]
+    own = [one.title for one, _ in able]
+    left = [text for title, text in others.items() if title not in own]
     hidden = [one.title for one in book.worksheets if one.sheet_state != "visible"]
-    others += [f'"{title}" (hidden)' for title in hidden]
-    return _with_notes(table, sheet.part, notes, others, sheet.title)
+    left += [f'"{title}" (hidden)' for title in hidden if title not in own]
+    table = tables[0]
+    if len(tables) > 1:
+        table = replace(one_below_the_other(tables, name, SHEET), notes=table.notes)
+    remarks = table.remarks
+    if left or len(own) > 1:
+        quoted = listed((f'"{title}"' for title in own), 6)
+        what = f"sheets {quoted} are" if len(own) > 1 else f"sheet {quoted} is"
+        rest = f"; {listed(left, 6)} {'is' if len(left) == 1 else 'are'} not" if left else ""
+        several = len(alike) > 1 and not sheet
+        way = ": --sheet NAME reads another, --sheet '*' each as a run" if several else ""
+        remarks = (f"{what} read{rest}{way}", *remarks)
+    return replace(table, notes=(*notes, *table.notes), remarks=remarks, place="row")
 
 
 class _Sheet(NamedTuple):
@@ -104,16 +134,18 @@ class _Sheet(NamedTuple):
     where: str
 
 
-def _chosen(sheets: Sequence[_Sheet], name: str) -> tuple[_Sheet, Table, list[str]]:
-    """Return the sheet that holds a measurement, its table, and what the other sheets hold.
+def _chosen(
+    sheets: Sequence[_Sheet], name: str
+) -> tuple[list[tuple[_Sheet, Table]], dict[str, str]]:
+    """Return the sheets that hold tables, the likeliest first, and by title what each holds.
 
-    That with most of what a run consists of, as its titles say, among those long enough for one;
-    the first where several are alike. A log, a calibration or a summary often stands before the
-    measurement. A sheet whose formulas were never computed may be the one.
+    That is the one with most of what a run consists of, as its titles say, among those long enough
+    for one; the first where several are alike. A log, a calibration or a summary often stands
+    before the measurement. A sheet whose formulas were never computed may be the one.
     """
     reasons: list[str] = []
     read: list[tuple[_Sheet, Table]] = []
-    others: dict[str, str] = {}
+    holds: dict[str, str] = {}
     for sheet in sheets:
         if len(_without_values(sheet.part)) >= ROWS:
             _refuse_without_values(sheet.part, sheet.where)
@@ -121,20 +153,33 @@ def _chosen(sheets: Sequence[_Sheet], name: str) -> tuple[_Sheet, Table, list[st
             table = delimited.read(sheet.text.encode(), sheet.where)
         except RecordError as error:
             reasons.append(str(error))
-            others[sheet.title] = f'"{sheet.title}"'
+            holds[sheet.title] = f'"{sheet.title}"'
             continue
         read.append((sheet, table))
         titles = listed([column.text for column in table.columns], 4)
         rows = f"{table.rows} row{'s' * (table.rows != 1)}"
-        others[sheet.title] = f'"{sheet.title}" ({rows}: {titles})'
+        holds[sheet.title] = f'"{sheet.title}" ({rows}: {titles})'
     if not read:
         for sheet in sheets:
             _refuse_without_values(sheet.part, sheet.where)
         raise RecordError(
             reasons[0] if len(reasons) == 1 else f"{name}: no sheet holds rows of numbers."
         )
-    best = max(read, key=lambda one: _worth(one[1]))
-    return *best, [text for title, text in others.items() if title != best[0].title]
+    return sorted(read, key=lambda one: _worth(one[1]), reverse=True), holds
+
+
+def _finished(book: Any, sheet: _Sheet, table: Table) -> Table:
+    """Return the table of a sheet's text with what the cells of the workbook tell besides."""
+    _refuse_without_values(sheet.part, sheet.where)
+    lines = ["", *delimited.lines_of(sheet.text)]
+    first = int(table.lines[0])
+    _refuse_merged(sheet.part, table, lines[1:first], sheet.where)
+    cells = next(book[sheet.title].iter_rows(min_row=first, max_row=first))
+    forms = [_QUOTED.sub("", cell.number_format or "") for cell in cells]
+    table = _in_percent(table, {k for k, form in enumerate(forms) if "%" in form})
+    formulas = len(_formulas(sheet.part))
+    told = [f"{formulas} cells hold formulas: their stored values are taken"] if formulas else []
+    return replace(table, notes=(*told, *table.notes))
 
 
 def _worth(table: Table) -> tuple[bool, int, bool]:
@@ -145,28 +190,6 @@ def _worth(table: Table) -> tuple[bool, int, bool]:
         meant = meaning(column.name, column.stated)
         found.add(meant.quantity if meant is not None else quantity_of_unit(column.stated))
     return table.rows >= SHORTEST, len(found & _OF_A_RUN), table.rows >= ROWS
-
-
-def _with_notes(table: Table, part: bytes, notes: list[str], others: list[str], own: str) -> Table:
-    """Return a sheet's table with what is to be known of it.
-
-    Parameters
-    ----------
-    table : as read from the sheet's text
-    part : the sheet's XML
-    notes : of the workbook
-    others, own : what the other sheets are and hold; the title of this one
-    """
-    formulas = len(_formulas(part))
-    if formulas:
-        notes = [*notes, f"{formulas} cells hold formulas: their stored values are taken"]
-    remarks = []
-    if others:
-        verb = "is" if len(others) == 1 else "are"
-        remarks = [f'sheet "{own}" is read; {listed(others, 6)} {verb} not']
-    return replace(
-        table, notes=(*notes, *table.notes), remarks=(*remarks, *table.remarks), place="row"
-    )
 
 
 def _refuse_large(archive: zipfile.ZipFile, name: str) -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.text import plain
 from ...units import parse as parse_unit
 from ..channels import TEMPERATURE, ChannelSpec, device_channel, meaning, quantity_of_unit
@@ -29,6 +30,8 @@ _SAME_TIME = 0.02  # of a step, by which times that are the same may differ
 
 _IN_DAYS = 2e-6
 """Spacing below which a time from 30,000 on is in days: in s, it would be above 500 kHz."""
+_SURELY_DAYS = 2e-7
+"""That below which a time of less than a day is in days as well."""
 
 MIN_TIME_ROWS = 10
 """Rows of numbers below which no column is taken for the time."""
@@ -165,10 +168,12 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
         named = meant is not None and meant.quantity == "time"
         if not (named or (timed and rising) or (rising and column.index == 0 and not unit)):
             continue
+        if not named and not unit and float(np.mean(spacing == 1.0)) > 0.98:
+            continue  # it counts the samples
         if unit and not timed:
             continue
         reason = "its name" if named else "its unit" if timed else "the first column, and it rises"
-        assumed, doubt = _assumed_unit(column, float(np.median(spacing)), float(good[0]))
+        assumed, doubt = _assumed_unit(column, _usual(spacing), float(good[0]))
         score = 4 * named + 2 * timed + rising
         guess = Guess("time", column.text, unit or assumed, 1, reason, doubt)
         if best is None or score > best[0]:
@@ -207,6 +212,13 @@ def _other_times(table: Table, chosen: str) -> str:
     return ""
 
 
+def _usual(spacing: Array) -> float:
+    """Return the usual spacing of times, which may be written with few digits; of (n,)."""
+    usual = float(np.median(spacing))
+    near = spacing[np.abs(spacing) <= 2.0 * abs(usual)]
+    return float(near.mean()) if near.size else usual
+
+
 def _assumed_unit(column: Column, spacing: float, first: float) -> tuple[str, str]:
     """Return the unit of a time that tells none, and the doubt; "" where it tells an unknown one.
 
@@ -219,10 +231,16 @@ def _assumed_unit(column: Column, spacing: float, first: float) -> tuple[str, st
     if told and "(" not in column.text:
         return "", f'its unit, "{told}", is not known'
     told = f'"{told}" is no unit that is known' if told else "no unit is given"
-    if 3e4 < first < 1e6 and spacing < _IN_DAYS:
+    for word, unit in (("micros", "us"), ("millis", "ms")):
+        if word in column.name.lower():
+            return unit, f"{told}, {unit} is assumed by its name"
+    if 0.0 <= first < 1.0 and 0.0 < spacing < _IN_DAYS and spacing > _SURELY_DAYS:
+        return "", f"{told}, and {spacing:.3g} may be of a day or of a second"
+    what = "days of a calendar" if 3e4 < first < 1e6 else "parts of a day"
+    if (3e4 < first < 1e6 or 0.0 <= first < 1.0) and 0.0 < spacing < _IN_DAYS:
         return (
             "day",
-            f"{told}, and its values are days of a calendar: {1.0 / 86400 / spacing:.4g} Hz",
+            f"{told}, and its values are {what}: {1.0 / 86400 / spacing:.4g} Hz",
         )
     for unit, size in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
         if 1e9 * size < first < 4e9 * size:

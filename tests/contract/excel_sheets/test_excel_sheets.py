@@ -11,6 +11,7 @@ import pytest
 
 from bristle.cli import main
 from bristle.data.read import read_table
+from bristle.study import Study
 
 T = 0.005 * np.arange(300)
 RUN = [("time [s]", "x [mm]", "F [kN]")] + [
@@ -50,7 +51,44 @@ def test_of_two_runs_the_other_is_named(tmp_path: Path, capsys) -> None:
     file = book(tmp_path / "run.xlsx", one=RUN, two=RUN[:200])
     assert main(["study", "new", str(tmp_path / "s"), "--data", str(file), "--quiet"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert 'sheet "one" is read; "two" (199 rows: time [s], x [mm], F [kN]) is not.' in said
+    assert 'sheet "one" is read; "two" (199 rows: time [s], x [mm], F [kN]) is not: ' in said
+    assert "--sheet NAME reads another, --sheet '*' each as a run." in said
+    study = Study(tmp_path / "s")
+    assert [len(run.time) for run in study.read()] == [300]
+
+
+@pytest.mark.parametrize(
+    ("sheet", "lengths"), [("one", [300]), ("two", [199]), ("*", [300, 199]), ("old", [100])]
+)
+def test_a_sheet_is_chosen_and_stays_so(tmp_path: Path, sheet: str, lengths: list[int]) -> None:
+    file = book(tmp_path / "a.xlsx", Log=CALIBRATION, one=RUN, two=RUN[:200], old=RUN[:101])
+    book(tmp_path / "b.xlsx", one=RUN[:240], old=RUN[:90], two=RUN[:220])
+    changed = openpyxl.load_workbook(file)
+    changed["old"].sheet_state = "hidden"
+    changed.save(file)
+    folder = str(tmp_path / "s")
+    assert main(["study", "new", folder, "--data", str(file), "--sheet", sheet, "--quiet"]) == 0
+    assert [len(run.time) for run in Study(folder).read()] == lengths
+    hold = ["--holdout", "b.xlsx", "--quiet"]
+    assert main(["study", "extend", folder, str(tmp_path / "b.xlsx"), *hold]) == 0
+    added = {"one": [239], "two": [219], "*": [239, 89, 219], "old": [89]}[sheet]
+    assert [len(run.time) for run in Study(folder).read()] == lengths + added
+    assert main(["study", "channels", folder, "--channel", "force=F@N", "--quiet"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "sheet", "said"),
+    [
+        ("a.xlsx", "three", 'no sheet is called "three"; there are "one", "two".'),
+        ("a.csv", "one", "this is no workbook, and has no sheet to choose."),
+    ],
+)
+def test_a_sheet_that_is_not_there(tmp_path: Path, capsys, name: str, sheet: str, said: str):
+    book(tmp_path / "a.xlsx", one=RUN, two=RUN)
+    (tmp_path / "a.csv").write_text("\n".join(",".join(map(str, row)) for row in RUN))
+    new = ["study", "new", str(tmp_path / "s"), "--data", str(tmp_path / name), "--sheet", sheet]
+    assert main([*new, "--quiet"]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_where_a_channel_is_on_another_sheet_the_sheet_is_named(tmp_path: Path, capsys) -> None:
