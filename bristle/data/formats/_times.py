@@ -36,15 +36,6 @@ def in_order(table: Table) -> Table:
         back = np.flatnonzero(np.diff(time) < 0.0)
         if not len(back):
             return table
-        order = np.argsort(time, kind="stable")
-        spacing = np.diff(time[order])
-        if spacing.min() > 0.0 and spacing.max() <= _EVEN * np.median(spacing):
-            how = "descends" if len(back) == len(time) - 1 else "is not in order"
-            remark = f'"{column.text}" {how}: the rows are taken in the order of time'
-            return replace(
-                table, values={key: own[order] for key, own in values.items()},
-                lines=table.lines[order], remarks=(*table.remarks, remark),
-            )  # fmt: skip
         if period := _period(column, time, back):
             others = [own for key, own in values.items() if key != column.text]
             if all(goes_on(own, back) for own in others):
@@ -58,6 +49,15 @@ def in_order(table: Table) -> Table:
                     "all channels go on: taken as a counter that ran over"
                 )
                 return replace(table, values=values, remarks=(*table.remarks, remark))
+        order = np.argsort(time, kind="stable")
+        spacing = np.diff(time[order])
+        if spacing.min() > 0.0 and spacing.max() <= _EVEN * np.median(spacing):
+            how = "descends" if len(back) == len(time) - 1 else "is not in order"
+            remark = f'"{column.text}" {how}: the rows are taken in the order of time'
+            return replace(
+                table, values={key: own[order] for key, own in values.items()},
+                lines=table.lines[order], remarks=(*table.remarks, remark),
+            )  # fmt: skip
         return table
     return table
 

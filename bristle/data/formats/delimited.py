@@ -334,7 +334,8 @@ def _title_fields(line: str, layout: Layout, wide: int) -> list[str]:
     fields = layout.split(stripped) if layout.delimiter else []
     if len(fields) < 2:  # blanks may part titles above a table of tabs
         fields = re.split(r"\s{2,}|\t", stripped)  # titles of several words stand further apart
-        fields = fields if len(fields) == wide else _TOKEN.findall(stripped)
+        if len(fields) != wide and not re.match(r"\S+:\s", stripped):  # "Time: 1.8 s" is no title
+            fields = _TOKEN.findall(stripped)
     if len(fields) == wide - 1 and layout.delimiter:
         fields.append("")
     while len(fields) > wide and not fields[-1].strip():
