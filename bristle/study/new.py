@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from ..core.progress import counted
 from ..core.text import capital, command, listed, plain
 from ..data.building_file import read_building
@@ -25,6 +27,7 @@ from ..data.decimate import FAST, RATE
 from ..data.extra_channels import found_in, raw_signals
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
 from ..data.measurement import measurements_of
+from ..data.noise import SHORTEST
 from ..data.pieces import holds_several, pieces_of
 from ..data.read import read_table
 from ..data.table import Table
@@ -340,27 +343,34 @@ def _refuse_incomplete(
 ) -> None:
     """Refuse what lacks a channel or a unit, with all that was guessed."""
     there = {guess.channel for guess in guesses} | set(channels)
+    if "time" not in there and (why := too_few_rows(table)):
+        raise StudyError(f"{table.source}: {why}. A measurement has {SHORTEST} at least.")
     wrong = []
+    free = _free(table, guesses)
     if "time" not in there:
-        why = too_few_rows(table) or "no column can be the time"
-        wrong.append(f"{why}: --channel time=COLUMN@s, or --step S, the sampling step in s")
+        apart = {text: np.diff(table.values[text]) for text in free}
+        rising = [text for text, d in apart.items() if (d > 0.0).all() and not (d == 1.0).all()]
+        way = f"{in_unit('time', rising[0])}; or " if len(rising) == 1 else ""
+        wrong.append(f"no column can be the time: {way}--step S, the sampling step in s")
+
+    def lacks(what: str, choice: str) -> None:
+        """Say what no column can be, and how one is named where one is left to name."""
+        way = f"--channel {choice}" if free else "no other column of numbers is left"
+        wrong.append(f"no column can be {what}: {way}")
+
     if rig == "bench":
         if not there & {"displacement", "velocity"}:
-            wrong.append(
-                "no column can be a displacement or velocity: --channel velocity=COLUMN@m/s"
-            )
-        if "force" not in there:
-            words = next((text for text in table.not_numeric if _may_be(table, text, "force")), "")
+            lacks("a displacement or velocity", "velocity=COLUMN@m/s")
+        words = next((text for text in table.not_numeric if _may_be(table, text, "force")), "")
+        if "force" not in there and words:
             wrong.append(
                 f'no column can be the force: "{words}" is not all numbers: '
                 f"{table.not_numeric[words]}"
-                if words
-                else "no column can be the force: --channel force=COLUMN@N"
             )
+        elif "force" not in there:
+            lacks("the force", "force=COLUMN@N")
     elif not any(name.startswith(("base_", "floor", "drift")) for name in there):
-        wrong.append(
-            "no column can be the response of a level: --channel base_displacement=COLUMN@m"
-        )
+        lacks("the response of a level", "base_displacement=COLUMN@m")
     for guess in guesses:
         if not guess.unit:
             problem = table.find(guess.column).problem.removesuffix(".")
@@ -384,6 +394,16 @@ def _refuse_incomplete(
             + rest
             + "".join(f"\n  {capital(remark, [])}." for remark in table.remarks)
         )
+
+
+def _free(table: Table, guesses: Iterable[Guess]) -> list[str]:
+    """Return the columns of numbers that change and are no channel."""
+    taken = {guess.column for guess in guesses}
+    return [
+        text
+        for text, values in table.values.items()
+        if text not in taken and text not in table.not_numeric and len({*values.tolist()}) > 1
+    ]
 
 
 def _may_be(table: Table, text: str, quantity: str) -> bool:
