@@ -3,7 +3,7 @@
 A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
 named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
 table here shows what its last run found. So have `compatibility`, `cost`, `exits`, `honest`,
-`instruments`, `lab`, `law_free`, `learned`, `limits`, `native`, `plan`, `prediction` and
+`instruments`, `lab`, `labels`, `law_free`, `learned`, `limits`, `native`, `plan`, `prediction` and
 `calibrate`, whose own table shows what each value of the rule trades. `paper` and `train` are
 commands of their own: they repeat the paper that bristle follows, and train the stock policy.
 """
@@ -21,8 +21,8 @@ from . import __path__ as folder
 from ._rows import Row
 
 COUNTED = (
-    "compatibility", "cost", "exits", "honest", "instruments", "lab", "law_free", "learned",
-    "limits", "native", "plan", "prediction", "stated",
+    "compatibility", "cost", "exits", "honest", "instruments", "lab", "labels", "law_free",
+    "learned", "limits", "native", "plan", "prediction", "stated",
 )  # fmt: skip
 """Benchmarks whose own options say how many cases are made, or where."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 
+from ..data.channels import label_name
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS
 
@@ -35,6 +36,9 @@ def effect_name(name: str) -> str:
     """
     key, _, site = name.partition("@")
     effect = EFFECTS.get(key)
+    if effect is not None and effect.changes:
+        on = joined([label_name(label) for label in effect.labels.values()])
+        return f"the dependence of {effect.changes} on {on}" if on else name
     if effect is None or not effect.__module__.startswith(_LIBRARY):
         return name
     title = effect.first_line().partition(":")[0]

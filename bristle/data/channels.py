@@ -14,9 +14,9 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.text import plain
 from ..core.text import quantity as quantity_text
-from ..errors import RecordError
+from ..errors import RecordError, UnitError
 from ..physics.drive import DRIVES
-from ..units import parse
+from ..units import canonical, parse
 
 # What is known of a run as a whole: its temperature, frequency, amplitude, the batch of oil.
 #
@@ -57,10 +57,27 @@ def label_text(name: str, value: Label, unit: str = "") -> str:
     """
     if isinstance(value, str):
         return value
-    unit = unit or UNITS.get(name, "")
+    unit = unit or label_unit(name)
     if unit == "degC":
         return f"{plain(value, 4)} °C"
     return quantity_text(value, unit or "1", 4)
+
+
+def label_unit(name: str) -> str:
+    """Return the unit of a label: its own, or that in which its name ends, as in pressure_psi."""
+    own = UNITS.get(name, "")
+    if own or "_" not in name:
+        return own
+    try:
+        return canonical(name.rpartition("_")[2])
+    except UnitError:
+        return ""
+
+
+def label_name(name: str) -> str:
+    """Return a label as it stands in a sentence, without its unit: "pressure" of pressure_psi."""
+    plain_name = name if name in UNITS or not label_unit(name) else name.rpartition("_")[0]
+    return plain_name.replace("_", " ")
 
 
 def varying(labels: Sequence[Labels]) -> list[str]:

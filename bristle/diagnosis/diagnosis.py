@@ -16,6 +16,7 @@ from ..identification.start_grid import is_rough
 from ..model.model import Model
 from ..physics.building import Building
 from ..physics.effect import exclude
+from .by_label import with_labels
 from .conclusion import conclude, insufficient
 from .effect_limits import EffectLimit, detectable, effect_limits, profiled, untestable
 from .experiments import separating
@@ -136,10 +137,15 @@ def _with_intervals(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     if prepared.scope.sweeps and is_rough(after.model):
         again = judge(fitted.model, prepared.problem, prepared.held_out)
         after = min(after, again, key=lambda one: one.z)
-    identifiable = {n: s for n, s in fitted.std.items() if n not in fitted.unidentified}
+    identifiable = {
+        name: max(std, found.std.get(name, 0.0))  # that over runs, where runs were left out
+        for name, std in fitted.std.items()
+        if name not in fitted.unidentified
+    }
     return replace(found, model=fitted.model, after=after, z_after=after.z, std=identifiable)
 
 
+@with_labels
 def diagnose_rig(
     train: Sequence[Measurement],
     holdout: Sequence[Measurement],

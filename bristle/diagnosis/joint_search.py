@@ -11,6 +11,7 @@ from ..identification.problem import Problem
 from ..identification.rig import DAMPER
 from ..model.model import Model
 from ..physics.building import Building
+from .by_label import with_labels
 from .conclusion import conclude, insufficient
 from .diagnosis import diagnose_lines, settled, with_evidence
 from .law_choice import LawAndEffects, LawVerdict, choose, equivalents, search, simplest
@@ -23,6 +24,7 @@ from .trials import missed_by
 from .verdict import Diagnosis
 
 
+@with_labels
 def diagnose_laws(
     train: Sequence[Measurement],
     holdout: Sequence[Measurement],

@@ -24,6 +24,7 @@ from ..identification.start_grid import refine
 from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
+from .by_label import confirmed, try_labels
 from .decision import (
     NOISE,
     OTHER_FORM,
@@ -215,6 +216,8 @@ class Trials:
         self._found: dict[tuple[str, ...], list[Trial]] = {}
         self._earlier = earlier._found if earlier else {}
         self._weighed: dict[float, Trials] = {}
+        if earlier is None:
+            try_labels(prepared)
         say("trying every effect inside the model")
         self.single = self._all(self.before, None)
 
@@ -444,7 +447,8 @@ def diagnose_damper(
     best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
     found = replace(found, sensors=sensors, together=best_pair)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
-    return replace(found, patterns=patterns, noise_known=prepared.held_out.noise_known), prepared
+    found = replace(found, patterns=patterns, noise_known=prepared.held_out.noise_known)
+    return confirmed(found, prepared), prepared
 
 
 def noise_is_all(prepared: Prepared) -> bool:

@@ -128,6 +128,7 @@ def joinable(
         name
         for name in (*(problem or Problem([])).damper_effects(base.law), *instruments)
         if name not in base.effects and not any(exclude(name, one) for one in base.effects)
+        if EFFECTS[name].changes.rpartition(".")[0] in ("", *base.effects)
     ]
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 

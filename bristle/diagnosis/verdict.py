@@ -124,6 +124,9 @@ class Diagnosis(Viewable):
     error : mapping of mapping of ForceError
         By role, "train" or "holdout", and site: the error of the model as it was given, on the runs
         as they are; none where nobody fitted that model.
+    written : mapping of str
+        The text of each effect that this diagnosis made and names: how a parameter depends on a
+        label of the runs. They stay defined; a study keeps them as files.
 
     Examples
     --------
@@ -146,6 +149,7 @@ class Diagnosis(Viewable):
     noise: Mapping[str, float] = field(default_factory=dict)
     laws: LawVerdict | None = None
     error: Mapping[str, Mapping[str, ForceError]] = field(default_factory=dict)
+    written: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def law(self) -> str:

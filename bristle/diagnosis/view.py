@@ -15,6 +15,7 @@ from ..physics.effect import EFFECTS
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.plots import ROW, draw_ranking
 from ..view.style import Page, look
+from .by_label import EXTRAPOLATED, NOT_SEPARABLE
 from .law_trials import FORM_ALONE
 from .verdict import Diagnosis
 from .words import (
@@ -55,9 +56,9 @@ def diagnosis_view(found: Diagnosis) -> View:
 def verdict_view(verdict: Verdict) -> View:
     """Return the view of the content of verdict.json."""
     kind, why = str(verdict["kind"]), reasons(verdict)
-    # Never left to the details: what is to be done before there is a verdict, and that another law
-    # explains what is named.
-    seen = ("study.toml", FORM_ALONE)
+    # Never left to the details: what is to be done before there is a verdict, that another law
+    # explains what is named, and which runs say less of a label than they seem to.
+    seen = ("study.toml", FORM_ALONE, EXTRAPOLATED, NOT_SEPARABLE)
     asks = [one for one in why if kind == "insufficient" or any(word in one for word in seen)]
     told = [text for text in why if text not in asks]
     shown, apart = told[:_WHY], told[_WHY:]

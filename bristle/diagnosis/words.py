@@ -401,7 +401,7 @@ def effect_words(found: SiteDiagnosis) -> list[str]:
     out = []
     for name in (one for one in found.effects if one in EFFECTS and one in model.effects):
         effect = EFFECTS[name]
-        if hasattr(effect, "in_words"):
+        if hasattr(effect, "in_words") and not effect.changes:  # told with its interval over runs
             values = {own: model.value(f"{name}.{own}") for own in effect.parameters}
             out.append(str(effect.in_words(effect.values_of(values))))
     return out

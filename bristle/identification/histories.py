@@ -18,7 +18,17 @@ from ..core.arrays import Array
 from ..core.progress import tell
 from ..data.corrections import JUMP
 from ..physics import damper, structure
-from ..physics.damper import jump, parameter_places, room, setup_of, state_places, step
+from ..physics.damper import (
+    change_parameters,
+    changes_of,
+    jump,
+    pack_into,
+    parameter_places,
+    room,
+    setup_of,
+    state_places,
+    step,
+)
 from ..physics.damper_source import LIBRARY, evaluate, functions_of, step_law
 from ..physics.effect import effects_of
 from ..physics.generate import Functions, Slots
@@ -193,7 +203,7 @@ def compiled_history(functions: Functions, effects: bool = True) -> Callable[...
 
     one, inline = (force_history, _INLINE) if effects else (law_history, _INLINE_LAW)
     with _ONE_AT_A_TIME:  # threads that try effects ask for it at once
-        if one.__name__ in _ahead and functions is LIBRARY:
+        if one.__name__ in _ahead and functions.link(one) is one:
             _ahead[one.__name__].wait()
         found: Callable[..., None] = compiled(functions.link(one), inline)
         return found
@@ -212,7 +222,7 @@ def compile_ahead(law: str = "", effects: Collection[str] = ()) -> None:
     if not law:
         damper.SETS.of(*laws_of("damper"), *effects_of("damper"))
         structure.SETS.of(*effects_of("structure"))
-    elif functions_of(law, effects) is not LIBRARY:
+    elif functions_of(law, effects).link(force_history) is not force_history:
         return
     for one in (force_history, law_history) if effects or not law else (law_history,):
         before = _ahead.get(one.__name__)
@@ -258,6 +268,10 @@ class DamperForces:
         slots = functions.slots
         self._setup = setup_of(law, {}, self.effects, np.array, _slots)
         self._history = compiled_history(functions, self._setup.active)
+        # An effect that changes a parameter does so to the values of each run.
+        self._plain = np.array(pack_into(law, {}, slots))
+        self._changes = np.array(changes_of(law, slots))
+        self._change = functions.link(change_parameters)
         # Laid down once: fits ask for thousands of forces, and to find each place takes its time.
         self._places = parameter_places(law, slots)
         self._state_places = state_places(law, slots)
@@ -283,7 +297,7 @@ class DamperForces:
             states end in `_0`; those that start with a signal take its first value
         tracks : (n,) in SI by name, of parameters of effects that change over the run
         """
-        p, z = self._setup.p.copy(), np.zeros(self._states)
+        p, z = self._plain.copy(), np.zeros(self._states)
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
         for slot, signal in self._begins:
             z[slot] = first[signal]
@@ -292,6 +306,7 @@ class DamperForces:
                 p[slot] = value
             if name in self._state_places:
                 z[self._state_places[name]] = value
+        self._change(p, self._setup.on, self._changes)
         setup = self._setup._replace(p=p)
         out = np.empty(len(x))
         # Each layout in memory would be compiled by itself.

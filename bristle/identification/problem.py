@@ -191,12 +191,31 @@ def corrected(
 def values_of_labels(effects: Iterable[str], labels: Labels) -> dict[str, float]:
     """Return the values of effects that are labels of a run, by the names of a model."""
     known = {
-        f"{name}.{own}": labels[label]
+        f"{name}.{own}": number_of(EFFECTS[name], label, labels[label])
         for name in effects
         for own, label in EFFECTS[name].labels.items()
         if label in labels
     }
-    return {name: value for name, value in known.items() if not isinstance(value, str)}
+    return {name: value for name, value in known.items() if value is not None}
+
+
+def number_of(effect: type[Effect], label: str, value: Label) -> float | None:
+    """Return a label as an effect counts it: a number, or its word's place from 1 on; None else.
+
+    Raises
+    ------
+    RecordError
+        If it is a word that the effect does not know.
+    """
+    if not isinstance(value, str):
+        return value
+    words = effect.label_words.get(label, ())
+    if words and value not in words:
+        raise RecordError(
+            f'{label} is "{value}" in a run, and the effect {effect.name} knows '
+            f"{', '.join(words)} alone. Leave the run out, or the effect."
+        )
+    return words.index(value) + 1.0 if words else None
 
 
 def tracks_of(effects: Iterable[str], extra: Mapping[str, Extra], run: str) -> dict[str, Array]:
@@ -466,7 +485,7 @@ class Problem:
         if not all(self._moves(channel) for channel in effect.channels.values()):
             return False
         names = {*effect.labels.values(), *effect.label_means.values()}
-        known = [self._numbers(name) for name in names]
+        known = [self._numbers(name, effect) for name in names]
         return all(len({*one}) > 1 and max(one) - min(one) >= effect.label_span for one in known)
 
     def _moves(self, channel: str) -> bool:
@@ -476,11 +495,11 @@ class Problem:
         values = np.concatenate([run.extra[channel].values for run in self.runs])
         return float(np.ptp(values)) > 0.0
 
-    def _numbers(self, label: str) -> list[float]:
+    def _numbers(self, label: str, effect: type[Effect]) -> list[float]:
         """Return the numbers of a label, one per run; none where a run lacks it."""
-        found = [run.labels.get(label, "") for run in self.runs]
-        numbers = [one for one in found if not isinstance(one, str)]
-        return numbers if len(numbers) == len(found) else []
+        known = [number_of(effect, label, r.labels[label]) for r in self.runs if label in r.labels]
+        numbers = [one for one in known if one is not None]
+        return numbers if len(numbers) == len(self.runs) else []
 
     def size(self, unit: str) -> float:
         """Return the typical size on this rig of a parameter of some unit, in SI."""
@@ -499,7 +518,7 @@ class Problem:
             if effect.of_this_rig():
                 return declared.value
             label = effect.labels.get(own) or effect.label_means.get(own, "")
-            if numbers := self._numbers(label):
+            if numbers := self._numbers(label, effect):
                 return float(np.clip(np.mean(numbers), *declared.bounds))
         reference = REFERENCE.get(declared.unit)
         value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)

@@ -17,6 +17,7 @@ from .damper_source import (
     LIBRARY,
     SETS,
     advance_law,
+    changed,
     evaluate,
     felt_voltage,
     functions_of,
@@ -35,8 +36,9 @@ from .series import INSTANT, SETTLE, Balance, advance_implicit, advance_series, 
 from .tuples import Inputs, Setup, record
 
 __all__ = [
-    "LIBRARY", "SETS", "DamperModel", "evaluate", "force_at", "functions_of", "hold_law", "jump",
-    "law_force", "room", "setup_of", "start_states", "step", "step_law",
+    "LIBRARY", "SETS", "DamperModel", "change_parameters", "changes_of", "evaluate", "force_at",
+    "functions_of", "hold_law", "jump", "law_force", "room", "setup_of", "start_states", "step",
+    "step_law",
 ]  # fmt: skip
 
 
@@ -45,14 +47,14 @@ __all__ = [
 # `bake` lays down once which value belongs where, for a law and the names of a component's values.
 # `fill` then runs on lists inside FMUs and on arrays in compiled code, and knows no name.
 
-NUMBERS, DEFAULTS, INTO_P, INTO_Z, SWITCHES, TRAITS, MOVING = range(7)
+NUMBERS, DEFAULTS, INTO_P, INTO_Z, SWITCHES, TRAITS, MOVING, CHANGES = range(8)
 """Rows of what is baked: see `bake`."""
 
-BAKED_ROWS = 7
+BAKED_ROWS = 8
 """How many rows `bake` gives; a component's own come behind them."""
 
 _CODE, _OWN_STATES, _EXACT, _SIGNED, _LAGS, _STATES = range(6)
-_ADVANCES, _JOINT, _FRICTION = range(3)
+_ADVANCES, _JOINT, _FRICTION, _WORKS = range(4)
 
 _LAW, _N_MOVING, _ADVANCING, _N_OWN, _SIGNS, _ACTIVE, _LAGGING, _SERIES = range(8)
 _OF_SETUP, _P, _ON, _MOVING = range(4)
@@ -85,6 +87,32 @@ def state_places(law: str, slots: Slots) -> dict[str, int]:
     return {**places, **{f"{name}_0": slot for name, slot in slots.states.items()}}
 
 
+def changes_of(law: str, slots: Slots) -> list[float]:
+    """Return pairs of an effect that changes a parameter and a slot of that parameter in `p`."""
+    places = parameter_places(law, slots)
+    return [
+        float(number)
+        for k, effect in enumerate(slots.effects)
+        for slot in places.get(effect.changes, ())
+        for number in (k, slot)
+    ]
+
+
+def change_parameters(p: Row, on: Any, changes: Row) -> None:
+    """Let the effects that are on change the parameters that depend on a label, in place.
+
+    Parameters
+    ----------
+    p : flat parameters as they are without
+    on : (effects,) whether each is on
+    changes : pairs as `changes_of` returns them
+    """
+    for i in range(0, len(changes), 2):
+        k, slot = int(changes[i]), int(changes[i + 1])
+        if on[k] != 0.0:
+            p[slot] = changed(k, p[slot], p)
+
+
 def pack_into(law: str, values: Mapping[str, float], slots: Slots) -> list[float]:
     """Return the flat parameters of a law and of all effects; missing ones take their defaults.
 
@@ -107,9 +135,9 @@ def bake(law: str, names: Sequence[str], slots: Slots) -> list[list[float]]:
     """Return the rows that say where a damper's values belong.
 
     They are: numbers of the law; the defaults of `p`; pairs of a value's index and its slot in `p`;
-    such pairs for `z`; the index of each effect's switch, -1 where it has none; three traits of
-    each effect (its states advance, it is in series, it is friction); pairs of an effect and the
-    slot of a state that moves by its rate.
+    such pairs for `z`; the index of each effect's switch, -1 where it has none; four traits of
+    each effect (its states advance, it is in series, it is friction, it is at work over a run);
+    pairs of an effect and the slot of a state that moves by its rate; pairs of `changes_of`.
 
     Parameters
     ----------
@@ -129,7 +157,7 @@ def bake(law: str, names: Sequence[str], slots: Slots) -> list[list[float]]:
     ]
     into_z = [(at[name], slot) for name, slot in state_places(law, slots).items() if name in at]
     traits = [
-        ("advance" in effect.hooks(), bool(effect.joint), is_friction(effect))
+        ("advance" in effect.hooks(), bool(effect.joint), is_friction(effect), not effect.changes)
         for effect in slots.effects
     ]
     moving = [
@@ -142,7 +170,7 @@ def bake(law: str, names: Sequence[str], slots: Slots) -> list[list[float]]:
     switches = [at.get(f"{effect.name}.on", -1) for effect in slots.effects]
     rows: list[list[float]] = [[*numbers, slots.z_size], pack_into(law, {}, slots)]
     rows += [_flat(into_p), _flat(into_z), [*switches], _flat(traits), _flat(moving)]
-    return rows
+    return [*rows, changes_of(law, slots)]
 
 
 def _flat(pairs: Sequence[tuple[float, ...]]) -> list[float]:
@@ -203,6 +231,12 @@ def fill(values: Row, baked: Row, store: Row, z: Row) -> int:
     code = switch(values, baked, store)
     if code < 0:
         return code
+    changing = row(baked, CHANGES)
+    if len(changing) > 0:
+        own = row(store, _P)  # in plain Python a copy
+        change_parameters(own, row(store, _ON), changing)
+        for i in range(len(own)):
+            store[p + i] = own[i]
     exact = law[_EXACT] != 0.0
     store[at + _N_MOVING] = float(list_moving(baked, store))
     store[at + _LAW], store[at + _LAGGING] = law[_CODE], law[_LAGS]
@@ -233,12 +267,12 @@ def switch(values: Row, baked: Row, store: Row) -> int:
     for k in range(len(switches)):
         given = int(switches[k])
         store[on + k] = 1.0 if given >= 0 and values[given] != 0.0 else 0.0
-        joint = traits[3 * k + _JOINT] != 0.0
-        if store[on + k] != 0.0:
+        joint = traits[4 * k + _JOINT] != 0.0
+        if store[on + k] != 0.0 and traits[4 * k + _WORKS] != 0.0:
             store[at + _ACTIVE] = 1.0
-            if traits[3 * k + _ADVANCES] != 0.0:
+            if traits[4 * k + _ADVANCES] != 0.0:
                 store[at + _ADVANCING] = 1.0
-            if traits[3 * k + _FRICTION] != 0.0:
+            if traits[4 * k + _FRICTION] != 0.0:
                 store[at + _SIGNS] = 1.0
             if joint:
                 series += 1
@@ -415,10 +449,11 @@ def setup_of(
         If two effects are series elements.
     """
     names = [*values, *(f"{effect}.on" for effect in effects)]
-    slots = functions_of(law, effects).slots
+    functions = functions_of(law, effects)
+    slots = functions.slots
     baked = packed(*bake(law, names, slots))
     store, z = [0.0] * store_size(baked), [0.0] * slots.z_size
-    if code := fill([*values.values(), *(1.0 for _ in effects)], baked, store, z):
+    if code := functions.link(fill)([*values.values(), *(1.0 for _ in effects)], baked, store, z):
         raise PhysicsError(refusals(slots)[code])
     setup = setup_from(store)
     moving = [int(slot) for slot in setup.moving[: setup.n_moving]]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .effect import Effect, effects_of
-from .generate import Functions, Sets, Slots, switched, switched_laws
+from .generate import Functions, Sets, Slots, call, q_source, switched, switched_laws
 from .law import Law, base_and_variant, laws_of
 from .tuples import FACTORS, FORM_OF_LAW, law_state, law_values
 
@@ -258,6 +258,16 @@ def is_friction(effect: type[Effect]) -> bool:
     return effect.contact and "halt" in effect.needs
 
 
+def changed_source(slots: Slots) -> str:
+    """Return `changed`: what effect k makes of the parameter that it changes, before a run."""
+    lines = ["def changed(k, value, p):"]
+    for k, effect in enumerate(slots.effects):
+        if effect.changes:
+            made = call(effect, "changed", slots, q_source(value="value"))
+            lines += [f"    if k == {k}:  # {effect.name}", f"        return {made}"]
+    return "\n".join([*lines, "    return value"])
+
+
 def net_force_source(slots: Slots) -> str:
     """Return what accelerates a series mass: `evaluate` without all that it can lack.
 
@@ -319,6 +329,7 @@ def net_force_source(slots: Slots) -> str:
 SETS = Sets(
     {
         "advance_law": advance_law_source,
+        "changed": changed_source,
         "evaluate": evaluate_source,
         "felt_voltage": voltage_source,
         "hold_law": hold_law_source,
@@ -334,8 +345,8 @@ SETS = Sets(
 )
 LIBRARY = SETS.library
 (
-    advance_law, evaluate, felt_voltage, hold_law, inner_motion, law_factors, law_force, net_force,
-    series_element, step_law,
+    advance_law, changed, evaluate, felt_voltage, hold_law, inner_motion, law_factors, law_force,
+    net_force, series_element, step_law,
 ) = LIBRARY.made.values()  # fmt: skip
 
 

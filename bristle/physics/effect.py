@@ -29,6 +29,7 @@ from .parameter import (
     TEXT_BY_NAME,
     TEXTS,
     all_parameters,
+    by_name,
     check_fields,
     check_numbers,
     class_text,
@@ -49,12 +50,13 @@ that was limited in slew or range behind its record."""
 
 FIELDS = {
     **dict.fromkeys(("name", "site", "kind", "shows", "source", "expect"), TEXT),
-    **dict.fromkeys(("family", "absorbed_by", "offset", "mass", "amount"), TEXT),
+    **dict.fromkeys(("family", "absorbed_by", "offset", "mass", "amount", "changes"), TEXT),
     **dict.fromkeys(("acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
     **dict.fromkeys(("sites", "excludes", "start_ties", "mimics", "faults"), TEXTS),
     **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
     **dict.fromkeys(("states", "starts", "lookalikes", "labels", "label_means"), TEXT_BY_NAME),
     "channels": TEXT_BY_NAME,
+    "label_words": ('a dictionary such as {"oil": ("A", "B")}', by_name(TEXTS[1])),
     **dict.fromkeys(("start_grid", "start_limits"), ANY_BY_NAME),
     "parameters": PARAMETERS,
     "tables": TABLES,
@@ -203,7 +205,7 @@ CHANNELS = ("force", "velocity")
 
 HOOKS = (
     "voltage", "motion", "yield_factor", "viscous_factor", "reach", "yield_force", "force",
-    "spring", "factor", "reaction", "rate", "advance", "channel",
+    "spring", "factor", "reaction", "rate", "advance", "channel", "changed",
 )  # fmt: skip
 """In the order in which an evaluation calls them."""
 
@@ -222,7 +224,7 @@ SHARED_SIGNALS = ("x", "v", "dt", "energy", "halt", "stiffness")
 
 OFFERED = {
     "damper": (
-        "x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt", "stiffness",
+        "x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt", "stiffness", "value",
     ),
     "structure": (*SHARED_SIGNALS, "force", "drift", "drift_rate", "storey"),
     "sensor": ("value", "dt"),
@@ -239,7 +241,8 @@ class Q(NamedTuple):
     `halt` the force that would bring the motion to rest within the step (what a stuck contact
     carries; to a contact in a damper whose motion is prescribed no force is enough), `stiffness`
     the linear stiffness of the storey at hand (in `force`: of the isolation; in a damper 0),
-    `storey` its number (1 above the base), `value` the signal that an instrument is to show.
+    `storey` its number (1 above the base), `value` the signal that an instrument is to show, or in
+    `changed` the parameter that changes.
     """
 
     x: float  # m
@@ -256,7 +259,7 @@ class Q(NamedTuple):
     halt: float  # N
     stiffness: float  # N/m
     storey: float  # 1
-    value: float  # unit of the channel
+    value: float  # unit of the channel, or of the parameter
 
 
 class Sizes(NamedTuple):
@@ -300,6 +303,13 @@ class Effect:
         the labels of `[[runs]]` in study.toml. The one is the run's own number, the other the mean
         of the training runs. No fit moves them, so `assumed` names them, too. The effect is tried
         where all runs have the labels and differ in them, by `label_span` at the least.
+    label_words
+        The words that a label may be, where it is no number: {label: words}. The parameter is then
+        the place of the run's word among them, from 1 on.
+    changes
+        Of an effect of the damper that says how another parameter depends on a label: that
+        parameter, "f_0" of the law or "gas_spring.k" of an effect that is on. The hook `changed`
+        gives its value from `q.value`, which it has without; it is called once, before a run.
     channels
         Parameters of an effect of the damper that follow a channel measured beside motion, command
         and force: {parameter: name in [extra] of study.toml}. No fit moves them, so `assumed` names
@@ -403,6 +413,8 @@ class Effect:
     labels: ClassVar[dict[str, str]] = {}
     label_means: ClassVar[dict[str, str]] = {}
     label_span: ClassVar[float] = 0.0
+    label_words: ClassVar[dict[str, tuple[str, ...]]] = {}
+    changes: ClassVar[str] = ""
     channels: ClassVar[dict[str, str]] = {}
     contact: ClassVar[bool] = False
     shows: ClassVar[str] = "force"
@@ -502,6 +514,11 @@ class Effect:
             return False
         if cls.joint and not law.exact():  # the bristle beside a joint is advanced exactly
             return False
+        other, _, own = cls.changes.rpartition(".")
+        if other and not (other in EFFECTS and EFFECTS[other].joins(law)):
+            return False
+        if cls.changes and own not in (EFFECTS[other] if other else law).parameters:
+            return False
         parts = {*cls.acts_on, *(ACTS_ON[hook] for hook in cls.hooks() if hook in ACTS_ON)}
         return all(law.has(part) for part in parts)
 
@@ -555,6 +572,10 @@ def _check(effect: type[Effect]) -> None:
         raise PhysicsError(f"{where}: defines no hook; there are {list(HOOKS)}.")
     if "rate" in effect.hooks() and "advance" in effect.hooks():
         raise PhysicsError(f"{where}: its states move by `rate` or by `advance`, not both.")
+    if bool(effect.changes) != ("changed" in effect.hooks()):
+        raise PhysicsError(f"{where}: changes and the hook `changed` go together.")
+    if effect.changes and (len(effect.hooks()) > 1 or effect.sites != ("damper",)):
+        raise PhysicsError(f"{where}: changes a parameter of the damper; no other hook is right.")
     if effect.states and not ("rate" in effect.hooks() or "advance" in effect.hooks()):
         raise PhysicsError(f"{where}: has states and neither `rate` nor `advance`.")
     if effect.joint and (len(effect.joint) != 2 or not set(effect.joint) <= set(effect.states)):

@@ -192,13 +192,30 @@ class Functions:
     """
 
     def __init__(self, slots: Slots, texts: Texts) -> None:
-        self.slots = slots
+        self.slots, self._texts = slots, texts
         self.made = {name: generate(name, text(slots), slots) for name, text in texts.items()}
         self.link = Link(self.made)
+        self._changing: dict[tuple[type[Effect], ...], Functions] = {}
 
     def have(self, *owners: Owner) -> bool:
         """Return whether laws and effects are in the set."""
         return {*owners}.issubset((*self.slots.laws, *self.slots.effects))
+
+    def changing(self, effects: Iterable[type[Effect]]) -> Functions:
+        """Return these with effects that change parameters before a run, behind all others.
+
+        Nothing that is computed over a run is generated, or compiled, anew.
+        """
+        wanted = tuple(sorted(effects, key=lambda one: one.name))
+        if not wanted:
+            return self
+        if wanted not in self._changing:
+            found = self._changing[wanted] = copy(self)
+            found.slots = Slots(self.slots.laws, (*self.slots.effects, *wanted))
+            text = self._texts["changed"](found.slots)
+            found.made = {**self.made, "changed": generate("changed", text, found.slots)}
+            found.link = Link(found.made)
+        return self._changing[wanted]
 
 
 class Sets:
@@ -215,7 +232,8 @@ class Sets:
     def __init__(self, texts: Texts, *owners: Owner) -> None:
         self._texts, here = texts, __name__.rpartition(".")[0]
         self._made: dict[frozenset[Owner], Functions] = {}
-        self.library = self._add([one for one in owners if one.__module__.startswith(here)])
+        own = [one for one in _apart(owners)[0] if one.__module__.startswith(here)]
+        self.library = self._add(own)
 
     def _add(self, owners: Sequence[Owner]) -> Functions:
         laws = tuple(one for one in owners if issubclass(one, Law))
@@ -225,19 +243,29 @@ class Sets:
 
     def of(self, *owners: Owner) -> Functions:
         """Return the functions of these laws and effects alone."""
-        known = self._made.get(frozenset(owners))
-        return known or self._add(sorted({*owners}, key=lambda one: one.name))
+        rest, changing = _apart(owners)
+        known = self._made.get(frozenset(rest))
+        known = known or self._add(sorted({*rest}, key=lambda one: one.name))
+        return known.changing(changing)
 
     def offering(self, *owners: Owner) -> Functions:
         """Return the functions of the library, or of these alone where it lacks one."""
-        return self.library if self.library.have(*owners) else self.of(*owners)
+        rest, changing = _apart(owners)
+        return self.library.changing(changing) if self.library.have(*rest) else self.of(*owners)
 
     def serving(self, *owners: Owner) -> Functions:
         """Return the first set that has these: what it has besides is switched off."""
+        rest, changing = _apart(owners)
         for one in [*self._made.values()]:
-            if one.have(*owners):
-                return one
+            if one.have(*rest):
+                return one.changing(changing)
         return self.of(*owners)
+
+
+def _apart(owners: Iterable[Owner]) -> tuple[list[Owner], list[type[Effect]]]:
+    """Return laws and effects, apart from the effects that change parameters before a run."""
+    changing = [one for one in owners if issubclass(one, Effect) and one.changes]
+    return [one for one in owners if one not in changing], changing
 
 
 class Link:

@@ -18,7 +18,13 @@ from ..data.checks.motion import (
     velocity_of_run,
 )
 from ..data.checks.recording import check_recording
-from ..data.checks.runs import Excitation, check_labels, check_runs, excitation_of
+from ..data.checks.runs import (
+    Excitation,
+    check_label_levels,
+    check_labels,
+    check_runs,
+    excitation_of,
+)
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
@@ -135,6 +141,7 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     findings += check_recording(recorded)
     doubted = [] if study.settings.has_building else list(check_labels(every))
     findings += doubted
+    findings += check_label_levels(runs.train, runs.holdout)
     # Where levels may be others than their runs' names say, no sensor is to blame for the force.
     stated = any(run.levels for run in study.settings.runs)
     if not study.settings.has_building and not (doubted and stated):

@@ -682,6 +682,12 @@ def rows_of_table(path: Path, files: Sequence[Path], commanded: bool = False) ->
         if file in found:
             raise StudyError(f"{where}: there is a row of {file} above; one is right.")
         found[file] = _facts(header, names, row, at[0], where)
+    if not any(name in found for file in files for name in (file.name, file.stem)):
+        raise StudyError(
+            f"--runs {path}: its {len(found)} rows are of {listed(found, 3)}, and none of the "
+            f"{len(files)} runs is called so: {listed([file.name for file in files], 3)}. The "
+            "names of the files are right in that column."
+        )
     return [_row_of(file, found, path) for file in files]
 
 

@@ -37,6 +37,8 @@ from ..physics.building import Building, frequencies
 from ..physics.effect import EFFECTS
 from ..physics.forms import joined_form
 from ..physics.laws import law_names
+from ..trust import remember_made
+from ..user_code.load import undefine
 from ..view import Viewable
 from .changes import noted
 from .forms import LawFits, law_command, law_or_all, with_law
@@ -112,9 +114,21 @@ def diagnose_study(
         rig = rig_of(study, model, runs)
         found = replace(found, error=force_errors(site_models(rig, model)))
     if write:
+        _write_effects(study, found)
         study.write_verdict(verdict_of(study, found))
         keeps("The verdict is kept in verdict.json.")
     return found
+
+
+def _write_effects(study: Study, found: Diagnosis) -> None:
+    """Keep the effects that a diagnosis made and names as files of the study's own."""
+    for name, text in found.written.items():
+        file = study.effects_folder / f"{name}.py"
+        write_whole(file, text)
+        remember_made(file, text)
+        undefine(name)  # the file's takes its place
+    if found.written:
+        study.usable_effects()
 
 
 def take_law(study: Study, found: Diagnosis) -> Identified | None:

@@ -178,22 +178,38 @@ def defined(texts: Mapping[str, str]) -> Iterator[None]:
     PhysicsError
         If a text is not right, or its name is taken.
     """
-    taken = [name for name in texts if name in EFFECTS]
-    if taken:
-        raise PhysicsError(f"effect {taken[0]!r}: the name is taken. Another one is right.")
     made = []
     try:
         for name, text in texts.items():
-            path = Path(f"{name}.py").absolute()
-            try:
-                made.append(_made(text, path, path, "effect"))
-            except FlawError as error:
-                raise PhysicsError(_where(path, error)) from None
+            made.append(define(name, text))
         yield
     finally:
         for effect in made:
             if EFFECTS.get(effect.name) is effect:
-                del EFFECTS[effect.name]
+                undefine(effect.name)
+
+
+def define(name: str, text: str) -> type[Effect]:
+    """Define an effect that bristle itself wrote, until `undefine` takes it away.
+
+    Raises
+    ------
+    PhysicsError
+        If the text is not right, or the name is taken.
+    """
+    if name in EFFECTS:
+        raise PhysicsError(f"effect {name!r}: the name is taken. Another one is right.")
+    path = Path(f"{name}.py").absolute()
+    try:
+        made: type[Effect] = _made(text, path, path, "effect")
+    except FlawError as error:
+        raise PhysicsError(_where(path, error)) from None
+    return made
+
+
+def undefine(name: str) -> None:
+    """Take an effect away that `define` gave."""
+    EFFECTS.pop(name, None)
 
 
 def flaw_of(name: str, text: str) -> str:

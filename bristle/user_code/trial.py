@@ -78,7 +78,9 @@ def _without(hook: str, q: Q) -> tuple[float, ...]:
         return (1.0,)
     if hook == "motion":
         return (q.x, q.v)
-    passed_on = {"voltage": q.V, "channel": q.value, "yield_force": copysign(1.0, q.v)}
+    if hook in ("channel", "changed"):
+        return (q.value,)
+    passed_on = {"voltage": q.V, "yield_force": copysign(1.0, q.v)}
     return (passed_on.get(hook, 0.0),)
 
 
@@ -224,11 +226,14 @@ def refuse_reads(effect: type[Effect], hook: str, q: Q, z: Any, p: Any) -> None:
 def _offered(effect: type[Effect], hook: str, site: str) -> tuple[str, ...]:
     """Return the signals that a hook gets at a site; all others are 0."""
     zero: tuple[str, ...] = ()
+    if hook == "changed":
+        return ("value",)
     if site == "structure":
         zero = _zero_in_structure(hook, effect.hooks())
-    elif site == "damper" and hook not in (*_STATES, "reaction"):
+    elif site == "damper":
         # The law's force is known to what is computed after it alone.
-        zero = () if effect.contact and hook == "force" else ("force",)
+        after = hook in (*_STATES, "reaction") or (effect.contact and hook == "force")
+        zero = ("value",) if after else ("force", "value")
     return tuple(name for name in OFFERED[site] if name not in zero)
 
 

@@ -12,9 +12,11 @@ from ...core.arrays import Array
 from ...core.finding import Finding
 from ...core.text import plain, quantity
 from ...physics.drive import DRIVES
+from ..channels import label_name, label_text
 from ..measurement import Measurement
 from ..noise import is_switched
 from ..relation import top_of
+from ..run_labels import MOVED, LabelOfRuns
 from ..tone import label_doubt, tone_of
 from .motion import velocity_of_run
 
@@ -307,6 +309,42 @@ def check_labels(runs: Sequence[Measurement]) -> Iterator[Finding]:
                 "of a command as well.",
                 "Correct labels and levels in its [[runs]] of study.toml.", run.name,
             )  # fmt: skip
+
+
+def check_label_levels(
+    train: Sequence[Measurement], holdout: Sequence[Measurement]
+) -> Iterator[Finding]:
+    """Yield the labels from which nothing can be told: their runs do not differ, or all do.
+
+    Parameters
+    ----------
+    train, holdout : the runs that models are fitted to, and the others
+    """
+    runs = [*train, *holdout]
+    for name in dict.fromkeys(name for run in runs for name in run.labels if name not in MOVED):
+        bare = [run.name for run in runs if name not in run.labels]
+        label = LabelOfRuns(name, tuple(run.labels[name] for run in runs if name in run.labels))
+        called, first = label_name(name), label_text(name, label.values[0])
+        if bare:
+            text = f"{called} is known of {len(label.values)} of {len(runs)} runs, not of {bare[0]}"
+            do = "Say it of all runs in their [[runs]] of study.toml."
+        elif len(label.levels) == 1:
+            text = f"{called} is {first} in all {len(runs)} runs"
+            do = "Measure runs at other values to see what it does."
+        elif label.counts:
+            text = f"{called} has another value in each of {len(runs)} runs, as their number has"
+            do = "Give runs that have something in common the same value."
+        elif len({run.labels[name] for run in train}) == 1:
+            apart = next(run for run in holdout if run.labels[name] != train[0].labels[name])
+            other = label_text(name, apart.labels[name])
+            text = (
+                f"{called} is {first} in all training runs, and {other} in {apart.name}, which is "
+                "held out"
+            )
+            do = 'Train on runs that differ in it: role = "train" in their [[runs]] of study.toml.'
+        else:
+            continue
+        yield Finding(f"label {name}", "note", f"{text}: nothing can be told from it.", do)
 
 
 # The levels that the command of runs keeps to, and whether they tell more than a straight line.

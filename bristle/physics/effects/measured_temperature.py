@@ -35,6 +35,7 @@ class MeasuredTemperature(Effect):
     )
     expect = "too much predicted force in warm runs, too little in cold ones"
     amount = "c_viscous"
+    family = "by_temperature"
     parameters = {
         "c_viscous": Parameter(0.01, "1/K", (-0.1, 0.1), "fall of the viscous part per kelvin"),
         "c_yield": Parameter(0.005, "1/K", (-0.1, 0.1), "fall of the yield part per kelvin"),

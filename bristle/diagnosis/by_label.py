@@ -1,0 +1,679 @@
+"""Parameters that depend on a label of the runs: a preload on the pressure, friction on the oil.
+
+A label does not move within a run, so runs count, not samples. What each run asks of a parameter by
+itself, all others shared, is held against its label; where that is beyond chance, and worth a
+trial, the dependence becomes an effect that changes the parameter, and is tried as any other is.
+Labels of the motion and of the command, such as an amplitude, are left out: they are the law's
+inputs.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from scipy.special import fdtrc, stdtrit
+
+from ..comparison.names import effect_name, joined
+from ..core.arrays import Array
+from ..core.text import with_interval
+from ..data.channels import TEMPERATURE, label_name, label_text, label_unit
+from ..data.extra_channels import as_word
+from ..data.run_labels import LabelOfRuns, labels_of, left_by
+from ..identification.problem import Problem, Run
+from ..identification.search import HUBER, in_threads
+from ..identification.start_grid import Search, refine
+from ..model.model import Model, parameter
+from ..physics.effect import EFFECTS
+from ..units import canonical
+from ..user_code.load import define, undefine
+from .decision import TOLD
+from .prepared import Prepared
+from .site_diagnosis import SiteDiagnosis
+from .verdict import Diagnosis, gains_of
+
+LIKELY = 0.005
+"""Largest probability, over all labels and parameters looked at, that chance parts the runs so."""
+
+WORTH = 0.04
+"""Smallest share of the training runs' loss that is worth a trial: z falls by half of it."""
+
+BENT = 0.01
+"""Largest probability that a straight line over the label explains the runs, for steps to do."""
+
+FEWEST, MOST_LEVELS, MOST = 4, 6, 4
+"""Runs that tell of a label, levels that have a step each, and dependences that are tried."""
+
+EXTRAPOLATED, NOT_SEPARABLE = "Extrapolation:", "Not separable:"
+"""How sentences begin that are never left to the details."""
+
+REFITS = 10
+"""Fits without one of the runs, or without a group of them, that give an interval."""
+
+ZERO_C = 273.15  # K
+NORMAL = 1.96
+"""Standard deviations of an interval of 95 % as `with_interval` writes it."""
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How a parameter depends on a label: the effect's `name`, its file's `text`, what it gains."""
+
+    name: str
+    text: str
+    label: str
+    gain: float
+
+
+# What runs ask of a parameter, each by itself.
+
+
+class RunwiseFit:
+    """What each run asks of each free parameter, all others shared by the runs, linearly.
+
+    Parameters
+    ----------
+    problem : all runs
+    model : as fitted to those for training
+    """
+
+    def __init__(self, problem: Problem, model: Model) -> None:
+        search = Search(problem, model, problem.expectation(model), model.free(), logarithms=False)
+        r = search.residuals(search.start)
+        J = search.jacobian(search.start, r)
+        far = HUBER * max(1.0, float(np.median(np.abs(r))) / 0.6745)
+        root = np.sqrt(np.minimum(1.0, far / np.maximum(np.abs(r), 1e-12)))
+        self.names, self.scale = search.names, search.scale
+        J, r = J * root[:, None], r * root
+        ends = np.cumsum([len(run.force) - run.skip for run in problem.runs])[:-1]
+        parts = list(zip(np.split(J, ends), np.split(r, ends), strict=True))
+        self._normal = np.array([own.T @ own for own, _ in parts])  # (k, p, p)
+        self._right = np.array([-own.T @ left for own, left in parts])  # (k, p)
+        self._loss = float(r @ r)
+
+    def apart(self, j: int) -> tuple[Array, Array]:
+        """Return what each run (k,) asks of parameter j, in its unit, and which runs tell it."""
+        others = [i for i in range(len(self.names)) if i != j]
+        own, k = self._normal[:, j, j], len(self._normal)
+        told = own > 1e-3 * own.max() if own.max() > 0.0 else np.zeros(k, dtype=bool)
+        A = np.zeros((len(others) + k, len(others) + k))
+        A[: len(others), : len(others)] = self._normal[:, others][:, :, others].sum(0)
+        A[: len(others), len(others) :] = self._normal[:, others, j].T
+        A[len(others) :, : len(others)] = self._normal[:, others, j]
+        A[len(others) :, len(others) :] = np.diag(np.where(told, own, 1.0))
+        b = np.concatenate([self._right[:, others].sum(0), self._right[:, j]])
+        return self.scale[j] * _solved(A, b)[len(others) :], told
+
+    def gain(self, j: int, columns: Array) -> tuple[float, Array]:
+        """Return the share of the loss that a dependence takes, and its sizes (c,), linearly.
+
+        Parameters
+        ----------
+        j : the parameter
+        columns : (k, c) by how much it changes in each run with each of its sizes at 1
+        """
+        p, c = len(self.names), columns.shape[1]
+        A, b = np.zeros((p + c, p + c)), np.zeros(p + c)
+        A[:p, :p], b[:p] = self._normal.sum(0), self._right.sum(0)
+        A[:p, p:] = np.einsum("kp,kc->pc", self._normal[:, :, j], columns)
+        A[p:, :p] = A[:p, p:].T
+        A[p:, p:] = np.einsum("k,kc,kd->cd", self._normal[:, j, j], columns, columns)
+        b[p:] = self._right[:, j] @ columns
+        without, all_of = _solved(A[:p, :p], b[:p]), _solved(A, b)
+        share = float(b @ all_of - b[:p] @ without) / max(self._loss, 1e-300)
+        return share, self.scale[j] * all_of[p:]
+
+
+def _solved(A: Array, b: Array) -> Array:
+    """Return the solution of normal equations, the least where they leave it open."""
+    size = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    return np.asarray(np.linalg.lstsq(A / np.outer(size, size), b / size, rcond=1e-10)[0] / size)
+
+
+def chance_of(asked: Array, design: Array, simpler: Array | None = None) -> float:
+    """Return the probability that chance parts what runs ask (k,) so well by a label: an F test.
+
+    Parameters
+    ----------
+    asked : (k,) what each run asks of the parameter
+    design : (k, c) the label's columns
+    simpler : (k, s) those that it is held against beside a constant; None for the constant alone
+    """
+    one = np.ones((len(asked), 1))
+    least = one if simpler is None else np.hstack([one, simpler])
+    whole = np.hstack([one, design])
+    rest, left, rank = (left_by(asked, X) for X in (least, whole)), 0.0, 0
+    (before, rank_before), (left, rank) = rest
+    free, more = len(asked) - rank, rank - rank_before
+    if free < 2 or more < 1:
+        return 1.0
+    # Rounding is no proof: of runs that follow a line exactly the rest is zero.
+    left = max(left, 1e-12 * float(asked @ asked), 1e-300)
+    return float(fdtrc(more, free, max(before - left, 0.0) / more / (left / free)))
+
+
+# What goes together with a label.
+
+
+def _motions(runs: Sequence[Run]) -> dict[str, Array]:
+    """Return what of the motion and the command may differ from run to run (k,), in words."""
+    return {
+        "the speed": np.array([float(np.sqrt(np.mean(run.v**2))) for run in runs]),
+        "the stroke": np.array([float(np.ptp(run.x)) for run in runs]),
+        f"the {runs[0].drive}": np.array([float(np.mean(run.V)) for run in runs]),
+    }
+
+
+def together(label: LabelOfRuns, runs: Sequence[Run]) -> list[str]:
+    """Return what these runs cannot separate from a label: other labels, the motion, in words."""
+    others = [one for one in labels_of([run.labels for run in runs]) if one.name != label.name]
+    found = [one.name for one in others if label.goes_with(one.numbers())]
+    return [*found, *(what for what, own in _motions(runs).items() if label.goes_with(own))]
+
+
+# The effects that are tried.
+
+
+def dependences(prepared: Prepared) -> list[Dependence]:
+    """Return the dependences on labels that are worth a trial, the most promising first.
+
+    Parameters
+    ----------
+    prepared : the runs, and the model as fitted without
+    """
+    train, model = prepared.searched, prepared.before.model
+    runs = [*train.runs, *prepared.held_out.runs]
+    labels = [
+        one
+        for one in labels_of([run.labels for run in runs])
+        if len({run.labels[one.name] for run in train.runs}) > 1
+    ]
+    if not labels or len(runs) < FEWEST or not prepared.held_out.noise_known:
+        return []
+    if any(run.force_draws is not None for run in runs):
+        return []  # a force by equilibrium has the rest of a building in it
+    fits = RunwiseFit(train.of(runs), model)
+    looked = LIKELY / (len(labels) * max(1, len(fits.names)))
+    found: list[Dependence] = []
+    for label in labels:
+        if any(what.startswith("the ") for what in together(label, runs)):
+            continue
+        own = [
+            one
+            for j in range(len(fits.names))
+            if (one := _dependence(fits, j, label, train, model, looked))
+        ]
+        own.sort(key=lambda one: -one.gain)
+        found += [one for one in own[:2] if one.gain >= 0.5 * own[0].gain]
+    return sorted(found, key=lambda one: -one.gain)[:MOST]
+
+
+def _dependence(
+    fits: RunwiseFit, j: int, label: LabelOfRuns, train: Problem, model: Model, likely: float
+) -> Dependence | None:
+    """Return how a parameter depends on a label; None where it does not, or hardly."""
+    name = fits.names[j]
+    effect = f"{name.replace('.', '_')}_by_{as_word(label.name)}"
+    asked, told = fits.apart(j)
+    if told.sum() < FEWEST or not effect.isidentifier() or effect in EFFECTS:
+        return None
+    steps, numbers = label.steps(), label.numbers()
+    at_train = numbers[: len(train.runs)]
+    middle = float(at_train.mean()) if label.is_number else numbers[0]
+    line = (numbers - middle)[:, None]
+    of_line = chance_of(asked[told], line[told]) if label.is_number else 1.0
+    stepped = not label.is_number or (
+        2 < len(label.levels) <= MOST_LEVELS
+        and chance_of(asked[told], steps[told], line[told]) < BENT * likely / LIKELY
+    )
+    if stepped and len({*at_train}) < len(label.levels):
+        stepped = False  # a level that training has not seen has no step
+    if not stepped and (not label.is_number or of_line > likely):
+        return None
+    if stepped and chance_of(asked[told], steps[told]) > likely:
+        return None
+    columns = steps if stepped else line
+    gain, sizes = fits.gain(j, columns)
+    if gain < WORTH or not np.any(sizes):
+        return None
+    text = _text(effect, name, label, model, sizes, None if stepped else (middle, numbers))
+    return Dependence(effect, text, label.name, gain)
+
+
+_made: ContextVar[dict[str, str] | None] = ContextVar("made", default=None)
+
+_Diagnose = TypeVar("_Diagnose", bound=Callable[..., Diagnosis])
+
+
+def with_labels(diagnose: _Diagnose) -> _Diagnose:
+    """Return a diagnosis that tries labels: the effects that its verdict names stay defined."""
+
+    @wraps(diagnose)
+    def diagnosed(*given: Any, **named: Any) -> Diagnosis:
+        made: dict[str, str] = {}
+        before = _made.set(made)
+        kept: set[str] = set()
+        try:
+            found = diagnose(*given, **named)
+            gains = gains_of(found.worst) if found.worst else []
+            rows = [{"effects": found.effects}, found.refined, *gains]
+            kept = {name for row in rows for name in row.get("effects", ())}
+            return replace(found, written={n: text for n, text in made.items() if n in kept})
+        finally:
+            _made.reset(before)
+            for name in made:
+                if name not in kept:
+                    undefine(name)
+
+    return cast(_Diagnose, diagnosed)
+
+
+def try_labels(prepared: Prepared) -> None:
+    """Define the effects of labels that are worth a trial; nothing where nobody lets it."""
+    made = _made.get()
+    if made is None:
+        return
+    for one in dependences(prepared):
+        define(one.name, one.text)
+        made[one.name] = one.text
+
+
+# The file of such an effect.
+
+
+def _text(
+    effect: str, name: str, label: LabelOfRuns, model: Model, sizes: Array,
+    line: tuple[float, Array] | None,
+) -> str:  # fmt: skip
+    """Return the text of an effect's file.
+
+    Parameters
+    ----------
+    effect, name : of the effect, and of the parameter that it changes
+    label : what it depends on
+    model : the model as fitted without
+    sizes : (c,) to begin with: a slope, or a step for each level but the first
+    line : the label's value where the parameter keeps its own, and its values (k,); None for steps
+    """
+    declared = parameter(model.law, name)
+    unit, word = declared.unit, _word_of(label.name)
+    owner = name.rpartition(".")[0]
+    of = f" of {effect_name(owner)}" if owner else ""
+    about = f"{declared.text}{of} ({name})"
+    what = f"The {about}"
+    least = f"{declared.bounds[0]!r}" if declared.bounds[0] >= 0.0 else ""
+    told = label_unit(label.name)
+    per = {"degC": "K"}.get(told, told) or f"unit of {label_name(label.name)}"
+    family = f"by_{as_word(label.name)}"
+    if line is None:
+        parts = _steps_text(label, word, unit, sizes, what)
+    elif label.name == TEMPERATURE and least and model.value(name) > 0.0:
+        parts = _arrhenius_text(word, float(sizes[0]) / model.value(name), line, what)
+    else:
+        parts = _line_text(word, unit, float(sizes[0]), line, what, (label.name, told, per))
+    formula, given, fields, parameters, value, words, imports = parts
+    if least:
+        value = f"max({value}, min(q.value, {least}))"
+        formula = f"{formula}, never below {least}"
+    lines = [
+        f'"""The {_plain(about)}, by the label {label.name} of the runs."""',
+        "", *imports, "",
+        *given,
+        "",
+        f"class {''.join(one.capitalize() for one in effect.split('_'))}(Effect):",
+        f'    """The {_plain(about)} depends on {label_name(label.name)}.',
+        "",
+        f"        {formula}",
+        "",
+        "    Told from runs that differ in the label, not derived. Leaves out what else those runs",
+        "    differed in: doubt it at a value that none of them had.",
+        '    """',
+        "",
+        f'    name = "{effect}"',
+        '    sites = ("damper",)',
+        '    needs = ("value",)',
+        f'    changes = "{name}"',
+        f'    family = "{family}"',
+        "    passive = True",
+        "    zero_at_rest = False",
+        '    source = "Learned from runs: what each of them asks of the parameter, by its label"',
+        f"    expect = {_literal(f'an error that goes with {label.name} from run to run')}",
+        "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
+        *fields,
+        f"    labels = {{{_literal(word)}: {_literal(label.name)}}}",
+        *parameters,
+        "",
+        "    @staticmethod",
+        "    def changed(q, z, p):",
+        f"        return {value}",
+        "",
+        "    @staticmethod",
+        "    def in_words(p):",
+        *words,
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+_Parts = tuple[str, list[str], list[str], list[str], str, list[str], list[str]]
+"""Formula, constants, class data, parameters, the value, the words' lines, and imports."""
+
+_IMPORT = "from bristle.physics.effect import Effect, Parameter"
+
+
+def _line_text(
+    word: str, unit: str, slope: float, line: tuple[float, Array], what: str,
+    told: tuple[str, str, str],
+) -> _Parts:  # fmt: skip
+    """Return the parts of the file of a straight line; `told`: the label's name, unit, and per."""
+    middle, values = line
+    name, label_si, per = told
+    warm = label_si == "degC"
+    own, of = ("degC", canonical(f"{unit}/K")) if warm else ("1", unit)
+    shown = f" {per}" if label_si and not warm else " °C" if warm else ""
+    of_what = f" of {label_name(name)}" if label_si else ""
+    size = f"{{abs(p.slope):.3g}} {unit}" if unit != "1" else "{abs(p.slope):.3g}"
+    return (
+        f"value + slope ({word} - middle)", [],
+        ['    amount = "slope"', f'    assumed = ({_literal(word)}, "middle")',
+         f'    label_means = {{"middle": {_literal(name)}}}'],
+        [
+            "    parameters = {",
+            f'        "slope": {_declared(slope, of, f"change with each {per}")},',
+            *_label_parameters(word, own, values, middle),
+            "    }",
+        ],
+        f"q.value + p.slope * (p.{word} - p.middle)",
+        [
+            '        way = "rises" if p.slope >= 0.0 else "falls"',
+            f'        return f"{_braced(what)} {{way}} by {size} per {per}{_braced(of_what)}; "\\',
+            f'            f"the model\'s value of it is that at {{p.middle:.4g}}{shown}."',
+        ],
+        [_IMPORT],
+    )  # fmt: skip
+
+
+def _arrhenius_text(word: str, share: float, line: tuple[float, Array], what: str) -> _Parts:
+    """Return the parts of the file of a parameter that follows a temperature by Arrhenius' law."""
+    middle, values = line
+    size = -share * (middle + ZERO_C) ** 2
+    return (
+        f"value exp(B (1/{word} - 1/middle)), temperatures in K", [],
+        ['    amount = "B"', f'    assumed = ({_literal(word)}, "middle")',
+         f'    label_means = {{"middle": "{TEMPERATURE}"}}'],
+        [
+            "    parameters = {",
+            f'        "B": {_declared(size, "K", "activation energy over the gas constant")},',
+            *_label_parameters(word, "degC", values, middle, (-200.0, 1000.0)),
+            "    }",
+        ],
+        f"q.value * exp(min(max(p.B * (1.0 / (p.{word} + {ZERO_C}) "
+        f"- 1.0 / (p.middle + {ZERO_C})), -3.0), 3.0))",
+        [
+            f"        share = 100.0 * p.B / (p.middle + {ZERO_C}) ** 2",
+            '        way = "falls" if p.B >= 0.0 else "rises"',
+            f'        return f"{_braced(what)} {{way}} by {{abs(share):.2g}} % per kelvin, "\\',
+            '            "by the law of Arrhenius; the model\'s value of it is that at "\\',
+            '            f"{p.middle:.4g} °C."',
+        ],
+        ["from math import exp", "", _IMPORT],
+    )  # fmt: skip
+
+
+def _steps_text(label: LabelOfRuns, word: str, unit: str, sizes: Array, what: str) -> _Parts:
+    """Return the parts of the file of a parameter that has a value at each level of a label."""
+    levels = [float(k) for k in range(1, len(label.levels) + 1)]
+    if label.is_number:
+        levels = [float(one) for one in label.levels]
+    most = 100.0 * float(np.max(np.abs(sizes)))
+    values = ", ".join(f"{float(one):.6g}" for one in (0.0, *sizes))
+    texts = [f"{label_name(label.name)} {label_text(label.name, one)}" for one in label.levels]
+    shown = [
+        f"{{p.step[{k}]:+.3g}}{'' if unit == '1' else ' ' + unit} at {_braced(text)}"
+        for k, text in enumerate(texts) if k
+    ]  # fmt: skip
+    words = tuple(str(one) for one in label.levels)
+    named = [] if label.is_number else [
+        f"    label_words = {{{_literal(label.name)}: {json.dumps(words, ensure_ascii=False)}}}"
+        .replace("[", "(").replace("]", ")")
+    ]  # fmt: skip
+    pairs = [f"{level:g} {text}" for level, text in zip(levels, texts, strict=True)]
+    told = "" if label.is_number else f": {', '.join(pairs)}"
+    return (
+        f"value + step({word})",
+        [f"LEVELS = ({', '.join(repr(one) for one in levels)})",
+         f'"""Of the label: {_plain(", ".join(texts))}."""', ""],
+        [f'    assumed = ({_literal(word)}, "step[1]")', *named],
+        [
+            "    parameters = {",
+            f'        "{word}": Parameter({levels[1]!r}, "1", {_span(np.array(levels))}, '
+            f"{_literal(f'of the run{told}')}),",
+            "    }",
+            "    tables = {",
+            f'        "step": Table(LEVELS, ({values}), "{unit}", ({-most:.6g}, {most:.6g}),',
+            f"            {_literal(f'change against {texts[0]}')}),",
+            "    }",
+        ],
+        f"q.value + interpolate(p.{word}, LEVELS, p.step)",
+        [f'        return f"{_braced(what)} differs from that at {_braced(texts[0])} by '
+         f'{joined(shown)}."'],
+        [f"{_IMPORT}, Table, interpolate"],
+    )  # fmt: skip
+
+
+def _label_parameters(
+    word: str, unit: str, values: Array, middle: float, bounds: tuple[float, float] | None = None
+) -> list[str]:
+    """Return the lines of the label as a parameter, and of where the law's value holds."""
+    span = _span(values) if bounds is None else f"({bounds[0]!r}, {bounds[1]!r})"
+    far, held = float(values[np.argmax(np.abs(values - middle))]), "where the value is as given"
+    return [
+        f'        "{word}": Parameter({far!r}, "{unit}", {span}, "of the run"),',
+        f'        "middle": Parameter({middle!r}, "{unit}", {span}, "{held}"),',
+    ]
+
+
+def _span(values: Array) -> str:
+    """Return bounds of a label far beyond what was seen: they only keep it a number."""
+    far = 100.0 * max(float(np.max(np.abs(values))), 1.0)
+    return f"({-far!r}, {far!r})"
+
+
+def _declared(value: float, unit: str, text: str) -> str:
+    most = 100.0 * abs(value)
+    return f'Parameter({value:.6g}, "{unit}", ({-most:.6g}, {most:.6g}), {_literal(text)})'
+
+
+def _word_of(label: str) -> str:
+    """Return what the parameter of a label is called."""
+    word = as_word(label)
+    taken = word in ("slope", "middle", "step", "on", "b", "") or word.endswith("_0")
+    return "label" if taken or not re.fullmatch(r"[a-z][a-z0-9_]*", word) else word
+
+
+def _literal(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _plain(text: str) -> str:
+    """Return a text as it stands between triple quotes."""
+    return text.replace("\\", "\\\\").replace('"""', r"\"\"\"")
+
+
+def _braced(text: str) -> str:
+    """Return a text as it stands in a formatted one."""
+    return json.dumps(text, ensure_ascii=False)[1:-1].replace("{", "{{").replace("}", "}}")
+
+
+# What a finding with a label says besides: how sure, where it is extrapolation, what it goes with.
+
+
+def confirmed(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
+    """Return a finding that says how sure a dependence on a label is, unknown where it is not.
+
+    Parameters
+    ----------
+    found : what the trials lead to
+    prepared : the runs, and the model that it began with
+    """
+    if found.kind == "none" or found.after is None:
+        return found
+    runs = [*prepared.problem.runs, *prepared.held_out.runs]
+    texts: list[str] = []
+    for name in (one for one in found.effects if one in EFFECTS and EFFECTS[one].changes):
+        trial = next((t for t in (found.after, *found.trials) if name in t.effects), None)
+        if trial is None or found.kind not in ("effect", "ambiguous"):
+            continue
+        model, std = _without_each(name, trial.model, prepared)
+        if not any(abs(model.value(own)) > _far(len(runs)) * one for own, one in std.items()):
+            return _unsure(found, name, model, std, len(runs))
+        texts.append(_told(name, model, std, len(runs)))
+        found = replace(found, std={**found.std, **std})
+    texts += _all_at_one_level(prepared)
+    texts += _not_separable(found, prepared, runs)
+    if found.after is not None:
+        texts += extrapolated(found.after.model, prepared.problem.runs, prepared.held_out.runs)
+    return replace(found, reasons=(*found.reasons, *texts)) if texts else found
+
+
+def _without_each(name: str, model: Model, prepared: Prepared) -> tuple[Model, dict[str, float]]:
+    """Return a model fitted to all runs, and how its dependence varies with which run is left out.
+
+    Returns
+    -------
+    the model; by parameter of the dependence its standard deviation by the jackknife, from fits
+    without each run or each of `REFITS` groups of them in turn (Efron 1982, The Jackknife, ch. 3)
+    """
+    runs = [*prepared.problem.runs, *prepared.held_out.runs]
+    n = min(REFITS, len(runs))
+    sizes = [own for own in model.free() if own.startswith(f"{name}.")]
+    whole = refine(model, prepared.problem.of(runs), 4)
+
+    def without(k: int) -> list[float]:
+        left = [run for j, run in enumerate(runs) if j % n != k]
+        fitted = refine(whole, prepared.problem.of(left), 3)
+        return [fitted.value(own) for own in sizes]
+
+    values = np.array(in_threads(without, range(n)))
+    std = np.sqrt((n - 1) / n * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
+    return whole, dict(zip(sizes, std.tolist(), strict=True))
+
+
+def _far(runs: int) -> float:
+    """Return how many standard deviations an interval of 95 % reaches, from so many runs."""
+    return float(stdtrit(min(REFITS, runs) - 1, 0.975))
+
+
+def _told(name: str, model: Model, std: dict[str, float], runs: int) -> str:
+    """Return what a dependence comes to, with its interval over the runs."""
+    effect, parts = EFFECTS[name], []
+    for key, one in std.items():
+        own = key.rpartition(".")[2]
+        unit = effect.parameters[own].unit
+        text, half = with_interval(model.value(key), one * _far(runs) / NORMAL)
+        parts.append(f"{own} {text} {half}{'' if unit == '1' else f' {unit}'}")
+    values = {own: model.value(f"{name}.{own}") for own in effect.parameters}
+    words = str(effect.in_words(effect.values_of(values))) if hasattr(effect, "in_words") else ""
+    each = "each" if runs <= REFITS else "each tenth"
+    told = f"By fits without {each} of {runs} runs in turn: {', '.join(parts)} (95 %)."
+    return f"{words} {told}".strip()
+
+
+def _unsure(
+    found: SiteDiagnosis, name: str, model: Model, std: dict[str, float], runs: int
+) -> SiteDiagnosis:
+    """Return a finding without a dependence that goes or turns with which run is left out."""
+    before = found.before
+    assert before is not None
+    why = (
+        f"With {effect_name(name)} the error falls, but these runs cannot tell it from chance. "
+        f"{_told(name, model, std, runs)} Measure more runs at each value of the label."
+    )
+    return replace(
+        found, kind="unknown", effects=(), reasons=(why,), after=before, model=before.model,
+        z_after=before.z, share=0.0,
+    )  # fmt: skip
+
+
+def extrapolated(model: Model, train: Sequence[Run], held_out: Sequence[Run]) -> list[str]:
+    """Return which held-out runs have a label beyond those that the model was fitted to.
+
+    Parameters
+    ----------
+    model : with the effects that depend on labels
+    train, held_out : the runs
+    """
+    out = []
+    names = {label for name in model.effects for label in EFFECTS[name].labels.values()}
+    for label in sorted(names):
+        seen = [y for run in train if not isinstance(y := run.labels.get(label, ""), str)]
+        beyond = [
+            run
+            for run in held_out
+            if seen and not isinstance(y := run.labels.get(label, ""), str)
+            and not min(seen) <= y <= max(seen)
+        ]  # fmt: skip
+        if beyond:
+            where = [f"{run.name} ({label_text(label, run.labels[label])})" for run in beyond]
+            where = where if len(where) <= TOLD else [*where[:TOLD], f"{len(where) - TOLD} more"]
+            ends = dict.fromkeys((min(seen), max(seen)))
+            span = " to ".join(label_text(label, one) for one in ends)
+            out.append(
+                f"{EXTRAPOLATED} the training runs have {label_name(label)} {span}, beyond which "
+                f"{'lie' if len(beyond) > 1 else 'lies'} {joined(where)}: nothing was fitted there."
+            )
+    return out
+
+
+def _all_at_one_level(prepared: Prepared) -> list[str]:
+    """Return that all training runs are at one level of a label that held-out ones differ in."""
+    out = []
+    for label in labels_of([r.labels for r in (*prepared.problem.runs, *prepared.held_out.runs)]):
+        levels = {run.labels[label.name] for run in prepared.problem.runs}
+        if len(levels) > 1:
+            continue
+        own = label_text(label.name, next(iter(levels)))
+        apart = next(run for run in prepared.held_out.runs if run.labels[label.name] not in levels)
+        out.append(
+            f"All training runs are at {label_name(label.name)} {own}, and the held-out "
+            f"{apart.name} at {label_text(label.name, apart.labels[label.name])}: nothing that was "
+            f"fitted tells what {label_name(label.name)} does. Train on some of both: role = "
+            '"train" in their [[runs]] of study.toml.'
+        )
+    return out
+
+
+def _not_separable(found: SiteDiagnosis, prepared: Prepared, runs: Sequence[Run]) -> list[str]:
+    """Return what goes together with a label that matters, and which run would separate the two."""
+    if found.before is None or found.kind == "none":
+        return []
+    named = {
+        label
+        for name in found.effects if name in EFFECTS and EFFECTS[name].changes
+        for label in EFFECTS[name].labels.values()
+    }  # fmt: skip
+    out: dict[frozenset[str], str] = {}
+    for label in labels_of([run.labels for run in runs]):
+        others = together(label, runs)
+        moved = any(one.startswith("the ") for one in others)
+        if not others or not (label.name in named or (moved and found.kind == "unknown")):
+            continue
+        numbers = label.numbers()
+        low, high = runs[int(np.argmin(numbers))], runs[int(np.argmax(numbers))]
+        own, at = label_name(label.name), label_text(label.name, low.labels[label.name])
+        like = ", ".join(
+            f"with {one} of {high.name}" if one.startswith("the ")
+            else f"at {label_name(one)} {label_text(one, high.labels[one])}"
+            for one in others
+        )  # fmt: skip
+        out.setdefault(
+            frozenset((label.name, *others)),
+            f"{NOT_SEPARABLE} {joined([own, *map(label_name, others)])} change together from run "
+            f"to run. A run at {own} {at} {like} separates them.",
+        )
+    return [*out.values()]
