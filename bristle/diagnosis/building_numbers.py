@@ -29,6 +29,9 @@ from .trials import judge
 DEVIATIONS = 3.0
 """Standard deviations of a mass that the doubt about it amounts to."""
 
+PASSES = 4
+"""Weighted least squares in so many passes, by Huber's weights of the pass before."""
+
 
 @dataclass(frozen=True)
 class Shaken:
@@ -68,14 +71,27 @@ def suited_masses(shaken: Shaken, building: Building, rule: DecisionRule = SITE)
     """
     lines = shaken.lines(building)
     before = _excess(lines, rule)
-    if before <= rule.least_excess * len(lines):
+    if max(before.values(), default=0.0) <= rule.least_excess:
         return building
     shift = _shift(shaken, building, lines, rule)
     if float(np.max(np.abs(shift / (1.0 + shift)))) > rule.mass_doubt:
         return building
     moved = with_masses(building, shift)
-    return (
-        moved if _excess(shaken.lines(moved), rule) <= rule.building_excess * before else building
+    return moved if _suit_better(before, _excess(shaken.lines(moved), rule), rule) else building
+
+
+def _suit_better(
+    before: Mapping[str, float], after: Mapping[str, float], rule: DecisionRule
+) -> bool:
+    """Return whether masses take half of what a line leaves, at one site, and add to none.
+
+    An effect of one site leaves its excess there, whatever the masses are: that says nothing of
+    what they do at the others.
+    """
+    noise = rule.excess(rule.adequate)
+    return all(after[site] <= max(before[site], noise) for site in before) and any(
+        before[site] > rule.excess(rule.quiet) and after[site] <= rule.building_excess * before[site]
+        for site in before
     )
 
 
@@ -111,25 +127,29 @@ def text_of_masses(before: Building, after: Building, measured: bool = True) -> 
     ]
 
 
-def _excess(lines: Mapping[str, StructurePair], rule: DecisionRule) -> float:
-    """Return what lines leave beyond noise on held-out runs, summed over the sites."""
-    total = 0.0
+def _excess(lines: Mapping[str, StructurePair], rule: DecisionRule) -> dict[str, float]:
+    """Return what lines leave beyond noise on held-out runs, by site."""
+    found = {}
     for site, (train, held_out) in lines.items():
         line = fit_line(train, law_of_part(site).name).model
-        total += rule.excess(judge(line, train, held_out).z)
-    return total
+        found[site] = rule.excess(judge(line, train, held_out).z)
+    return found
 
 
 def _shift(
     shaken: Shaken, building: Building, lines: Mapping[str, StructurePair], rule: DecisionRule
 ) -> Array:
-    """Return by which share (n,) each mass is to move: least squares, with what the file knows."""
+    """Return by which share (n,) each mass is to move: least squares, with what the file knows.
+
+    Robust, and what a line of a site misses anyhow counts as noise there: an effect is not to move
+    masses.
+    """
     n = building.size
     unit = rule.mass_doubt / DEVIATIONS
     able = _determined(n, shaken.lowest, shaken.measured)
     moved = [with_masses(building, unit * np.eye(n)[j]) for j in range(n)]
     others = [shaken.lines(one) for one in moved]
-    normal, gradient = np.eye(n), np.zeros(n)
+    sites = []
     for site, (train, _) in lines.items():
         law = law_of_part(site)
         expected = train.expectation(fit_line(train, law.name).model)
@@ -137,25 +157,32 @@ def _shift(
             [1.0 / e[1][run.skip :] for e, run in zip(expected, train.runs, strict=True)]
         )
         columns = [line_columns(run, LAWS[law.name])[run.skip :] for run in train.runs]
-        Q = np.linalg.qr(np.concatenate(columns) * weight[:, None])[0]
-        here = _target(train)
-
-        def left(values: Array, Q: Array = Q, weight: Array = weight) -> Array:
-            """Return what no line absorbs of forces (m,), over the noise."""
-            scaled = values * weight
-            return np.asarray(scaled - Q @ (Q.T @ scaled))
-
-        above = _above(building, train)
+        here, above = _target(train), _above(building, train)
         slopes = np.stack(
             [
-                left(_target(other[site][0]) * above / _above(one, train) - here)
+                _target(other[site][0]) * above / _above(one, train) - here
                 for one, other in zip(moved, others, strict=True)
             ],
             axis=1,
         )
-        normal += slopes.T @ slopes
-        gradient += slopes.T @ left(here)
-    return np.asarray(-unit * able @ np.linalg.solve(able.T @ normal @ able, able.T @ gradient))
+        sites.append(
+            (np.concatenate(columns) * weight[:, None], slopes * weight[:, None], here * weight)
+        )
+    shift = np.zeros(n)
+    for _ in range(PASSES):
+        normal, gradient = np.eye(n), np.zeros(n)
+        for A, slopes, target in sites:
+            now = target + slopes @ shift
+            left = np.abs(now - A @ np.linalg.lstsq(A, now, rcond=None)[0])
+            spread = max(1.0, float(np.median(left)) / 0.6745)
+            robust = np.sqrt(np.minimum(1.0, HUBER * spread / np.maximum(left, 1e-300))) / spread
+            Q = np.linalg.qr(A * robust[:, None])[0]
+            slopes, target = slopes * robust[:, None], target * robust
+            slopes = slopes - Q @ (Q.T @ slopes)  # what no line absorbs
+            normal += slopes.T @ slopes
+            gradient += slopes.T @ target
+        shift = -able @ np.linalg.solve(able.T @ normal @ able, able.T @ gradient)
+    return np.asarray(unit * shift)
 
 
 def _above(building: Building, problem: StructureProblem) -> float:

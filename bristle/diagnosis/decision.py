@@ -123,9 +123,13 @@ def _suffices(before: Trial, best: Trial, rule: DecisionRule) -> bool:
 def missing(before: Trial, after: Trial, rule: DecisionRule = BENCH) -> bool:
     """Return whether an effect lowers the held-out error by enough, and beyond chance.
 
-    An effect that serves the many samples near rest at the cost of all others is none.
+    An effect that serves the many samples near rest at the cost of all others is none; of a few
+    samples beside reversals the plain error says nothing.
     """
-    if 1.0 - after.z / before.z < rule.gain or after.rms > rule.most_rms * before.rms:
+    if 1.0 - after.z / before.z < rule.gain:
+        return False
+    larger = after.rms > rule.most_rms * before.rms
+    if larger and not after.rms_bulk <= rule.most_rms * before.rms_bulk:
         return False
     return paired(before.losses, after.losses, rule.chance).low > 0.0
 

@@ -373,11 +373,13 @@ class BuildingRuns:
         """Adjust the building's numbers beside what was found at the damper; return whether so.
 
         Where the force follows from equilibrium, the file's numbers show in what an effect leaves,
-        and hardly before.
+        and hardly before. They may do what a second effect does, so that no pair comes before them.
         """
         if not self._problems[DAMPER][0].reconstructed or found.kind == "none":
             return False
-        best = found.after if found.kind != "unknown" else next(iter(found.trials), None)
+        pair = found.together is not None and found.after is found.together
+        alone = found.kind != "unknown" and not pair
+        best = found.after if alone else next(iter(found.trials), None)
         if best is None or max(best.z, best.train) <= BENCH.adequate:
             return False
         return self._suit(best.model)

@@ -490,9 +490,10 @@ def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:
 def excused_by_sensor(
     found: SiteDiagnosis, most: float, reason: str, rule: DecisionRule = BENCH
 ) -> SiteDiagnosis:
-    """Return a damper's finding, not unknown where an instrument already known explains it.
+    """Return a damper's finding, none where an instrument already known explains it.
 
-    What an effect of the library lowers is not excused.
+    Neither unknown nor, for what it leaves of some runs, contradicted. What an effect of the
+    library lowers is not excused.
 
     Parameters
     ----------
@@ -503,10 +504,13 @@ def excused_by_sensor(
     """
     before = found.before
     assert before is not None
-    gains = any(1.0 - trial.z / before.z >= rule.gain for trial in found.trials)
-    if found.kind != "unknown" or gains or max(before.z, before.train) > most:
+    worst = max(before.z, before.train)
+    gains = found.kind == "unknown" and any(
+        1.0 - trial.z / before.z >= rule.gain for trial in found.trials
+    )
+    if found.kind not in ("unknown", "none") or gains or not rule.clean < worst <= most:
         return found
-    why = f"{reason} This explains the error, {before.z:.2f} {NOISE}."
+    why = f"{reason} This explains the error, {worst:.2f} {NOISE}."
     return replace(found, kind="none", reasons=(why,))
 
 

@@ -50,6 +50,10 @@ SECONDS = 4
 WORTH = 0.005
 """Share of the loss that a candidate must gain at least to be refined."""
 
+FEW = 0.005
+"""Share of the samples that may hold nearly all of a plain error: at a reversal dry friction is on
+the wrong side at once."""
+
 SHOWN = ("force",)
 """Channels whose instrument's effects are tried where nothing else is known of them."""
 
@@ -64,9 +68,9 @@ class Trial:
     `train`, `z` the robust RMS of residual over expected noise there; `losses` (n,) the robust loss
     per held-out sample, by the weights of the fit; `residual` (n,) the residuals over the noise;
     `rms` [N] the error over the samples that decide: where a law of dry friction is at rest its
-    force may be any, and no effect is judged by that. `error` is that over all samples, None where
-    nobody asked. `refined` is False where the first, short search already showed that it gains too
-    little.
+    force may be any, and no effect is judged by that; `rms_bulk` [N] that of all but the `FEW`
+    worst, NaN where nobody asked. `error` is that over all samples, None where nobody asked.
+    `refined` is False where the first, short search already showed that it gains too little.
     """
 
     model: Model
@@ -77,6 +81,7 @@ class Trial:
     residual: Array
     refined: bool = True
     error: ForceError | None = None
+    rms_bulk: float = float("nan")
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -103,8 +108,16 @@ def judge(
     decides = pooled(errors_by_run(held_out, model, entire=False))
     return Trial(
         model, z_scale(own), z_of(mean_loss(losses(z))), decides.rms, losses(r), z, noise is None,
-        force_error([(held_out, model)]),
+        force_error([(held_out, model)]), _rms_bulk(held_out, r, expected),
     )  # fmt: skip
+
+
+def _rms_bulk(problem: Problem, r: Array, expected: Expected) -> float:
+    """Return the RMS [N] of an error, normalised (n,), but for its `FEW` worst samples."""
+    pairs = zip(problem.runs, expected, strict=True)
+    sigma = np.concatenate([noise[run.skip :] for run, (_, noise, _) in pairs])
+    size = np.sort(np.abs(r * sigma)[r != 0.0])
+    return float(np.sqrt(np.mean(size[: len(size) - round(FEW * len(size))] ** 2)))
 
 
 def missed_by(trial: Trial, train: Problem) -> float:
