@@ -90,7 +90,8 @@ def _suit_better(
     """
     noise = rule.excess(rule.adequate)
     return all(after[site] <= max(before[site], noise) for site in before) and any(
-        before[site] > rule.excess(rule.quiet) and after[site] <= rule.building_excess * before[site]
+        before[site] > rule.excess(rule.quiet)
+        and after[site] <= rule.building_excess * before[site]
         for site in before
     )
 

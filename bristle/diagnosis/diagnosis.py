@@ -25,7 +25,7 @@ from .law_trials import better_law, try_laws
 from .prepared import Prepared, Progress, of_layer, silent
 from .remaining import patterns_of, remaining_residual
 from .rig_runs import RigRuns, runs_of_rig
-from .site import diagnose_damper, diagnose_line, joinable_at
+from .site import Trials, diagnose_damper, diagnose_line, joinable_at, noise_is_all
 from .site_diagnosis import SiteDiagnosis
 from .trials import SHOWN, joinable, judge
 from .verdict import Diagnosis
@@ -183,17 +183,29 @@ def diagnose_rig(
     prepared = runs.prepare(DAMPER)
     if prepared is None:
         return conclude(findings, runs.context(None))
-    found, prepared = diagnose_damper(prepared, say)
-    if runs.suit(found):
-        again = runs.prepare(DAMPER)
-        assert again is not None
-        found, prepared = diagnose_damper(again, say)
+    found, prepared = _at_damper(prepared, runs, say)
     found = settled(found, prepared, runs, findings)
     say(f"verdict {found.briefly}")
     if prepared.scope.any_law:
         found = _beside_other_laws(found, prepared, runs.bends, say)
     findings[DAMPER] = with_evidence(found, prepared, profile=profile)
     return conclude(findings, runs.context(prepared))
+
+
+def _at_damper(prepared: Prepared, runs: RigRuns, say: Progress) -> tuple[SiteDiagnosis, Prepared]:
+    """Return what a damper lacks, beside the numbers of a building that its force follows from.
+
+    They are adjusted beside the best single effect: what a second one does they may do as well.
+    """
+    if not prepared.problem.reconstructed or noise_is_all(prepared):
+        return diagnose_damper(prepared, say)
+    made = Trials(prepared, say)
+    single, _ = diagnose_damper(prepared, say, made, pairs=False, excess=0.0)
+    if not runs.suit(single):
+        return diagnose_damper(prepared, say, made)
+    again = runs.prepare(DAMPER)
+    assert again is not None
+    return diagnose_damper(again, say)
 
 
 def diagnose_lines(
@@ -205,7 +217,7 @@ def diagnose_lines(
         say(f"{site}: effects of the structure")
         prepared = runs.prepare(site)
         assert prepared is not None
-        found = contradicted(diagnose_line(site, prepared), prepared)
+        found = settled(diagnose_line(site, prepared), prepared, runs, findings)
         findings[site] = with_evidence(found, prepared, profile=profile)
     return findings
 
@@ -216,15 +228,15 @@ def settled(
     runs: RigRuns,
     findings: Mapping[str, SiteDiagnosis],
 ) -> SiteDiagnosis:
-    """Return the damper's diagnosis, excused by an instrument or contradicted by its runs.
+    """Return a site's diagnosis, excused by an instrument or contradicted by its runs.
 
     What an instrument explains contradicts nothing.
 
     Parameters
     ----------
-    found, prepared : what the damper lacks, and what its diagnosis began with
+    found, prepared : what the site lacks, and what its diagnosis began with
     runs : of the rig
-    findings : what the other sites lack
+    findings : what the other sites lack, as far as they were diagnosed
     """
     excused = runs.excused(found, findings)
     return excused if excused is not found else contradicted(found, prepared)

@@ -12,6 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+import numpy as np
+
+from ..comparison.names import joined
 from ..core.finding import Finding
 from ..data.channels import DRIVE
 from ..data.checks.runs import tells_a_bend
@@ -228,7 +231,13 @@ class RigRuns(Protocol):
         """Adjust the rig's numbers beside what was found at the damper; return whether so."""
 
     def excused(self, found: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]) -> SiteDiagnosis:
-        """Return the damper's diagnosis, not unknown where an instrument explains what is left."""
+        """Return a site's diagnosis, none where instruments explain what is left.
+
+        Parameters
+        ----------
+        found : what the site lacks
+        findings : what the other sites lack, as far as they were diagnosed
+        """
 
     def context(self, damper: Prepared | None) -> VerdictContext:
         """Return what the verdict tells beside the sites, from what the damper's began with."""
@@ -387,11 +396,14 @@ class BuildingRuns:
     def _suit(self, damper: Model) -> bool:
         """Take the building that suits a damper's model best, within what is known; or leave it."""
         law, straight = self._present.law, self._straight
-        train = self._problems[DAMPER][0]
-        fitted = fit_damper(train, damper).model
+        given, rule = self._problems[DAMPER], BENCH
+        fitted = fit_damper(given[0], damper).model
         known = within_prior(fitted, self._train, self._building, law, straight)
         suited = self._made(known)
-        if not _suits(suited[DAMPER], self._problems[DAMPER], damper):
+        # Held-out runs say too whether the numbers explain what the file's leave: what an effect
+        # does they may follow in part, and then they are the file's still.
+        left = judge(fit_damper(suited[DAMPER][0], damper).model, *suited[DAMPER]).z
+        if rule.excess(left) > rule.building_excess * rule.excess(judge(fitted, *given).z):
             return False
         self._problems, self._notes = suited, moved_numbers(self._building, known)
         return True
@@ -446,7 +458,13 @@ class BuildingRuns:
         )  # fmt: skip
 
     def excused(self, found: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]) -> SiteDiagnosis:
-        """Return the damper's diagnosis, not unknown where an instrument explains what is left."""
+        """Return a site's diagnosis, none where instruments explain what is left; see `RigRuns`."""
+        if names := self._without_accelerometer(found.site):
+            why = f"Without the acceleration of {joined(names)} equilibrium is known less well."
+            rule = BENCH if found.site == DAMPER else SITE
+            found = excused_by_sensor(found, BENCH.no_velocity_z, why, rule)
+        if found.site != DAMPER:
+            return found
         if blurred(self._sensors) or not self._velocities:
             why = "Without the velocity of the base, its reversals are not located exactly."
             found = excused_by_sensor(found, BENCH.no_velocity_z, why)
@@ -457,6 +475,19 @@ class BuildingRuns:
             found = excused_by_sensor(found, most, why)
         return found
 
+    def _without_accelerometer(self, site: str) -> list[str]:
+        """Return the levels in a site's equilibrium whose acceleration is a smoothed motion's."""
+        if site == DAMPER:
+            lowest = self._device.upper if self._problems[DAMPER][0].reconstructed else None
+        else:
+            number = int(site.removeprefix("storey")) if site.startswith("storey") else 0
+            lowest = number - (not self._building.isolated)
+        if lowest is None:
+            return []
+        there = np.all([one.accelerometer for one in [*self._train, *self._holdout]], axis=0)
+        names = self._building.levels()
+        return [names[level] for level in range(lowest, len(names)) if not there[level]]
+
     def context(self, _damper: Prepared | None) -> VerdictContext:
         """Return what the verdict tells beside the sites."""
         reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed
@@ -466,21 +497,6 @@ class BuildingRuns:
         if reconstructed and not beside:
             notes = (*notes, OF_STOREY)
         return VerdictContext(force, self._sensors, self._noise, notes, beside_layer=beside)
-
-
-def _suits(
-    suited: StructurePair, given: StructurePair, damper: Model, rule: DecisionRule = BENCH
-) -> bool:
-    """Return whether moved numbers of a building explain what the file's leave, held-out runs too.
-
-    What an effect does they may follow in part; then they are the file's still.
-    """
-
-    def left(pair: StructurePair) -> float:
-        base = fit_damper(pair[0], damper)
-        return rule.excess(judge(base.model, *pair).z)
-
-    return left(suited) <= rule.building_excess * left(given)
 
 
 def _rounded(layer: SiteDiagnosis, rule: DecisionRule = SITE) -> bool:
@@ -606,7 +622,7 @@ class BenchRuns:
     def excused(
         self, found: SiteDiagnosis, _findings: Mapping[str, SiteDiagnosis]
     ) -> SiteDiagnosis:
-        """Return the damper's diagnosis as it is."""
+        """Return a diagnosis as it is."""
         return found
 
     def context(self, damper: Prepared | None) -> VerdictContext:
