@@ -15,8 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.arrays import Array
-from ..identification.building_motion import Response
-from ..identification.building_sites import StructurePair, StructureProblem, damper_run, problems_of
+from ..identification.building_motion import Response, shear
+from ..identification.building_sites import (
+    StructurePair,
+    StructureProblem,
+    StructureRun,
+    damper_run,
+    problems_of,
+)
 from ..identification.rig_fit import fit_line, line_columns
 from ..identification.search import HUBER
 from ..identification.start_grid import Search
@@ -89,11 +95,10 @@ def _suit_better(
     what they do at the others.
     """
     noise = rule.excess(rule.adequate)
-    return all(after[site] <= max(before[site], noise) for site in before) and any(
-        before[site] > rule.excess(rule.quiet)
-        and after[site] <= rule.building_excess * before[site]
-        for site in before
-    )
+    if any(after[site] > max(noise, (1.0 + rule.trace) * before[site]) for site in before):
+        return False
+    clear = [site for site in before if before[site] > rule.excess(rule.quiet)]
+    return any(after[site] <= rule.building_excess * before[site] for site in clear)
 
 
 def with_masses(building: Building, shift: Array) -> Building:
@@ -149,7 +154,6 @@ def _shift(
     unit = rule.mass_doubt / DEVIATIONS
     able = _determined(n, shaken.lowest, shaken.measured)
     moved = [with_masses(building, unit * np.eye(n)[j]) for j in range(n)]
-    others = [shaken.lines(one) for one in moved]
     sites = []
     for site, (train, _) in lines.items():
         law = law_of_part(site)
@@ -159,10 +163,11 @@ def _shift(
         )
         columns = [line_columns(run, LAWS[law.name])[run.skip :] for run in train.runs]
         here, above = _target(train), _above(building, train)
+        carried = _carried(shaken, building, train)
         slopes = np.stack(
             [
-                _target(other[site][0]) * above / _above(one, train) - here
-                for one, other in zip(moved, others, strict=True)
+                (here + _carried(shaken, one, train) - carried) * above / _above(one, train) - here
+                for one in moved
             ],
             axis=1,
         )
@@ -194,8 +199,22 @@ def _above(building: Building, problem: StructureProblem) -> float:
     """
     if not problem.storey:
         return 1.0
-    level = problem.storey - (not building.isolated)
-    return float(np.diag(np.array(building.M))[level:].sum())
+    return float(np.diag(np.array(building.M))[_level(building, problem) :].sum())
+
+
+def _level(building: Building, problem: StructureProblem) -> int:
+    """Return the level above a site's line."""
+    return problem.storey - (not building.isolated) if problem.storey else 0
+
+
+def _carried(shaken: Shaken, building: Building, problem: StructureProblem) -> Array:
+    """Return what is carried below a site's level with a building's masses, as `_target` has it."""
+    level, by_name = _level(building, problem), {one.name: one for one in shaken.train}
+    parts = []
+    for run in problem.runs:
+        assert isinstance(run, StructureRun)
+        parts.append(shear(by_name[run.name], building, level)[0][run.keep][run.skip :])
+    return np.concatenate(parts)
 
 
 def _determined(n: int, lowest: int, measured: bool) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -438,6 +439,20 @@ class Response:
         if self.force is None:
             return list(self.others)
         return [Load(self.device, self.force, self.noise_force), *self.others]
+
+    @cached_property
+    def white(self) -> list[tuple[Array | None, Array]]:
+        """By level draws (d, n) of its accelerometer's noise, None without one, and (d, 1) of V's.
+
+        In standard deviations; the same at each use.
+        """
+        count, n = self.draws.shape[1:3]
+        out: list[tuple[Array | None, Array]] = []
+        for level, own in enumerate(self.accelerometer):
+            generator = np.random.default_rng(level + 100)
+            a = generator.standard_normal((count, n)) if own else None
+            out.append((a, generator.standard_normal((count, 1))))
+        return out
 
     def hides(self, level: int) -> bool:
         """Return whether a damper of unknown force acts across the storey below a level."""

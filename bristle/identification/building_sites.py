@@ -424,11 +424,10 @@ def _error(response: Response, level: int) -> Array:
     count, n = response.draws.shape[1:3]
     error = np.zeros((count, n, 4))
     error[:, :, :3] = response.draws[level]
-    generator = np.random.default_rng(level + 100)
-    if response.accelerometer[level]:
-        white = float(np.hypot(response.noise_a[level], response.noise_ground))
-        error[:, :, 2] = white * generator.standard_normal((count, n))
-    error[:, :, 3] = response.V_left * generator.standard_normal((count, 1))
+    a, V = response.white[level]
+    if a is not None:
+        error[:, :, 2] = float(np.hypot(response.noise_a[level], response.noise_ground)) * a
+    error[:, :, 3] = response.V_left * V
     return error
 
 
