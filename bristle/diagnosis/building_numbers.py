@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -79,11 +80,20 @@ def suited_masses(shaken: Shaken, building: Building, rule: DecisionRule = SITE)
     before = _excess(lines, rule)
     if max(before.values(), default=0.0) <= rule.least_excess:
         return building
-    shift = _shift(shaken, building, lines, rule)
-    if float(np.max(np.abs(shift / (1.0 + shift)))) > rule.mass_doubt:
-        return building
-    moved = with_masses(building, shift)
-    return moved if _suit_better(before, _excess(shaken.lines(moved), rule), rule) else building
+    rows = _rows(shaken, building, lines, rule)
+    found, least = building, sum(before.values())
+    for one in (None, *lines):  # an effect of one site may look like masses; the others then tell
+        able = [rows[site] for site in lines if site != one]
+        shift = _shift(able, _determined(building.size, shaken.lowest, shaken.measured), rule)
+        if float(np.max(np.abs(shift / (1.0 + shift)))) > rule.mass_doubt:
+            continue
+        moved = with_masses(building, shift)
+        after = _excess(shaken.lines(moved), rule)
+        if _suit_better(before, after, rule) and sum(after.values()) < least:
+            found, least = moved, sum(after.values())
+        if max(after.values()) <= rule.excess(rule.adequate):
+            break
+    return found
 
 
 def _suit_better(
@@ -142,19 +152,22 @@ def _excess(lines: Mapping[str, StructurePair], rule: DecisionRule) -> dict[str,
     return found
 
 
-def _shift(
-    shaken: Shaken, building: Building, lines: Mapping[str, StructurePair], rule: DecisionRule
-) -> Array:
-    """Return by which share (n,) each mass is to move: least squares, with what the file knows.
+class _Rows(NamedTuple):
+    """What a site tells of masses, in noises: columns of its line, of each mass, and the force."""
 
-    Robust, and what a line of a site misses anyhow counts as noise there: an effect is not to move
-    masses.
-    """
+    line: Array
+    masses: Array
+    force: Array
+
+
+def _rows(
+    shaken: Shaken, building: Building, lines: Mapping[str, StructurePair], rule: DecisionRule
+) -> dict[str, _Rows]:
+    """Return by site how its force follows its line (m, p), and each mass (m, n) by a deviation."""
     n = building.size
     unit = rule.mass_doubt / DEVIATIONS
-    able = _determined(n, shaken.lowest, shaken.measured)
     moved = [with_masses(building, unit * np.eye(n)[j]) for j in range(n)]
-    sites = []
+    rows = {}
     for site, (train, _) in lines.items():
         law = law_of_part(site)
         expected = train.expectation(fit_line(train, law.name).model)
@@ -164,31 +177,46 @@ def _shift(
         columns = [line_columns(run, LAWS[law.name])[run.skip :] for run in train.runs]
         here, above = _target(train), _above(building, train)
         carried = _carried(shaken, building, train)
-        slopes = np.stack(
-            [
-                (here + _carried(shaken, one, train) - carried) * above / _above(one, train) - here
-                for one in moved
-            ],
-            axis=1,
+        slopes = [
+            (here + _carried(shaken, one, train) - carried) * above / _above(one, train) - here
+            for one in moved
+        ]
+        rows[site] = _Rows(
+            np.concatenate(columns) * weight[:, None],
+            np.stack(slopes, axis=1) * weight[:, None],
+            here * weight,
         )
-        sites.append(
-            (np.concatenate(columns) * weight[:, None], slopes * weight[:, None], here * weight)
-        )
+    return rows
+
+
+def _shift(sites: Sequence[_Rows], able: Array, rule: DecisionRule) -> Array:
+    """Return by which share (n,) each mass is to move: least squares, with what the file knows.
+
+    Robust, and what a line of a site misses anyhow counts as noise there: an effect is not to move
+    masses.
+
+    Parameters
+    ----------
+    sites : what tells of them
+    able : basis (n, k) of the changes that equilibrium may tell
+    rule : how well masses are known
+    """
+    n = len(able)
     shift = np.zeros(n)
     for _ in range(PASSES):
         normal, gradient = np.eye(n), np.zeros(n)
-        for A, slopes, target in sites:
-            now = target + slopes @ shift
-            left = np.abs(now - A @ np.linalg.lstsq(A, now, rcond=None)[0])
+        for line, masses, force in sites:
+            now = force + masses @ shift
+            left = np.abs(now - line @ np.linalg.lstsq(line, now, rcond=None)[0])
             spread = max(1.0, float(np.median(left)) / 0.6745)
             robust = np.sqrt(np.minimum(1.0, HUBER * spread / np.maximum(left, 1e-300))) / spread
-            Q = np.linalg.qr(A * robust[:, None])[0]
-            slopes, target = slopes * robust[:, None], target * robust
-            slopes = slopes - Q @ (Q.T @ slopes)  # what no line absorbs
-            normal += slopes.T @ slopes
-            gradient += slopes.T @ target
+            Q = np.linalg.qr(line * robust[:, None])[0]
+            own, target = masses * robust[:, None], force * robust
+            own = own - Q @ (Q.T @ own)  # what no line absorbs
+            normal += own.T @ own
+            gradient += own.T @ target
         shift = -able @ np.linalg.solve(able.T @ normal @ able, able.T @ gradient)
-    return np.asarray(unit * shift)
+    return np.asarray(rule.mass_doubt / DEVIATIONS * shift)
 
 
 def _above(building: Building, problem: StructureProblem) -> float:
@@ -209,11 +237,13 @@ def _level(building: Building, problem: StructureProblem) -> int:
 
 def _carried(shaken: Shaken, building: Building, problem: StructureProblem) -> Array:
     """Return what is carried below a site's level with a building's masses, as `_target` has it."""
-    level, by_name = _level(building, problem), {one.name: one for one in shaken.train}
-    parts = []
+    level, parts = _level(building, problem), []
     for run in problem.runs:
         assert isinstance(run, StructureRun)
-        parts.append(shear(by_name[run.name], building, level)[0][run.keep][run.skip :])
+        assert run.whole is not None
+        # A run that does not move is left out, and names may be alike: the command is its own.
+        response = next(one for one in shaken.train if one.V is run.whole.V)
+        parts.append(shear(response, building, level)[0][run.keep][run.skip :])
     return np.concatenate(parts)
 
 
