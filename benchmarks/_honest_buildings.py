@@ -175,10 +175,13 @@ def _able(
 
 
 def answered(kind: str, number: int, seed: int = SEED) -> Answer:
-    """Return what the verdict says of a case; an error is wrong."""
+    """Return what the verdict says of a case; an error is wrong, a generator's is no case."""
     about: Answer = {"kind": "error", "effects": [], "hidden": ["?"] * (kind == "effect")}
     try:
         given = house(kind, number, seed)
+    except ValueError:  # the specimen's equations were not solved
+        return about | {"kind": "no case", "error": traceback.format_exc()}
+    try:
         made, begun = given.made, process_time()
         about |= {
             "law": made.law, "reconstructed": made.reconstructed, "hidden": [*made.hidden],
@@ -206,8 +209,9 @@ def _site(found: dict[str, Any]) -> list[Any]:
 def rows(done: dict[str, Answer]) -> list[Row]:
     """Return the rows of what has answers."""
     out = []
-    clean = [one for one in done.values() if not one.get("hidden")]
-    hiding = [one for one in done.values() if one.get("hidden")]
+    made = [one for one in done.values() if one["kind"] != "no case"]
+    clean = [one for one in made if not one.get("hidden")]
+    hiding = [one for one in made if one.get("hidden")]
     if clean:
         none = score.Count(sum(one["kind"] == "none" for one in clean), len(clean))
         named = sum(bool(one["effects"]) for one in clean)

@@ -424,7 +424,17 @@ def _step(
     p = J.shape[1]
     normal[p:, p:] += np.eye(len(shift))
     gradient[p:] += shift
+    step, free = np.zeros(len(gradient)), np.ones(len(gradient), dtype=np.bool_)
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    step = -np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-10)[0] / size
+    for _ in range(p + 1):
+        own = (normal / np.outer(size, size))[np.ix_(free, free)]
+        step[:] = 0.0
+        step[free] = -np.linalg.lstsq(own, (gradient / size)[free], rcond=1e-10)[0] / size[free]
+        # What a parameter at its bound cannot do, the numbers do.
+        beyond = (search.start <= search.low) & (step[:p] < 0.0)
+        beyond |= (search.start >= search.high) & (step[:p] > 0.0)
+        if not beyond.any():
+            break
+        free[:p] &= ~beyond
     theta = np.clip(search.start + step[:p], search.low, search.high)
     return step[p:], search.at(theta)

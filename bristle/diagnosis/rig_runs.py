@@ -462,7 +462,7 @@ class BuildingRuns:
         if names := self._without_accelerometer(found.site):
             why = f"Without the acceleration of {joined(names)} equilibrium is known less well."
             rule = BENCH if found.site == DAMPER else SITE
-            found = excused_by_sensor(found, BENCH.no_velocity_z, why, rule)
+            found = excused_by_sensor(found, BENCH.no_accelerometer_z, why, rule)
         if found.site != DAMPER:
             return found
         if blurred(self._sensors) or not self._velocities:

@@ -64,6 +64,12 @@ def test_a_gain_at_the_cost_of_the_plain_error_is_none_missing():
     assert not missing(before, replace(after, rms=1.2 * before.rms))
 
 
+def test_a_few_samples_beside_reversals_are_no_cost():
+    before, after = replace(trial(3.0), rms_bulk=1.0), replace(trial(1.5, "drift"), rms=3.6)
+    assert missing(before, replace(after, rms_bulk=0.6))
+    assert not missing(before, replace(after, rms_bulk=1.2))
+
+
 def test_noise_that_was_estimated_too_high_judges_nothing():
     found = decide(trial(0.5), [trial(0.4, "stribeck")], refuse)
     assert (found.kind, found.effects) == ("insufficient", ())

@@ -358,6 +358,13 @@ def test_only_what_an_instrument_accounts_for_is_excused_by_sensor():
     assert judged(1.19, 0.001) == "none"
     assert judged(1.19, 0.1) == "unknown", "an effect explains it in part"
     assert judged(1.6, 0.001) == "unknown", "more than the instrument accounts for"
+    before = trial((), 1.02, train=1.2)
+    found = of_decision(Decision("none", (), before, 0.0, ("z.",)), before)
+    excused = of_damper.excused_by_sensor(found, 1.25, "Blurred.")
+    assert excused.kind == "none"
+    assert "1.20 times" in excused.reasons[0], "what it leaves of some runs contradicts nothing"
+    quiet = replace(found, before=trial((), 1.02))
+    assert of_damper.excused_by_sensor(quiet, 1.25, "Blurred.") is quiet
 
 
 def test_a_load_cell_that_rounds_is_put_on_the_model_and_not_taken_back():
