@@ -15,11 +15,11 @@ from collections import deque
 from collections.abc import Generator, Iterable
 from typing import Any
 
+from ..core.text import install
 from ..errors import EnsembleError, RunError
 from ..version import __version__
 from .campaign import Campaign, RunOutcome
 
-INSTALL = 'pip install "bristle[cluster]"'
 CONNECT = 10.0
 """Seconds in which a scheduler must answer."""
 PATIENCE = 300.0
@@ -74,7 +74,7 @@ def _connected(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise EnsembleError(
-            f"--cluster needs Dask's scheduler, which is not installed: {INSTALL}"
+            f"--cluster needs Dask's scheduler, which is not installed:  {install('cluster')}"
         ) from None
     connect: Any = Client  # only partly typed
     try:

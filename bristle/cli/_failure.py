@@ -22,12 +22,18 @@ def line(error: Exception, command: str) -> str:
     file = _keep(error)
     if file is None:
         return f"{said} Its traceback could not be written; --debug shows it."
-    return f"{said} Please report it with its traceback: {file}"
+    return f"{said} Its traceback: {file}  Report it with what  bristle bug-report  packs."
+
+
+def folders() -> tuple[Path, Path]:
+    """Return where tracebacks are kept, and where they are if nothing can be written there."""
+    from ..core.files import state_folder
+
+    return state_folder() / "errors", Path(tempfile.gettempdir()) / "bristle-errors"
 
 
 def _keep(error: Exception) -> Path | None:
     """Write a traceback among those of this user; return the file, None where none can be."""
-    from ..core.files import state_folder
     from ..version import __version__
 
     lines = [
@@ -37,7 +43,7 @@ def _keep(error: Exception) -> Path | None:
         *traceback.format_exception(error),
     ]
     name = f"{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.txt"
-    for folder in (state_folder() / "errors", Path(tempfile.gettempdir()) / "bristle-errors"):
+    for folder in folders():
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             file = folder / name

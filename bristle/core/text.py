@@ -302,6 +302,11 @@ def capital(note: str, files: Iterable[str]) -> str:
     return note[:1].upper() + note[1:]
 
 
+def install(extra: str) -> str:
+    """Return the command that installs what an extra of bristle needs."""
+    return f"pip install 'bristle[{extra}]'"
+
+
 def command(*words: object) -> str:
     """Return a `bristle` command as a shell reads it: what holds a space is quoted.
 

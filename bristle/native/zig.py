@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from ..core.files import cache_folder
+from ..core.text import install
 from ..errors import BuildError
 
 
@@ -134,7 +135,7 @@ def version() -> str:
     if importlib.util.find_spec("ziglang") is None:
         raise BuildError(
             "what runs without Python, a native FMU or a page with sliders, is compiled by zig, "
-            "which is not installed: `pip install bristle[native]` is right."
+            f"which is not installed:  {install('native')}"
         )
     return importlib.metadata.version("ziglang")
 

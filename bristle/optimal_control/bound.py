@@ -30,6 +30,8 @@ FASTER = 2.0
 SPEEDS = 40
 SLIDING = 20.0
 """Length of the sliding at each of these speeds, in periods of the first mode."""
+SOLVER = "cvxpy"
+"""The package that solves the program; an extra installs it."""
 INEXACT = 0.01
 """Share that is taken off a bound that the solver calls inexact."""
 

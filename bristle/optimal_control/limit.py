@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ from ..system.model import System
 from ..system.scenario import load_scenario
 from ..system.toml import save
 from ..view import Viewable
-from .bound import FASTER, bound_of, largest_force
+from .bound import FASTER, SOLVER, bound_of, largest_force
 from .case import SCENARIO_FILE, Case, ControlProblem, case_of, refuse_folder, with_voltage
 from .search import descended, foreseen, levelled
 
@@ -307,11 +308,12 @@ def _seen_ahead(
 def _bound(
     problem: ControlProblem, whole: ControlProblem, voltage: Array, statistic: str
 ) -> tuple[float | None, float]:
-    """Return the lower bound, None where effects of the damper allow none; the largest force."""
+    """Return the lower bound, None where effects of the damper allow none or `SOLVER` is
+    missing; the largest force."""
     tell("a lower bound")
     case, course = problem.case, whole.course
     whole.respond(voltage)
-    if not case.plain:
+    if not (case.plain and find_spec(SOLVER)):
         return None, float(np.abs(course.force).max())
     speed = float(np.abs(course.x @ case.plant.velocity).max())
     most = max(largest_force(case, FASTER * speed), float(np.abs(course.force).max()))

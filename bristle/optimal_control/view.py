@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from ..core.text import plain
+from ..core.text import install, plain
 from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import BLUE, GREY, INK, PALE, VERMILION, Page, look
+from .bound import SOLVER
 from .limit import AGREE, TRUST, Limit
 
 if TYPE_CHECKING:
@@ -67,7 +69,10 @@ def confidence(found: Limit) -> list[str]:
         f"the search's own {plain(found.searched, 4)}."
     )
     if found.bound is None:
-        said.append("No lower bound: the damper has effects, or the convex program failed.")
+        why = "the damper has effects, or the convex program failed."
+        if find_spec(SOLVER) is None:
+            why = f"it needs {SOLVER}, which is not installed:  {install('design')}"
+        said.append(f"No lower bound: {why}")
     if not found.sure:
         said.append("Not sure: more starts (--starts 8) may find less.")
     return said

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.text import install
 from ..errors import DesignError
 from .plant import Plant
 
@@ -140,8 +141,7 @@ def _solved(
 def _problem(
     plants: list[Plant], grid: Array, tau: float, varies: str, rate: float, strict: float
 ) -> tuple[Any, dict[str, Any]]:
-    import cvxpy as cp
-
+    cp = _cvxpy()
     n = plants[0].order
     x_varies, y_varies = VARIES[varies]
     unknowns: dict[str, Any] = {"gamma": cp.Variable()}
@@ -157,7 +157,7 @@ def _problem(
         for sign in (1.0, -1.0) if x_varies or y_varies else (0.0,):
             dX, dY = sign * rate * unknowns["X1"], sign * rate * unknowns["Y1"]
             blocks = _blocks(plant, unknowns["gamma"], (X, dX), (Y, dY), hats)
-            full = cp.bmat(blocks)  # type: ignore[attr-defined]
+            full = cp.bmat(blocks)
             size = full.shape[0]
             constraints.append(0.5 * (full + full.T) << -strict * np.eye(size))
     # X and Y are affine in r: where they hold at both ends they hold between.
@@ -165,7 +165,7 @@ def _problem(
         X = unknowns["X0"] + r * unknowns["X1"]
         Y = unknowns["Y0"] + r * unknowns["Y1"]
         coupling = tau * np.eye(n)
-        pair = cp.bmat([[X, coupling], [coupling, Y]])  # type: ignore[attr-defined]
+        pair = cp.bmat([[X, coupling], [coupling, Y]])
         constraints.append(0.5 * (pair + pair.T) >> 0)
     return cp.Problem(cp.Minimize(unknowns["gamma"]), constraints), unknowns
 
@@ -192,9 +192,18 @@ def _blocks(
     ]
 
 
-def _run_solver(problem: Any) -> str:
-    import cvxpy as cp
+def _cvxpy() -> Any:
+    try:
+        import cvxpy
+    except ImportError:
+        raise DesignError(
+            f"this design needs cvxpy, which is not installed:  {install('design')}"
+        ) from None
+    return cvxpy
 
+
+def _run_solver(problem: Any) -> str:
+    cp = _cvxpy()
     try:
         with warnings.catch_warnings():
             # Inexact solutions are checked below, with numbers.

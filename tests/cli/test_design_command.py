@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 import warnings
 from math import inf
 from pathlib import Path
@@ -225,6 +226,16 @@ def test_a_solver_that_fails_is_one_message_and_no_file(
         assert main(["design", kind, f"my_{kind}.toml"]) == 2
         assert "DesignError: the solver CLARABEL failed: it broke down" in capsys.readouterr().err
     assert not list(here.glob("*.json"))
+
+
+def test_without_the_solver_a_design_says_what_installs_it(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "cvxpy", None)
+    assert main(["design", "hinf", "my_hinf.toml"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "pip install 'bristle[design]'" in said
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,7 @@ def test_without_zig_the_command_says_what_to_install(
     finally:
         zig.version.cache_clear()
     assert code == BuildError.exit_code
-    assert "pip install bristle[native]" in capsys.readouterr().err
+    assert "pip install 'bristle[native]'" in capsys.readouterr().err
     assert not (tmp_path / "web").exists()
 
 

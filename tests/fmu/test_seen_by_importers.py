@@ -144,7 +144,7 @@ def test_build_takes_the_effects_asked_for_and_switches_them_on(
     assert main(["build", "LuGreDamper", "--effects", "gas_sprin"]) == 2
     assert 'Did you mean "gas_spring"?' in capsys.readouterr().err
     assert main(["build", "ConstantVoltage", "--effects", "gas_spring"]) == 2
-    assert "It offers: none" in capsys.readouterr().err
+    assert "There are none" in capsys.readouterr().err
 
 
 OWN = '''"""Bump: a force at rest."""

@@ -125,7 +125,7 @@ def test_without_the_compiler_a_message_says_what_to_install(
     assert main(["build", "ConstantVoltage", "--native", "--out", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "pip install bristle[native]" in said
+    assert "pip install 'bristle[native]'" in said
     assert list(tmp_path.iterdir()) == []
 
 

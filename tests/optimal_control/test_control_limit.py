@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -197,6 +198,14 @@ def test_what_a_limit_is_refused_for(
     said = capsys.readouterr().err
     assert words in said
     assert "Traceback" not in said
+
+
+@pytest.mark.slow
+def test_without_the_solver_there_is_a_limit_and_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cvxpy", None)
+    found = limit(PULSE, {"run.stop": 0.3}, previews=(), starts=1)
+    assert found.bound is None
+    assert "No lower bound: it needs cvxpy" in found._repr_html_()
 
 
 def test_a_statistic_that_there_is_not_is_refused() -> None:

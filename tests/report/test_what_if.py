@@ -74,4 +74,4 @@ def test_without_zig_it_says_what_to_install(
     finally:
         zig.version.cache_clear()
     assert code == BuildError.exit_code
-    assert "pip install bristle[native]" in capsys.readouterr().err
+    assert "pip install 'bristle[native]'" in capsys.readouterr().err

@@ -17,11 +17,10 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from ...core.text import install
 from ...errors import RecordError
 from ..table import Table, without_codes
 from ._times import in_order
-
-INSTALL = "pip install 'bristle[formats]'"
 
 
 @cache
@@ -71,4 +70,4 @@ def library(module: str, name: str, what: str) -> Any:
     try:
         return import_module(module)
     except ImportError:
-        raise RecordError(f"{name}: this is {what}; to read it:  {INSTALL}") from None
+        raise RecordError(f"{name}: this is {what}; to read it:  {install('formats')}") from None
