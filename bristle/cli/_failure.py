@@ -22,7 +22,7 @@ def line(error: Exception, command: str) -> str:
     file = _keep(error)
     if file is None:
         return f"{said} Its traceback could not be written; --debug shows it."
-    return f"{said} Its traceback: {file}  Report it with what  bristle bug-report  packs."
+    return f"{said} Please report it with what  bristle bug-report  packs, its traceback: {file}"
 
 
 def folders() -> tuple[Path, Path]:

