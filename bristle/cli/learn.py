@@ -4,13 +4,15 @@ A spline along displacement, speed, acceleration, the command, a memory of these
 acts as an added force, a factor of a part of the law, or a map of the command. Where no curve along
 one signal explains the error, surfaces over two signals are tried too. In the isolation layer or a
 storey of a building a curve acts as an added force, friction or damping, or a factor of the
-stiffness. The command keeps it if it lowers the error on held-out runs beyond chance.
+stiffness. The command keeps it if it lowers the error on held-out runs beyond chance. What no
+formula serves, a closure carries: a small network, and no effect of physics.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 from ._options import (
     add_details,
@@ -21,6 +23,9 @@ from ._options import (
     print_json,
     print_study_view,
 )
+
+if TYPE_CHECKING:
+    from ..study.study import Study
 
 HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
@@ -46,6 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     text = "name of the effect; default learned_1, learned_2"
     parser.add_argument("--name", default="", help=text)
+    text = "learn a closure: a small network in parallel with the model, for what no curve serves"
+    parser.add_argument("--closure", action="store_true", help=text)
     text = "keep the table even if a formula fits as well"
     parser.add_argument("--table", action="store_true", help=text)
     add_dry_run(parser)
@@ -63,6 +70,8 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.view import learned_with_next
 
     study = Study(arguments.folder)
+    if arguments.closure:
+        return _closure(study, arguments)
     signals = {name: name for name in (*ALONG, *study.settings.beside)}
     signals |= _of_command(study.drive)
     found = learn_effect(
@@ -78,6 +87,27 @@ def main(arguments: argparse.Namespace) -> int:
         print_json(found.as_dict())
         return 0
     print_study_view(learned_with_next(found, arguments.folder), arguments)
+    return 0
+
+
+def _closure(study: Study, arguments: argparse.Namespace) -> int:
+    """Learn a closure, write its effect's file, print what was found."""
+    from ..errors import StudyError
+    from ..study.learn import learn_study_closure
+    from ..study.view import closure_with_next
+
+    given = ("along", "parts", "at", "table")
+    wrong = [{"parts": "as"}.get(one, one) for one in given if getattr(arguments, one)]
+    if wrong:
+        raise StudyError(
+            f"--{wrong[0]} chooses a curve; a closure has all motion and command as inputs. "
+            f"--closure without --{wrong[0]} is right."
+        )
+    found = learn_study_closure(study, name=arguments.name, write=not arguments.dry_run)
+    if arguments.json:
+        print_json(found.as_dict())
+        return 0
+    print_study_view(closure_with_next(found, arguments.folder), arguments)
     return 0
 
 

@@ -267,6 +267,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_study(auto)
     text = "if no known effect explains the error, learn a curve and continue"
     auto.add_argument("--learn", action="store_true", help=text)
+    text = "if the verdict is unknown in the end, add a closure; the verdict stays unknown"
+    auto.add_argument("--closure", action="store_true", help=text)
     auto.add_argument(
         "--law",
         help="all: search for the law together with its effects (default on a test bench if no law "
@@ -473,7 +475,10 @@ def _auto(arguments: argparse.Namespace) -> int:
     from ..study.view import completed_view
 
     study = Study(arguments.folder)
-    done = complete(study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn)
+    done = complete(
+        study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn,
+        closure=arguments.closure,
+    )  # fmt: skip
     if arguments.json:
         print_json(done.as_dict())
         return 0

@@ -193,11 +193,15 @@ def evaluate_source(slots: Slots) -> str:
             lines.append(f"{_targets(law, 'dz')} = {law.name}_rate(q, s, k)")
         return lines
 
+    beside = slots.only(lambda effect: "parallel" in effect.hooks())
     lines = [
         "def evaluate(setup, now, z, dz, z_next):",
         _SETUP,
         _NOW,
         *_ROD,
+        *(["    command = V", "    beside = 0.0"] if beside.effects else []),
+        *switched(beside, "parallel", "beside += {call}", **_Q),
+        *(["    halt = halt - beside"] if beside.effects else []),  # friction carries the rest
         "    force = 0.0",
         *switched(slots, "voltage", "V = {call}", **q),
         *switched(slots, "motion", "x, v = {call}", **q),
@@ -215,7 +219,7 @@ def evaluate_source(slots: Slots) -> str:
         *switched(slots, "rate", "{dz}= {call}", **q),
         *switched(slots, "advance", "{z_next}= {call}", **q),
         *switched(slots, "reaction", "force = {call}; friction = 0.0", **q),
-        "    return force, friction",
+        f"    return force{' + beside' if beside.effects else ''}, friction",
     ]
     return "\n".join(lines)
 

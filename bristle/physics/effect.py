@@ -12,7 +12,7 @@ test bench, which has one site, the plain name does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import new_class
 from typing import Any, ClassVar, NamedTuple
 
@@ -198,14 +198,23 @@ def exclude(one: str, other: str) -> bool:
     return second.name in first.excludes or first.name in second.excludes
 
 
+CLOSURE = "closure"
+"""The kind of what is no effect of physics: a verdict that rests on it stays unknown."""
+
+
+def closures(names: Iterable[str]) -> list[str]:
+    """Return those of some effects, by a model's names, that are closures."""
+    return [name for name in names if name in EFFECTS and EFFECTS[name].kind == CLOSURE]
+
+
 SITES = ("damper", "structure", "sensor")
 
 CHANNELS = ("force", "velocity")
 """Channels whose instrument a sensor's effect may be."""
 
 HOOKS = (
-    "voltage", "motion", "yield_factor", "viscous_factor", "reach", "yield_force", "force",
-    "spring", "factor", "reaction", "rate", "advance", "channel", "changed",
+    "parallel", "voltage", "motion", "yield_factor", "viscous_factor", "reach", "yield_force",
+    "force", "spring", "factor", "reaction", "rate", "advance", "channel", "changed",
 )  # fmt: skip
 """In the order in which an evaluation calls them."""
 
@@ -291,7 +300,8 @@ class Effect:
         effect's hooks act on (`ACTS_ON`).
     kind
         What it is a case of: "spring", "lag", "series element", "inertia" ... A law that contains
-        one is not offered another. Its own name where nothing is said.
+        one is not offered another. Its own name where nothing is said. `CLOSURE`: no effect of
+        physics, but a network for what has no name.
     starts
         States that begin with the value of a signal where a measurement begins: {state: signal}.
     bristles
@@ -565,6 +575,13 @@ def _check(effect: type[Effect]) -> None:
         raise PhysicsError(f"{where}: shows = {effect.shows!r} is none of {CHANNELS}.")
     if (effect.site == "sensor") != ("channel" in effect.hooks()):
         raise PhysicsError(f"{where}: the hook `channel` belongs to the site sensor, to it alone.")
+    if "parallel" in effect.hooks() and (
+        effect.sites != ("damper",) or not {*effect.hooks()} <= {"parallel", "rate", "advance"}
+    ):
+        raise PhysicsError(
+            f"{where}: the hook `parallel` belongs to the site damper, with states and no other "
+            "hook beside it."
+        )
     wrong = [name for name in effect.starts if name not in effect.states]
     if wrong:
         raise PhysicsError(f"{where}: starts names {wrong}; its states are {list(effect.states)}.")

@@ -129,6 +129,7 @@ def switched(slots: Slots, hook: str, line: str, **q: str) -> list[str]:
     `line` holds `{call}` where the hook's value belongs, and `{dz}` or `{z_next}` for the
     assignment targets of the effect's states; `q` names the variables that feed `Q`. An effect
     that changes the voltage keeps to the voltage that it was given, in `rate` and `advance` too.
+    One in parallel with the whole damper knows motion and command as they come to that.
     """
     lines = []
     for effect in slots.effects:
@@ -136,14 +137,15 @@ def switched(slots: Slots, hook: str, line: str, **q: str) -> list[str]:
             continue
         if hook == "voltage":
             lines.append(f"    V_{effect.name} = V")
-        if "voltage" in effect.hooks():
-            q["V"] = "V_" + effect.name
-        elif "V" in q:
-            q["V"] = "V"
+        given = dict(q)
+        if "parallel" in effect.hooks():
+            given |= {"x": "rod_x", "v": "rod_v", "V": "command"}
+        elif "voltage" in effect.hooks():
+            given["V"] = "V_" + effect.name
         places = slots.places(effect)
         lines.append(f"    if on[{slots.switches[effect.name]}]:  # {effect.name}")
         text = line.format(
-            call=call(effect, hook, slots, q_source(**q)),
+            call=call(effect, hook, slots, q_source(**given)),
             dz="".join(f"dz[{place}], " for place in places),
             z_next="".join(f"z_next[{place}], " for place in places),
         )

@@ -11,13 +11,15 @@ from ..core.progress import tell
 from ..diagnosis import Diagnosis
 from ..diagnosis.decision import missing
 from ..diagnosis.trials import Trial
+from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
+from ..physics.effect import closures
 from .changes import other_data
 from .forms import law_or_all
 from .history import Step
 from .identified import Identified, is_identified
 from .identify import identify_study
-from .learn import learn_effect
+from .learn import learn_effect, learn_study_closure
 from .steps import Say, add_effects, diagnose_study, identify_with, take_law, verdict_of
 from .study import Study
 from .study_file import ALL
@@ -40,18 +42,21 @@ MOST_ABREAST = 3
 class Completed:
     """What `complete` came to: the last diagnosis, and the steps that it made.
 
-    `curves` are those learned where no effect of the library explained the error.
+    `curves` are those learned where no effect of the library explained the error; `closure` what
+    the network came to that was asked for in the end.
     """
 
     verdict: Diagnosis
     steps: tuple[Step, ...]
     curves: tuple[LearnedEffect, ...] = ()
+    closure: LearnedClosure | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         return {
             "verdict": self.verdict.as_dict(),
             **({"learned": [one.as_dict() for one in self.curves]} if self.curves else {}),
+            **({"closure": self.closure.as_dict()} if self.closure else {}),
             "steps": [
                 {
                     "number": step.number, "what": step.what, "why": step.why,
@@ -68,6 +73,7 @@ def complete(
     law: str | None = None,
     greedy: bool = False,
     curves: bool = False,
+    closure: bool = False,
     say: Say = tell,
 ) -> Completed:
     """Identify, diagnose and add until the verdict is none, ambiguous, unknown or insufficient.
@@ -83,6 +89,7 @@ def complete(
     greedy : whether to go on where the verdict is unknown, by the effect that lowers the held-out
         error most, as long as one does so by enough and beyond chance; see `gaining`
     curves : whether to go on where the verdict is unknown, by learning a curve
+    closure : whether to end with a closure where the verdict is unknown then; the verdict stays
     say : called with a few words at each stage
     """
     steps: list[Step] = []
@@ -108,7 +115,15 @@ def complete(
             names = (learned[-1].name,) if learned[-1].file is not None else ()
         names = names or tuple(trial.effects[-1] for trial in abreast[:1])
         if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
-            return Completed(found, tuple(steps), tuple(learned))
+            network = None
+            if closure and found.kind == "unknown" and not closures(study.model().effects):
+                say("learning a closure")
+                network = learn_study_closure(study)
+                if network.file is not None:
+                    say(f"adding {network.name}")
+                    why = f"verdict: {found.kind}"
+                    stepped(add_effects(study, (network.name,), why=why, found=found).step)
+            return Completed(found, tuple(steps), tuple(learned), network)
         identified = None
         if len(abreast) > 1:
             names, identified = _best_identified(study, abreast, say)

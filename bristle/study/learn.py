@@ -16,6 +16,8 @@ from ..diagnosis.prepared import Prepared
 from ..diagnosis.rig_runs import RigRuns, runs_of_rig
 from ..errors import StudyError
 from ..learning.closed_forms import close, closed_forms
+from ..learning.closure import LearnedClosure, learn_closure
+from ..learning.closure_file import closure_text
 from ..learning.curve import CurvePlace, refuse_elsewhere
 from ..learning.curve_picture import curve_png
 from ..learning.effect_file import effect_text
@@ -62,8 +64,7 @@ def learn_effect(
     for why in study.usable_effects():
         tell(f"left out: {why}")
     given, name = name, name or _free_name(study)
-    if not name.isidentifier() or iskeyword(name):
-        raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
+    _refuse_no_word(name)
     _refuse_taken(study, name)
     site, opened = _opened(study, at)
     refuse_elsewhere(parts, along, CurvePlace(site), study.settings.beside)
@@ -84,6 +85,61 @@ def learn_effect(
             return _written(study, one, given) if write else one
     why = f"{found.curve.words().capitalize()} can be no effect: {flaw}"
     return replace(learned, closed=None, found=replace(found, refused=why))
+
+
+def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> LearnedClosure:
+    """Learn a closure of a study's model: a network for what no formula serves.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    name : of its effect; else closure_1, closure_2 ...
+    write : whether to write the effect's file and what the report says of it
+
+    Raises
+    ------
+    StudyError
+        If the study has one run for training, or is of a building, the data carry no verdict, or
+        the name is taken.
+    """
+    for why in study.usable_effects():
+        tell(f"left out: {why}")
+    if study.settings.has_building:
+        raise StudyError(
+            f"{study.folder}: a closure is in parallel with a damper on a test bench; this study "
+            "is of a building. Learn a curve at one of its sites:  bristle learn --at SITE."
+        )
+    train = study.runs().train
+    if len({run.source for run in train}) < 2:
+        raise StudyError(
+            f"{study.folder}: one run is for training ({train[0].name}). Folds of whole runs "
+            "choose a closure, so it needs two or more, with different amplitudes or commands. "
+            "Add runs:  bristle study extend"
+        )
+    given, name = name, name or _free_name(study, "closure")
+    _refuse_no_word(name)
+    _refuse_taken(study, name)
+    _, opened = _opened(study, "")
+    found = learn_closure(opened, name)
+    if found.refused or found.closure is None:
+        return found
+    origin = f"{LEARNED} {study.name}, {date.today().year}"
+    if flaw := flaw_of(name, closure_text(name, found.closure, origin)):
+        return replace(found, refused=f"The network can be no effect: {flaw}")
+    if not write:
+        return found
+    with study.writing():
+        study.refuse_if_changed()
+        if given:
+            _refuse_taken(study, given)
+        name = given or _free_name(study, "closure")
+        file, text = study.effects_folder / f"{name}.py", closure_text(name, found.closure, origin)
+        write_whole(file, text)
+        remember_made(file, text)
+    found = replace(found, name=name, file=file)
+    told = json.dumps(found.as_dict(), indent=2, ensure_ascii=False)
+    study.write_report(f"{name}.json", told)
+    return found
 
 
 def _text(study: Study, learned: LearnedEffect, name: str) -> str:
@@ -164,9 +220,14 @@ def _wanted(study: Study, there: Sequence[str]) -> list[str]:
     return [site for site in there if site in unknown] or list(there)
 
 
-def _free_name(study: Study) -> str:
+def _free_name(study: Study, begin: str = "learned") -> str:
     """Return the first of learned_1, learned_2 ... that no effect has."""
-    return next(name for k in count(1) if not _is_taken(study, name := f"learned_{k}"))
+    return next(name for k in count(1) if not _is_taken(study, name := f"{begin}_{k}"))
+
+
+def _refuse_no_word(name: str) -> None:
+    if not name.isidentifier() or iskeyword(name):
+        raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
 
 
 def _refuse_taken(study: Study, name: str) -> None:

@@ -34,7 +34,7 @@ from ..identification.histories import compile_ahead
 from ..identification.rig_fit import force_errors, site_models
 from ..model.model import Model
 from ..physics.building import Building, frequencies
-from ..physics.effect import EFFECTS
+from ..physics.effect import EFFECTS, closures
 from ..physics.forms import joined_form
 from ..physics.laws import law_names
 from ..trust import remember_made
@@ -72,6 +72,9 @@ def diagnose_study(
 ) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
+    A closure is no effect of physics: what it carries is missing still, so the verdict is on the
+    model without it.
+
     Parameters
     ----------
     study : the folder, opened
@@ -102,13 +105,15 @@ def diagnose_study(
             f"{law_command(study.folder, str(law))} ; to compare all of them:  "
             f"{command('diagnose', study.folder, '--law', ALL)}"
         )
-    known = runs.train, runs.holdout, model, building_of(study, model)
+    networks = closures(model.effects)
+    physics = model.only([one for one in model.effects if one not in networks])
+    known = runs.train, runs.holdout, physics, building_of(study, model)
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
-            kept = LawFits(study, model) if write else None
+            kept = LawFits(study, physics) if write else None
             found = diagnose_laws(*known, named=model.law, profile=profile, kept=kept, say=say)
         else:
-            fitted = is_identified(model)
+            fitted = is_identified(model) and not networks
             found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
     if is_identified(model):
         rig = rig_of(study, model, runs)
@@ -159,8 +164,11 @@ def _turned(study: Study) -> list[str]:
 def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
     """Return the content of verdict.json, with what weakens the split and what is left out."""
     verdict = found.as_dict()
+    networks = closures(study.model(to_show=True).effects)
     notes = [
         *study.runs().notes, *_turned(study), *(f"Left out: {why}" for why in study.left_out()),
+        *(f"The verdict is on the model without {one}: a closure is no effect of physics."
+          for one in networks),
     ]  # fmt: skip
     return {**verdict, "notes": notes} if notes else verdict
 
@@ -245,9 +253,12 @@ def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]
     for name in _named_here(study, names):
         refuse_effect(model, name, not study.settings.has_building)
         model = model.with_effect(name)
-    start = {k: v for k, v in begin.items() if k in model.values}
+    alone = bool(closures(names))  # trained beside the present values: no other start is near
+    known = {**(present.values if alone else {}), **begin}
+    start = {k: v for k, v in known.items() if k in model.values}
     # With the new effects at their defaults it would be nobody's model: before is the one without.
-    task = FitTask(study.settings.cut_off, table=False, present=present, begin=start)
+    starts = 1 if alone else FitTask.starts
+    task = FitTask(study.settings.cut_off, starts, table=False, present=present, begin=start)
     return identify_model(study, model, task)
 
 

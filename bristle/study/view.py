@@ -17,9 +17,11 @@ from ..diagnosis.conclusion import is_correctable
 from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, error_text, verdict_view
 from ..errors import RecordError
+from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
 from ..model.model import Model
 from ..physics.drive import DRIVES
+from ..physics.effect import closures
 from ..physics.forms import joined_form
 from ..view.blocks import Block, Figure, Next, Table, Text, View, view_of
 from ..view.style import Page
@@ -192,7 +194,8 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     if not judged:
         return view
     began = study.model_of(steps[0].number, to_show=True)
-    added = [name for name in model.effects if name not in began.effects]
+    known = (*began.effects, *closures(model.effects))
+    added = [name for name in model.effects if name not in known]
     if not added:
         return view
     own = [effect_text(name, _sizes(model, name), DRIVES[model.drive]) for name in added]
@@ -215,7 +218,20 @@ def learned_with_next(found: LearnedEffect, folder: Path) -> View:
     if found.file is not None:
         then = (Next(command("add", folder, found.name), "puts it into the model"),)
     elif found.found.refused:
-        then = (Next(command("compare", folder), "shows where the error is"),)
+        closure = command("learn", folder, "--closure")
+        then = (
+            Next(command("compare", folder), "shows where the error is"),
+            Next(closure, "carries it without a formula"),
+        )
+    view = found.view()
+    return view._replace(blocks=(*view.blocks, *then))
+
+
+def closure_with_next(found: LearnedClosure, folder: Path) -> View:
+    """Return the view of a study's closure, with the command that follows."""
+    then: tuple[Next, ...] = ()
+    if found.file is not None:
+        then = (Next(command("add", folder, found.name), "puts it beside the model"),)
     view = found.view()
     return view._replace(blocks=(*view.blocks, *then))
 
@@ -231,7 +247,8 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     """
     view = story_view(study, verdict)
     table = steps_table(history_steps(study.steps()), study.settings.cut_off)
-    curves = [Text(" ".join(one.sentences())) for one in done.curves]
+    told = [one.sentences() for one in (*done.curves, done.closure) if one is not None]
+    curves = [Text(" ".join(one)) for one in told]
     return view._replace(blocks=(*curves, *view.blocks, table))
 
 

@@ -15,6 +15,7 @@ from bristle.cli import main
 from bristle.fmu.build import plan
 from bristle.identification.histories import DamperForces
 from bristle.learning.closed_forms import closed_forms, formula_of
+from bristle.learning.closure_file import Closure, Input, Region, Store, closure_text, rounded
 from bristle.learning.curve import AT_DAMPER, PARTS, Curve, CurvePlace, may_change, parts_at
 from bristle.learning.effect_file import effect_text
 from bristle.learning.signals import ALONG, RING, SLIP
@@ -85,6 +86,41 @@ def test_every_part_and_every_signal_gives_the_same_numbers(tmp_path: Path) -> N
         assert mine == other
         assert pair.shown()[1] != alone, file.stem
         pair.end()
+
+
+def network() -> Closure:
+    """Return a closure with a weight for every kind of input."""
+    inputs = (
+        Input("v", 0.0), Input("x", 0.0), Input("recent_v", 0.03), Input("way", 0.002, 0.01),
+        Input("V", 0.0), Input("recent_V", 0.05),
+    )  # fmt: skip
+    size = len(inputs)
+    draw = np.random.default_rng(1)
+    middle, spread = np.zeros(size), np.array([0.1, 0.01, 0.1, 0.5, 3.0, 3.0])
+    end = np.full(size, 2.0)
+    region = Region(-end, end, 0.5 * end, np.eye(size), 4.0)
+    hidden, bias, out, linear = (
+        rounded(draw.standard_normal(shape)) for shape in ((8, size), 8, 8, size)
+    )
+    store = Store(0.001, 0.02, 0.008, 1e-3)
+    return Closure(
+        inputs, middle, spread, region, hidden, bias, out, linear, 0.1, 5.0, store, "voltage"
+    )  # fmt: skip
+
+
+def test_a_closure_gives_the_same_numbers(tmp_path: Path) -> None:
+    file = tmp_path / "closure_1.py"
+    file.write_text(closure_text(file.stem, network(), "made for a test, 2026"), encoding="utf-8")
+    what = plan("LuGreDamper", name="Closed", effects=[file])
+    form = Native(build(what, folder() / "closed", [here()]))
+    plain = Both(form, component_of(what))
+    plain.begin()
+    plain.largest_difference()
+    pair = Both(form, component_of(what), **{"closure_1.on": True})
+    pair.begin()
+    assert pair.largest_difference() <= EQUAL
+    assert pair.shown()[1] != plain.shown()[1]
+    pair.end()
 
 
 def test_curves_of_a_layer_and_of_a_storey_give_the_same_numbers(tmp_path: Path) -> None:

@@ -1,0 +1,577 @@
+"""A closure: a small network for what a model misses and no formula serves, in parallel with it.
+
+Its inputs are the motion of the rod, the command, and exponential traces of both over time and over
+travel. Its hidden weights are drawn (random features: Rahimi & Recht 2008, NIPS 20; Huang, Zhu &
+Siew 2006, Neurocomputing 70, 489-501), its output is a ridge regression in closed form. So a choice
+of inputs, size, scale and penalty costs little, and folds of whole runs make it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..core.arrays import Array, Flags, Indices
+from ..core.progress import tell
+from ..core.text import percent, plain, quantity, scale
+from ..data.corrections import jumps
+from ..diagnosis.prepared import Prepared
+from ..diagnosis.rule import DecisionRule
+from ..diagnosis.trials import Trial, judge
+from ..identification.problem import Problem, Run, has_offset, sensors, zero_of
+from ..identification.start_grid import refine
+from ..model.model import Model
+from ..physics.drive import DRIVES
+from ..physics.effect import CLOSURE
+from ..user_code.load import defined
+from ..view import Viewable
+from .closure_file import Closure, Input, Region, Store, closure_text, rounded
+from .signals import faded
+
+SPREAD = (0.05, 0.2, 0.8, 3.2)
+"""Time constants of the traces, in RMS displacements over RMS velocities."""
+
+TRAVELS = (0.05, 0.2, 0.8)
+"""Travels of the traces of the direction, in RMS displacements."""
+
+SLOW = 0.1
+"""Speed over which the direction changes, in RMS velocities."""
+
+SIZES = (30, 60, 120)
+"""Hidden units that are tried."""
+
+SEES = (3, 99)
+"""Inputs that a hidden unit sees, at the most."""
+
+STEEP = (0.3, 0.6, 1.2)
+"""Spreads of the hidden weights."""
+
+PENALTIES = tuple(10.0**k for k in range(-6, 1))
+"""Ridges, in samples."""
+
+FOLDS = 4
+"""Parts of the training runs that are left out in turn: whole runs, of a single one stretches."""
+
+MOST = 40_000
+"""Samples of the training runs, about, that are used."""
+
+AS_GOOD = 1.02
+"""Loss of a smaller network, by the least, at which it is taken."""
+
+WORTH = 0.97
+"""Largest error on left-out folds, by that without a closure, of a closure that is tried."""
+
+MARGIN = 0.15
+"""Share of an input's range over which a closure fades beyond it."""
+
+STRETCHES = 8
+"""Parts of the held-out runs, at least, over which a gain must not be scatter."""
+
+ROOM = 1.5
+"""Times the largest force, and energy given back, of the training runs that a closure may have."""
+
+SOON = 0.02
+"""Time in which the store of energy may run empty, in RMS displacements over RMS velocities."""
+
+REST = 0.01
+"""Speed in RMS velocities below which a closure that may give no energy fades."""
+
+ROUND = 0.01
+"""Variance that is added to scaled inputs where their region is told: nothing is thinner."""
+
+SWEEPS = 4
+"""Jacobians of a refit of the model beside a closure."""
+
+LIVES, TOLD = 0.1, 3
+"""Share of a closure's variance that an input takes with it, from which on it is told; how many."""
+
+ALIKE = 0.1
+"""Spread of the runs' RMS displacements, by their mean, below which they have one amplitude."""
+
+
+@dataclass(frozen=True, repr=False)
+class LearnedClosure(Viewable):
+    """What `learn_closure` came to.
+
+    `closure` the network, None where none was trained; `before`, `after` the trials without and
+    with it; `folds` its error on left-out parts of the training runs by that without it; `share`
+    RMS of its force over RMS of the measured one, on held-out runs; `lives_on` the groups of its
+    inputs with the share of its variance that goes without each; `outside` the share of held-out
+    samples where it has faded by half or more; `stroke` [m] RMS displacement of the training runs
+    where all have one amplitude, else 0; `refused` why it is not kept, "" where it is; `file` its
+    effect's, None where none is written.
+    """
+
+    name: str
+    closure: Closure | None
+    before: Trial
+    after: Trial | None = None
+    folds: float = 1.0
+    share: float = 0.0
+    lives_on: tuple[tuple[str, float], ...] = ()
+    outside: float = 0.0
+    stroke: float = 0.0
+    refused: str = ""
+    file: Path | None = None
+
+    def sentences(self) -> list[str]:
+        """Return what was learned, as an engineer would say it."""
+        if self.refused or self.closure is None or self.after is None:
+            return [f"No closure is kept. {self.refused}", *self._one_amplitude()]
+        errors = [one.error for one in (self.before, self.after)]
+        fall = " to ".join(percent(one.headline[1]) for one in errors if one is not None)
+        lives = [(words, part) for words, part in self.lives_on if part >= LIVES][:TOLD]
+        inputs = ", ".join(f"{words} ({100.0 * part:.0f} %)" for words, part in lives)
+        return [
+            f"{self.name} is a closure: a network of {len(self.closure.out)} units for what the "
+            "model misses and no formula serves. It is no effect of physics, and the verdict stays "
+            f"unknown. With it the error on held-out runs falls from {fall} of the force; its own "
+            f"force is {percent(self.share)} of it.",
+            f"Look for the physics in what it lives on: {inputs}; in brackets how much of its "
+            "variance goes without that.",
+            f"It is not supported beyond {self._region()}: it fades to zero there. Of the held-out "
+            f"samples {percent(self.outside)} are outside.",
+            *self._one_amplitude(),
+        ]
+
+    def _region(self) -> str:
+        """Return the ranges of motion and command in the training runs, in words."""
+        assert self.closure is not None
+        out, c = [], self.closure
+        units = {"v": "m/s", "x": "m", "V": DRIVES[c.drive].unit}
+        for k, one in enumerate(c.inputs):
+            if one.kind in units:
+                low, high = (
+                    float(end[k] * c.spread[k] + c.middle[k])
+                    for end in (c.region.low, c.region.high)
+                )
+                factor, unit = scale(units[one.kind], max(abs(low), abs(high)))
+                name = c.drive if one.kind == "V" else one.words
+                out.append(f"{name} {plain(factor * low, 3)} to {plain(factor * high, 3)} {unit}")
+        return ", ".join(out)
+
+    def _one_amplitude(self) -> list[str]:
+        if not self.stroke:
+            return []
+        return [
+            "The training runs all move with one amplitude "
+            f"({quantity(self.stroke, 'm')} RMS): a closure knows no other one. Measure two or "
+            "more, over the range in which the model is to be used."
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        out: dict[str, Any] = {
+            "name": self.name, "kind": CLOSURE, "kept": not self.refused, "why": self.refused,
+            "sentences": self.sentences(), "z_before": self.before.z, "forms": [],
+        }  # fmt: skip
+        if self.closure is None or self.after is None:
+            return out
+        errors = {
+            f"error_{when}": one.error.headline[1]
+            for when, one in (("before", self.before), ("after", self.after))
+            if one.error is not None
+        }
+        return out | errors | {
+            "z": self.after.z, "folds": self.folds, "share": self.share,
+            "units": len(self.closure.out), "weights": self.closure.weights,
+            "lives_on": dict(self.lives_on), "outside": self.outside,
+        }  # fmt: skip
+
+
+def learn_closure(
+    prepared: Prepared, name: str, rule: DecisionRule | None = None
+) -> LearnedClosure:
+    """Learn what the model of an opening misses, as a network in parallel with the damper.
+
+    Parameters
+    ----------
+    prepared : runs and the fitted model, as a diagnosis begins with them
+    name : of the effect that the network becomes
+    rule : the numbers that decide; None takes the opening's
+    """
+    rule, before, train = rule or prepared.rule, prepared.before, prepared.problem
+    alike = one_amplitude(train.runs)
+    stroke = float(np.mean([np.std(run.x) for run in train.runs])) if alike else 0.0
+    found = LearnedClosure(name, None, before, stroke=stroke)
+    if before.z <= rule.clean:
+        why = f"The model leaves {before.z:.2f} times the noise (z): nothing is missing."
+        return replace(found, refused=why)
+    trained = trained_beside(train, before.model)
+    if trained is None:
+        why = "No network lowers the error on parts of the training runs that it has not seen."
+        return replace(found, refused=why)
+    closure, model, folds = trained
+    tell(f"closure: {len(closure.hidden)} units, judged on held-out runs")
+    with defined({name: closure_text(name, closure, "a trial")}):
+        joined = replace(model, effects=(*model.effects, name))
+        fitted, held = (one.of(one.runs) for one in (train, prepared.held_out))
+        after = judge(joined, fitted, held)
+        errors = [errors_of(one, held) for one in (before.model, joined)]
+    told = [_Seen(held, model, run, closure.inputs) for run in held.runs]
+    carried = [one.forces(closure) for one in told]
+    force = np.concatenate([run.force[run.skip :] for run in held.runs])
+    inside = np.concatenate(
+        [one.inside(closure)[run.skip :] for one, run in zip(told, held.runs, strict=True)]
+    )
+    own = np.concatenate([c[run.skip :] for c, run in zip(carried, held.runs, strict=True)])
+    found = replace(
+        found, closure=closure, after=after, folds=folds,
+        share=float(np.sqrt(np.mean(own**2) / np.mean(force**2))),
+        lives_on=_lives_on(closure, told, own, held.runs), outside=float(np.mean(inside < 0.5)),
+    )  # fmt: skip
+    if not lowers(errors[0], errors[1], rule.gain):
+        rms = [float(np.sqrt(np.mean(np.concatenate(one) ** 2))) for one in errors]
+        why = (
+            "A network lowers the error on parts of the training runs, but not over the held-out "
+            f"runs beyond their scatter ({rms[0]:.4g} N before, {rms[1]:.4g} N with it)."
+        )
+        return replace(found, refused=why)
+    return found
+
+
+def one_amplitude(runs: Sequence[Run]) -> bool:
+    """Return whether all runs move about alike: each with one amplitude, and the same one."""
+    sizes = np.array([float(np.std(run.x)) for run in runs])
+    tops = np.array([0.5 * float(np.ptp(run.x)) for run in runs])
+    steady = bool(np.all(tops < 1.6 * sizes))  # a sine has 1.41, what is random 2.5 or more
+    return steady and bool(np.ptp(sizes) <= ALIKE * np.mean(sizes))
+
+
+def errors_of(model: Model, problem: Problem) -> list[Array]:
+    """Return per run the error of a model's force at the samples that count [N]."""
+    zero = zero_of(problem, model)[0] if problem.free_zero and not has_offset(model) else 0.0
+    return [(run.force - problem.predict(model, run) - zero)[_counts(run)] for run in problem.runs]
+
+
+def lowers(before: Sequence[Array], after: Sequence[Array], gain: float) -> bool:
+    """Return whether errors (per run) fall by a gain, and beyond their scatter over the runs.
+
+    Of few runs it is that over stretches of them.
+    """
+    total = [float(np.mean(np.concatenate([*one]) ** 2)) for one in (before, after)]
+    if total[1] > (1.0 - gain) ** 2 * total[0]:
+        return False
+    each = max(1, -(-STRETCHES // len(before)))
+    falls = np.array(
+        [
+            np.mean(a**2) - np.mean(b**2)
+            for one, other in zip(before, after, strict=True)
+            for a, b in zip(np.array_split(one, each), np.array_split(other, each), strict=True)
+            if len(a)
+        ]
+    )
+    return bool(np.mean(falls) > 2.0 * np.std(falls, ddof=1) / np.sqrt(len(falls)))
+
+
+def trained_beside(train: Problem, model: Model) -> tuple[Closure, Model, float] | None:
+    """Return a network, the model refitted beside it, and its error on left-out folds.
+
+    That error is by the error without a network there. None where no network lowers it.
+
+    Parameters
+    ----------
+    train : the training runs; they alone are looked at
+    model : fitted to them
+    """
+    best: tuple[Closure, Model, float] | None = None
+    present, least, begun = model, float("inf"), 0.0
+    for turn in range(2):
+        tell("training a closure" if turn == 0 else "training it beside the model refitted")
+        found = _chosen(train, present)
+        if found is None:
+            break
+        closure, loss, without = found
+        if loss >= (AS_GOOD**-0.5) * least:
+            break
+        begun = begun or without  # the error of the model as given
+        least, best = loss, (closure, present, float(np.sqrt(loss / begun)))
+        present = _refitted(train, present, closure)
+    return best
+
+
+def _refitted(train: Problem, model: Model, closure: Closure) -> Model:
+    """Return a model fitted to what a closure leaves of the force: both add up at the rod."""
+    runs = [
+        replace(run, force=run.force - _Seen(train, model, run, closure.inputs).forces(closure))
+        for run in train.runs
+    ]
+    return refine(model, train.of(runs), SWEEPS)
+
+
+def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None:
+    """Return the best network beside a model, its loss on left-out folds, and that without one."""
+    zero = zero_of(train, model)[0] if train.free_zero and not has_offset(model) else 0.0
+    total = sum(int(np.count_nonzero(_counts(run))) for run in train.runs)
+    rows = [np.flatnonzero(_counts(run))[:: max(1, total // MOST)] for run in train.runs]
+    y = [
+        (run.force - train.predict(model, run) - zero)[row]
+        for run, row in zip(train.runs, rows, strict=True)
+    ]
+    fold = _folds(rows)
+    without = float(np.mean(np.concatenate(y) ** 2))
+    tried: list[tuple[float, int, Closure]] = []
+    for position in (False, True):
+        inputs = inputs_of(train.runs, position)
+        seen = [_Seen(train, model, run, inputs) for run in train.runs]
+        grid = _Grid(seen, rows, y, fold)
+        for few, steep in product(SEES, STEEP):
+            tried += grid.tried(few, steep)
+    least = min(loss for loss, _, _ in tried)
+    if least > WORTH**2 * without:
+        return None
+    able = [one for one in tried if one[0] <= AS_GOOD * least]
+    loss, _, closure = min(able, key=lambda one: one[:2][::-1])
+    return replace(closure, store=_store(train, closure)), loss, without
+
+
+def _counts(run: Run) -> Flags:
+    """Return which samples of a run count (n,)."""
+    out = np.zeros(len(run.force), dtype=bool)
+    out[run.skip :] = run.judged
+    return out
+
+
+def _folds(rows: Sequence[Indices]) -> Indices:
+    """Return the fold of each sample: whole runs, of a single one stretches."""
+    if len(rows) > 1:
+        return np.concatenate([np.full(len(row), k % FOLDS) for k, row in enumerate(rows)])
+    return np.concatenate([np.arange(len(row)) * FOLDS // max(len(row), 1) for row in rows])
+
+
+def inputs_of(runs: Sequence[Run], position: bool) -> tuple[Input, ...]:
+    """Return the inputs of a network for runs; time constants and travels are of their scales.
+
+    Parameters
+    ----------
+    runs : of the training
+    position : whether the displacement itself is an input: its zero may be anywhere
+    """
+    x = np.concatenate([run.x - np.mean(run.x) for run in runs])
+    v, V = (np.concatenate([getattr(run, name) for run in runs]) for name in ("v", "V"))
+    way, speed, top = float(np.std(x)), float(np.std(v)), float(np.max(np.abs(V)))
+    step, time = max(run.dt for run in runs), _time(runs)
+    times = [share * time for share in SPREAD if share * time >= 2.0 * step]
+    times = rounded(np.array(times)).tolist()
+    travels, (slow,) = rounded(way * np.array(TRAVELS)).tolist(), rounded(SLOW * np.array([speed]))
+    out = [Input("v", 0.0)]
+    if position:
+        out.append(Input("x", 0.0))
+    out += [Input("recent_v", tau) for tau in times]
+    out += [Input("way", travel, float(slow)) for travel in travels]
+    if top > 0.0:
+        moving = max(float(np.std(run.V)) for run in runs) > 1e-3 * top
+        if float(np.ptp(V)) > 1e-3 * top:
+            out.append(Input("V", 0.0))
+        out += [Input("recent_V", tau) for tau in times if moving]
+    return tuple(out)
+
+
+def _time(runs: Sequence[Run]) -> float:
+    """Return the time scale of a motion [s]: RMS displacement over RMS velocity."""
+    x = np.concatenate([run.x - np.mean(run.x) for run in runs])
+    return float(np.std(x) / np.std(np.concatenate([run.v for run in runs])))
+
+
+class _Seen:
+    """What a network sees of a run, and what the load cell shows of its force.
+
+    `signals` (m, k) the inputs at the moments of which a model gives the force.
+    """
+
+    def __init__(self, problem: Problem, model: Model, run: Run, inputs: Sequence[Input]) -> None:
+        self.problem, self.model, self.run, self.inputs = problem, model, run, tuple(inputs)
+        self.fed = problem.fed(model, run)
+        x, v, _, V, dt = self.fed.moments
+        held = np.where(jumps(V), np.append(V[:1], V[:-1]), V)  # what acted up to a jump
+        self.signals = np.column_stack([_history(one, x, v, V, held, dt) for one in inputs])
+
+    @property
+    def plain(self) -> bool:
+        """Whether the load cell shows a force as it is."""
+        return self.run.finer is None and not sensors(self.model.effects, "force")
+
+    def at(self, values: Array, rows: Indices) -> Array:
+        """Return values (m, ...) of the moments at samples of the run."""
+        return values[rows * (1 if self.run.finer is None else self.run.finer.parts)]
+
+    def shown(self, columns: Array) -> Array:
+        """Return what the load cell shows (n, c) of forces (m, c)."""
+        if self.plain:
+            return columns
+        none = self.problem.shown(self.model, self.run, self.fed, np.zeros(len(columns)))
+        rows = [self.problem.shown(self.model, self.run, self.fed, one) for one in columns.T]
+        return np.column_stack([row - none for row in rows])
+
+    def forces(self, closure: Closure) -> Array:
+        """Return a network's force (n,) [N], whatever its store of energy allows."""
+        return self.shown(closure.force(self.signals)[:, None])[:, 0]
+
+    def inside(self, closure: Closure) -> Array:
+        """Return how far a network is supported (n,): 1 inside its region, 0 far outside."""
+        inside = closure.region.inside(closure.scaled(self.signals))
+        return self.at(inside, np.arange(len(self.run.force)))
+
+
+def _history(one: Input, x: Array, v: Array, V: Array, held: Array, dt: float) -> Array:
+    """Return an input (m,) along a motion and command that are linear between the samples."""
+    if one.kind in ("v", "x", "V"):
+        return {"v": v, "x": x, "V": V}[one.kind]
+    if one.kind == "recent_v":
+        return faded(v, dt, one.over, float(v[0]))
+    keep = np.exp(-dt / one.over) if one.kind == "recent_V" else 0.0
+    if one.kind == "recent_V":
+        middle = 0.5 * (V[:-1] + held[1:])
+        late = lfilter([1.0 - keep], [1.0, -keep], middle, zi=[keep * V[0]])[0]
+        return np.append(V[:1], late)
+    middle = 0.5 * (v[1:] + v[:-1])
+    kept, to = np.exp(-np.abs(middle) * dt / one.over).tolist(), np.tanh(middle / one.slow).tolist()
+    out, now = [0.0], 0.0
+    for k, goal in zip(kept, to, strict=True):
+        now = goal + (now - goal) * k
+        out.append(now)
+    return np.array(out)
+
+
+def region_of(u: Array) -> Region:
+    """Return where scaled inputs (m, k) of training runs are."""
+    low, high = np.min(u, axis=0), np.max(u, axis=0)
+    margin = np.maximum(MARGIN * (high - low), 1e-3)
+    spread = u.T @ u / len(u) + ROUND * np.eye(u.shape[1])
+    axes = np.tril(np.linalg.inv(np.linalg.cholesky(spread)))
+    reach = float(np.sqrt(np.max(np.sum((u @ axes.T) ** 2, axis=1))))
+    low, high, margin, axes, reaches = map(rounded, (low, high, margin, axes, np.array([reach])))
+    return Region(low, high, margin, axes, float(reaches[0]))
+
+
+class _Grid:
+    """Networks on some inputs, of which folds tell the loss.
+
+    A fold is judged by a network that fades beyond what the other folds did.
+
+    Parameters
+    ----------
+    seen : the runs as a network sees them
+    rows : per run the samples that are used
+    y : per run what the model leaves there [N]
+    fold : (n,) of all these samples
+    """
+
+    def __init__(
+        self, seen: Sequence[_Seen], rows: Sequence[Indices], y: Sequence[Array], fold: Indices
+    ) -> None:
+        self.seen, self.rows, self.y = seen, rows, np.concatenate(y)
+        every = np.concatenate([one.signals for one in seen])
+        middle, spread = np.mean(every, axis=0), np.std(every, axis=0)
+        self.middle = rounded(middle)
+        self.spread = rounded(np.maximum(spread, 1e-9 * (1.0 + np.abs(middle))))
+        self.scaled = [(one.signals - self.middle) / self.spread for one in seen]
+        self.parts = [fold == k for k in range(FOLDS) if np.any(fold == k)]
+        self.region = region_of((every - self.middle) / self.spread)
+        used = np.concatenate([one.at(u, row) for one, u, row in self._runs()])
+        self.windows = [region_of(used[~part]).inside(used[part]) for part in self.parts]
+        self.powers = [float(self.y[part] @ self.y[part]) for part in self.parts]
+
+    def _runs(self) -> list[tuple[_Seen, Array, Indices]]:
+        return list(zip(self.seen, self.scaled, self.rows, strict=True))
+
+    def tried(self, few: int, steep: float) -> list[tuple[float, int, Closure]]:
+        """Return networks of all sizes and penalties: loss on left-out folds, hidden units, itself.
+
+        Parameters
+        ----------
+        few : how many inputs a hidden unit sees
+        steep : spread of the hidden weights
+        """
+        most, k = max(SIZES), len(self.middle)
+        draw = np.random.default_rng(1)
+        hidden = steep * draw.standard_normal((most, k))
+        for row in hidden:
+            row[draw.permutation(k)[few:]] = 0.0
+        hidden, bias = rounded(hidden), rounded(draw.uniform(-1.5, 1.5, most))
+        A = np.concatenate(
+            [
+                _columns(u[row], hidden, bias) if one.plain
+                else one.shown(_columns(u, hidden, bias))[row]
+                for one, u, row in self._runs()
+            ]
+        )  # fmt: skip
+        own = [A[part] for part in self.parts]
+        faded = [one * window[:, None] for one, window in zip(own, self.windows, strict=True)]
+        out = []
+        grams = [one.T @ one for one in own]
+        sides = [one.T @ self.y[part] for one, part in zip(own, self.parts, strict=True)]
+        judged = [
+            (power, one.T @ self.y[part], one.T @ one)
+            for power, one, part in zip(self.powers, faded, self.parts, strict=True)
+        ]
+        for size, penalty in product(SIZES, PENALTIES):
+            n = 1 + k + size
+            ridge = penalty * len(A) * np.eye(n)
+            gram, side = sum(grams)[:n, :n] + ridge, sum(sides)[:n]
+            loss = 0.0
+            for G, s, (power, t, H) in zip(grams, sides, judged, strict=True):
+                theta = np.linalg.solve(gram - G[:n, :n], side - s[:n])
+                loss += power - 2.0 * float(theta @ t[:n]) + float(theta @ H[:n, :n] @ theta)
+            theta = rounded(np.linalg.solve(gram, side))
+            largest = float(np.max(np.abs(A[:, :n] @ theta)))
+            closure = Closure(
+                self.seen[0].inputs, self.middle, self.spread, self.region, hidden[:size],
+                bias[:size], theta[1 + k :], theta[1 : 1 + k], float(theta[0]),
+                float(rounded(np.array([ROOM * max(largest, 1e-9)]))[0]), Store(0.0, 0.0, 0.0, 0.0),
+                self.seen[0].run.drive,
+            )  # fmt: skip
+            out.append((loss / len(A), size, closure))
+        return out
+
+
+def _columns(u: Array, hidden: Array, bias: Array) -> Array:
+    """Return what a network's output is linear in (m, 1 + k + n), at scaled inputs (m, k)."""
+    return np.column_stack([np.ones(len(u)), u, np.tanh(u @ hidden.T + bias)])
+
+
+def _store(train: Problem, closure: Closure) -> Store:
+    """Return the energy that the device may give back: what the rig gave in the training runs."""
+    begin = back = 0.0
+    for run in train.runs:
+        power = run.force * run.v
+        taken = run.dt * np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1])))
+        begin = max(begin, -float(np.min(taken)))
+        back = max(back, float(np.max(np.maximum.accumulate(taken) - taken)))
+    speeds = np.concatenate([run.v for run in train.runs])
+    soon = max(4.0 * max(run.dt for run in train.runs), SOON * _time(train.runs))
+    least = closure.size * float(np.max(np.abs(speeds))) * soon
+    sizes = [begin, max(ROOM * back, begin, least), soon, REST * float(np.std(speeds))]
+    return Store(*rounded(np.array(sizes)).tolist())
+
+
+def _lives_on(
+    closure: Closure, seen: Sequence[_Seen], own: Array, runs: Sequence[Run]
+) -> tuple[tuple[str, float], ...]:
+    """Return the groups of inputs with the share of a network's variance that goes without each.
+
+    Without an input is with its middle over the training runs.
+    """
+    total = max(float(np.var(own)), 1e-300)
+    out = []
+    for words in dict.fromkeys(one.words for one in closure.inputs):
+        still = np.array([one.words == words for one in closure.inputs])
+        rest = []
+        for one, run in zip(seen, runs, strict=True):
+            signals = np.where(still, closure.middle, one.signals)
+            near = closure.region.inside(closure.scaled(one.signals))
+            u = closure.scaled(signals)
+            net = _columns(u, closure.hidden, closure.bias) @ np.concatenate(
+                [[closure.constant], closure.linear, closure.out]
+            )
+            force = closure.size * np.tanh(net / closure.size) * near
+            rest.append(one.shown(force[:, None])[run.skip :, 0])
+        changed = float(np.mean((np.concatenate(rest) - own) ** 2))
+        out.append((words, min(changed / total, 1.0)))
+    return tuple(sorted(out, key=lambda pair: -pair[1]))

@@ -1,0 +1,82 @@
+"""`bristle learn --closure`: what it says, what it writes, what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from answers import Capture, asked, told
+
+STEP = 0.004  # s
+
+
+def measured(path: Path, seed: int) -> None:
+    """Write a run of a damper whose friction follows motion and command late."""
+    draw = np.random.default_rng(seed)
+    t = STEP * np.arange(2000)
+    w = 2.0 * np.pi * draw.uniform(0.4, 4.0, 8)
+    angle = w[:, None] * t + draw.uniform(0.0, 6.0, 8)[:, None]
+    size = 0.06 / w
+    x, v = size @ np.sin(angle), (size * w) @ np.cos(angle)
+    V = np.repeat(draw.choice([0.0, 2.0, 4.0], 10), len(t) // 10)
+    goal = np.tanh(v / 0.03) * (2.0 + 1.5 * V) - 250.0 * x * (v > 0.0)
+    late, now = np.empty(len(t)), 0.0
+    for k in range(len(t)):
+        now = goal[k] + (now - goal[k]) * np.exp(-STEP / 0.02)
+        late[k] = now
+    force = 60.0 * v + late + 0.03 * draw.standard_normal(len(t))
+    header = "time [s],displacement [m],velocity [m/s],voltage [V],force [N]"
+    table = np.column_stack([t, x, v, V, force])
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
+
+
+def made(folder: Path, capsys: Capture, train: int) -> Path:
+    """Return an identified study with so many runs for training and one held out."""
+    names = [*(f"train_{k}" for k in range(1, train + 1)), "holdout_1"]
+    for seed, name in enumerate(names):
+        measured(folder / f"{name}.csv", seed)
+    rig = folder / "rig"
+    told(capsys, "study", "new", rig, *(folder / f"{name}.csv" for name in names))
+    told(capsys, "identify", rig, "--law", "bingham", "--no-table")
+    return rig
+
+
+@pytest.fixture
+def rig(tmp_path: Path, capsys: Capture) -> Path:
+    return made(tmp_path, capsys, 3)
+
+
+def test_it_is_learned_added_and_called_no_effect(rig: Path, capsys: Capture) -> None:
+    found = asked(capsys, "learn", rig, "--closure")
+    assert found["kept"] is True
+    assert found["error_after"] < 0.7 * found["error_before"]
+    assert 0.0 < found["share"] < 1.0
+    assert (rig / "effects" / "closure_1.py").is_file()
+    said = " ".join(found["sentences"])
+    assert "It is no effect of physics" in said
+    assert "it fades to zero there" in said
+    kept = json.loads((rig / "reports" / "closure_1.json").read_text())
+    assert kept["sentences"] == found["sentences"]
+    added = asked(capsys, "add", rig, "closure_1")
+    assert added["added"] == ["closure_1"]
+    # Another law, friction that follows late: what is missing has no name in the library.
+    verdict = asked(capsys, "diagnose", rig, "--law", "bingham")
+    assert verdict["kind"] != "none"
+    assert "closure_1" not in verdict["effects"]
+    assert any("without closure_1" in note for note in verdict["notes"])
+
+
+def test_a_single_run_for_training_is_refused(tmp_path: Path, capsys: Capture) -> None:
+    rig = made(tmp_path, capsys, 1)
+    why = told(capsys, "learn", rig, "--closure", code=2)
+    assert "one run is for training (train_1)" in why
+    assert "Add runs" in why
+    assert not (rig / "effects" / "closure_1.py").exists()
+
+
+def test_what_chooses_a_curve_does_not_go_with_it(rig: Path, capsys: Capture) -> None:
+    for words in (("--along", "displacement"), ("--as", "force"), ("--at", "damper"), ("--table",)):
+        why = told(capsys, "learn", rig, "--closure", *words, code=2)
+        assert f"{words[0]} chooses a curve" in why

@@ -1,0 +1,170 @@
+"""A closure carries what has no formula, fades beyond its runs, and creates no energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+from bingham_runs import STEP, VALUES, runs
+
+from bristle.diagnosis.prepared import Prepared
+from bristle.diagnosis.trials import judge
+from bristle.identification.histories import force_history
+from bristle.identification.problem import Problem
+from bristle.learning.closure import LearnedClosure, learn_closure, lowers, one_amplitude
+from bristle.learning.closure_file import Closure, closure_text
+from bristle.model.model import Model
+from bristle.physics.damper import DamperModel, functions_of, room, setup_of
+from bristle.physics.generate import Link
+from bristle.physics.tuples import Inputs
+from bristle.user_code.load import defined, flaw_of
+
+NAME = "closure_1"
+ORIGIN = "made for a test, 2026"
+
+
+def late(x, v, V, F):
+    """A force that no curve along one signal is: it follows the motion and the command late."""
+    keep = np.exp(-STEP / 0.05)
+    out, now = np.empty(len(v)), 0.0
+    for k, goal in enumerate(np.tanh(v / 0.05) * (1.0 + 0.2 * V) - 120.0 * x * (v > 0.0)):
+        now = goal + (now - goal) * keep
+        out[k] = now
+    return F + 1.5 * out
+
+
+def opened(problem: Problem) -> Prepared:
+    train, held = (problem.of(part) for part in (problem.runs[:2], problem.runs[2:]))
+    return Prepared(judge(Model("bingham", (), VALUES), train, held), train, held)
+
+
+@cache
+def learned() -> LearnedClosure:
+    found = learn_closure(opened(runs(late)), NAME)
+    assert found.refused == ""
+    return found
+
+
+@cache
+def network() -> Closure:
+    closure = learned().closure
+    assert closure is not None
+    return closure
+
+
+def forces(closure: Closure, motion, values=VALUES) -> np.ndarray:
+    """Return the force [N] of a Bingham damper with a closure for motions (x, v, a, V) at STEP."""
+    with defined({NAME: closure_text(NAME, closure, ORIGIN)}):
+        model = DamperModel("bingham", values, [NAME])
+        energy, before, out = 0.0, (0.0, 0.0), []
+        for x, v, a, V in motion:
+            force = model.step(x, v, a, V, STEP, energy, 0.0, False)
+            energy += 0.5 * STEP * (before[0] * before[1] + force * v)
+            before = force, v
+            out.append(force)
+    return np.array(out)
+
+
+def sine(amplitude: float, frequency: float, cycles: int, V: float = 3.0):
+    w = 2.0 * pi * frequency
+    times = STEP * np.arange(1, round(cycles / frequency / STEP) + 1)
+    return [
+        (amplitude * sin(w * t), amplitude * w * cos(w * t), -amplitude * w * w * sin(w * t), V)
+        for t in times
+    ]
+
+
+def test_it_lowers_the_error_on_runs_that_it_has_not_seen() -> None:
+    found = learned()
+    assert found.after is not None
+    assert found.after.rms < 0.75 * found.before.rms
+    assert found.folds < 0.9
+    text = " ".join(found.sentences())
+    assert "It is no effect of physics, and the verdict stays unknown." in text
+    assert "It is not supported beyond velocity" in text
+    assert found.as_dict()["lives_on"]
+
+
+def test_a_true_model_keeps_none() -> None:
+    found = learn_closure(opened(runs()), NAME)
+    assert found.closure is None
+    assert "nothing is missing" in found.refused
+
+
+def test_a_gain_in_one_stretch_alone_is_scatter() -> None:
+    before = [np.ones(800)]
+    once = [np.where(np.arange(800) < 100, 0.0, 1.0)]
+    assert not lowers(before, once, 0.02)
+    assert lowers(before, [0.9 * np.ones(800)], 0.02)
+
+
+def test_its_file_is_an_effect_that_is_accepted() -> None:
+    assert flaw_of(NAME, closure_text(NAME, network(), ORIGIN)) == ""
+
+
+def test_compiled_code_gives_the_numbers_of_plain_python() -> None:
+    run = runs(late).runs[2]
+    part = run.of(slice(0, 300))
+    with defined({NAME: closure_text(NAME, network(), ORIGIN)}):
+        compiled = Problem([part]).predict(Model("bingham", (NAME,), VALUES), part)
+        functions = functions_of("bingham", [NAME])
+        setup = setup_of("bingham", VALUES, [NAME])
+        size = functions.slots.z_size
+        z, z1, work = [0.0] * size, [0.0] * size, [0.0] * room(size)
+        for state, signal in (("s", part.v), ("V", part.V)):
+            for name, slot in functions.slots.states.items():
+                k = name.rpartition(".s")[2]
+                if k.isdigit() and network().inputs[int(k)].kind == {
+                    "s": "recent_v", "V": "recent_V",
+                }[state]:  # fmt: skip
+                    z[slot] = float(signal[0])
+        out = [0.0] * len(part.x)
+        motion = Inputs(
+            *(one.tolist() for one in (part.x, part.v, part.a, part.V)), STEP, 0.0, 0.0, False
+        )
+        tracks = type("None_", (), {"slots": (), "values": ()})()
+        link: Link = functions.link
+        link(force_history)(setup, motion, tracks, z, z1, work, out)
+    assert np.abs(np.array(out) - compiled).max() <= 1e-12 * np.abs(compiled).max()
+
+
+def test_it_fades_beyond_the_motion_of_its_runs() -> None:
+    far = sine(0.5, 1.0, 2)
+    bare = DamperModel("bingham", VALUES, [])
+    alone = np.array([bare.step(x, v, a, V, STEP, 0.0, 0.0, False) for x, v, a, V in far])
+    fastest = max(abs(v) for _, v, _, _ in far)
+    quick = np.array([abs(v) > 0.5 * fastest for _, v, _, _ in far])
+    assert np.abs(forces(network(), far) - alone)[quick].max() == 0.0
+
+
+@pytest.mark.parametrize("times", [1.0, -30.0, 30.0])
+@pytest.mark.parametrize(("amplitude", "frequency"), [(0.001, 5.0), (0.008, 1.0), (0.008, 3.0)])
+def test_the_device_never_gives_energy_whatever_the_weights(
+    times: float, amplitude: float, frequency: float
+) -> None:
+    closure = network()
+    wild = replace(
+        closure, out=times * closure.out, linear=times * closure.linear,
+        constant=times * closure.constant, size=max(abs(times), 1.0) * closure.size,
+    )  # fmt: skip
+    motion = sine(amplitude, frequency, 20)
+    v, force = np.array([one[1] for one in motion]), forces(wild, motion)
+    power = force * v
+    taken = STEP * np.cumsum(0.5 * (power + np.append(0.0, power[:-1])))
+    # At first it may give back what is in its store; each cycle that repeats itself takes energy.
+    cycle = round(1.0 / frequency / STEP)
+    rounding = 1e-3 * amplitude * float(np.abs(force).max())
+    assert taken.min() >= -wild.store.begin - rounding
+    assert taken[-1] - taken[-1 - cycle] >= -rounding
+
+
+def test_runs_of_one_amplitude_are_told() -> None:
+    run = runs().runs[0]
+    t = STEP * np.arange(len(run.x))
+    alike = [replace(run, x=0.01 * np.sin(w * t)) for w in (6.0, 9.0)]
+    assert one_amplitude(alike)
+    assert not one_amplitude([alike[0], replace(run, x=0.02 * np.sin(6.0 * t))])
+    assert not one_amplitude(runs().runs)
