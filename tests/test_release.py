@@ -35,9 +35,9 @@ def test_citation_and_package_have_one_version_and_date() -> None:
 
 def test_every_requirement_has_bounds_and_the_lowest_one_is_tried() -> None:
     lines = (ROOT / "tests" / "lowest.txt").read_text(encoding="utf-8").splitlines()
-    tried = dict(line.lower().split("==") for line in lines if "==" in line)
+    pinned = [line.partition("#")[0].strip().lower() for line in lines]
+    tried = dict(line.split("==") for line in pinned if line)
     needed = [*PROJECT["project"]["dependencies"], *EXTRAS["design"], *EXTRAS["formats"]]
-    assert len(tried) == len(needed)
     for name, bounds in map(parts, needed):
         assert bounds.keys() == {">=", "<"}, name
         assert (tried[name] + ".").startswith(bounds[">="] + "."), name
