@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown = commands.add_parser("list", help="list the effects that each rig can hide")
     add_json(shown, "print as JSON")
     shown.set_defaults(act=_list)
-    bench = commands.add_parser("bench", help="an MR damper on a test bench")
+    bench = commands.add_parser("bench", help="an MR damper, or another device, on a test bench")
     _add_choices(bench)
     text = "keep the voltage constant in each run, at 2 or 6 V, as many laboratories do"
     bench.add_argument("--held", action="store_true", help=text)
@@ -51,7 +51,10 @@ def _add_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--none", action="store_true", help="hide nothing")
     text = "hide an effect that is not in the library"
     parser.add_argument("--outside", action="store_true", help=text)
-    text = "law of the damper: bingham or lugre; in a building lugre"
+    text = (
+        "law of the damper: bingham or lugre; in a building lugre; on a bench also shock_absorber, "
+        "friction_damper, isolator or fluid_viscous, which nothing commands"
+    )
     parser.add_argument("--law", default="", help=text)
     text = "noise on every channel as a share of its RMS; 0.01 by default"
     parser.add_argument("--noise", type=float, default=0.01, metavar="SHARE", help=text)
@@ -80,7 +83,7 @@ def _list(arguments: argparse.Namespace) -> int:
     for one in HIDDEN.values():
         print(f"{one.name:20} {', '.join(one.rigs):16} {one.about}")
         if one.laws:
-            print(f"{'':37} (laws {', '.join(one.laws)})")
+            print(f"{'':37} (laws {', '.join((*one.laws, *one.devices))})")
     outside = ", ".join(one.name for one in HIDDEN.values() if one.outside)
     print(f"\nNo effect of the library: {outside}. Draw one of them with --outside.")
     print("Make one:  bristle example bench my_rig")

@@ -15,8 +15,7 @@ import numpy as np
 from ..core.files import write_whole
 from ..core.text import unknown
 from ..errors import StudyError
-
-Values = dict[str, float]
+from .devices import DEVICES, Values
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,8 @@ class Scales:
 class Hidden:
     """Something that can be hidden: its name, the rigs that can have it, what it is.
 
-    `draw(rng, scales)` gives its values in SI. `outside` for what no effect of the library is.
+    `draw(rng, scales)` gives its values in SI. `outside` for what no effect of the library is;
+    `devices` that nothing commands can have it as well.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Hidden:
     draw: Callable[[np.random.Generator, Scales], Values]
     laws: tuple[str, ...] = ()
     outside: bool = False
+    devices: tuple[str, ...] = ()
 
 
 UNITS = {
@@ -148,22 +149,28 @@ HIDDEN = {
     one.name: one
     for one in (
         Hidden("coil_lag", BOTH, "a coil that follows the voltage late", _coil),
-        Hidden("temperature", BOTH, "a fluid that thins as it warms", _heat),
+        Hidden("temperature", BOTH, "a fluid that thins as it warms", _heat,
+               devices=("shock_absorber", "isolator")),
         Hidden("quadratic_damping", BOTH, "an orifice, its loss nearly quadratic", _orifice),
-        Hidden("asymmetry", BOTH, "valves that differ between the directions", _valves),
+        Hidden("asymmetry", BOTH, "valves that differ between the directions", _valves,
+               devices=("friction_damper", "fluid_viscous")),
         Hidden("saturation", BOTH, "a core that saturates", _field),
         Hidden("mount_compliance", BENCH, "a rubber bush at the rod's end", _mount),
-        Hidden("fluid_inertia", BENCH, "the mass of the fluid in the gap", _inertia),
-        Hidden("stribeck", BENCH, "a yield force that is larger at creeping speed", _creep, FALLS),
+        Hidden("fluid_inertia", BENCH, "the mass of the fluid in the gap", _inertia,
+               devices=("shock_absorber", "fluid_viscous")),
+        Hidden("stribeck", BENCH, "a yield force that is larger at creeping speed", _creep, FALLS,
+               devices=("friction_damper",)),
         Hidden("flattening", BENCH, "a force that thins with speed", _thinning, FALLS),
         Hidden("base_friction", TOWER, "dry friction under the base", _friction),
         Hidden("storey_softening", TOWER, "storeys that soften with drift", _softening),
         Hidden("end_stop", TOWER, "a bumper beyond a gap", _stop),
-        Hidden("gas_spring", BOTH, "a gas column beside the fluid", _gas),
+        Hidden("gas_spring", BOTH, "a gas column beside the fluid", _gas,
+               devices=("fluid_viscous",)),
         Hidden("duffing", TOWER, "isolation springs that stiffen late", _hardening),
-        Hidden("worn_bore", BOTH, "a bore worn at mid-stroke", _bore, (), outside=True),
+        Hidden("worn_bore", BOTH, "a bore worn at mid-stroke", _bore, (), outside=True,
+               devices=("shock_absorber", "fluid_viscous")),
         Hidden("ripple", BOTH, "a thread on the rod that runs through the seal", _ripple, (),
-               outside=True),
+               outside=True, devices=tuple(DEVICES)),
         Hidden("loose_brace", TOWER, "a brace of the first storey that bears beyond its play",
                _brace, (), outside=True),
     )
@@ -176,8 +183,15 @@ def able(rig: str, law: str, *, outside: bool = False) -> list[str]:
     return [
         one.name
         for one in HIDDEN.values()
-        if rig in one.rigs and one.outside == outside and (not one.laws or law in one.laws)
+        if rig in one.rigs and one.outside == outside and _fits(one, law)
     ]
+
+
+def _fits(one: Hidden, law: str) -> bool:
+    """Return whether a damper of a law can have what can be hidden."""
+    if law in DEVICES:
+        return law in one.devices
+    return not one.laws or law in one.laws
 
 
 def choose(

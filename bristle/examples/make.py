@@ -16,7 +16,8 @@ from ..errors import StudyError
 from ..study.steps import create_study
 from ..study.study import Study
 from . import rigs
-from .hidden import UNITS, Hidden, Scales, Values, choose, seal
+from .devices import DEVICES, Values
+from .hidden import UNITS, Hidden, Scales, choose, seal
 from .rigs import (
     CENTRE,
     Damper,
@@ -66,8 +67,9 @@ class Choice:
             raise StudyError(f"--noise {self.noise:g}: 0 to {LARGEST_NOISE:g} is plausible.")
         if self.seed < 0:
             raise StudyError(f"--seed {self.seed}: 0 or a positive whole number is right.")
-        if self.law and self.law not in CENTRE:
-            raise StudyError(f'--law "{self.law}"; an example has: {", ".join(CENTRE)}.')
+        if self.law and self.law not in (*CENTRE, *DEVICES):
+            known = ", ".join([*CENTRE, *DEVICES])
+            raise StudyError(f'--law "{self.law}"; an example has: {known}.')
 
 
 def make_bench(folder: Path | str, choice: Choice) -> Study:
@@ -96,7 +98,8 @@ def make_bench(folder: Path | str, choice: Choice) -> Study:
     shown = dict(zip([name for name, *_ in plan], runs, strict=True))
     answer["instruments"] = instruments(shown, choice.noise)
     shown = _with_noise(shown, answer, noise)
-    return _written(Path(folder), shown, answer, DESCRIBED["bench"], "A damper on a bench")
+    text = DESCRIBED["bench"] if damper.commanded else DESCRIBED["bench"].replace(*NO_VOLTAGE)
+    return _written(Path(folder), shown, answer, text, "A damper on a bench")
 
 
 def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True) -> Study:
@@ -215,12 +218,13 @@ def _written(
     return study
 
 
+NO_VOLTAGE = ("| voltage | V | commanded, 0 to 8 V |\n", "")
 CELL = "| force | N | load cell between damper and ground |\n"
 NO_CELL = "\nThe damper's force was not measured.\n"
 DESCRIBED = {
     "bench": """# {name}: a damper on a bench
 
-A made example. A bench moved an MR damper of about 10 N and 20 mm stroke to either side, and a
+A made example. A bench moved a damper of about 10 N and 20 mm stroke to either side, and a
 recorder took 500 samples per second with {noise:g} % noise on every channel.
 
 | channel | unit | instrument |

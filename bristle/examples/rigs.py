@@ -16,7 +16,9 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from ..errors import RunError, StudyError
-from .hidden import Scales, Values
+from . import devices
+from .devices import Values
+from .hidden import Scales
 
 # The damper of an example: a yield force, a drag, and what may be hidden in it.
 #
@@ -43,6 +45,8 @@ NAMES = {
 
 def in_library_names(law: str, values: Values) -> dict[str, float]:
     """Return the values of a damper under the names, and in the form, that the library gives."""
+    if law in devices.DEVICES:
+        return devices.in_library_names(law, values)
     same = {name: values[own] for name, own in NAMES[law].items()}
     if law == "bingham":
         return same
@@ -64,8 +68,8 @@ class Damper:
 
     def __post_init__(self) -> None:
         h = self.hidden
-        groups = {
-            "share": self.law != "bingham" or "mount_k" in h,
+        groups = dict.fromkeys(devices.STATES.get(self.law, ()), True) | {
+            "share": self.commanded and (self.law != "bingham" or "mount_k" in h),
             "field": "coil_tau" in h,
             "heat": "heat_capacity" in h,
             "piston": "mount_k" in h,
@@ -73,9 +77,19 @@ class Damper:
         }
         self.states = [name for name, there in groups.items() if there]
 
+    @property
+    def commanded(self) -> bool:
+        """Whether a voltage commands it."""
+        return self.law not in devices.DEVICES
+
     def scales(self, stroke: float, speed: float) -> list[float]:
         """Return the size of each state, for the integrator's tolerances."""
-        sizes = {"share": 1.0, "field": 1.0, "heat": 0.1, "piston": 0.1 * stroke}
+        sizes = devices.STATES.get(self.law, {}) | {
+            "share": 1.0,
+            "field": 1.0,
+            "heat": 0.1,
+            "piston": 0.1 * stroke,
+        }
         return [sizes.get(name, speed) for name in self.states]
 
     def respond(
@@ -116,10 +130,12 @@ class Damper:
     def _fluid(self, w: float, e: float, now: dict[str, float], rates: dict[str, float]) -> float:
         """Return the law's force; the share's rate goes into `rates`."""
         p = self.values
-        limit = p["Y_0"] + p["Y_1"] * e
-        limit *= 1.0 + self.hidden.get("creep_rise", 0.0) * exp(
+        creep = 1.0 + self.hidden.get("creep_rise", 0.0) * exp(
             -((w / self.hidden.get("creep_speed", inf)) ** 2)
         )
+        if not self.commanded:
+            return devices.FORCE[self.law](p | {"R": creep * p.get("R", 0.0)}, w, now, rates)
+        limit = creep * (p["Y_0"] + p["Y_1"] * e)
         drag = (p["D_0"] + p["D_1"] * e) * w * exp(-abs(w) / p["w_n"])
         if "share" not in now:
             return limit * (copysign(1.0, w) if abs(w) > STILL else 0.0) + drag
@@ -142,7 +158,7 @@ class Damper:
     def _beside(self, x: float, v: float, a: float) -> float:
         """Return the forces in parallel with the fluid."""
         h = self.hidden
-        total = h.get("fluid_mass", 0.0) * a
+        total = h.get("fluid_mass", 0.0) * a + devices.beside(self.law, self.values, x)
         if "gas_k" in h:  # a polytropic gas column that the rod shortens
             length, power = h["gas_length"], h["gas_power"]
             total += h["gas_k"] * length / power * ((1.0 - x / length) ** -power - 1.0)
@@ -364,7 +380,8 @@ def perform(damper: Damper, motion: Motion, volts: Programme, scales: Scales) ->
     Returns
     -------
     dict
-        `time` s, `displacement` m, `velocity` m/s, `voltage` V and `force` N, each (n,).
+        `time` s, `displacement` m, `velocity` m/s, `force` N and, where one commands the damper,
+        `voltage` V, each (n,).
     """
     t = motion.time
 
@@ -386,7 +403,7 @@ def perform(damper: Damper, motion: Motion, volts: Programme, scales: Scales) ->
         "time": t,
         "displacement": np.array([one[0] for one in moved]),
         "velocity": np.array([one[1] for one in moved]),
-        "voltage": np.array(command),
+        **({"voltage": np.array(command)} if damper.commanded else {}),
         "force": np.array(force),
     }
 
@@ -593,12 +610,13 @@ def streams(seed: int) -> list[np.random.Generator]:
 def scales_of(rig: str, law: str) -> Scales:
     """Return what the numbers of a rig ("bench", "building") are measured in."""
     drift = DRIFT if rig == "building" else 0.0
-    return Scales(FORCE, SPEED, STROKE, CENTRE[law]["w_n"], drift)
+    drop = CENTRE.get(law, CENTRE["lugre"])["w_n"]
+    return Scales(FORCE, SPEED, STROKE, drop, drift)
 
 
 def draw_damper(law: str, rng: np.random.Generator) -> Values:
     """Return the values of a damper's law."""
-    table = CENTRE[law]
+    table = devices.DEVICES.get(law) or CENTRE[law]
     spread = _spread(tuple(table.values()), rng)
     return dict(zip(table, spread.tolist(), strict=True))
 

@@ -44,7 +44,7 @@ def steady_state(law: str, w: float, volts: float) -> float:
 
 
 def test_the_equations_use_no_law_no_effect_and_no_fit() -> None:
-    for name in ("rigs", "hidden"):
+    for name in ("rigs", "devices", "hidden"):
         path = ROOT / "bristle" / "examples" / f"{name}.py"
         ours = {one for one in imported(path) if one.startswith("bristle.")}
         assert {one.split(".")[1] for one in ours} <= {"errors", "core", "examples"}
