@@ -44,14 +44,15 @@ class Experiment:
     switch: float
     contrast: float = 0.0
     deviations: float = 0.0
-    drive: Drive = VOLTAGE
+    drive: Drive | None = VOLTAGE
 
     def sentence(self, rule: DecisionRule = BENCH) -> str:
         """Return the run as a sentence of an experiment's plan."""
         if self.deviations < rule.separating_sigma:
+            levels = f" and levels of the {self.drive.name}" if self.drive else ""
             return (
-                "No run within the strokes, speeds, accelerations and levels of the "
-                f"{self.drive.name} so far would distinguish them: at best the forces "
+                f"No run within the strokes, speeds{',' if self.drive else ' and'} accelerations"
+                f"{levels} so far would distinguish them: at best the forces "
                 f"differ by {self.deviations:.1f} standard deviations over "
                 f"{LENGTH:g} s. Use a wider range."
             )
@@ -61,18 +62,20 @@ class Experiment:
             else f"a sweep of {1e3 * self.amplitude:.3g} mm from {self.low:.3g} to "
             f"{self.high:.3g} Hz"
         )
-        low, high = self.levels
-        drive = (
-            f"at {low:.3g} {self.drive.unit}"
-            if low == high
-            else f"with the {self.drive.name} switched between {low:.3g} and {high:.3g} "
-            f"{self.drive.unit} every "
-            f"{self.switch:.3g} s"
-        )
         return (
-            f"Run {motion} {drive} for {LENGTH:g} s: then the forces of the alternatives differ "
+            f"Run {motion}{self._driven()} for {LENGTH:g} s: then the forces of the alternatives differ "
             f"by {self.contrast:.2g} times the noise, even if they are fitted again."
         )
+
+    def _driven(self) -> str:
+        """Return what the command does meanwhile."""
+        if self.drive is None:
+            return ""
+        (low, high), unit = self.levels, self.drive.unit
+        if low == high:
+            return f" at {low:.3g} {unit}"
+        switched = f"switched between {low:.3g} and {high:.3g} {unit} every {self.switch:.3g} s"
+        return f" with the {self.drive.name} {switched}"
 
     def signals(self, dt: float) -> tuple[Array, Array, Array, Array]:
         """Return x, v, a (n,) [m, m/s, m/s2] and V (n,) [V] of the run."""
@@ -122,7 +125,7 @@ def _plans(problem: Problem) -> list[Experiment]:
     for amplitude in (x_top, 0.3 * x_top, 0.1 * x_top):
         top = _highest(problem, amplitude)
         for low, high in ((0.05 * top, top), (0.1 * top, 0.1 * top), (top, top)):
-            kind = DRIVES[problem.runs[0].drive]
+            kind = DRIVES[problem.runs[0].drive] if V_top > 0.0 else None
             plans += [Experiment(amplitude, low, high, *drive, drive=kind) for drive in drives]
     return plans
 

@@ -12,6 +12,7 @@ from ..data.channels import channel_unit, is_channel
 from ..identification.error import ForceError
 from ..physics.drive import Drive, text_for, unit_for
 from ..physics.effect import EFFECTS
+from ..physics.laws import LAWS
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.plots import ROW, draw_ranking
 from ..view.style import Page, look
@@ -192,8 +193,16 @@ def _tables(verdict: Verdict) -> list[Block]:
 
 
 def law_block(rows: Sequence[Verdict]) -> Table:
-    """Return the table of laws, from its rows as verdict.json has them."""
-    return Table(HEADER, law_table(rows), range(2, 8), "The laws", note=TABLE_NOTE)
+    """Return the table of laws, from its rows as verdict.json has them.
+
+    Without the form of the command where laws without one were tried: nothing commands the damper.
+    """
+    told, laws = [*range(len(HEADER))], [LAWS.get(str(row["law"])) for row in rows]
+    if any(law is not None and not law.own and not law.has("command") for law in laws):
+        told.remove(HEADER.index("command"))
+    cells = [[row[k] for k in told] for row in law_table(rows)]
+    right = range(len(told) - 6, len(told))
+    return Table([HEADER[k] for k in told], cells, right, "The laws", note=TABLE_NOTE)
 
 
 def _trials(verdict: Verdict) -> list[Block]:

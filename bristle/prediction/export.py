@@ -263,7 +263,7 @@ def _range(study: Study, model: Model, runs: Runs, notes: list[str]) -> dict[str
     """
     found = {}
     drive = drive_named(runs.all[0].drive)  # that of all runs
-    if not runs.all[0].drive:
+    if not runs.all[0].drive and study.settings.has_building:
         notes.append("neither voltage nor current was measured: the scenario holds 0 V.")
     tops = [float(one[drive.name].max()) for one in runs.all if one.has(drive.name)]
     if max(tops, default=0.0) > drive.largest:

@@ -422,11 +422,12 @@ def _before_after(content: Content) -> str:
         names = ("", "the model now")
     z = f"z {short_z(content.before.z)} before, " if content.before else ""
     title = f"Before and after {content.added}" if content.before else "The loops"
+    by = "the level of the command, else by speed" if content.study.drive else "speed"
     loops = html.figure(
         png(loops_page(content.before, content.now, names)),
         f"Force loops, measured and predicted; {z}{short_z(content.now.z)} now",
-        "Single cycles of held-out runs by the level of the command, else by speed: measured "
-        "(black), predicted (blue), and the band in which 95 % of a true model's samples would be.",
+        f"Single cycles of held-out runs by {by}: measured (black), predicted (blue), and the band "
+        "in which 95 % of a true model's samples would be.",
     )
     page = maps_page(content.before, content.now, names)
     maps = ""

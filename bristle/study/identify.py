@@ -17,7 +17,7 @@ from ..errors import StudyError
 from ..identification.error import ForceError
 from ..identification.error_table import LawError, error_table
 from ..identification.histories import compile_ahead
-from ..identification.problem import robust_z
+from ..identification.problem import Problem, robust_z, suited
 from ..identification.rig import DAMPER, Rig
 from ..identification.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identification.run_start import under_load_text
@@ -415,17 +415,19 @@ def _table(at: SiteModel, task: FitTask) -> list[LawError]:
     if site.is_line or not site.any_law or samples > _LONGEST_TABLE:
         return []
     return error_table(
-        site.train, site.holdout, task.cutoff, laws=_tabled(at.model.law),
+        site.train, site.holdout, task.cutoff, laws=_tabled(at.model.law, site.train),
         starts=min(task.starts, _TABLE_STARTS),
     )  # fmt: skip
 
 
-def _tabled(own: str) -> tuple[str, ...]:
+def _tabled(own: str, train: Problem) -> tuple[str, ...]:
     """Return the laws of the table: the model's, and those that a step moves on by `advance`.
+
+    Of these the ones that suit the runs.
 
     What is integrated by its rates takes minutes to fit; whoever wants it asks for it by name.
     """
-    named = {name: base_and_variant(name)[0] for name in law_names()}
+    named = {name: base_and_variant(name)[0] for name in suited(train, law_names())}
     names = tuple(n for n, law in named.items() if law.exact() or law.name == own)
     return names if own in names else (*names, own)
 

@@ -31,7 +31,7 @@ class Delay(Effect):
         "Horiuchi, Inoue, Konno & Namita (1999), Earthq. Eng. Struct. Dyn. 28(10), 1121-1141 "
         "(delays in dynamic tests); filter: Thomson (1949), Proc. IEE 96(44), 487-490"
     )
-    expect = "the whole residual follows the rate of the force, whatever the motion and voltage"
+    expect = "the whole residual follows the rate of the force, whatever the motion"
     states = {"half": "N", "low": "N", **{f"past_{k}": "N" for k in range(SLOTS)}}
     starts = dict.fromkeys(states, "value")
     amount = "time"

@@ -25,7 +25,7 @@ class Flattening(Effect):
         "Yasuda, Armstrong & Cohen (1981), Rheologica Acta 20(2), 163-178 (Carreau's and Cross's "
         "laws in one)"
     )
-    expect = "too much predicted force at high speed, in both directions, at every voltage alike"
+    expect = "too much predicted force at high speed, in both directions alike"
     amount = "1/v_f"
     parameters = {
         "v_f": Parameter(0.5, "m/s", (1e-3, 1e3), "speed over which the force falls"),

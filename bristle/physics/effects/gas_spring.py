@@ -23,7 +23,7 @@ class GasSpring(Effect):
     source = (
         "Spencer, Dyke, Sain & Carlson (1997), J. Eng. Mech. 123(3), 230-238, element k_1 (x - x_0)"
     )
-    expect = "a force in phase with displacement, whatever the velocity and voltage"
+    expect = "a force in phase with displacement, whatever the velocity"
     amount = "k"
     parameters = {
         "k": Parameter(80.0, "N/m", (0.0, 1e6), "stiffness at mid-stroke"),
