@@ -63,8 +63,8 @@ class Experiment:
             f"{self.high:.3g} Hz"
         )
         return (
-            f"Run {motion}{self._driven()} for {LENGTH:g} s: then the forces of the alternatives differ "
-            f"by {self.contrast:.2g} times the noise, even if they are fitted again."
+            f"Run {motion}{self._driven()} for {LENGTH:g} s: then the forces of the alternatives "
+            f"differ by {self.contrast:.2g} times the noise, even if they are fitted again."
         )
 
     def _driven(self) -> str:

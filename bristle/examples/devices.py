@@ -102,11 +102,11 @@ def in_library_names(law: str, p: Values) -> Values:
                                     ("v_", tail, "b"))
         }  # fmt: skip
         gas = {"f_0": -p["G"], "k_g": stiffness, "k_g2": -stiffness * (p["n"] + 1.0) / 2.0 / p["L"]}
-        return {**valves, "f_s": p["B"], "rho": 1.0 / p["l"], "k_s": p["K"], **gas}
+        return {**valves, "f_s": p["B"], "rho": 1.0 / p["l"], "give": 1.0 / p["K"], **gas}
     if law == "friction_damper":
         return {"f_c": p["R"], "rho": 1.0 / p["l"], "play": p["gap"], "c": p["D"], "k": p["S"]}
     if law == "isolator":
         rubber = {"k": p["R"], "k_3": p["H"], "c": p["D"]}
         return {"q": p["Y"], "rho": 1.0 / p["l"], "sigma": p["t"], **rubber}
     c = p["P"] * 0.1 ** p["p"]
-    return {"c": c, "alpha": p["p"], "rho": p["K"] / c}
+    return {"c": c, "alpha": p["p"], "give": c / p["K"]}

@@ -632,7 +632,7 @@ def sizes(runs: list[Run]) -> dict[str, float]:
         "N.s/m": force / v, "N.s2/m2": force / v**2, "kg": force / a, "J": force * x, "V": V,
         "N/V": force / V, "N/(m.V)": force / (x * V), "N.s/(m.V)": force / (v * V),
         "N/V2": force / V**2, "N/(m.V2)": force / (x * V**2), "N.s/(m.V2)": force / (v * V**2),
-        "1/m": 1.0 / x,
+        "1/m": 1.0 / x, "m/N": x / force,
         "s": 0.05, "1": 1.0, "1/K": 0.01,
     }  # fmt: skip
 

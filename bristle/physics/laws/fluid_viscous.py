@@ -64,12 +64,13 @@ def flow(y, alpha):
     return speed if y >= 0.0 else -speed
 
 
-def relaxing(y, rho, alpha):
-    """Return the rate [1/s] at which the carried share of c relaxes where it is y > 0."""
-    return rho * flow(y, alpha) / (alpha * y)
+def relaxation(y, give, alpha):
+    """Return the time [s] in which the carried share of c relaxes where it is y >= 0."""
+    through = flow(y, alpha)
+    return max(give * alpha * y / through, AT_ONCE) if through > 0.0 else AT_ONCE
 
 
-def carried_on(y, v, rho, alpha, dt):
+def carried_on(y, v, give, alpha, dt):
     """Return the share of c [1] that is carried after a step at constant velocity v [m/s].
 
     The spring takes up what the dashpot does not let through at the mean share. That lies between
@@ -78,16 +79,18 @@ def carried_on(y, v, rho, alpha, dt):
     goal = steady(v, alpha)
     if y == goal or dt <= 0.0:
         return y
-    share = mean_share(relaxing(max(abs(y), abs(goal)), rho, alpha) * dt)
-    gain = share * rho * dt
+    if give <= 0.0:
+        return goal
+    share = mean_share(dt / relaxation(max(abs(y), abs(goal)), give, alpha))
+    step = share * dt
     low, high, mean = min(y, goal), max(y, goal), goal
     width = high - low
     for _ in range(MOST_TRIALS):
         through = flow(mean, alpha)
-        slope = 1.0 + gain * through / (alpha * mean) if mean != 0.0 else 0.0
-        excess = mean - y - gain * (v - through)
+        slope = give + step * through / (alpha * mean) if mean != 0.0 else 0.0
+        excess = give * (mean - y) - step * (v - through)
         low, high, mean = narrowed(low, high, mean, excess, slope)
-        if abs(excess) <= CLOSE * width:
+        if abs(excess) <= CLOSE * (give * width + step * abs(v)):
             break
     return y + (mean - y) / share
 
@@ -95,11 +98,11 @@ def carried_on(y, v, rho, alpha, dt):
 class FluidViscous(Law):
     """Fluid viscous damper: f = c y, a dashpot with a power of the speed behind a spring.
 
-        y' = rho (v - V_r |y|^(1/alpha) sgn(y)),   V_r = 0.1 m/s
+        give y' = v - V_r |y|^(1/alpha) sgn(y),   V_r = 0.1 m/s
 
     Steady motion gives f = c (|v|/V_r)^alpha sgn(v), so C = c/V_r^alpha of data sheets; the spring,
-    that of the oil and the brackets, is k = c rho. alpha below 1 limits the force at speed, 2 is an
-    orifice. Leaves out friction of seals and a gas force.
+    that of the oil and the brackets, is k = c/give. alpha below 1 limits the force at speed, 2 is
+    an orifice. Leaves out friction of seals and a gas force.
     """
 
     name = "fluid_viscous"
@@ -114,11 +117,11 @@ class FluidViscous(Law):
     parameters = {
         "c": Parameter(8.0, "N", (0.0, 1e8), "force of steady motion at 0.1 m/s"),
         "alpha": Parameter(0.6, "1", (0.1, 2.0), "exponent of the speed"),
-        "rho": Parameter(1000.0, "1/m", (1.0, 1e7), "stiffness of the spring in series, by c"),
+        "give": Parameter(1e-3, "m", (0.0, 1.0), "deflection under c of the spring in series"),
     }
     shapes = {
         "alpha": Shape(0.2, 1.8, 6, ("c",)),
-        "rho": Shape(2.0, 2000.0, 5, ("c",)),
+        "give": Shape(5e-4, 0.5, 5, ("c",)),
     }
 
     @staticmethod
@@ -127,13 +130,14 @@ class FluidViscous(Law):
         top = max(abs(z.carried), abs(at), abs(now))
         if at == now or top == 0.0:
             return p.c * z.carried
-        late = late_share(relaxing(top, p.rho, p.alpha) * q.dt)
+        late = late_share(q.dt / relaxation(top, p.give, p.alpha))
         return p.c * (z.carried + late * (now - at))
 
     @staticmethod
     def rate(q, z, p):
-        return p.rho * (q.v - flow(z.carried, p.alpha)), (q.v - z.rod) / AT_ONCE
+        give = max(p.give, AT_ONCE * V_REF)
+        return (q.v - flow(z.carried, p.alpha)) / give, (q.v - z.rod) / AT_ONCE
 
     @staticmethod
     def advance(q, z, p):
-        return carried_on(z.carried, q.v, p.rho, p.alpha, q.dt), q.v
+        return carried_on(z.carried, q.v, p.give, p.alpha, q.dt), q.v

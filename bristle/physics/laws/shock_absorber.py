@@ -38,27 +38,26 @@ def slope(u, p):
 
 def relaxation(resisting, p):
     """Return the time [s] in which the oil follows the rod, at a slope of the valves [N.s/m]."""
-    return max(resisting / p.k_s, AT_ONCE)
+    return max(resisting * p.give, AT_ONCE)
 
 
 def flowing(u, v, p, dt):
     """Return the speed of the oil [m/s] after a step at constant velocity v [m/s].
 
-    The spring in series takes up what the valves do not let through: their force rises by its
-    stiffness times the travel of the rod beyond that of the oil, whose mean speed lies at a share
+    What gives way takes up what the valves do not let through: it bends, by their force's rise
+    times its compliance, as the rod moves farther than the oil, whose mean speed lies at a share
     of its change. The speed stays between that at the begin and the rod's.
     """
     if u == v or dt <= 0.0:
         return u
-    stiff = p.k_s * dt
     share = mean_share(dt / relaxation(slope(v, p), p))
-    goal = valves(u, p) + stiff * (v - (1.0 - share) * u)
+    begin, goal = valves(u, p), dt * (v - (1.0 - share) * u)
     low, high, end = min(u, v), max(u, v), v
-    width, stiff = high - low, share * stiff
+    width = high - low
     for _ in range(MOST_TRIALS):
-        excess = valves(end, p) + stiff * end - goal
+        excess = p.give * (valves(end, p) - begin) + share * dt * end - goal
         before = end
-        low, high, end = narrowed(low, high, end, excess, slope(end, p) + stiff)
+        low, high, end = narrowed(low, high, end, excess, p.give * slope(end, p) + share * dt)
         if abs(end - before) <= CLOSE * width:
             break
     return end
@@ -67,14 +66,14 @@ def flowing(u, v, p, dt):
 class ShockAbsorber(Law):
     """Shock absorber: f = F_valves(u) + f_s rho z + f_0 + k_g x + k_g2 x^2.
 
-        F_valves = c_2 u + (c_1 - c_2) v_k tanh(u/v_k),   F_valves' = k_s (v - u)
+        F_valves = c_2 u + (c_1 - c_2) v_k tanh(u/v_k),   give F_valves' = v - u
         z' = v - rho |v| z
 
     c_1, c_2 and the knee v_k are those of rebound (c_r1, c_r2, v_r) as +x grows, and of compression
     (c_c1, c_c2, v_c) on the way back: c_2 < c_1 is digressive, a valve that blows off, c_2 > c_1
-    progressive. Both rise with speed, so the valves never feed energy. k_s is the stiffness of oil,
-    hoses and bushes, f_s the friction of the seals, f_0 the gas force at mid-stroke. Leaves out
-    cavitation and the heat of the oil: doubt it when the force fades from cycle to cycle.
+    progressive. Both rise with speed, so the valves never feed energy. give is the compliance of
+    oil, hoses and bushes, f_s the friction of the seals, f_0 the gas force at mid-stroke. Leaves
+    out cavitation and the heat of the oil: doubt it when the force fades from cycle to cycle.
     """
 
     name = "shock_absorber"
@@ -97,14 +96,14 @@ class ShockAbsorber(Law):
         "f_0": Parameter(0.0, "N", (-1e6, 1e6), "gas force at mid-stroke"),
         "k_g": Parameter(40.0, "N/m", (0.0, 1e7), "stiffness of the gas"),
         "k_g2": Parameter(500.0, "N/m2", (-1e9, 1e9), "growth of that stiffness to one end"),
-        "k_s": Parameter(1e4, "N/m", (1.0, 1e10), "stiffness in series with the valves"),
+        "give": Parameter(1e-4, "m/N", (0.0, 1.0), "compliance in series with the valves"),
         "rho": Parameter(2000.0, "1/m", (1.0, 1e7), "inverse of the deflection of the seals"),
     }
     shapes = {
         "v_r": Shape(0.1, 3.0, 5, ("c_r1", "c_r2")),
         "v_c": Shape(0.1, 3.0, 5, ("c_c1", "c_c2")),
         "rho": Shape(1.0, 100.0, 3, ("f_s",)),
-        "k_s": Shape(20.0, 20.0, 1, ()),
+        "give": Shape(0.03, 0.03, 1, ()),
     }
 
     @staticmethod
