@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.files import replaced_by
+from ..core.files import replaced_by, writing
 from ..errors import EnsembleError, RunError
 from ..model.draws import POINT, reach, simulated_whole
 from .campaign import RunOutcome
@@ -54,15 +54,13 @@ class RunsTable:
         self._file = -1
         if path is None:
             return
-        try:
+        with writing(path, EnsembleError):
             if path.exists() and not fresh:
                 self.outcomes = _read(plan, path)
                 self._rewrite()  # without a line cut short
             else:
                 replaced_by(path, lambda new: new.write_bytes(_head(plan)))
             self._file = os.open(path, os.O_WRONLY | os.O_APPEND)
-        except OSError as error:
-            raise EnsembleError(f"{path}: cannot be written ({error.strerror or error}).") from None
 
     @property
     def left(self) -> list[int]:

@@ -146,6 +146,11 @@ def add_no_figure(parser: argparse.ArgumentParser, text: str = "draw nothing") -
     parser.add_argument("--no-figure", action="store_true", help=text)
 
 
+def add_out(parser: argparse.ArgumentParser, text: str, metavar: str = "FOLDER") -> None:
+    """Add --out, the file or folder that a command writes."""
+    parser.add_argument("-o", "--out", type=Path, metavar=metavar, help=text)
+
+
 def add_overrides(
     parser: argparse.ArgumentParser, of: str = "file", example: str = "damper.f_c=2"
 ) -> None:
@@ -212,10 +217,14 @@ def print_json(answer: Any) -> None:
     print(json_text(answer))
 
 
-def print_view(view: View, files: Iterable[Path | str]) -> None:
-    """Print a view, and the files that were written."""
+def print_answer(
+    arguments: argparse.Namespace, answer: Any, view: View, files: Iterable[Path | str] = ()
+) -> None:
+    """Print an answer: as JSON where that is asked for, else its view and the files written."""
     from ..view import terminal
 
+    if arguments.json:
+        return print_json(answer)
     print(terminal.text(view))
     for path in files:
         print(f"  {path}")
@@ -225,18 +234,22 @@ IN_REPORT = ("add", "compare", "diagnose", "identify", "study")
 """Commands whose details stand in a study's report too."""
 
 
-def print_study_view(view: View, arguments: argparse.Namespace, *pictures: Path | None) -> None:
-    """Print the view of a study's result, and the pictures that were drawn.
+def print_study_answer(
+    arguments: argparse.Namespace, answer: Any, view: View, *pictures: Path | None
+) -> None:
+    """Print a study's result: as JSON where that is asked for, else its view and its pictures.
 
     Parameters
     ----------
-    view : of the result
     arguments : of the command, with `folder` and `details`
+    answer, view : of the result
     pictures : their files, None for one that was not drawn
     """
     from ..core.text import command
     from ..view import terminal
 
+    if arguments.json:
+        return print_json(answer)
     elsewhere = command("report", arguments.folder) if arguments.command in IN_REPORT else ""
     print(terminal.text(view, details=arguments.details, elsewhere=elsewhere))
     for picture in filter(None, pictures):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import add_json, add_study, add_trust, print_json, print_view
+from ._options import add_json, add_study, add_trust, print_answer
 
 HELP = (
     "add an effect to a study's model and refit it: error before and after, a step in the history"
@@ -30,8 +30,5 @@ def main(arguments: argparse.Namespace) -> int:
     study = Study(arguments.folder)
     added = add_effects(study, arguments.effects, why=arguments.why)
     keeps("The new step is kept in the study's history.")
-    if arguments.json:
-        print_json(added.as_dict())
-    else:
-        print_view(added_view(added, arguments.folder), ())
+    print_answer(arguments, added.as_dict(), added_view(added, arguments.folder))
     return 0

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
-from ._options import add_json, add_native, add_trust, builder, print_json
+from ._options import add_json, add_native, add_out, add_trust, builder, print_json
 
 if TYPE_CHECKING:
     from ..fmu.build import BuildPlan
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("component", metavar="COMPONENT", help=text)
     text = "building file, for a Structure"
-    parser.add_argument("--from", dest="building", type=Path, metavar="FILE", help=text)
+    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
     text = "ground motion (PEER AT2, CSV or a name), for a GroundMotion"
     parser.add_argument("--record", type=Path, metavar="FILE", help=text)
     text = "controller file of `bristle design`, for a controller of its kind"
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--effects", dest="offers", default="", metavar="NAMES", help=text)
     parser.add_argument("--name", help="name of the model and its file; else the component's")
     text = "folder of NAME.fmu; an older one is replaced; else the current folder"
-    parser.add_argument("--out", type=Path, default=Path(), metavar="FOLDER", help=text)
+    add_out(parser, text)
     add_native(parser)
     add_trust(parser)
     add_json(parser)
@@ -68,7 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
         offers=None if every else names,
         starts={} if every else {name + SWITCH: True for name in names},
     )
-    target = arguments.out / f"{what.name}.fmu"
+    target = (arguments.out or Path()) / f"{what.name}.fmu"
     fresh = not arguments.native and built_guid(target) == what.guid()
     make = builder(arguments)
     if not fresh:

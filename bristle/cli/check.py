@@ -152,13 +152,12 @@ def _own(file: Path, as_json: bool) -> int:
 
 def _word(file: Path) -> str:
     """Return what a file defines, "effect" or "law", by the class that its class extends."""
+    from ..core.files import reading
     from ..errors import PhysicsError
     from ..user_code.reading import text_of
 
-    try:
+    with reading(file, PhysicsError):
         bases = re.findall(r"^class \w+\((\w+)", text_of(file, errors="replace"), re.MULTILINE)
-    except OSError as error:
-        raise PhysicsError(f"{file}: cannot be read ({error.strerror or error}).") from None
     if "OwnController" in bases:
         raise PhysicsError(f"{file}: a controller is checked where it is built: bristle build FILE")
     return "law" if "Law" in bases else "effect"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Block, Next, Text
-from ._options import add_details, add_json, add_study, add_trust, print_json
+from ._options import add_details, add_json, add_out, add_study, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -24,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_study(parser)
     add_role(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
+    add_out(parser, "file of the picture", "FILE")
     add_trust(parser)
     add_details(parser)
     add_json(parser)

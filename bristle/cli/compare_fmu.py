@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_channel, add_details, add_json, channels_of, print_json
+from ._options import add_channel, add_details, add_json, add_out, channels_of, print_json
 
 if TYPE_CHECKING:
     from ..prediction.compare_fmu import FmuComparison
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_channel(parser)
     text = "time limit of the run in s"
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help=text)
-    parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
+    add_out(parser, "file of the picture", "FILE")
     add_details(parser)
     add_json(parser)
 

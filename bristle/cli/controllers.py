@@ -11,7 +11,15 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_json, add_no_figure, add_trust, finite, print_json, print_view, share_of
+from ._options import (
+    add_json,
+    add_no_figure,
+    add_out,
+    add_trust,
+    finite,
+    print_answer,
+    share_of,
+)
 
 if TYPE_CHECKING:
     from ..controller_comparison.result import ControllerComparison
@@ -70,11 +78,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "number of processes; else one per core"
     parser.add_argument("--workers", type=int, metavar="N", help=text)
     add_no_figure(parser, "write only tables, no report")
-    parser.add_argument(
-        "--out", type=Path, metavar="FOLDER",
-        help="folder of report, tables and scenarios; older ones are replaced; else "
-        "results/comparison/BUILDING/",
-    )  # fmt: skip
+    text = (
+        "folder of report, tables and scenarios; older ones are replaced; else "
+        "results/comparison/BUILDING/"
+    )
+    add_out(parser, text)
     add_json(parser)
     add_trust(parser)
 
@@ -107,10 +115,8 @@ def main(arguments: argparse.Namespace) -> int:
         write_whole(files[0], controllers_report(found))
     answer = {"command": _said(arguments), **_answer(found, files)}
     write_whole(folder / ANSWER, json.dumps(answer, indent=1, allow_nan=False))
-    if arguments.json:
-        print_json(answer)
-    else:
-        print_view(found.view(), ())
+    print_answer(arguments, answer, found.view())
+    if not arguments.json:
         print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
         for path in files:
             print(f"  {path}")

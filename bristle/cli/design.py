@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next
-from ._options import add_json, print_json, print_view
+from ._options import add_json, add_out, print_answer
 
 if TYPE_CHECKING:
     from ..synthesis import DesignResult
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", choices=tuple(_COMPONENTS), help="kind of controller")
     parser.add_argument("file", type=Path, metavar="FILE", help="design file, TOML")
     text = "controller file, with figure and answer beside it; else named after the design file"
-    parser.add_argument("--out", type=Path, metavar="FILE.json", help=text)
+    add_out(parser, text, "FILE.json")
     add_json(parser)
 
 
@@ -51,10 +51,10 @@ def main(arguments: argparse.Namespace) -> int:
     result = design(task)
     answer = {**_answer(result), "warnings": warnings}
     answer["files"] = [str(path.absolute()) for path in _write(result, answer, out)]
-    if arguments.json:
-        print_json(answer)
-    else:
-        _print(result, answer["files"], out)
+    component = _COMPONENTS[result.controller.kind].split()[0]
+    bake = Next(command("build", component, "--controller", out), "bakes it in")
+    view = result.view()
+    print_answer(arguments, answer, view._replace(blocks=(*view.blocks, bake)), answer["files"])
     return 0
 
 
@@ -73,10 +73,11 @@ def _write(result: DesignResult, answer: dict[str, Any], out: Path) -> list[Path
     """Write controller file, answer and picture beside the target, and rename them into place."""
     import json
 
+    from ..core.files import writing
     from ..errors import DesignError
     from ..synthesis.analysis import curves
 
-    try:
+    with writing(out, DesignError):
         with tempfile.TemporaryDirectory(prefix=".bristle_", dir=out.absolute().parent) as folder:
             made = [Path(folder) / out.name]
             result.controller.save(made[0])
@@ -89,12 +90,3 @@ def _write(result: DesignResult, answer: dict[str, Any], out: Path) -> list[Path
                 made.append(made[0].with_suffix(".png"))
                 draw_design(result, made[-1])
             return [path.replace(out.parent / path.name) for path in made]
-    except OSError as error:
-        raise DesignError(f"{out}: cannot be written ({error.strerror or error}).") from error
-
-
-def _print(result: DesignResult, files: list[str], out: Path) -> None:
-    component = _COMPONENTS[result.controller.kind].split()[0]
-    bake = Next(command("build", component, "--controller", out), "bakes it in")
-    view = result.view()
-    print_view(view._replace(blocks=(*view.blocks, bake)), files)

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import (
-    add_details,
-    add_dry_run,
-    add_json,
-    add_study,
-    add_trust,
-    print_json,
-    print_study_view,
-)
+from ._options import add_details, add_dry_run, add_json, add_study, add_trust, print_study_answer
 
 HELP = "find the effects that a study's model misses, with confidence and alternatives"
 
@@ -41,6 +33,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..core.progress import tell
     from ..study.steps import diagnose_study, verdict_of
     from ..study.study import Study
+    from ..study.view import diagnosed_view
 
     study = Study(arguments.folder)
     found = diagnose_study(
@@ -55,10 +48,5 @@ def main(arguments: argparse.Namespace) -> int:
         from ..view.style import png
 
         picture = study.write_report("diagnose.png", png(draw_verdict(verdict)))
-    if arguments.json:
-        print_json(verdict)
-    else:
-        from ..study.view import diagnosed_view
-
-        print_study_view(diagnosed_view(verdict, study.folder), arguments, picture)
+    print_study_answer(arguments, verdict, diagnosed_view(verdict, study.folder), picture)
     return 0

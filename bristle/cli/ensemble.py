@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_json, add_no_figure, add_trust, print_json, print_view
+from ._options import add_json, add_no_figure, add_out, add_trust, print_answer
 
 if TYPE_CHECKING:
     from ..campaign.ensemble import Ensemble
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "folder of runs, quantiles and figure; a stopped ensemble continues there; else "
         "results/NAME/"
     )
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help=text)
+    add_out(parser, text)
     parser.add_argument("--fresh", action="store_true", help="start again and replace earlier runs")
     text = "repeat runs that failed, alone or with an effect"
     parser.add_argument("--retry", action="store_true", help=text)
@@ -66,10 +66,7 @@ def main(arguments: argparse.Namespace) -> int:
         print(stopped, file=sys.stderr)
         return 130
     files = _write(found, folder, not arguments.no_figure)
-    if arguments.json:
-        print_json(_answer(found, files))
-    else:
-        print_view(found.view(), files.values())
+    print_answer(arguments, _answer(found, files), found.view(), files.values())
     if not (found.runs["status"] == "done").any():
         print(f"RunError: all {len(found.runs)} runs failed.", file=sys.stderr)
         return 1
@@ -77,17 +74,14 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
+    from ..core.files import writing
     from ..errors import not_usable
 
     files = {"runs": folder / "runs.csv", "quantiles": folder / "quantiles.csv"}
-    try:
+    with writing(files["quantiles"], not_usable):
         if found.continued < len(found.runs):
             (folder / "figure.png").unlink(missing_ok=True)  # that of fewer runs, or of others
         found.quantiles.to_csv(files["quantiles"], float_format="%.9g")
-    except OSError as error:
-        raise not_usable(
-            f"{files['quantiles']}: cannot be written: {error.strerror or error}."
-        ) from error
     if figure and (found.runs["status"] == "done").sum() > 1:
         from ..campaign.view import draw_ensemble
 

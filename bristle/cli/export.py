@@ -15,11 +15,12 @@ from ..errors import ScenarioError, StudyError
 from ._options import (
     add_json,
     add_native,
+    add_out,
     add_overrides,
     add_trust,
     builder,
+    print_answer,
     print_json,
-    print_view,
 )
 
 HELP = "write a study's model as an FMU; or a scenario as one FMU, or as a web page"
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("what", metavar="FOLDER", help=text)
     text = "output folder; else export/ in the study, with --as-one the current folder"
-    parser.add_argument("--out", type=Path, metavar="DIR", help=text)
+    add_out(parser, text)
     text = "write the whole scenario as one FMU, with --native"
     parser.add_argument("--as-one", action="store_true", help=text)
     text = (
@@ -71,18 +72,15 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     found = export_study(Study(Path(arguments.what)), arguments.out, builder(arguments))
-    if arguments.json:
-        answer = {
-            "fmu": str(found.fmu.absolute()),
-            "scenario": str(found.scenario.absolute()),
-            "files": [str(file.absolute()) for file in found.files],
-            "run": found.run,
-            "notes": list(found.notes),
-            "proof": found.proof and found.proof.as_dict(),
-        }
-        print_json(answer)
-        return 0
-    print_view(found.view(), ())
+    answer = {
+        "fmu": str(found.fmu.absolute()),
+        "scenario": str(found.scenario.absolute()),
+        "files": [str(file.absolute()) for file in found.files],
+        "run": found.run,
+        "notes": list(found.notes),
+        "proof": found.proof and found.proof.as_dict(),
+    }
+    print_answer(arguments, answer, found.view())
     return 0
 
 

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_json, add_native, add_overrides, add_trust, builder, print_json
+from ._options import add_json, add_native, add_out, add_overrides, add_trust, builder, print_json
 
 if TYPE_CHECKING:
     from ..engine.coupling_error import Expected
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "scenario file, or name of a stock scenario"
     parser.add_argument("scenario", metavar="SCENARIO", help=text)
     text = "file of the package; an older one is replaced; else NAME.ssp in the current folder"
-    parser.add_argument("-o", "--out", type=Path, metavar="FILE.ssp", help=text)
+    add_out(parser, text, "FILE.ssp")
     text = "also write OspSystemStructure.xml with the FMUs beside it"
     parser.add_argument("--osp", type=Path, metavar="FOLDER", help=text)
     add_overrides(parser)

@@ -10,10 +10,10 @@ from ._options import (
     add_json,
     add_study,
     add_trust,
+    import_ahead,
     json_text,
-    print_json,
-    print_study_view,
-    print_view,
+    print_answer,
+    print_study_answer,
 )
 
 HELP = (
@@ -63,7 +63,6 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.fit_view import identified_with_next
     from ..study.identify import STAGES, identify_study
     from ..study.study import Study
-    from ._options import import_ahead
 
     study = Study(arguments.folder)
     if not arguments.dry_run:
@@ -93,11 +92,8 @@ def main(arguments: argparse.Namespace) -> int:
         if budget is not None:
             parts = study.write_report("force_budget.png", png(budget, 110))
         study.write_report("identify.json", json_text(found.as_dict()) + "\n")
-    if arguments.json:
-        place = str(picture.absolute()) if picture else None
-        print_json({**found.as_dict(), "picture": place})
-        return 0
-    print_study_view(identified_with_next(found, study.folder), arguments, picture, parts)
+    answer = {**found.as_dict(), "picture": str(picture.absolute()) if picture else None}
+    print_study_answer(arguments, answer, identified_with_next(found, study.folder), picture, parts)
     return 0
 
 
@@ -113,8 +109,5 @@ def _main_building(arguments: argparse.Namespace) -> int:
     if arguments.law:
         raise StudyError("--law is a damper's: --structure identifies the building without one.")
     found = identify_building_alone(Study(arguments.folder), write=not arguments.dry_run)
-    if arguments.json:
-        print_json(found.as_dict())
-        return 0
-    print_view(found.view(), ())
+    print_answer(arguments, found.as_dict(), found.view())
     return 0

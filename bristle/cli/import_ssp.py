@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from ..core.text import command, cut_short
-from ._options import add_json, print_json
+from ._options import add_json, add_out, print_json
 
 HELP = "convert an SSP package of another tool to a scenario"
 
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle import-ssp`."""
     parser.add_argument("package", type=Path, metavar="FILE.ssp", help="SSP 1.0 or 2.0")
     text = "folder of scenario and FMUs; else NAME/ in the current folder"
-    parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help=text)
+    add_out(parser, text)
     add_json(parser)
 
 

@@ -14,15 +14,7 @@ import argparse
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-from ._options import (
-    add_details,
-    add_dry_run,
-    add_json,
-    add_study,
-    add_trust,
-    print_json,
-    print_study_view,
-)
+from ._options import add_details, add_dry_run, add_json, add_study, add_trust, print_study_answer
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -83,10 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
         table=arguments.table,
         write=not arguments.dry_run,
     )
-    if arguments.json:
-        print_json(found.as_dict())
-        return 0
-    print_study_view(learned_with_next(found, arguments.folder), arguments)
+    print_study_answer(arguments, found.as_dict(), learned_with_next(found, arguments.folder))
     return 0
 
 

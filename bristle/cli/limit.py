@@ -15,10 +15,10 @@ from ._options import (
     add_json,
     add_judged,
     add_no_figure,
+    add_out,
     add_overrides,
     add_trust,
-    print_json,
-    print_view,
+    print_answer,
 )
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "number of starts of the search; else 3"
     parser.add_argument("--starts", type=int, default=3, metavar="N", help=text)
     text = "folder of voltage, scenario, results and picture; else results/limit/SCENARIO/"
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help=text)
+    add_out(parser, text)
     add_no_figure(parser)
     add_overrides(parser, "scenario", "ground.peak=3.924")
     add_trust(parser)
@@ -80,10 +80,7 @@ def main(arguments: argparse.Namespace) -> int:
 
         files.append(folder / "limit.png")
         draw_limit(found).save(files[-1], dpi=160)
-    if arguments.json:
-        print_json(_answer(found, files))
-    else:
-        print_view(found.view(), files)
+    print_answer(arguments, _answer(found, files), found.view(), files)
     return 0
 
 

@@ -65,7 +65,10 @@ def main(arguments: argparse.Namespace) -> int:
     if kind in (None, "scenarios"):
         tables["scenarios"] = _scenarios()
     if kind is None:
-        tables["effects"], tables["laws"] = _effects(), _laws()
+        tables |= {
+            f"{word}s": [_in_brief(row) for row in _all_of(_kind(word))]
+            for word in ("effect", "law")
+        }
     if arguments.json:
         print_json(tables[kind] if kind else tables)
         return 0
@@ -163,25 +166,6 @@ def _scenarios() -> Rows:
     return rows
 
 
-def _effects() -> Rows:
-    from ..physics import effects as _registered  # noqa: F401  (importing registers them)
-    from ..physics.effect import EFFECTS
-
-    return [
-        {"name": name, "site": ", ".join(effect.sites), "description": effect.first_line()}
-        for name, effect in sorted(EFFECTS.items())
-    ]
-
-
-def _laws() -> Rows:
-    from ..physics.laws import laws_of
-
-    return [
-        {"name": law.name, "description": (law.__doc__ or "").partition("\n")[0]}
-        for law in sorted(laws_of("damper"), key=lambda law: law.name)
-    ]
-
-
 def _print(title: str, rows: Rows) -> None:
     """Print one table."""
     columns = [
@@ -231,8 +215,12 @@ def _found(
     if name is not None:
         told: dict[str, Any] | list[dict[str, Any]] = kind.told(_find(name, kind, left_out))
     else:
-        told = [kind.told(one) for _, one in sorted(kind.registered.items())]
+        told = _all_of(kind)
     return kind, told, list(left_out.values())
+
+
+def _all_of(kind: _ListedKind) -> Rows:
+    return [kind.told(one) for _, one in sorted(kind.registered.items())]
 
 
 def _kind(word: str) -> _ListedKind:

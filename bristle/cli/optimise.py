@@ -6,15 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import (
-    add_json,
-    add_judged,
-    add_no_figure,
-    add_overrides,
-    add_trust,
-    print_json,
-    print_view,
-)
+from ._options import add_json, add_judged, add_no_figure, add_overrides, add_trust, print_answer
 
 if TYPE_CHECKING:
     from ..campaign.best_constant import Passive
@@ -82,30 +74,25 @@ def main(arguments: argparse.Namespace) -> int:
         progress=True,
     )
     files = _write(found, arguments.out, not arguments.no_figure)
-    if arguments.json:
-        named = {name: str(path.absolute()) for name, path in files.items()}
-        print_json({**_answer(found), **named})
-    else:
-        print_view(found.view(), files.values())
+    named = {name: str(path.absolute()) for name, path in files.items()}
+    print_answer(arguments, {**_answer(found), **named}, found.view(), files.values())
     return 0
 
 
 def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     import pandas as pd
 
-    from ..core.files import write_json
+    from ..core.files import write_json, writing
     from ..errors import not_usable
 
     table = pd.DataFrame(found.values.T, columns=[motion.name for motion in found.motions])
     table.insert(0, "voltage [V]", found.grid)
     files = {"table": folder / "passive.csv", "answer": folder / "passive.json"}
-    try:
+    with writing(folder, not_usable):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "passive.png").unlink(missing_ok=True)  # that of an older optimum
         table.to_csv(files["table"], index=False, float_format="%.9g")
         write_json(files["answer"], {"schema": 1, **_answer(found)})
-    except OSError as error:
-        raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
     if figure:
         from ..campaign.view import draw_passive
 

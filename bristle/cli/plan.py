@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next, Text
-from ._options import add_details, add_dry_run, add_json, add_trust, print_json
+from ._options import add_details, add_dry_run, add_json, add_out, add_trust, print_json
 
 if TYPE_CHECKING:
     from ..planning.plan import Plan
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", type=int, metavar="N", help="number of tests; 4 by default")
     parser.add_argument("--seed", type=int, default=1, help="seed of the candidate tests")
     text = "folder of the files; by default plan, plan_2 ... in the study"
-    parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help=text)
+    add_out(parser, text)
     add_dry_run(parser)
     add_trust(parser)
     add_details(parser)

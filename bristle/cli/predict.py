@@ -1,8 +1,8 @@
 """Simulate building and identified damper under ground motions alone, and say how far that holds.
 
 Of a study of a building the ground motion and command of each run are taken, and the error of peak
-and RMS of each response stands beside its 95 % band. `--in` puts a damper from a bench into the
-building of a file.
+and RMS of each response stands beside its 95 % band. `--building` puts a damper from a bench into
+the building of a file.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import argparse
 from math import isfinite
 from pathlib import Path
 
-from ._options import add_details, add_json, add_study, add_trust, print_json, print_study_view
+from ._options import add_details, add_json, add_study, add_trust, print_study_answer
 from .compare import add_role
 
 HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 %% band"
@@ -21,13 +21,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle predict`."""
     add_study(parser)
     add_role(parser)
-    text = "simulate a damper from a bench in the building of this file, under --ground or --data"
-    parser.add_argument("--in", dest="house", type=Path, metavar="FILE", help=text)
-    text = "with --in: a measurement of that building"
+    text = "simulate a damper from a bench in the building of this file, under --record or --data"
+    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
+    text = "with --building: a measurement of that building"
     parser.add_argument("--data", type=Path, metavar="FILE", help=text)
-    text = "with --in: name or file of a ground motion, for a prediction without a measurement"
-    parser.add_argument("--ground", metavar="RECORD", help=text)
-    text = "with --in: the damper's constant command if the ground motion has none; else 0"
+    text = "with --building: name or file of a ground motion, where nothing was measured"
+    parser.add_argument("--record", metavar="RECORD", help=text)
+    text = "with --building: the damper's constant command if the ground motion has none; else 0"
     parser.add_argument("--level", type=float, metavar="V", help=text)
     text = "number of draws of the parameters for the band; 0 for no band; else 20"
     parser.add_argument("--draws", type=int, metavar="N", help=text)
@@ -51,32 +51,29 @@ def main(arguments: argparse.Namespace) -> int:
     _refuse(arguments)
     study = Study(arguments.folder)
     draws = DRAWS if arguments.draws is None else arguments.draws
-    if arguments.house is None:
+    if arguments.building is None:
         found = closed_loop(
             study, role=arguments.role, draws=draws, with_limits=arguments.with_limits
         )
     else:
-        house = house_of(arguments.house)
-        trials = trials_in(house, arguments.data, arguments.ground, arguments.level)
+        house = house_of(arguments.building)
+        trials = trials_in(house, arguments.data, arguments.record, arguments.level)
         found = closed_loop_in(study, house, trials, draws=draws, with_limits=arguments.with_limits)
-    if arguments.json:
-        print_json(found.as_dict())
-        return 0
-    print_study_view(found.view(), arguments)
+    print_study_answer(arguments, found.as_dict(), found.view())
     return 0
 
 
 def _refuse(arguments: argparse.Namespace) -> None:
-    """Refuse options that need --in, those that do not go with it, and bad numbers."""
+    """Refuse options that need --building, those that do not go with it, and bad numbers."""
     from ..errors import StudyError
 
-    alone = [one for one in ("data", "ground", "level") if getattr(arguments, one) is not None]
-    if alone and arguments.house is None:
+    alone = [one for one in ("data", "record", "level") if getattr(arguments, one) is not None]
+    if alone and arguments.building is None:
         raise StudyError(
-            f"--{alone[0]} needs --in: a study of a building has ground motions of its own."
+            f"--{alone[0]} needs --building: a study of a building has ground motions of its own."
         )
-    if arguments.house is not None and arguments.role != "holdout":
-        raise StudyError("--role does not go with --in: the runs are those of the building.")
+    if arguments.building is not None and arguments.role != "holdout":
+        raise StudyError("--role does not go with --building: the runs are those of the building.")
     if arguments.level is not None and not isfinite(arguments.level):
         raise StudyError(f"--level {arguments.level}: expected a finite number.")
     if arguments.draws is not None and arguments.draws < 0:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 
-from ._options import add_json, add_study, add_trust, print_json
+from ._options import add_json, add_out, add_study, add_trust, print_json
 
 HELP = "write a study's report as one HTML file: verdict, history, loops, parameters, data"
 
@@ -15,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle report`."""
     add_study(parser)
     text = "file of the report; else FOLDER/reports/report.html"
-    parser.add_argument("--out", type=Path, metavar="FILE", help=text)
+    add_out(parser, text, "FILE")
     text = "leave the study's test runs closed"
     parser.add_argument("--keep-test-closed", action="store_true", help=text)
     text = (

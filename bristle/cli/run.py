@@ -6,15 +6,15 @@ import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ._options import (
     add_json,
     add_no_figure,
+    add_out,
     add_overrides,
     add_trust,
-    print_json,
-    print_view,
+    print_answer,
     share_of,
 )
 
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "folder of results, figure and log; older ones are replaced; else results/NAME/, or "
         "results/NAME_a.b=value/ with --set a.b=value"
     )
-    parser.add_argument("--out", metavar="FOLDER", help=text)
+    add_out(parser, text)
     add_overrides(parser)
     text = "step FMUs (fmu), or solve built-in components together (compiled)"
     parser.add_argument("--engine", choices=("fmu", "compiled"), default="fmu", help=text)
@@ -66,7 +66,7 @@ def main(arguments: argparse.Namespace) -> int:
     file = resolve_scenario(arguments.file)
     if arguments.tolerance is not None:
         overrides |= _steps_for(arguments, file, overrides)
-    folder = Path(arguments.out or Path("results", run_name(file, overrides)))
+    folder: Path = arguments.out or Path("results", run_name(file, overrides))
     scenario = load_scenario(file, overrides)
     _show(scenario)
     code, trouble = 0, ""
@@ -88,10 +88,7 @@ def main(arguments: argparse.Namespace) -> int:
             written[name.partition(".")[0]] = folder / name
         except RunError as error:  # the results are there all the same
             code, trouble = code or 1, "\n".join(filter(None, (trouble, str(error))))
-    if arguments.json:
-        _print_json(frame, written, trouble)
-    else:
-        print_view(frame.view(), written.values())
+    print_answer(arguments, _answer(frame, written, trouble), frame.view(), written.values())
     if trouble:
         kind = "RunError: " if code == 1 else ""
         print(f"{kind}{trouble}", file=sys.stderr)
@@ -162,12 +159,12 @@ def _share(text: str) -> float:
     return value
 
 
-def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> None:
+def _answer(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> dict[str, Any]:
     from dataclasses import asdict
 
     from ..engine.results import summarise
 
-    answer = {
+    return {
         "complete": frame.attrs["complete"],
         "error": trouble or None,
         "rows": len(frame),
@@ -178,4 +175,3 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
         "outputs": [asdict(summary) for summary in summarise(frame, everything=True)],
         **{name: str(path.absolute()) for name, path in written.items()},
     }
-    print_json(answer)

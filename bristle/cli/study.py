@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next
@@ -20,9 +20,9 @@ from ._options import (
     add_trust,
     channels_of,
     files_of,
+    print_answer,
     print_json,
-    print_study_view,
-    print_view,
+    print_study_answer,
     test_files,
 )
 
@@ -378,18 +378,15 @@ def _new(arguments: argparse.Namespace) -> int:
         device=arguments.device,
         without=arguments.without,
     )
-    if arguments.json:
-        _print_json(created)
-    else:
-        print_view(created.view(), ())
+    print_answer(arguments, _created_answer(created), created.view())
     return 0
 
 
-def _print_json(created: Created) -> None:
+def _created_answer(created: Created) -> dict[str, Any]:
     from dataclasses import asdict
 
     settings = created.study.settings
-    answer = {
+    return {
         "folder": str(created.study.folder.absolute()),
         "rig": settings.rig,
         "runs": [asdict(run) for run in settings.runs],
@@ -398,7 +395,6 @@ def _print_json(created: Created) -> None:
         "unused": list(created.unused),
         "notes": list(created.notes),
     }
-    print_json(answer)
 
 
 def _check(arguments: argparse.Namespace) -> int:
@@ -424,15 +420,13 @@ def _check(arguments: argparse.Namespace) -> int:
             _print_corrections(joined)
         found = check_data(study)
     picture = study.write_report("data_check.png", png(found.page(), 110))
-    if arguments.json:
-        answer = {**found.as_dict(), "picture": str(picture.absolute())}
-        answer |= {"not_corrected": apart} if apart else {}
-        print_json(answer)
-    else:
-        then = Next(command("identify", study.folder), "fits the model")
-        view = found.view()
-        view = view._replace(blocks=(*view.blocks, *([then] if found.ok else [])))
-        print_view(view, ())
+    answer = {**found.as_dict(), "picture": str(picture.absolute())}
+    answer |= {"not_corrected": apart} if apart else {}
+    then = Next(command("identify", study.folder), "fits the model")
+    view = found.view()
+    view = view._replace(blocks=(*view.blocks, *([then] if found.ok else [])))
+    print_answer(arguments, answer, view)
+    if not arguments.json:
         print(f"Picture: {picture}")
     return 0 if found.ok else StudyError.exit_code
 
@@ -479,8 +473,6 @@ def _auto(arguments: argparse.Namespace) -> int:
         study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn,
         closure=arguments.closure,
     )  # fmt: skip
-    if arguments.json:
-        print_json(done.as_dict())
-        return 0
-    print_study_view(completed_view(study, done, verdict_of(study, done.verdict)), arguments)
+    view = completed_view(study, done, verdict_of(study, done.verdict))
+    print_study_answer(arguments, done.as_dict(), view)
     return 0

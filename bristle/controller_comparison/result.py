@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..campaign.campaign import Statistic
+from ..core.files import writing
 from ..core.text import quantity
 from ..errors import not_usable
 from ..view import Viewable
@@ -180,12 +181,10 @@ class ControllerComparison(Viewable):
         }
         if self.worst is not None:
             frames["worst.csv"] = self.worst.rename(columns=titles)
-        try:
+        with writing(folder, not_usable):
             folder.mkdir(parents=True, exist_ok=True)
             for name, frame in frames.items():
                 frame.to_csv(folder / name, index=False, float_format="%.9g")
-        except OSError as error:
-            raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
         return [folder / name for name in frames]
 
 

@@ -20,6 +20,7 @@ from ..campaign.ensemble_file import EnsemblePlan, read_ensemble
 from ..campaign.table import RunsTable
 from ..core.files import cache_folder
 from ..core.progress import Count, listening
+from ..core.toml_write import toml_text
 from ..engine import Engine
 from ..engine.cosimulation import Cosimulation, ignore
 from ..engine.coupled import Coupled
@@ -48,7 +49,6 @@ from .setting import (
     DamperPlace,
     Folder,
     constant,
-    ensemble_text,
     plain_name,
 )
 
@@ -211,7 +211,7 @@ class CaseRunner:
         }  # fmt: skip
         if content["engine"] == "fmu" and self.fmus != "python":
             content["fmus"] = self.fmus
-        self.folder.write(file, ensemble_text(content, {**tables, "outputs": kept}))
+        self.folder.write(file, toml_text({"schema": 1, **content, **tables, "outputs": kept}))
         plan = read_ensemble(file)
         runs_file = file.with_suffix(".csv")
         with quiet(), _continued(plan, runs_file, self.folder.goes_on) as table:

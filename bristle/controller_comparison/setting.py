@@ -14,8 +14,8 @@ from ..campaign.best_constant import G
 from ..campaign.campaign import Statistic
 from ..component.controller_file import Controller
 from ..core.config import toml_content
+from ..core.files import writing
 from ..core.text import did_you_mean, unknown, written
-from ..core.toml_write import toml_table
 from ..data import list_ground_motions, read_ground_motion
 from ..data.building_file import read_building
 from ..errors import DesignError, ScenarioError, not_usable
@@ -210,11 +210,9 @@ class Folder:
             kept = f"{stem}_{count}{ending}"
         self._kept[kept] = file
         target = self.path / FILES / kept
-        try:
+        with writing(target, not_usable):
             if not (target.exists() and target.samefile(file)):
                 shutil.copyfile(file, target)
-        except OSError as error:
-            raise not_usable(f"{target}: cannot be written: {error.strerror or error}.") from error
         return f"{ABOVE}/{FILES}/{kept}"
 
     def at(self, kind: str, motion: str, name: str) -> Path:
@@ -229,25 +227,15 @@ class Folder:
         RunError
             If it cannot be written, exit code 2.
         """
-        try:
+        with writing(path, not_usable):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error
         return path
 
 
 def plain_name(text: str) -> str:
     """Return a text as the name of a file: letters, digits, dots and dashes."""
     return re.sub(r"[^\w.+-]+", "_", text).strip("._") or "unnamed"
-
-
-def ensemble_text(content: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the text of an ensemble file: its keys, and the tables after them by name."""
-    lines = toml_table({"schema": 1, **content})
-    for name, table in tables.items():
-        lines += ["", f"[{name}]", *toml_table(table)]
-    return "\n".join(lines) + "\n"
 
 
 # The damper whose command controllers set.

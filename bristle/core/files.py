@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,32 @@ from typing import Any
 from ..errors import StudyError
 from .config import read_text
 from .text import written
+
+
+@contextmanager
+def writing(path: str | Path, raises: Callable[[str], Exception]) -> Iterator[None]:
+    """Say, where a file, or one in a folder, cannot be written, which and why.
+
+    Parameters
+    ----------
+    path : of the file or folder
+    raises : makes the error from its text
+    """
+    try:
+        yield
+    except OSError as error:
+        inside = error.filename and Path(error.filename).is_relative_to(path)
+        which = error.filename if inside else path
+        raise raises(f"{which}: cannot be written ({error.strerror or error}).") from error
+
+
+@contextmanager
+def reading(path: str | Path, raises: Callable[[str], Exception]) -> Iterator[None]:
+    """Say, where a file cannot be read, which and why; parameters as for `writing`."""
+    try:
+        yield
+    except OSError as error:
+        raise raises(f"{path}: cannot be read ({error.strerror or error}).") from error
 
 
 def write_whole(path: Path, content: str | bytes) -> None:

@@ -31,6 +31,15 @@ def toml_value(value: object) -> str:
     return repr(value)
 
 
+def toml_text(content: Mapping[str, object]) -> str:
+    """Return a document: its plain keys, and behind them a table for each mapping."""
+    tables = {name: one for name, one in content.items() if isinstance(one, Mapping)}
+    lines = toml_table({key: one for key, one in content.items() if key not in tables})
+    for name, table in tables.items():
+        lines += ["", f"[{toml_key(name)}]", *toml_table(table)]
+    return "\n".join(lines) + "\n"
+
+
 def toml_table(table: Mapping[str, object]) -> list[str]:
     """Return the lines of a table, one for each of its keys."""
     return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID, uuid5
 
-from ..core.files import fmus_folder
+from ..core.files import fmus_folder, writing
 from ..core.text import unknown
 from ..errors import BuildError
 from ..physics.drive import VOLTAGE
@@ -270,14 +270,12 @@ def build(what: BuildPlan, folder: Path) -> Path:
     guid = what.guid()
     if built_guid(target) == guid:
         return target
-    try:
+    with writing(target, BuildError):
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / ".lock"):
             if built_guid(target) != guid:
                 make = _build_here if _pythonfmu_is_whole() else _build_elsewhere
                 make(what, guid, target)
-    except OSError as error:
-        raise BuildError(f"{target}: cannot be written ({error.strerror or error}).") from error
     return target
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import units
 from ..core.config import toml_content
-from ..core.files import cache_folder, components_folder, write_whole
+from ..core.files import cache_folder, components_folder, reading, write_whole
 from ..errors import BuildError, StudyError
 from ..physics.forms import split_form
 from ..physics.law import LAWS
@@ -137,10 +137,8 @@ def component_class(path: Path) -> type[Slave]:
     BuildError
         If the file cannot be read, or defines none, or more than one.
     """
-    try:
+    with reading(path, BuildError):
         content = path.read_bytes()
-    except OSError as error:
-        raise BuildError(f"{path}: cannot be read ({error.strerror or error}).") from None
     return _class_of(path, content)
 
 

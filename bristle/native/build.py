@@ -13,6 +13,7 @@ from pathlib import Path
 from uuid import UUID, uuid5
 from xml.etree.ElementTree import Element, SubElement, fromstring
 
+from ..core.files import writing
 from ..core.progress import Count, tell
 from ..errors import BuildError
 from ..fmu import documentation
@@ -329,12 +330,10 @@ def ensure(
 
     what = planned(component, building, controller, effects)
     folder = zig.folder() / ("fmus_fmi3" if fmi == 3 else "fmus")
-    try:
+    with writing(folder, BuildError):
         folder.mkdir(exist_ok=True)
         with FileLock(folder / ".lock"):  # runs side by side that need it do not both write it
             return build(what, folder, [here()], fmi)
-    except OSError as error:
-        raise BuildError(f"{folder}: cannot be written ({error.strerror or error}).") from error
 
 
 def _note_in(path: Path) -> bytes:

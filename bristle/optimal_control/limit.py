@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.files import writing
 from ..core.progress import Count, counted, tell
 from ..core.text import unknown
 from ..engine.coupled import Coupled
@@ -325,8 +326,6 @@ def _played(case: Case, voltage: Array, out: str | Path | None) -> Results:
     system = with_voltage(case, voltage)
     if out is None:
         return run(system, engine="compiled")
-    try:
+    with writing(out, not_usable):
         save(system, Path(out) / SCENARIO_FILE)
-    except OSError as error:
-        raise not_usable(f"{out}: cannot be written: {error.strerror or error}.") from error
     return run(Path(out) / SCENARIO_FILE, engine="compiled", out=out)

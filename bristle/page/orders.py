@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..core.text import command, unknown, written
+from ..core.toml_write import toml_text
 from .requests import UPLOADS, RequestError, batch_name, file_name
 
 Options = Mapping[str, Any]
@@ -138,23 +139,8 @@ def write_design(folder: Path, kind: object, values: object, building: str) -> s
     content = content_of(kind, values, building)
     numbers = [int(name.rpartition("_")[2]) for name in names_of(folder)]
     name = f"{content['kind']}_{max(numbers, default=0) + 1}"
-    write_whole(folder / FOLDER / f"{name}.toml", _design_text(content))
+    write_whole(folder / FOLDER / f"{name}.toml", toml_text(content))
     return name
-
-
-def _design_text(content: Mapping[str, Any]) -> str:
-    """Return a design file's text: values first, then its tables."""
-    lines = [f"{key} = {_value(one)}" for key, one in content.items() if not isinstance(one, dict)]
-    for table, rows in content.items():
-        if isinstance(rows, dict):
-            lines += ["", f"[{table}]", *(f"{key} = {_value(one)}" for key, one in rows.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
-    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def _number(name: str, value: object) -> float:

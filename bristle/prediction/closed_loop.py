@@ -60,7 +60,7 @@ def closed_loop(
     if building is None:
         raise StudyError(
             f"{study.folder}: the damper was measured on a bench: a prediction needs a building, "
-            f"as in  {command('predict', study.name, '--in', 'house.toml')}"
+            f"as in  {command('predict', study.name, '--building', 'house.toml')}"
         )
     effects, more = _prepared(study, model, draws, with_limits)
     runs = study.runs()
@@ -116,8 +116,8 @@ def closed_loop_in(
     """
     if study.settings.has_building:
         raise StudyError(
-            f"{study.folder}: its damper was measured in a building of its own; --in goes with a "
-            "damper on a bench."
+            f"{study.folder}: its damper was measured in a building of its own; --building goes "
+            "with a damper on a bench."
         )
     model = study.model()
     effects, more = _prepared(study, model, draws, with_limits)

@@ -152,9 +152,9 @@ def trials_in(
     """
     if (data is None) == (ground is None):
         raise StudyError(
-            "--in needs the ground motion: a record, or measured responses of the building with "
-            f"it, as in  {command('predict', 'RIG', '--in', 'house.toml')} "
-            "--ground el_centro_1940_ns --level 3, or --data shake.csv"
+            "--building needs the ground motion: a record, or measured responses of the building "
+            f"with it, as in  {command('predict', 'RIG', '--building', 'house.toml')} "
+            "--record el_centro_1940_ns --level 3, or --data shake.csv"
         )
     if ground is not None:
         record = read_ground_motion(ground, Path.cwd())

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.files import writing
 from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.measurement import Measurement
 from ..errors import RecordError, StudyError
@@ -97,7 +97,8 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     notes: list[str] = []
     held = _held_out(study, model, runs, notes)
     step = step_for(held) if held else None
-    with _writing(folder):
+    with writing(folder, StudyError):
+        folder.mkdir(parents=True, exist_ok=True)
         fmu = build(_damper(study, model, runs, notes, step), folder)
 
         def damper(parameters: Parameters) -> dict[str, Any]:
@@ -158,22 +159,11 @@ def write_editable(study: Study, folder: Path) -> Editable:
     def damper(parameters: Parameters) -> dict[str, Any]:
         return {**source_of(own), "parameters": {**values, **parameters}}
 
-    with _writing(folder):
+    with writing(folder, StudyError):
+        folder.mkdir(parents=True, exist_ok=True)
         scenario, _ = _scenario(study, model, measurement, VOLTAGE, folder, damper, notes)
     numbers = tuple(name for name in values if name in own.values)
     return Editable(scenario, measurement.name, numbers, measurement.has("force"), tuple(notes))
-
-
-@contextmanager
-def _writing(folder: Path) -> Iterator[None]:
-    """Make a folder; say which file of it cannot be written."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        yield
-    except OSError as error:
-        raise StudyError(
-            f"{error.filename or folder}: cannot be written ({error.strerror or error})."
-        ) from None
 
 
 def _scenario(

@@ -372,7 +372,7 @@ def building_view(found: IdentifiedBuilding) -> View:
     hidden = f"The runs do not identify {joined(fit.unidentified)}."
     written = list[Block]()
     if found.file is not None:
-        fmu = command("build", "Structure", "--from", found.file)
+        fmu = command("build", "Structure", "--building", found.file)
         written = [
             Text(f"Written: {found.file}, now the building of the model."),
             Next(fmu, "makes an FMU of it"),

@@ -8,10 +8,10 @@ import tempfile
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..core.files import writing
 from ..errors import ScenarioError
 from ..fmu.build import BuildPlan, build, plan
 from ..fmu.description import Value, Variable
@@ -304,11 +304,11 @@ def export_ssp(
     with tempfile.TemporaryDirectory(prefix="bristle_ssp_") as temporary:
         fmus = _fmus(scenario, Path(temporary), build)
         inside = {name: f"{RESOURCES}/{fmu.name}" for name, fmu in fmus.items()}
-        with _writing(file):
+        with writing(file, ScenarioError):
             _pack(file, ssd_text(scenario, inside), list(fmus.values()))
         written = [file]
         if osp is not None:
-            with _writing(osp):
+            with writing(osp, ScenarioError):
                 written += _lay_out(osp, scenario, fmus)
     return ExportedPackage(tuple(written), tuple(_notes(scenario)))
 
@@ -415,11 +415,3 @@ def _lay_out(folder: Path, scenario: System, fmus: Mapping[str, Path]) -> list[P
     beside = {name: fmu.name for name, fmu in fmus.items()}
     structure.write_text(osp_text(scenario, beside), encoding="utf-8")
     return [structure]
-
-
-@contextmanager
-def _writing(target: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise ScenarioError(f"{target}: cannot be written ({error.strerror or error}).") from None

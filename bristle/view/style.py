@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
+from ..core.files import writing
 from ..core.text import short_z as short_z
 from ..errors import not_usable
 
@@ -184,10 +185,8 @@ class Page:
                 f'{path}: "{path.suffix}" is no format of a figure; there are {", ".join(FORMATS)}.'
             )
         undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-        try:
+        with writing(path, not_usable):
             _save(self.figure, path, dpi=dpi, metadata=undated)
-        except OSError as error:
-            raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error
 
 
 def png(drawn: Page | Figure, dpi: int = 160) -> bytes:

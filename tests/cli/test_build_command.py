@@ -31,7 +31,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_building_becomes_an_fmu_with_its_ports_in_the_current_folder(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["build", "Structure", "--from", "my.toml", "--name", "Tower"]) == 0
+    assert main(["build", "Structure", "--building", "my.toml", "--name", "Tower"]) == 0
     said = capsys.readouterr().out
     assert said.startswith("Tower.fmu: built, guid ")
     assert "floor3_displacement [m]" in said
@@ -61,7 +61,7 @@ def test_what_stands_there_already_is_not_built_again(
 
 def test_an_older_file_gives_way(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "Tower.fmu").write_text("not an FMU")
-    assert main(["build", "Structure", "--from", "my.toml", "--name", "Tower"]) == 0
+    assert main(["build", "Structure", "--building", "my.toml", "--name", "Tower"]) == 0
     assert read_description(here / "Tower.fmu").name == "Tower"
 
 
@@ -76,8 +76,8 @@ def test_a_record_is_baked_in(here: Path) -> None:
     ("arguments", "words"),
     [
         (["Structur"], 'no component is named "Structur"'),
-        (["Structure", "--from", "gone.toml"], "gone.toml: there is no such file"),
-        (["LuGreDamper", "--from", "my.toml"], "a building goes into Structure"),
+        (["Structure", "--building", "gone.toml"], "gone.toml: there is no such file"),
+        (["LuGreDamper", "--building", "my.toml"], "a building goes into Structure"),
         (["Structure", "--record", "my.toml"], "a record goes into GroundMotion"),
         (["GroundMotion", "--record", "gone.at2"], "gone.at2"),
         (["Structure", "--name", "a b"], '"a b" is no model name'),

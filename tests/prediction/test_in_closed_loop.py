@@ -211,11 +211,11 @@ def test_what_cannot_be_is_refused(
     with pytest.raises(StudyError, match="no ground_acceleration was measured"):
         closed_loop(Study(study.folder), draws=0)
     for options, told in (
-        (["--level", "3"], "--level needs --in"),
+        (["--level", "3"], "--level needs --building"),
         (["--draws", "-1"], "0 or a positive whole number"),
-        (["--in", "house.toml", "--role", "test"], "does not go with --in"),
-        (["--in", "house.toml", "--level", "nan"], "expected a finite number"),
-        (["--in", str(house(made)), "--ground", "el_centro_1940_ns"],
+        (["--building", "house.toml", "--role", "test"], "does not go with --building"),
+        (["--building", "house.toml", "--level", "nan"], "expected a finite number"),
+        (["--building", str(house(made)), "--record", "el_centro_1940_ns"],
          "in a building of its own"),
     ):  # fmt: skip
         assert main(["predict", str(made), *options]) == 2
@@ -249,10 +249,10 @@ def test_a_record_alone_gives_a_prediction_with_its_band(
     made: Path, bench: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked = [
-        "predict", str(bench.folder), "--in", str(house(made)),
+        "predict", str(bench.folder), "--building", str(house(made)),
         "--draws", "5",
     ]  # fmt: skip
-    assert main([*asked, "--ground", "el_centro_1940_ns", "--level", "2", "--json"]) == 0
+    assert main([*asked, "--record", "el_centro_1940_ns", "--level", "2", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["role"] is None
     assert all(one["measured"] is None and one["band"] for one in answer["rows"])
@@ -260,14 +260,17 @@ def test_a_record_alone_gives_a_prediction_with_its_band(
     stroke = answer["strokes"][0]
     assert any("in the training runs" in note for note in answer["notes"]) == (stroke > 0.012)
     for options, told in (
-        ([], "--in needs the ground motion"),
-        (["--ground", "el_centro_1940_ns", "--data", "a.csv"], "--in needs the ground motion"),
-        (["--ground", "nowhere.at2"], "nowhere.at2"),
+        ([], "--building needs the ground motion"),
+        (
+            ["--record", "el_centro_1940_ns", "--data", "a.csv"],
+            "--building needs the ground motion",
+        ),
+        (["--record", "nowhere.at2"], "nowhere.at2"),
     ):
         assert main([*asked, *options]) == 2
         assert told in capsys.readouterr().err
     assert main(["predict", str(bench.folder)]) == 2
-    assert "--in house.toml" in capsys.readouterr().err
+    assert "--building house.toml" in capsys.readouterr().err
 
 
 def test_a_command_in_another_unit_than_that_of_the_damper_is_refused(

@@ -142,7 +142,7 @@ def test_printed_for_people_and_dry_run_leaves_the_study(tmp_path, capsys):
     assert "bristle build" not in shown  # nothing was written
     assert sorted((tmp_path / "rig").rglob("*")) == before
     assert cli.main(["identify", str(tmp_path / "rig"), "--structure"]) == 0
-    assert "bristle build Structure --from" in capsys.readouterr().out
+    assert "bristle build Structure --building" in capsys.readouterr().out
 
 
 def test_what_is_no_building_is_refused(tmp_path, capsys):
