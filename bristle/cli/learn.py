@@ -93,10 +93,7 @@ def _closure(study: Study, arguments: argparse.Namespace) -> int:
             f"--closure without --{wrong[0]} is right."
         )
     found = learn_study_closure(study, name=arguments.name, write=not arguments.dry_run)
-    if arguments.json:
-        print_json(found.as_dict())
-        return 0
-    print_study_view(closure_with_next(found, arguments.folder), arguments)
+    print_study_answer(arguments, found.as_dict(), closure_with_next(found, arguments.folder))
     return 0
 
 
