@@ -143,7 +143,7 @@ def test_damaged_parquet_is_refused(frame: pd.DataFrame, tmp_path: Path) -> None
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match=r"nowhere\.csv: cannot be read"):
+    with pytest.raises(RunError, match=r"nowhere\.csv: cannot be read: No such file"):
         load_results(tmp_path / "nowhere.csv")
 
 
@@ -156,7 +156,7 @@ def test_full_disk_at_the_start_leaves_no_file(
 
     monkeypatch.setattr(Path, "write_bytes", refuse)
     monkeypatch.setattr("pyarrow.parquet.write_table", refuse)
-    with pytest.raises(RunError, match="cannot be written .No space left on device") as caught:
+    with pytest.raises(RunError, match="cannot be written: No space left on device") as caught:
         write(frame, tmp_path / "results")
     assert caught.value.exit_code == 2
     assert not list(tmp_path.iterdir())
