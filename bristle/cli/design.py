@@ -77,16 +77,18 @@ def _write(result: DesignResult, answer: dict[str, Any], out: Path) -> list[Path
     from ..errors import DesignError
     from ..synthesis.analysis import curves
 
-    with writing(out, DesignError):
-        with tempfile.TemporaryDirectory(prefix=".bristle_", dir=out.absolute().parent) as folder:
-            made = [Path(folder) / out.name]
-            result.controller.save(made[0])
-            made.append(made[0].with_name(f"{out.stem}_answer.json"))
-            whole = {**answer, "curves": curves(result)}
-            made[-1].write_text(json.dumps(whole, allow_nan=False), encoding="utf-8")
-            if result.plants:
-                from ..synthesis.view import draw_design
+    with (
+        writing(out, DesignError),
+        tempfile.TemporaryDirectory(prefix=".bristle_", dir=out.absolute().parent) as folder,
+    ):
+        made = [Path(folder) / out.name]
+        result.controller.save(made[0])
+        made.append(made[0].with_name(f"{out.stem}_answer.json"))
+        whole = {**answer, "curves": curves(result)}
+        made[-1].write_text(json.dumps(whole, allow_nan=False), encoding="utf-8")
+        if result.plants:
+            from ..synthesis.view import draw_design
 
-                made.append(made[0].with_suffix(".png"))
-                draw_design(result, made[-1])
-            return [path.replace(out.parent / path.name) for path in made]
+            made.append(made[0].with_suffix(".png"))
+            draw_design(result, made[-1])
+        return [path.replace(out.parent / path.name) for path in made]
