@@ -236,6 +236,6 @@ def least_squares(begin: Model, train: Problem, held: Problem) -> float:
     return share_of(errors_of(scaled.at(found.x), held), held.runs)
 
 
-def errors_of(model: Model, problem: Problem) -> list[Array]:
-    """Return per run the error (n - skip,) [N] of a model's force."""
-    return [(run.force - problem.predict(model, run))[run.skip :] for run in problem.runs]
+def errors_of(model: Model, problem: Problem, zero: float = 0.0) -> list[Array]:
+    """Return per run the error (n - skip,) [N] of a model's force above a `zero` [N]."""
+    return [(run.force - problem.predict(model, run) - zero)[run.skip :] for run in problem.runs]

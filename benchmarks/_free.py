@@ -1,7 +1,8 @@
 """Which model the package arrives at where nobody names law, effect or curve: on training runs.
 
-The same steps as `bristle study auto --law all --greedy --learn`. Every one is judged on a part of
-the training runs, split off as `bristle study new` splits, so that runs held out see the end alone.
+The same steps as `bristle study auto --law all --greedy --learn --closure`. Every one is judged on
+a part of the training runs, split off as `bristle study new` splits, so that runs held out see the
+end alone.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem, has_offset, zero_of
 from bristle.identification.rig import DAMPER, Site
 from bristle.identification.rig_fit import fit_site
+from bristle.learning.closure import learn_closure, trained_beside
+from bristle.learning.closure_file import closure_text
 from bristle.learning.curve import Curve
 from bristle.learning.effect_file import effect_text
 from bristle.learning.fit import learn
@@ -35,14 +38,15 @@ from bristle.study.inputs import runs_of
 from bristle.study.runs import Runs
 from bristle.user_code.load import defined
 
-from ._floor import share_of
+from ._floor import errors_of, share_of
 
 
 @dataclass(frozen=True)
 class Found:
     """A model with its curves, and how the steps to it did on the part that judged them.
 
-    `z` error / noise there; `faults` of the channels, as the training runs show them.
+    `z` error / noise there; `faults` of the channels, as the training runs show them; `closed`
+    whether a closure lowered the error on that part beyond its scatter.
     """
 
     model: Model
@@ -50,20 +54,26 @@ class Found:
     z: float
     faults: tuple[Finding, ...]
     free_zero: bool
+    closed: bool = False
 
     @property
     def words(self) -> str:
         """Law, effects and curves."""
         effects = [one for one in self.model.effects if not one.startswith(NAME)]
-        return " + ".join([self.model.law, *effects, *(one.words() for one in self.curves)])
+        closure = ["a closure"] if self.closed else []
+        return " + ".join(
+            [self.model.law, *effects, *(one.words() for one in self.curves), *closure]
+        )
 
 
 NAME = "learned_"
 """Begin of the names of curves."""
 
+CLOSURE = "closure_1"
 
-def bare_law(train: Sequence[Measurement]) -> Found:
-    """Return the law of least plain error on the part of training runs that judges.
+
+def bare_laws(train: Sequence[Measurement]) -> list[Found]:
+    """Return the laws, that of least plain error on the part of training runs that judges first.
 
     Raises
     ------
@@ -71,12 +81,12 @@ def bare_law(train: Sequence[Measurement]) -> Found:
         If the training runs carry no verdict.
     """
     _, data, rows = _laws(train, silent)
-    best = min((row.trial for row in rows), key=lambda trial: trial.rms)
-    return Found(best.model, (), best.z, data.faults, False)
+    ranked = sorted((row.trial for row in rows), key=lambda trial: trial.rms)
+    return [Found(one.model, (), one.z, data.faults, False) for one in ranked]
 
 
-def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, Found]:
-    """Return the models that training runs lead to: law with effects, and with curves besides.
+def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, Found, Found]:
+    """Return the models that training runs lead to: law with effects, with curves, with a closure.
 
     Parameters
     ----------
@@ -93,7 +103,7 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
     chosen = choose(search(rows, TrialsByLaw(data, say)))
     assert chosen.prepared is not None
     opened = _with_effects(split, chosen.finding, chosen.prepared, say)
-    return _found(opened, ()), _with_curves(opened, say)
+    return (_found(opened, ()), *_with_curves(opened, say))
 
 
 def _laws(
@@ -133,8 +143,11 @@ def _with_effects(split: Runs, finding: SiteDiagnosis, opened: Prepared, say: Pr
     return opened
 
 
-def _with_curves(opened: Prepared, say: Progress) -> Found:
-    """Learn curves as long as one lowers the error beyond chance and the model is not full."""
+def _with_curves(opened: Prepared, say: Progress) -> tuple[Found, Found]:
+    """Learn curves as long as one lowers the error beyond chance and the model is not full.
+
+    Then a closure: the second one has it, where it is kept.
+    """
     curves: tuple[Curve, ...] = ()
     with ExitStack() as stack:
         while len(opened.before.model.effects) < MOST_EFFECTS:
@@ -149,7 +162,9 @@ def _with_curves(opened: Prepared, say: Progress) -> Found:
                 opened, before=learned.after, problem=opened.problem.of(opened.problem.runs),
                 held_out=opened.held_out.of(opened.held_out.runs), part=None,
             )  # fmt: skip
-    return _found(opened, curves)
+        found = _found(opened, curves)
+        say("a closure")
+        return found, replace(found, closed=not learn_closure(opened, CLOSURE).refused)
 
 
 def _found(opened: Prepared, curves: tuple[Curve, ...]) -> Found:
@@ -173,10 +188,27 @@ def opened_once(found: Found, train: Sequence[Measurement], held: Sequence[Measu
         problem, judging = corrected_runs(found, train, held)
         model = _identified(found.model, problem)
         zero = zero_of(problem, model)[0] if found.free_zero and not has_offset(model) else 0.0
-        errors = [
-            (run.force - judging.predict(model, run) - zero)[run.skip :] for run in judging.runs
-        ]
-        return share_of(errors, judging.runs)
+        if found.closed:
+            return with_closure(model, problem, judging, zero)
+        return share_of(errors_of(model, judging, zero), judging.runs)
+
+
+def with_closure(model: Model, problem: Problem, judging: Problem, zero: float = 0.0) -> float:
+    """Return the error of a model on held-out runs, with a closure where training folds want one.
+
+    Parameters
+    ----------
+    model : fitted to the training runs
+    problem, judging : the runs that the closure is trained on, and those that judge it
+    zero : of the force [N]
+    """
+    found = trained_beside(problem, model)
+    if found is None:
+        return share_of(errors_of(model, judging, zero), judging.runs)
+    closure, beside, _ = found
+    with defined({CLOSURE: closure_text(CLOSURE, closure, "a benchmark")}):
+        joined = replace(beside, effects=(*beside.effects, CLOSURE))
+        return share_of(errors_of(joined, judging, zero), judging.runs)
 
 
 def _identified(model: Model, problem: Problem) -> Model:

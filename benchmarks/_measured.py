@@ -263,6 +263,42 @@ def friction(folder: Path, law: str) -> Row:
     return row
 
 
+def absorber_runs(folder: Path) -> Runs:
+    """Return the runs of a passive shock absorber: three of speed and pressure, and two others."""
+    names = ("speed6_100psi", "speed1_100psi", "speed5_150psi"), ("speed1_150psi", "speed5_50psi")
+    train, held = (read_measurements([folder / f"{one}.csv" for one in part]) for part in names)
+    return train, held
+
+
+def last_third(runs: Runs) -> Runs:
+    """Return all runs cut in two: the last third of each is held out."""
+    every = [(run, len(run.time) * 2 // 3) for run in (*runs[0], *runs[1])]
+    return (
+        [run.part(0, cut, f"{run.name}, first two thirds") for run, cut in every],
+        [run.part(cut, len(run.time), f"{run.name}, last third") for run, cut in every],
+    )
+
+
+def by_level(runs: Runs) -> Runs:
+    """Return all runs, those of the middle one of three levels held out.
+
+    Levels of the mean command; where it is one, of the RMS displacement. What has too few runs
+    for that has none held out.
+    """
+    every = [*runs[0], *runs[1]]
+    level = [float(np.mean(run["voltage"])) if run.has("voltage") else 0.0 for run in every]
+    if np.ptp(level) <= 1e-3 * max(map(abs, level)):
+        level = [float(np.std(run["displacement"])) for run in every if run.has("displacement")]
+    if len(every) < 3 or len(level) < len(every):
+        return every, []
+    low, high = np.quantile(level, (1.0 / 3.0, 2.0 / 3.0))
+    middle = [low <= one <= high for one in level]
+    return (
+        [run for run, out in zip(every, middle, strict=True) if not out],
+        [run for run, out in zip(every, middle, strict=True) if out],
+    )
+
+
 def between(run: Measurement, begin: float, end: float) -> Measurement:
     """Return the part of a run between two times [s]."""
     first, last = (int(np.searchsorted(run.time, t)) for t in (begin, end))

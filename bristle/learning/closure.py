@@ -32,6 +32,7 @@ from ..physics.effect import CLOSURE
 from ..user_code.load import defined
 from ..view import Viewable
 from .closure_file import Closure, Input, Region, Store, closure_text, rounded
+from .closure_names import Nearest, nearest_effect
 from .signals import faded
 
 SPREAD = (0.05, 0.2, 0.8, 3.2)
@@ -104,8 +105,8 @@ class LearnedClosure(Viewable):
     RMS of its force over RMS of the measured one, on held-out runs; `lives_on` the groups of its
     inputs with the share of its variance that goes without each; `outside` the share of held-out
     samples where it has faded by half or more; `stroke` [m] RMS displacement of the training runs
-    where all have one amplitude, else 0; `refused` why it is not kept, "" where it is; `file` its
-    effect's, None where none is written.
+    where all have one amplitude, else 0; `nearest` the effect of the library that is; `refused` why
+    it is not kept, "" where it is; `file` its effect's, None where none is written.
     """
 
     name: str
@@ -117,6 +118,7 @@ class LearnedClosure(Viewable):
     lives_on: tuple[tuple[str, float], ...] = ()
     outside: float = 0.0
     stroke: float = 0.0
+    nearest: Nearest | None = None
     refused: str = ""
     file: Path | None = None
 
@@ -135,6 +137,7 @@ class LearnedClosure(Viewable):
             f"force is {percent(self.share)} of it.",
             f"Look for the physics in what it lives on: {inputs}; in brackets how much of its "
             "variance goes without that.",
+            *([self.nearest.sentence(self.closure.drive)] if self.nearest else []),
             f"It is not supported beyond {self._region()}: it fades to zero there. Of the held-out "
             f"samples {percent(self.outside)} are outside.",
             *self._one_amplitude(),
@@ -182,6 +185,8 @@ class LearnedClosure(Viewable):
             "z": self.after.z, "folds": self.folds, "share": self.share,
             "units": len(self.closure.out), "weights": self.closure.weights,
             "lives_on": dict(self.lives_on), "outside": self.outside,
+            **({"nearest": self.nearest.effect, "nearest_explains": self.nearest.explains,
+                "nearest_z": self.nearest.trial.z} if self.nearest else {}),
         }  # fmt: skip
 
 
@@ -233,7 +238,9 @@ def learn_closure(
             f"runs beyond their scatter ({rms[0]:.4g} N before, {rms[1]:.4g} N with it)."
         )
         return replace(found, refused=why)
-    return found
+    part = prepared.searched
+    shown = [_Seen(part, before.model, run, closure.inputs).forces(closure) for run in part.runs]
+    return replace(found, nearest=nearest_effect(prepared, before.model, part, shown))
 
 
 def one_amplitude(runs: Sequence[Run]) -> bool:

@@ -18,6 +18,7 @@ from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, error_text, verdict_view
 from ..errors import RecordError
 from ..learning.closure import LearnedClosure
+from ..learning.closure_names import NEAR
 from ..learning.result import LearnedEffect
 from ..model.model import Model
 from ..physics.drive import DRIVES
@@ -232,6 +233,9 @@ def closure_with_next(found: LearnedClosure, folder: Path) -> View:
     then: tuple[Next, ...] = ()
     if found.file is not None:
         then = (Next(command("add", folder, found.name), "puts it beside the model"),)
+    if found.nearest is not None and found.nearest.explains >= NEAR:
+        name = found.nearest.effect
+        then = (*then, Next(command("add", folder, name), "takes the effect in its place"))
     view = found.view()
     return view._replace(blocks=(*view.blocks, *then))
 
