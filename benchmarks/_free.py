@@ -164,7 +164,7 @@ def _with_curves(opened: Prepared, say: Progress) -> tuple[Found, Found]:
             )  # fmt: skip
         found = _found(opened, curves)
         say("a closure")
-        return found, replace(found, closed=not learn_closure(opened, CLOSURE).refused)
+        return found, replace(found, closed=not learn_closure(opened, CLOSURE, names=False).refused)
 
 
 def _found(opened: Prepared, curves: tuple[Curve, ...]) -> Found:

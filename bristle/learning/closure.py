@@ -191,7 +191,7 @@ class LearnedClosure(Viewable):
 
 
 def learn_closure(
-    prepared: Prepared, name: str, rule: DecisionRule | None = None
+    prepared: Prepared, name: str, rule: DecisionRule | None = None, *, names: bool = True
 ) -> LearnedClosure:
     """Learn what the model of an opening misses, as a network in parallel with the damper.
 
@@ -200,6 +200,7 @@ def learn_closure(
     prepared : runs and the fitted model, as a diagnosis begins with them
     name : of the effect that the network becomes
     rule : the numbers that decide; None takes the opening's
+    names : whether the effect of the library that comes nearest is looked for
     """
     rule, before, train = rule or prepared.rule, prepared.before, prepared.problem
     alike = one_amplitude(train.runs)
@@ -238,6 +239,8 @@ def learn_closure(
             f"runs beyond their scatter ({rms[0]:.4g} N before, {rms[1]:.4g} N with it)."
         )
         return replace(found, refused=why)
+    if not names:
+        return found
     part = prepared.searched
     shown = [_Seen(part, before.model, run, closure.inputs).forces(closure) for run in part.runs]
     return replace(found, nearest=nearest_effect(prepared, before.model, part, shown))

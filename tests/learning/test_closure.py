@@ -12,10 +12,11 @@ from bingham_runs import STEP, VALUES, runs
 
 from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import judge
-from bristle.identification.histories import force_history
+from bristle.identification.histories import DamperForces, force_history
 from bristle.identification.problem import Problem
 from bristle.learning.closure import LearnedClosure, learn_closure, lowers, one_amplitude
 from bristle.learning.closure_file import Closure, closure_text
+from bristle.learning.closure_names import nearest_effect
 from bristle.model.model import Model
 from bristle.physics.damper import DamperModel, functions_of, room, setup_of
 from bristle.physics.generate import Link
@@ -43,7 +44,7 @@ def opened(problem: Problem) -> Prepared:
 
 @cache
 def learned() -> LearnedClosure:
-    found = learn_closure(opened(runs(late)), NAME)
+    found = learn_closure(opened(runs(late)), NAME, names=False)
     assert found.refused == ""
     return found
 
@@ -86,6 +87,25 @@ def test_it_lowers_the_error_on_runs_that_it_has_not_seen() -> None:
     assert "It is no effect of physics, and the verdict stays unknown." in text
     assert "It is not supported beyond velocity" in text
     assert found.as_dict()["lives_on"]
+
+
+@pytest.mark.slow
+def test_the_effect_that_it_stands_for_is_named_and_tried() -> None:
+    def hidden(x, v, V, F):
+        lag = {**VALUES, "coil_lag.tau": 0.08}
+        return DamperForces("bingham", ["coil_lag"]).force(x, v, 0.0 * v, V, STEP, lag)
+
+    told = opened(runs(hidden))
+    base = told.before.model
+    carried = [run.force - told.problem.predict(base, run) for run in told.problem.runs]
+    found = nearest_effect(told, base, told.problem, carried)
+    assert found is not None
+    assert found.effect == "coil_lag"
+    assert found.explains > 0.8
+    assert found.trial.model.value("coil_lag.tau") == pytest.approx(0.08, rel=0.05)
+    assert found.trial.z < 0.5 * told.before.z
+    text = found.sentence("voltage")
+    assert text.startswith("Nearest in the library: coil lag, which explains")
 
 
 def test_a_true_model_keeps_none() -> None:
