@@ -189,7 +189,7 @@ def test_no_time_is_told_and_no_step_that_would_spoil_the_record(tmp_path, capsy
             for name, u in (("displacement", "mm"), ("force", "N"))]  # fmt: skip
     file = tdms(tmp_path / "run.tdms", *bare)
     assert main(["study", "new", str(tmp_path / "s"), "--data", str(file), "--quiet"]) == 2
-    assert "or --step S, the sampling step in s" in capsys.readouterr().err
+    assert "no column can be the time: --step S, the sampling step in s" in capsys.readouterr().err
 
 
 def test_two_times_in_one_table_are_doubted(tmp_path: Path, capsys) -> None:
