@@ -7,6 +7,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,8 @@ class Layout:
 
     def split(self, line: str) -> list[str]:
         """Return the fields of a line."""
-        if not self.delimiter:
-            return line.split()
+        if not self.delimiter:  # a blank of another kind parts thousands
+            return line.split() if line.isascii() else re.split("[ \t]+", line.strip(" \t\r\n"))
         if '"' in line:
             return next(csv.reader([line], delimiter=self.delimiter), [])
         return line.split(self.delimiter)
@@ -74,11 +75,8 @@ class Body:
 
 def state_of(text: str, comma: bool) -> str:
     """Return whether a field is a "number", "missing", or a "word"."""
-    plain = text.strip().strip('"').strip()
-    if (_COMMA if comma else _POINT).fullmatch(plain) or is_grouped(plain, comma):
-        return "number"
-    lower = plain.lower().replace("+", "")
-    return "missing" if lower in _MISSING or lower in _INFINITE else "word"
+    value = _value(text, comma)
+    return "word" if value is None else "number" if isfinite(value) else "missing"
 
 
 def is_grouped(text: str, comma: bool) -> bool:
