@@ -83,6 +83,9 @@ LAYOUTS = {
     + rows(",", (COUNT, T, (2.0 * (COUNT - 1)) % 1000, X, U, F), K, clock(cut=7), K, P, P, P),
     "Hioki": '"File name","a.MEM"\n"CH","U1-1","U1-2","U1-3"\n"Mode","V","V","V"\n'
     '"Time(s)","Disp[mm]","Coil[V]","Force[N]"\n' + rows(",", BASE, *(lambda v: f"{v:.8E}",) * 4),
+    "SignalExpress": "channel names:\nDisp - mm\tCoil - V\tLoad - kN\nstart times:\n"
+    + "\t".join(["12.03.2024 10:00:00,000"] * 3) + "\ndt:\n0,002\t0,002\t0,002\ndata:\n"
+    + rows("\t", (X, U, F / 1e3), C, C, comma(8)),
     "bars": "Time, sec|Disp., mm|Coil volts, V|Force, N\n" + rows("|", BASE, P, P, P, P),
     "groups alone": "Zeit [ms];Weg [um];Spule [mV];Kraft [N]\n"
     + rows(";", (1e3 * T, 1e3 * X, 1e3 * U, F), *(lambda v: f"{v:,.0f}".replace(",", "."),) * 4),
