@@ -57,7 +57,7 @@ def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> 
     RecordError
         If nothing separates runs, or a column that is needed is not there.
     """
-    if not holds_several(split):
+    if not holds_several(split) or (split == "sheets" and SHEET not in table.values):
         return [table]
     if wrong_split(split):
         raise RecordError(f"{table.source}: split = {split!r}; {RIGHT}")
@@ -74,7 +74,7 @@ def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> 
         why = {
             "restart": "its time never goes back",
             "column": f'"{title.strip()}" never changes',
-            "sheets": "one sheet alone has these columns",
+            "sheets": "its sheets are of one run",
             "rests": f"nothing rests for {RESTS:g} s between two motions",
         }[kind]
         if len(cuts):

@@ -13,6 +13,7 @@ from pathlib import Path
 from ..errors import RecordError
 from . import formats
 from .table import Table
+from .times import in_order
 
 LARGEST = 256 * 1024**2
 """Largest content that is read, after decompression [bytes]: about 3 million rows of 8 columns."""
@@ -31,7 +32,8 @@ def read_table(path: Path | str, split: str = "") -> Table:
     Parameters
     ----------
     path : of the file
-    split : how files hold runs, of which "sheet NAME" and "sheets" tell what of a workbook is read
+    split : how files hold runs: "sheet NAME" and "sheets" tell what of a workbook is read, and with
+        "restart" a time that goes back is no counter
 
     Raises
     ------
@@ -42,7 +44,8 @@ def read_table(path: Path | str, split: str = "") -> Table:
     path = Path(path)
     kind, _, title = split.partition(" ")
     sheet = {"sheet": title.strip(), "sheets": "*"}.get(kind, "")
-    return formats.read(content_of(path), path.suffix.lower(), str(path), sheet)
+    table = formats.read(content_of(path), path.suffix.lower(), str(path), sheet)
+    return table if kind == "restart" else in_order(table)
 
 
 def files_in(folder: Path) -> list[Path]:

@@ -148,7 +148,8 @@ def titles(
         found = title(index, text)
         if met[text] > 1:
             found = replace(found, text=f"{text} ({met[text]})")
-        bare = "" if units is None or _is_time(units[index]) else units[index].strip()
+        bare = "" if units is None else units[index].strip()
+        bare = "" if len(bare) > 1 and _is_time(bare) else bare  # "Time", and no tonne
         if units is not None and bare.lower() not in _NOTHING:
             found = _in_unit(found, units[index].strip().strip('"').strip())
         for row in others if units is None else ():

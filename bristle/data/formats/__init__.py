@@ -20,7 +20,6 @@ from typing import Any
 from ...core.text import install
 from ...errors import RecordError
 from ..table import Table, without_codes
-from ._times import in_order
 
 
 @cache
@@ -50,7 +49,7 @@ def read(content: bytes, suffix: str, name: str, sheet: str = "") -> Table:
     if sheet and not hasattr(module, "read_sheet"):
         raise RecordError(f"{name}: this is no workbook, and has no sheet to choose.")
     table: Table = module.read_sheet(content, name, sheet) if sheet else module.read(content, name)
-    return in_order(without_codes(table))
+    return without_codes(table)
 
 
 def library(module: str, name: str, what: str) -> Any:

@@ -232,7 +232,7 @@ def _assumed_unit(column: Column, spacing: float, first: float) -> tuple[str, st
         return "", f'its unit, "{told}", is not known'
     told = f'"{told}" is no unit that is known' if told else "no unit is given"
     for word, unit in (("micros", "us"), ("millis", "ms")):
-        if word in column.name.lower():
+        if word in re.split(r"[^a-z]+", column.name.lower()):
             return unit, f"{told}, {unit} is assumed by its name"
     if 0.0 <= first < 1.0 and 0.0 < spacing < _IN_DAYS and spacing > _SURELY_DAYS:
         return "", f"{told}, and {spacing:.3g} may be of a day or of a second"

@@ -73,6 +73,9 @@ def test_a_sheet_is_chosen_and_stays_so(tmp_path: Path, sheet: str, lengths: lis
     assert main(["study", "extend", folder, str(tmp_path / "b.xlsx"), *hold]) == 0
     added = {"one": [239], "two": [219], "*": [239, 89, 219], "old": [89]}[sheet]
     assert [len(run.time) for run in Study(folder).read()] == lengths + added
+    book(tmp_path / "c.xlsx", Log=CALIBRATION, **{sheet.replace("*", "alone"): RUN[:210]})
+    assert main(["study", "extend", folder, str(tmp_path / "c.xlsx"), "--quiet"]) == 0
+    assert len(Study(folder).read()[-1].time) == 209
     assert main(["study", "channels", folder, "--channel", "force=F@N", "--quiet"]) == 0
 
 

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.data.guess import guess_channels, specs
 from bristle.data.measurement import measurements_of
+from bristle.data.pieces import pieces_of
 from bristle.data.read import read_table
 from bristle.errors import RecordError
 
@@ -168,6 +170,16 @@ def test_days_without_a_unit(tmp_path: Path, capsys, zero: float, places: int, w
     code, said = told(file, capsys)
     assert code == 0
     assert f"no unit is given, and its values are {what}: " in said
+
+
+def test_runs_of_a_minute_are_cut_where_that_is_asked(tmp_path: Path) -> None:
+    t = np.tile(np.arange(600) / 10.0, 2)
+    columns = [np.sin(2.0 * np.pi * t / 3.0), 0.0 * t, np.cos(2.0 * np.pi * t / 3.0)]
+    file = timed(tmp_path, "Time [s]", t, P, columns)
+    assert "a counter that ran over" in read_table(file).remarks[0]
+    table = read_table(file, "restart")
+    cut = pieces_of(table, "restart", specs(table, guess_channels(table)))
+    assert [one.rows for one in cut] == [600, 600]
 
 
 def test_a_count_of_samples_is_no_time(tmp_path: Path, capsys) -> None:

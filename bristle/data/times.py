@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.arrays import Array, Indices
-from ...core.text import listed, plain
-from ..channels import meaning, quantity_of_unit
-from ..noise import SHORTEST
-from ..sampling import goes_on
-from ..table import Table
-from ..titles import Column
+from ..core.arrays import Array, Indices
+from ..core.text import listed, plain
+from .channels import meaning, quantity_of_unit
+from .noise import SHORTEST
+from .sampling import goes_on
+from .table import Table
+from .titles import Column
 
 _EVEN = 1.5
 """Spacing in usual ones up to which rows in the order of time leave no gap."""
