@@ -11,11 +11,11 @@ import numpy as np
 
 from ..core.arrays import Array, Flags
 from ..core.text import plain, quantity, short_z
-from ..data.channels import Label, Labels, label_text, varying
+from ..data.channels import Label, Labels, label_name, label_text, varying
 from ..identification.search import z_scale
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .misfit import CLOSE
-from .names import joined, name_of
+from .names import joined
 from .predictions import RunPrediction
 
 STEADY = 1e-3
@@ -110,7 +110,7 @@ def label_sentence(errors: Sequence[LabelError]) -> str:
     if len(far) == 1 and far[0].run:
         return _of_one_run(far[0], rest[0].z)
     where = _values(far, own)
-    label = "" if far[0].unit else f"{name_of(far[0].name)} "
+    label = "" if far[0].unit else f"{label_name(far[0].name)} "
     others = f"z = {short_z(rest[0].z)} at most at {_values(rest, own)}"
     if rest[0].z <= CLOSE:
         return f"Only the runs at {label}{where} are wrong: z = {short_z(own[0].z)}, and {others}."
@@ -126,7 +126,7 @@ def _of_one_run(far: LabelError, others: float) -> str:
     far : the error of that run
     others : the largest z of a value with the others
     """
-    label = "" if far.unit else f"{name_of(far.name)} "
+    label = "" if far.unit else f"{label_name(far.name)} "
     wrong = f"is wrong: z = {short_z(far.z)}" if others <= CLOSE else ""
     begin = (
         f"Only {far.run} {wrong}"

@@ -53,6 +53,9 @@ FEWEST, MOST_LEVELS, MOST = 4, 6, 4
 EXTRAPOLATED, NOT_SEPARABLE = "Extrapolation:", "Not separable:"
 """How sentences begin that are never left to the details."""
 
+MOTION = "the "
+"""How what belongs to the motion or the command begins, unlike the name of a label."""
+
 REFITS = 10
 """Fits without one of the runs, or without a group of them, that give an interval."""
 
@@ -164,9 +167,9 @@ def chance_of(asked: Array, design: Array, simpler: Array | None = None) -> floa
 def _motions(runs: Sequence[Run]) -> dict[str, Array]:
     """Return what of the motion and the command may differ from run to run (k,), in words."""
     return {
-        "the speed": np.array([float(np.sqrt(np.mean(run.v**2))) for run in runs]),
-        "the stroke": np.array([float(np.ptp(run.x)) for run in runs]),
-        f"the {runs[0].drive}": np.array([float(np.mean(run.V)) for run in runs]),
+        f"{MOTION}speed": np.array([float(np.sqrt(np.mean(run.v**2))) for run in runs]),
+        f"{MOTION}stroke": np.array([float(np.ptp(run.x)) for run in runs]),
+        f"{MOTION}{runs[0].drive}": np.array([float(np.mean(run.V)) for run in runs]),
     }
 
 
@@ -174,18 +177,21 @@ def together(label: LabelOfRuns, runs: Sequence[Run]) -> list[str]:
     """Return what these runs cannot separate from a label: other labels, the motion, in words."""
     others = [one for one in labels_of([run.labels for run in runs]) if one.name != label.name]
     found = [one.name for one in others if label.goes_with(one.numbers())]
-    return [*found, *(what for what, own in _motions(runs).items() if label.goes_with(own))]
+    moved = [what for what, own in _motions(runs).items() if label.goes_with(own)]
+    return [*found, *moved]
 
 
 # The effects that are tried.
 
 
-def dependences(prepared: Prepared) -> list[Dependence]:
+def dependences(prepared: Prepared, *, with_motion: bool = False) -> list[Dependence]:
     """Return the dependences on labels that are worth a trial, the most promising first.
 
     Parameters
     ----------
     prepared : the runs, and the model as fitted without
+    with_motion : whether those on labels that go together with the motion are asked for, which are
+        none to try, in place of all others
     """
     train, model = prepared.searched, prepared.before.model
     runs = [*train.runs, *prepared.held_out.runs]
@@ -202,7 +208,7 @@ def dependences(prepared: Prepared) -> list[Dependence]:
     looked = LIKELY / (len(labels) * max(1, len(fits.names)))
     found: list[Dependence] = []
     for label in labels:
-        if any(what.startswith("the ") for what in together(label, runs)):
+        if any(what.startswith(MOTION) for what in together(label, runs)) is not with_motion:
             continue
         own = [
             one
@@ -535,7 +541,8 @@ def confirmed(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
         texts.append(_told(name, model, std, len(runs)))
         found = replace(found, std={**found.std, **std})
     texts += _all_at_one_level(prepared)
-    texts += _not_separable(found, prepared, runs)
+    found, inseparable = _not_separable(found, prepared, runs)
+    texts += inseparable
     if found.after is not None:
         texts += extrapolated(found.after.model, prepared.problem.runs, prepared.held_out.runs)
     return replace(found, reasons=(*found.reasons, *texts)) if texts else found
@@ -648,32 +655,48 @@ def _all_at_one_level(prepared: Prepared) -> list[str]:
     return out
 
 
-def _not_separable(found: SiteDiagnosis, prepared: Prepared, runs: Sequence[Run]) -> list[str]:
-    """Return what goes together with a label that matters, and which run would separate the two."""
-    if found.before is None or found.kind == "none":
-        return []
-    named = {
-        label
-        for name in found.effects if name in EFFECTS and EFFECTS[name].changes
-        for label in EFFECTS[name].labels.values()
-    }  # fmt: skip
+def _not_separable(
+    found: SiteDiagnosis, prepared: Prepared, runs: Sequence[Run]
+) -> tuple[SiteDiagnosis, list[str]]:
+    """Return a finding that names all labels that these runs cannot separate, and says so.
+
+    Two labels that change together are alternatives. One that changes with the motion is not
+    named, and told where a parameter goes with it.
+    """
+    tried = {name: trial for trial in found.trials for name in trial.effects if _labels(name)}
+    named = {label for name in found.effects for label in _labels(name)}
+    if found.kind in ("unknown", "insufficient"):
+        named |= {one.label for one in dependences(prepared, with_motion=True)}
     out: dict[frozenset[str], str] = {}
     for label in labels_of([run.labels for run in runs]):
         others = together(label, runs)
-        moved = any(one.startswith("the ") for one in others)
-        if not others or not (label.name in named or (moved and found.kind == "unknown")):
+        alike = [n for n in tried if {*_labels(n)} & {*others} and n not in found.effects]
+        others = [
+            one for one in others
+            if one.startswith(MOTION) or any(one in _labels(name) for name in tried)
+        ]  # fmt: skip
+        if not others or label.name not in named or f"{MOTION}{label.name}" in others:
             continue
+        if found.kind in ("effect", "ambiguous") and alike:
+            best = min(alike, key=lambda name: tried[name].z)
+            found = replace(found, kind="ambiguous", effects=(*found.effects, best))
         numbers = label.numbers()
         low, high = runs[int(np.argmin(numbers))], runs[int(np.argmax(numbers))]
         own, at = label_name(label.name), label_text(label.name, low.labels[label.name])
-        like = ", ".join(
-            f"with {one} of {high.name}" if one.startswith("the ")
-            else f"at {label_name(one)} {label_text(one, high.labels[one])}"
+        like = " and ".join(
+            f"{one} of {high.name}" if one.startswith(MOTION)
+            else f"{label_name(one)} {label_text(one, high.labels[one])}"
             for one in others
         )  # fmt: skip
         out.setdefault(
             frozenset((label.name, *others)),
             f"{NOT_SEPARABLE} {joined([own, *map(label_name, others)])} change together from run "
-            f"to run. A run at {own} {at} {like} separates them.",
+            f"to run. A run at {own} {at} with {like} separates them.",
         )
-    return [*out.values()]
+    return found, [*out.values()]
+
+
+def _labels(name: str) -> tuple[str, ...]:
+    """Return the labels that an effect changes a parameter by; none of another effect."""
+    effect = EFFECTS.get(name)
+    return tuple(effect.labels.values()) if effect is not None and effect.changes else ()

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from bristle.data.run_labels import labels_of
-from bristle.diagnosis.by_label import chance_of, dependences, extrapolated, together
+from bristle.diagnosis.by_label import chance_of, confirmed, dependences, extrapolated, together
 from bristle.diagnosis.prepared import Prepared
+from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import joinable, judge
 from bristle.errors import PhysicsError, RecordError
 from bristle.identification.fit import fit
@@ -127,6 +128,61 @@ def test_what_moves_with_the_motion_is_not_tried_and_the_two_are_told():
     (label,) = labels_of([run.labels for run in same])
     assert "the speed" in together(label, same)
     assert dependences(prepared(same)) == []
+
+
+def found_with(known, names):
+    """Return what a diagnosis finds whose trials are those of some effects, the first the best."""
+    trials = []
+    for name in names:
+        (start,) = initial_guesses(name, known.before.model, known.problem)
+        trials.append(judge(refine(start, known.problem), known.problem, known.held_out))
+    return SiteDiagnosis(
+        "damper", "effect", (names[0],), known.before.z, trials[0].z, 1.0, 0.0,
+        trials=tuple(trials), before=known.before, after=trials[0], reasons=("It falls.",),
+    )  # fmt: skip
+
+
+def test_labels_that_change_together_are_alternatives_with_the_run_that_separates_them():
+    runs = [
+        made(k, {"pressure": p, "hose": "ABC"[round(p / 50) - 1]}, f_0=0.02 * p)
+        for k, p in enumerate(PRESSURES)
+    ]
+    known = prepared(runs)
+    found = {one.name: one.text for one in dependences(known)}
+    assert {*found} == {"f_0_by_pressure", "f_0_by_hose"}
+    with defined(found):
+        told = confirmed(found_with(known, ["f_0_by_pressure", "f_0_by_hose"]), known)
+    assert (told.kind, told.effects) == ("ambiguous", ("f_0_by_pressure", "f_0_by_hose"))
+    assert told.reasons[-1] == (
+        "Not separable: pressure and hose change together from run to run. A run at pressure 50 "
+        "with hose C separates them."
+    )
+
+
+def test_a_dependence_that_hangs_on_one_run_is_unknown():
+    known = prepared(with_pressure(lambda _p: {}))
+    text = dependences(prepared(with_pressure(lambda p: {"f_0": 0.02 * p})))[0].text
+    with defined({"f_0_by_pressure_psi": text}):
+        told = confirmed(found_with(known, ["f_0_by_pressure_psi"]), known)
+    assert (told.kind, told.effects) == ("unknown", ())
+    assert "these runs cannot tell it from chance" in told.reasons[0]
+    assert "Measure more runs at each value of the label." in told.reasons[0]
+
+
+def test_training_runs_all_at_one_level_are_told():
+    runs = [made(k, {"hose": "A" if k < 6 else "B"}, f_0=1.0 + (k > 5)) for k in range(8)]
+    known = prepared(runs)
+    assert dependences(known) == []
+    bare = SiteDiagnosis(
+        "damper", "unknown", (), known.before.z, known.before.z, 0.0, 0.0,
+        before=known.before, after=known.before,
+    )  # fmt: skip
+    (said,) = confirmed(bare, known).reasons
+    assert said == (
+        "All training runs are at hose A, and the held-out run_6 at B: nothing that was fitted "
+        'tells what hose does. Train on some of both: role = "train" in their [[runs]] of '
+        "study.toml."
+    )
 
 
 def test_few_runs_prove_nothing():
