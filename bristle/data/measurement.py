@@ -441,7 +441,18 @@ def from_first(time: Array) -> Array:
 
 
 def in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
-    """Return a column in the channel's SI unit."""
+    """Return a column (n,) in the channel's SI unit, NaN where a value is missing.
+
+    Parameters
+    ----------
+    table, channel : what a file holds, and the name of the channel
+    spec : where it is in the table
+
+    Raises
+    ------
+    RecordError
+        If there is no such column, or it holds words, has no unit or one of another quantity.
+    """
     column = table.find(spec.column)
     if column.text in table.not_numeric:
         raise RecordError(

@@ -74,7 +74,6 @@ def test_channels_that_lack_are_said() -> None:
     specs = {key: SPECS[key] for key in ("time", "displacement", "force")}
     (run,) = measured(data, specs)
     assert any("no velocity" in note for note in run.notes)
-    assert any("no command" in note for note in run.notes)
     with pytest.raises(RecordError, match=r"voltage was not measured; there are displacement"):
         run["voltage"]
 
