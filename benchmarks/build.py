@@ -13,8 +13,9 @@ from ._rows import Row
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = (
-    "import sys, pathlib; from bristle.fmu.build import build_all; "
-    "print(len(build_all(pathlib.Path(sys.argv[1]))))"
+    "import sys, pathlib; from bristle.fmu.build import build, plan; "
+    "from bristle.fmu.catalogue import component_names; folder = pathlib.Path(sys.argv[1]); "
+    "print(len([build(plan(name), folder) for name in component_names()]))"
 )
 
 

@@ -444,8 +444,3 @@ def planned(
         named.update(path.name.encode() + path.read_bytes())
     name = f"{what.name}_{named.hexdigest()[:8]}"
     return replace(what, name=name, baked={**what.baked, "name": name})
-
-
-def build_all(folder: Path, only: Iterable[str] = ()) -> list[Path]:
-    """Build the built-in components, or those of `only`, into a folder; return their paths."""
-    return [build(plan(name), folder) for name in (list(only) or catalogue.component_names())]

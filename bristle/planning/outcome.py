@@ -35,8 +35,9 @@ HEADER = ("question", "figure", "now", "with these tests")
 class Outcome:
     """What tests will show of one thing.
 
-    `purpose` one of `purposes.PURPOSES`; `name` of effect, rivals, parameter or coordinate;
-    `what` the quantity is, in `unit`; `now` from the runs at hand, `then` with the tests too;
+    `purpose` "separate", "see", "sharpen" or "learn"; `name` of effect, rivals,
+    parameter or coordinate; `what` the quantity is, in `unit`; `now` from the runs at hand, `then`
+    with the tests too;
     infinite where no run shows it. `settled` whether a verdict will be able to tell; `beyond`
     whether no test that was looked at would; `excited` whether the tests change anything of it.
     """

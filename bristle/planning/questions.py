@@ -267,7 +267,6 @@ def coordinates_of(
 # - sharpen: standard deviations of parameters;
 # - learn: how well a part without a form is held along its coordinates.
 
-PURPOSES = ("separate", "see", "sharpen", "learn")
 
 ENOUGH = 3.0
 """How many times as far apart as a verdict asks rivals are of no more use."""
@@ -292,8 +291,8 @@ LEAST = 1e-3
 class AskedFigure:
     """A number that a plan makes smaller.
 
-    `purpose` one of PURPOSES; `name` of effect, pair, parameter or coordinate; `value` of it, in
-    `unit`; `enough` what need not be less.
+    `purpose` "separate", "see", "sharpen" or "learn"; `name` of effect, pair,
+    parameter or coordinate; `value` of it, in `unit`; `enough` what need not be less.
     """
 
     purpose: str

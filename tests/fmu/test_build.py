@@ -24,7 +24,7 @@ from kinds import ONE_OF_EACH
 
 from bristle.errors import BuildError, PhysicsError, RecordError
 from bristle.fmu import catalogue
-from bristle.fmu.build import BuildPlan, build, build_all, built_guid, ensure, plan
+from bristle.fmu.build import BuildPlan, build, built_guid, ensure, plan
 
 ROOT = Path(__file__).resolve().parents[2]
 each_component = pytest.mark.parametrize("component", COMPONENTS)
@@ -142,10 +142,9 @@ def test_a_name_a_building_and_start_values_change_the_digest(write: Any) -> Non
 # -- nothing done twice
 
 
-def test_only_the_named_ones_are_built(tmp_path: Path) -> None:
-    assert build_all(tmp_path, only=["LuGreDamper"]) == [tmp_path / "LuGreDamper.fmu"]
+def test_a_name_that_no_component_has_is_refused_with_the_near_one() -> None:
     with pytest.raises(BuildError, match=r'no component is named "LuGreDampr".*"LuGreDamper"'):
-        build_all(tmp_path, only=["LuGreDampr"])
+        plan("LuGreDampr")
 
 
 def spoil(path: Path, how: str) -> None:
