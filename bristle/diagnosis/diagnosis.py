@@ -21,13 +21,13 @@ from .conclusion import conclude, insufficient
 from .effect_limits import EffectLimit, detectable, effect_limits, profiled, untestable
 from .experiments import separating
 from .inconsistent_runs import contradicted
-from .law_trials import better_law, try_laws
+from .law_trials import OtherLaw, better_law, try_laws
 from .prepared import Prepared, Progress, of_layer, silent
 from .remaining import patterns_of, remaining_residual
 from .rig_runs import RigRuns, runs_of_rig
 from .site import Trials, diagnose_damper, diagnose_line, joinable_at, noise_is_all
 from .site_diagnosis import SiteDiagnosis
-from .trials import SHOWN, joinable, judge
+from .trials import SHOWN, Trial, joinable, judge
 from .verdict import Diagnosis
 
 NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the law."
@@ -245,14 +245,29 @@ def settled(
 def _beside_other_laws(
     found: SiteDiagnosis, prepared: Prepared, bends: bool, say: Progress
 ) -> SiteDiagnosis:
-    """Return a diagnosis that leaves an error with how much of it is the form of the law."""
-    judged = found.before if found.kind == "unknown" else found.after
-    if found.kind == "insufficient" or judged is None or judged.z <= prepared.rule.clean:
+    """Return a diagnosis that leaves an error with how much of it is the form of the law.
+
+    Effects that leave an error are not named where another law explains the runs without them.
+    """
+    before, judged = found.before, found.before if found.kind == "unknown" else found.after
+    if found.kind == "insufficient" or before is None or judged is None:
         return found
-    if not found.noise_known:
+    if judged.z <= prepared.rule.clean or not found.noise_known:
         return found
     say("trying every law")
-    laws = try_laws(prepared.searched, prepared.held_out, judged.model, bends=bends)
-    other = better_law(judged, laws, prepared.rule)
+
+    def better(than: Trial) -> OtherLaw | None:
+        laws = try_laws(prepared.searched, prepared.held_out, than.model, bends=bends)
+        return better_law(than, laws, prepared.rule)
+
+    other = better(before)
+    if judged is not before:
+        if other is not None and other.z <= prepared.rule.adequate:
+            found = replace(
+                found, kind="unknown", effects=(), model=before.model, after=before,
+                z_after=before.z,
+            )  # fmt: skip
+        else:
+            other = better(judged)
     text = NOT_THE_LAW if other is None else other.sentence(added=found.kind != "unknown")
     return replace(found, other_law=other, reasons=(*found.reasons, text))

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from bristle.data.channels import ChannelSpec
 from bristle.data.checks.runs import tells_a_bend
-from bristle.diagnosis import law_trials
-from bristle.diagnosis.law_trials import LawTrial, better_law, not_finite, try_laws
+from bristle.data.measurement import measurements_of_frame
+from bristle.diagnosis import diagnose_rig, law_trials
+from bristle.diagnosis.law_trials import (
+    FORM_ALONE,
+    LawTrial,
+    better_law,
+    not_finite,
+    try_laws,
+)
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.words import left_out
 from bristle.identification.error import ForceError
@@ -105,3 +114,34 @@ def test_two_levels_or_a_command_that_was_not_measured_tell_no_bend(runs):
     assert not tells_a_bend(measurements([two]))
     del two["U [V]"]
     assert not tells_a_bend(measurements([two]))
+
+
+@pytest.mark.slow
+def test_effects_that_leave_an_error_are_not_named_where_another_law_explains_the_runs_alone():
+    runs = [_of_tanh(k) for k in range(3)]
+    found = diagnose_rig(runs[:2], runs[2:], Model("bingham"))
+    assert found.kind == "unknown"
+    assert found.effects == ()
+    (text,) = [one for one in found.reasons if FORM_ALONE in one]
+    assert text.startswith("Without a further effect, the law tanh")
+
+
+def _of_tanh(k):
+    """Return a run of a damper that yields smoothly, with a spring: 8 s at 500 Hz, by current."""
+    rng = np.random.default_rng(k)
+    t = np.arange(0.0, 8.0, 2e-3)
+    slow, size = 2.0 * np.pi * (1.0, 2.0, 1.5)[k], (0.012, 0.008, 0.010)[k]
+    fast = 2.0 * np.pi * 2.7
+    x = size * (np.sin(slow * t) + 0.3 * np.sin(fast * t + 0.4))
+    v = size * (slow * np.cos(slow * t) + 0.3 * fast * np.cos(fast * t + 0.4))
+    current = 0.5 + 0.5 * np.sin(2.0 * np.pi * 0.31 * t + k)
+    force = (800.0 + 900.0 * current) * np.tanh(v / 0.01) + (2000.0 + 1500.0 * current) * v
+    frame = pd.DataFrame({
+        "time": t,
+        "displacement": x + 2e-5 * rng.standard_normal(len(t)),
+        "current": current + 1e-3 * rng.standard_normal(len(t)),
+        "force": force + 20_000.0 * x + 8.0 * rng.standard_normal(len(t)),
+    })  # fmt: skip
+    units = {"time": "s", "displacement": "m", "current": "A", "force": "N"}
+    specs = {name: ChannelSpec(name, unit) for name, unit in units.items()}
+    return measurements_of_frame(frame, f"run{k}", specs)[0]
