@@ -12,12 +12,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..physics.forms import CURVED, LINEAR_FORM, split_form
+from ..physics.law import Law
 from .decision import missing
 from .law_trials import LawTrial
 from .prepared import Prepared
 from .rule import BENCH, DecisionRule
 from .site_diagnosis import SiteDiagnosis
 from .trials import Difference, Trial, joinable, paired
+
+HIDDEN = 0.03
+"""Share of a law's excess that an effect leaves at most where what is left may be the part that a
+richer law has: one that alone does as well, within `close`, has no larger one."""
 
 EXPLAINING = ("none", "effect", "ambiguous")
 """The kinds of a finding that leave nothing unexplained."""
@@ -117,8 +122,14 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     contain no effect, the one with a parabola only where a straight line is clearly worse. Then
     those of them that no simpler one surpasses, the smallest error first, up to `most_laws` of all
     these. Last, where they are not among them, the law with the smallest z even if its plain error
-    puts it out, and the simplest of those that contain an effect and are not clearly worse.
+    puts it out, and the simplest of those that contain an effect and are not clearly worse. Of laws
+    with an effect none goes on that a simpler one with the same parts equals.
     """
+    rows = [
+        row
+        for row in rows
+        if not (_holds(row) and any(_equals_with_less(other, row, rule) for other in rows))
+    ]
     ranked = sorted(rows, key=lambda row: row.trial.z)
     first = best_of([row.trial for row in rows], rule)
     by_z = next(row for row in rows if row.trial is first)
@@ -184,7 +195,9 @@ def search(
     first: a law is left out where the runs are explained already by no more parameters than it
     would have with the smallest effect that can join it. Where no law with a single effect explains
     the runs so well that none could be clearly better, the best law that was left out is looked at
-    as well, and after it two effects of each law.
+    as well, and after it two effects of each law: first of the one that a single effect brings
+    nearest; once two explain the runs, no more of laws that began too far from that one. A law that
+    a simpler one of its parts equals waits until effects nearly explain what that leaves.
 
     Parameters
     ----------
@@ -197,20 +210,34 @@ def search(
         begun.append(lacking(first, True))
         if begun[0].finding.kind == "none" and not first.contains:
             return begun
-    searched = {pair.row.law for pair in begun}
-    others = [row for row in survivors(rows, rule) if row.law not in searched]
-    for pairs in (False, True):
-        found = list(begun)
-        for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
-            if _could_be_simpler(row, found, rule):
-                found.append(lacking(row, pairs))
-        if not pairs and not _explained(found, rule):
-            # One law's missing effect may be what another law has: it then fits better alone.
-            passed = _best_passed_over(rows, found)
-            found += [lacking(row, pairs) for row in passed]
-            others += passed
-        if _explained(found, rule):
-            break
+    others = [row for row in survivors(rows, rule) if row is not first or not begun]
+    others.sort(key=lambda row: (row.fitted, row.trial.z))
+    single = list(begun)
+
+    def look(row: LawTrial, found: list[LawAndEffects], pairs: bool) -> None:
+        if not _waits(row, found, rule) and _could_be_simpler(row, found, rule):
+            found.append(lacking(row, pairs))
+
+    for row in others:
+        look(row, single, False)
+    if not _explained(single, rule):
+        # One law's missing effect may be what another law has: it then fits better alone.
+        for row in _best_passed_over(rows, [*others, *(pair.row for pair in begun)]):
+            look(row, single, False)
+            others.append(row)
+    if _explained(single, rule):
+        return single
+    found, far = list(begun), float("inf")
+    for pair in sorted(single[len(begun) :], key=lambda pair: pair.reach(rule).z):
+        left = rule.excess(pair.reach(rule).z)
+        if left <= far and _could_be_simpler(pair.row, found, rule):
+            pair = lacking(pair.row, True)
+            far = min(far, rule.within * left) if pair.explains else far
+        found.append(pair)
+    known = {pair.row.law for pair in found}
+    for row in others:
+        if row.law not in known:
+            look(row, found, True)
     return found
 
 
@@ -219,11 +246,29 @@ def _explained(found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
     return any(pair.explains and pair.after.z <= 1.0 + rule.law_gain for pair in found)
 
 
-def _best_passed_over(rows: Sequence[LawTrial], found: Sequence[LawAndEffects]) -> list[LawTrial]:
-    """Return the law with the smallest z of which no variant and no form was searched, if any."""
-    searched = {_base(pair.row) for pair in found}
+def _best_passed_over(rows: Sequence[LawTrial], looked: Sequence[LawTrial]) -> list[LawTrial]:
+    """Return the law with the smallest z of which no variant and no form was looked at, if any."""
+    searched = {_base(row) for row in looked}
     left = [row for row in rows if _base(row) not in searched]
     return sorted(left, key=lambda row: row.trial.z)[:1]
+
+
+def _waits(row: LawTrial, found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
+    """Return whether a simpler law of the same parts equals a law, and its effects leave much."""
+    return any(
+        _equals_with_less(pair.row, row, rule)
+        and rule.excess(pair.reach(rule).z) > HIDDEN * rule.excess(pair.row.trial.z)
+        for pair in found
+    )
+
+
+def _equals_with_less(simpler: LawTrial, row: LawTrial, rule: DecisionRule) -> bool:
+    """Return whether a law does as well as another that has the same parts with more parameters."""
+    if _base(row) is _base(simpler) or {*_base(row).parts} != {*_base(simpler).parts}:
+        return False
+    level = simpler.trial.z <= (1.0 + rule.close) * row.trial.z
+    level &= simpler.trial.rms <= (1.0 + rule.law_gain) * row.trial.rms
+    return simpler.fitted < row.fitted and level
 
 
 def _could_be_simpler(row: LawTrial, found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
@@ -308,8 +353,8 @@ def equivalents(
     return [(law, effects, z) for (law, effects), z in sorted(out.items(), key=lambda i: i[1])]
 
 
-def _base(row: LawTrial) -> str:
-    return row.trial.model.law_class.base.name
+def _base(row: LawTrial) -> type[Law]:
+    return row.trial.model.law_class.base
 
 
 # What a verdict says of laws: which one the runs prefer, how the others do, what is as good.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +20,13 @@ from ..errors import StudyError
 from ..identification.prepare import SHORTEST
 from ..identification.problem import Problem, Run
 from ..identification.rig import Seeds
+from ..identification.start_grid import refine
 from ..model.model import Model
 from ..physics.effect import effects_of
 from .decision import TOLD, in_runs
 from .effect_size import SizeSearch
 from .rule import BENCH, DecisionRule
-from .trials import Trial
+from .trials import Trial, judge
 
 # Measurements as they would be without the faults of their sensors.
 
@@ -155,6 +157,16 @@ class Prepared:
         problem, held_out = (one.with_excess(excess) for one in (self.problem, self.held_out))
         part = None if self.part is None else self.part.with_excess(excess)
         return replace(self, problem=problem, held_out=held_out, part=part)
+
+    @cached_property
+    def freed(self) -> Prepared:
+        """The same runs with the zero of the force fitted along with every model."""
+        train, held_out = self.problem.with_free_zero(), self.held_out.with_free_zero()
+        before = judge(refine(self.before.model, train), train, held_out)
+        part = self.part
+        if part is not None:
+            part = train if part is self.problem else part.with_free_zero()
+        return replace(self, before=before, problem=train, held_out=held_out, part=part)
 
     def known(self, model: Model) -> SizeSearch:
         """Return what sizes of effects beside a fitted model are found with."""

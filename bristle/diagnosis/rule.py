@@ -187,6 +187,14 @@ class DecisionRule:
     Trades and found: as `complete`.
     """
 
+    within: float = 3.0
+    """Times the excess that a single effect leaves of one law, whose two effects explain the runs,
+    up to which two effects of another law are searched.
+
+    Trades: if lower, a law that two effects serve as well is missed; if higher, computing time.
+    Found: blind seeds, and campaigns that no law explains.
+    """
+
     # --- data that carry no verdict
 
     quietest: float = 3.0

@@ -214,6 +214,7 @@ class Trials:
         self.before = prepared.before
         self.pairs: list[Trial] = []
         self._found: dict[tuple[str, ...], list[Trial]] = {}
+        self._alone: dict[tuple[str, ...], list[Trial]] = {}
         self._earlier = earlier._found if earlier else {}
         self._weighed: dict[float, Trials] = {}
         if earlier is None:
@@ -236,6 +237,12 @@ class Trials:
         return self._weighed[excess]
 
     @cached_property
+    def freed(self) -> Trials:
+        """The trials with the zero of the force fitted along."""
+        self.say("the zero of the force is fitted along with every effect")
+        return Trials(self.prepared.freed, self.say)
+
+    @cached_property
     def patterns(self) -> list[ResidualPattern]:
         """Along which coordinates the present model's residual is organised."""
         return patterns_of(self.before, self.prepared.held_out)
@@ -249,7 +256,12 @@ class Trials:
 
     def reduce(self, pair: Trial) -> list[Trial]:
         """Return the trials of a pair's members alone."""
-        return try_members(pair, self.before.model, self.prepared.problem, self.prepared.held_out)
+        if pair.effects not in self._alone:
+            prepared = self.prepared
+            alone = try_members(pair, self.before.model, prepared.searched, prepared.held_out)
+            lesser = min(one.z for one in alone) < min(one.z for one in self.single)
+            self._alone[pair.effects] = self._on_all_runs(alone) if lesser else alone
+        return self._alone[pair.effects]
 
     def _all(self, first: Trial, most: int | None) -> list[Trial]:
         if first.effects in self._found:
@@ -265,15 +277,27 @@ class Trials:
             )
             trials = [*trials, *self._of_layer(first)]
         trials.sort(key=lambda trial: trial.z)
+        if most is None or self._may_be_needed(trials[0]):
+            trials = self._on_all_runs(trials)
+        self._found[first.effects] = trials
+        return [*trials]
+
+    def _may_be_needed(self, pair: Trial) -> bool:
+        """Return whether two effects leave as little as `decide` asks of them, or nearly so."""
+        rule, single = self.prepared.rule, min(trial.z for trial in self.single)
+        return rule.excess(pair.z / NEAR) <= rule.pair_left * rule.excess(single)
+
+    def _on_all_runs(self, trials: list[Trial]) -> list[Trial]:
+        """Return trials, the best first, those that contend fitted to all runs."""
+        prepared = self.prepared
+        trials = sorted(trials, key=lambda trial: trial.z)
         if prepared.searched is not prepared.problem:
             best = trials[0].z
             for k, one in enumerate(trials[:CONTENDERS]):
                 if one.refined and one.z <= NEAR * best:
-                    trials[k] = judge(
-                        refine(one.model, prepared.problem), prepared.problem, held_out
-                    )
-        self._found[first.effects] = sorted(trials, key=lambda trial: trial.z)
-        return [*self._found[first.effects]]
+                    fitted = refine(one.model, prepared.problem)
+                    trials[k] = judge(fitted, prepared.problem, prepared.held_out)
+        return sorted(trials, key=lambda trial: trial.z)
 
     def _again(self, trial: Trial) -> Trial:
         """Return a trial fitted and judged by these runs' weights, from where it ended before."""
@@ -333,10 +357,9 @@ def free_zero(
     if not has_offset(decision.best.model):
         if not _significant(problem, decision.best.model, rule):
             return None
-        return _freed(prepared)
-    freed = _freed(prepared)
+        return prepared.freed
     alone = len(decision.effects) == 1
-    return None if alone and missing(freed.before, decision.best) else freed
+    return None if alone and missing(prepared.freed.before, decision.best) else prepared.freed
 
 
 def zero_fault(problem: Problem, decision: Decision, rule: DecisionRule = SENSOR) -> Finding | None:
@@ -381,16 +404,6 @@ def _significant(problem: Problem, model: Model, rule: DecisionRule) -> bool:
     return abs(zero) > max(rule.fault_sigma * std, least)
 
 
-def _freed(prepared: Prepared) -> Prepared:
-    """Return what a diagnosis begins with, the zero of the force fitted along."""
-    train, held_out = prepared.problem.with_free_zero(), prepared.held_out.with_free_zero()
-    before = judge(refine(prepared.before.model, train), train, held_out)
-    part = prepared.part
-    if part is not None:
-        part = train if part is prepared.problem else part.with_free_zero()
-    return replace(prepared, before=before, problem=train, held_out=held_out, part=part)
-
-
 # What the law of a damper lacks, on a bench or inside a building.
 
 
@@ -424,8 +437,7 @@ def diagnose_damper(
     made, decision = _decided(prepared, say, made, pairs)
     zero, freed = None, free_zero(prepared, decision)
     if freed is not None:
-        say("the zero of the force is fitted along with every effect")
-        again, other = _decided(freed, say, None, pairs)
+        again, other = _decided(freed, say, made.freed, pairs)
         zero = zero_fault(freed.problem, other)
         if zero is not None:
             prepared, made, decision = freed, again, other

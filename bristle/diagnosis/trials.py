@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.progress import Count
-from ..identification.error import ForceError, errors_by_run, force_error, pooled
+from ..identification.error import ForceError, judged_errors
 from ..identification.problem import EXPLAINS, Expected, Problem, excess_of, in_noises, residuals
 from ..identification.search import in_threads, loss, losses, mean_loss, z_of, z_scale
 from ..identification.start_grid import (
@@ -105,10 +105,10 @@ def judge(
     r = residuals(held_out, model, expected)
     z = in_noises(held_out, r, expected)
     own = in_noises(train, residuals(train, model, fitted), fitted)
-    decides = pooled(errors_by_run(held_out, model, entire=False))
+    decides, told = judged_errors(held_out, model, expected)
     return Trial(
         model, z_scale(own), z_of(mean_loss(losses(z))), decides.rms, losses(r), z, noise is None,
-        force_error([(held_out, model)]), _rms_bulk(held_out, r, expected),
+        told, _rms_bulk(held_out, r, expected),
     )  # fmt: skip
 
 

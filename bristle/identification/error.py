@@ -20,7 +20,7 @@ from ..core.text import percent, quantity
 from ..data.left_out import LOADED, NO_VALUE, SETTLING, WAYS_OUT, any_of
 from ..errors import RecordError
 from ..model.model import Model
-from .problem import Problem, Run, has_offset, zero_of
+from .problem import Expected, Problem, Run, has_offset, zero_of
 
 MENTIONED = 0.02
 """Share of samples left out above which the error over all samples is told as well."""
@@ -179,23 +179,42 @@ def force_error(pairs: Iterable[tuple[Problem, Model]]) -> ForceError:
     return pooled(error for problem, model in pairs for error in errors_by_run(problem, model))
 
 
-def errors_by_run(problem: Problem, model: Model, entire: bool = True) -> list[ForceError]:
-    """Return the error of a model on each run of a problem, whatever its fit left out.
+def errors_by_run(problem: Problem, model: Model) -> list[ForceError]:
+    """Return the error of a model on each run of a problem, whatever its fit left out."""
+    return _errors_on([run.entire() for run in problem.runs], problem, model)
+
+
+def judged_errors(
+    problem: Problem, model: Model, expected: Expected
+) -> tuple[ForceError, ForceError]:
+    """Return the error of a model over the samples that a fit takes, and `force_error`.
 
     Parameters
     ----------
     problem, model : the runs, and what predicts them
-    entire : False for the error over those samples alone that a fit takes
+    expected : what a true model would show on each run
     """
-    runs = [run.entire() if entire else run for run in problem.runs]
-    zero = zero_on(problem, model)
+    entire = [run.entire() for run in problem.runs]
+    taken = pooled(_errors_on(problem.runs, problem, model, expected))
+    if all(one is run for one, run in zip(entire, problem.runs, strict=True)):
+        return taken, taken
+    return taken, pooled(_errors_on(entire, problem, model, expected))
+
+
+def _errors_on(
+    runs: Sequence[Run], problem: Problem, model: Model, expected: Expected | None = None
+) -> list[ForceError]:
+    zero = zero_on(problem, model, expected)
     return [error_on(run, problem.predict(model, run) + zero) for run in runs]
 
 
-def zero_on(problem: Problem, model: Model) -> float:
-    """Return the zero of the load cell [N] with which a model was fitted: what it shows more."""
+def zero_on(problem: Problem, model: Model, expected: Expected | None = None) -> float:
+    """Return the zero of the load cell [N] with which a model was fitted: what it shows more.
+
+    `expected` is what a true model would show on each run, None draws it for this model.
+    """
     if problem.free_zero and not has_offset(model):
-        return zero_of(problem, model)[0]
+        return zero_of(problem, model, expected)[0]
     return 0.0
 
 

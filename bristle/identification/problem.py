@@ -755,12 +755,19 @@ def has_offset(model: Model) -> bool:
     )
 
 
-def zero_of(problem: Problem, model: Model) -> tuple[float, float]:
+def zero_of(
+    problem: Problem, model: Model, expected: Expected | None = None
+) -> tuple[float, float]:
     """Return the constant [N] by which the force is above a model's, and its standard deviation.
 
     It is that of Huber's loss over all runs; the deviation is from the scatter of blocks.
+
+    Parameters
+    ----------
+    problem, model : the runs and what predicts them
+    expected : what a true model would show on each run; None draws it for this model
     """
-    expected = problem.expectation(model)
+    expected = expected or problem.expectation(model)
     found = _with_zero(problem, model, expected)
     zero = _constant(problem, found, expected)
     weight = _noise(problem, expected) ** -2.0

@@ -126,6 +126,9 @@ LOOKED = {"none": 24, "memory": 4, "joint": 6}
 FARTHEST = 10.0
 """Multiple of a start's own size at which its effect is looked at, at the most."""
 
+FOLLOWED = 3
+"""Jacobians of the search that fits the base model to a part of the runs."""
+
 STEPS = (1.0, 0.3)
 """Shares of the linear step, of which the first that serves counts: a law far from linear
 overshoots."""
@@ -216,21 +219,18 @@ def _tied(effect: str, law: str, values: dict[str, float], problem: Problem) -> 
 class ScreeningData:
     """Data for a search: runs, what to expect there, and what the base model leaves there.
 
-    `left` (n,) are its normalised residuals, `known` (n, p) its sensitivities; `kept` says from how
-    many starts a search is worth its cost, `looked` of how many a linear step is made.
+    `left` (n,) are its normalised residuals, `known` (n, p) its sensitivities, `cost` its mean loss
+    where it is fitted to these data; `kept` says from how many starts a search is worth its cost,
+    `looked` of how many a linear step is made.
     """
 
     problem: Problem
     expected: Expected
     left: Array
     known: Array
+    cost: float
     kept: int
     looked: int
-
-    @cached_property
-    def cost(self) -> float:
-        """The base model's mean loss."""
-        return mean_loss(loss(self.left))
 
     @cached_property
     def _weight(self) -> Array:
@@ -281,8 +281,12 @@ class SearchContext:
                 search = Search(problem, self.base, expected, self.base.free())
                 left = search.residuals(search.start)
                 known = search.jacobian(search.start, left)
+                cost = mean_loss(loss(left))
+                if len(problem.runs) < len(self.train.runs):
+                    # What the law gains by following these runs alone is no gain of an effect.
+                    cost = search.run(FOLLOWED)[1].cost
                 self._screening[kind] = ScreeningData(
-                    problem, expected, left, known, KEPT[kind], LOOKED[kind]
+                    problem, expected, left, known, cost, KEPT[kind], LOOKED[kind]
                 )
         return self._screening[kind]
 

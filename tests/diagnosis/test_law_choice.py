@@ -325,4 +325,60 @@ def test_two_effects_are_tried_only_where_no_single_one_explains_the_runs():
     assert twice == []
     z_of_lugre["lugre"] = 1.06  # a pair could be clearly better
     search(rows, look)
-    assert twice == ["bingham", "lugre", "bouc_wen"]
+    assert twice == ["lugre"], "two effects of the others begin too far from there"
+    z_of_lugre["bouc_wen"] = 1.1
+    twice.clear()
+    search(rows, look)
+    assert twice == ["lugre", "bouc_wen"], "one that begins near may do better"
+
+
+def test_two_effects_are_tried_of_the_nearest_law_first_and_of_all_until_two_explain_the_runs():
+    rows = [row("lugre", 5.0), row("dahl", 5.05), row("bouc_wen", 4.0), row("bingham", 9.0)]
+    alone = {"lugre": 2.0, "dahl": 4.9, "bouc_wen": 3.0, "bingham": 8.0}
+    twice = []
+
+    def look(one, pairs):
+        twice.extend([one.law] * pairs)
+        found = pairs and one.law == explains
+        left = 1.3 if found else alone[one.law]
+        return pair(one.law, one.trial.z, "effect" if found else "unknown", ("delay",), left)
+
+    explains = ""
+    search(rows, look)
+    assert twice == ["lugre", "bouc_wen", "dahl", "bingham"]
+    twice.clear()
+    explains = "lugre"
+    found = search(rows, look)
+    assert twice == ["lugre", "bouc_wen"]
+    assert {one.row.law for one in found} == {*alone}, "the others stay with a single effect"
+    assert choose(found).row.law == "lugre"
+
+
+def test_a_law_that_a_simpler_one_of_its_parts_equals_waits_for_effects_that_leave_little():
+    z = {"modified_bouc_wen": 4.9, "bouc_wen": 4.91, "lugre": 5.0, "dahl": 5.01, "bingham": 9.0}
+    rows = [row(law, z[law]) for law in z]
+    assert "modified_bouc_wen" not in [one.law for one in survivors(rows)]
+    coarse = replace(rows[1], trial=replace(rows[1].trial, rms=6.0))
+    assert "modified_bouc_wen" in [one.law for one in survivors([rows[0], coarse, *rows[2:]])]
+    for left, waits in ((4.0, True), (1.2, False)):
+        look, asked = looker(*(pair(law, z[law], "unknown", z=left) for law in z))
+        search(rows, look)
+        assert {"bouc_wen", "dahl"} <= {*asked}
+        assert ("modified_bouc_wen" not in asked) is waits
+        assert ("lugre" not in asked) is waits
+
+
+def test_a_law_that_waited_is_searched_once_two_effects_of_the_simpler_one_leave_little():
+    rows = [row("lugre", 5.0), row("dahl", 5.01), row("bingham", 9.0)]
+    asked = []
+
+    def look(one, pairs):
+        asked.append((one.law, pairs))
+        left = {"dahl": 1.2, "lugre": 1.0}.get(one.law, 8.0) if pairs else 4.0
+        kind = "effect" if pairs else "unknown"
+        return pair(one.law, one.trial.z, kind, ("delay", "stribeck"), left)
+
+    found = search(rows, look)
+    assert ("lugre", False) not in asked
+    assert asked[-1] == ("lugre", True)
+    assert choose(found).row.law == "lugre"
