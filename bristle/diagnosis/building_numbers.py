@@ -82,7 +82,8 @@ def suited_masses(shaken: Shaken, building: Building, rule: DecisionRule = SITE)
         return building
     rows = _rows(shaken, building, lines, rule)
     found, least = building, sum(before.values())
-    for one in (None, *lines):  # an effect of one site may look like masses; the others then tell
+    clear = [site for site in lines if before[site] > rule.excess(rule.clean)]
+    for one in (None, *clear):  # an effect of one site may look like masses; the others then tell
         able = [rows[site] for site in lines if site != one]
         shift = _shift(able, _determined(building.size, shaken.lowest, shaken.measured), rule)
         if float(np.max(np.abs(shift / (1.0 + shift)))) > rule.mass_doubt:
