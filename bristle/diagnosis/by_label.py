@@ -25,6 +25,7 @@ from ..core.arrays import Array
 from ..core.text import with_interval
 from ..data.channels import TEMPERATURE, label_name, label_text, label_unit
 from ..data.extra_channels import as_word
+from ..data.measurement import Measurement
 from ..data.run_labels import LabelOfRuns, labels_of, left_by
 from ..identification.problem import Problem, Run
 from ..identification.search import HUBER, in_threads
@@ -527,9 +528,13 @@ def confirmed(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     found : what the trials lead to
     prepared : the runs, and the model that it began with
     """
-    if found.kind == "none" or found.after is None:
+    if found.after is None:
         return found
-    runs = [*prepared.problem.runs, *prepared.held_out.runs]
+    train, held_out = prepared.problem.runs, prepared.held_out.runs
+    if found.kind == "none":
+        beyond = extrapolated(found.after.model, train, held_out)
+        return replace(found, reasons=(*found.reasons, *beyond)) if beyond else found
+    runs = [*train, *held_out]
     texts: list[str] = []
     for name in (one for one in found.effects if one in EFFECTS and EFFECTS[one].changes):
         trial = next((t for t in (found.after, *found.trials) if name in t.effects), None)
@@ -544,7 +549,7 @@ def confirmed(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     found, inseparable = _not_separable(found, prepared, runs)
     texts += inseparable
     if found.after is not None:
-        texts += extrapolated(found.after.model, prepared.problem.runs, prepared.held_out.runs)
+        texts += extrapolated(found.after.model, train, held_out)
     return replace(found, reasons=(*found.reasons, *texts)) if texts else found
 
 
@@ -607,7 +612,9 @@ def _unsure(
     )  # fmt: skip
 
 
-def extrapolated(model: Model, train: Sequence[Run], held_out: Sequence[Run]) -> list[str]:
+def extrapolated(
+    model: Model, train: Sequence[Run | Measurement], held_out: Sequence[Run | Measurement]
+) -> list[str]:
     """Return which held-out runs have a label beyond those that the model was fitted to.
 
     Parameters

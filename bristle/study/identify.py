@@ -13,6 +13,7 @@ from ..core.progress import tell
 from ..core.text import plain, unknown
 from ..data.cut_off import saturated_share
 from ..data.measurement import Measurement
+from ..diagnosis.by_label import extrapolated
 from ..errors import StudyError
 from ..identification.error import ForceError
 from ..identification.error_table import LawError, error_table
@@ -354,6 +355,7 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
         model = others.pop(own)
     rig.prepare(model)
     notes = [*runs.notes, *doubts([run for run in runs.all if run.has("force")])]
+    notes += extrapolated(model, runs.train, runs.holdout)
     task.show(1)
     fits = fit_rig(rig, model, task.starts, task.begin)
     task.show(2)
