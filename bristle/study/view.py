@@ -251,9 +251,9 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     """
     view = story_view(study, verdict)
     table = steps_table(history_steps(study.steps()), study.settings.cut_off)
-    told = [one.sentences() for one in (*done.curves, done.closure) if one is not None]
-    curves = [Text(" ".join(one)) for one in told]
-    return view._replace(blocks=(*curves, *view.blocks, table))
+    learned = [Text(" ".join(one.sentences())) for one in done.curves]
+    learned += map(Text, done.closure.sentences() if done.closure else ())
+    return view._replace(blocks=(*learned, *view.blocks, table))
 
 
 def _sizes(model: Model, effect: str) -> dict[str, tuple[float, float | None, str]]:
