@@ -260,14 +260,14 @@ def _beside_other_laws(
         laws = try_laws(prepared.searched, prepared.held_out, than.model, bends=bends)
         return better_law(than, laws, prepared.rule)
 
-    other = better(before)
-    if judged is not before:
-        if other is not None and other.z <= prepared.rule.adequate:
-            found = replace(
-                found, kind="unknown", effects=(), model=before.model, after=before,
-                z_after=before.z,
-            )  # fmt: skip
-        else:
-            other = better(judged)
+    def explains(one: OtherLaw | None) -> bool:
+        return one is not None and one.z <= prepared.rule.adequate
+
+    other = better(judged)
+    if judged is not before and explains(other) and explains(alone := better(before)):
+        other = alone
+        found = replace(
+            found, kind="unknown", effects=(), model=before.model, after=before, z_after=before.z
+        )
     text = NOT_THE_LAW if other is None else other.sentence(added=found.kind != "unknown")
     return replace(found, other_law=other, reasons=(*found.reasons, text))
