@@ -43,13 +43,14 @@ def beyond(offset, play):
 
 
 class FrictionDamper(Law):
-    """Friction damper: f = f_c rho b + c v + k x + f_0, with play before its plates are met.
+    """Friction damper: f = f_c rho b + c v + k x + f_0.
 
         b = s beyond +-play,   s' = v - rho |v| b
 
-    f_c is the friction coefficient times the preload of the bolts. Dahl's law behind play: a large
-    rho is Coulomb friction, play 0 a tight joint. Leaves out the wear of the plates and the impact
-    as the play closes: doubt it when the force rings after that.
+    b is how far the plates are bent, once the rod has crossed their play; f_c is the friction
+    coefficient times the preload of the bolts. Dahl's law behind play: a large rho is Coulomb
+    friction, play 0 a tight joint. Leaves out the wear of the plates and the impact as the play
+    closes: doubt it when the force rings after that.
     """
 
     name = "friction_damper"
