@@ -45,7 +45,9 @@ class DamperSlave(ComponentSlave):
         self.description = text_for(self.description or "", drive)
         self.add_input("displacement", "m", "displacement of the rod", over_step=HELD)
         self.add_input("velocity", "m/s", "velocity of the rod", over_step=HELD)
-        self.add_input(drive.name, drive.unit, _ABOUT[drive.name], over_step=HELD)
+        commanded = LAWS[self.law].has("command")
+        about = _ABOUT[drive.name] if commanded else "not used by this law"
+        self.add_input(drive.name, drive.unit, about, over_step=HELD, optional=not commanded)
         text = "force that keeps the structure from accelerating; needs moving_mass"
         self.add_input("holding_force", "N", text, over_step=HELD, optional=True)
         text = "acceleration of the rod; else from differences of velocity"
