@@ -123,6 +123,7 @@ def complete(
                     say(f"adding {network.name}")
                     why = f"verdict: {found.kind}"
                     stepped(add_effects(study, (network.name,), why=why, found=found).step)
+                    study.write_verdict(verdict_of(study, found))  # on the model without it
             return Completed(found, tuple(steps), tuple(learned), network)
         identified = None
         if len(abreast) > 1:
