@@ -192,7 +192,7 @@ class DecisionRule:
     up to which two effects of another law are searched.
 
     Trades: if lower, a law that two effects serve as well is missed; if higher, computing time.
-    Found: blind seeds, and campaigns that no law explains.
+    Found: stated.
     """
 
     # --- data that carry no verdict

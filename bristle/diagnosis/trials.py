@@ -113,11 +113,15 @@ def judge(
 
 
 def _rms_bulk(problem: Problem, r: Array, expected: Expected) -> float:
-    """Return the RMS [N] of an error, normalised (n,), but for its `FEW` worst samples."""
+    """Return the RMS [N] of an error, normalised (n,), but for its `FEW` worst samples.
+
+    NaN where no sample is judged.
+    """
     pairs = zip(problem.runs, expected, strict=True)
     sigma = np.concatenate([noise[run.skip :] for run, (_, noise, _) in pairs])
     size = np.sort(np.abs(r * sigma)[r != 0.0])
-    return float(np.sqrt(np.mean(size[: len(size) - round(FEW * len(size))] ** 2)))
+    kept = size[: len(size) - round(FEW * len(size))]
+    return float(np.sqrt(np.mean(kept**2))) if len(kept) else np.nan
 
 
 def missed_by(trial: Trial, train: Problem) -> float:

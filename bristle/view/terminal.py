@@ -99,7 +99,8 @@ def aligned(
             tables = (aligned(one[0], one[1:], range(1, len(one[0]))) for one in both)
             return [line for lines in tables for line in (*lines, "")][:-1]
     if sum(wide) + 2 * len(wide) > WIDTH and last not in right:
-        wide[last] = max(READ, WIDTH - sum(wide[:last]) - 2 * len(wide))
+        room = WIDTH - sum(wide[:last]) - 2 * len(wide)
+        wide[last] = min(wide[last], max(READ, room))
     if sum(wide) + 2 * len(wide) > (WIDTH if last in right else WIDEST):
         return [line for row in rows for line in _stacked(header, row)]
     titles = [_wrapped(title, max(1, width)) for title, width in zip(header, wide, strict=True)]

@@ -26,7 +26,7 @@ needs_terminal = pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-te
 OWN_MESSAGE = {"run", "ensemble"}
 """Commands that tell themselves how much they kept."""
 SHORT = {
-    "check", "example", "import-ssp", "list", "new", "page", "study", "undo",
+    "bug-report", "check", "example", "import-ssp", "list", "new", "page", "study", "undo",
 }  # fmt: skip
 """Commands that are done in a moment, wait for the user, or have actions that are told apart."""
 
