@@ -62,10 +62,12 @@ WIRES = """
 "{name}.displacement" = "structure.{level}_displacement"
 "{name}.velocity" = "structure.{level}_velocity"
 """
-# Every coefficient that the force is proportional to, by law.
+# Every coefficient that the force is proportional to, or, as a compliance, the reverse, by law.
 COEFFICIENTS = {
     component_of_law(law.name): {
-        name: parameter.value for name, parameter in law.parameters.items() if "N" in parameter.unit
+        name: (parameter.value, -1.0 if parameter.unit.endswith("/N") else 1.0)
+        for name, parameter in law.parameters.items()
+        if "N" in parameter.unit
     }
     for law in laws_of("damper")
 }
@@ -79,7 +81,7 @@ def scenario(
     for factor, port, name in zip(
         times, ("damper_force", "extra_force"), ("damper", "second"), strict=False
     ):
-        given = ", ".join(f"{n} = {v * factor!r}" for n, v in COEFFICIENTS[kind].items())
+        given = ", ".join(f"{n} = {v * factor**p!r}" for n, (v, p) in COEFFICIENTS[kind].items())
         dampers.append(DAMPER.format(name=name, kind=kind, parameters=given))
         wires.append(WIRES.format(name=name, port=port, level=level))
     file = folder / f"{len(times)}.toml"

@@ -213,6 +213,6 @@ def test_python_that_offers_no_symbols_is_explained(
     def refuse(*_: object, **named: object) -> None:
         raise OSError("x.so: undefined symbol: _Py_NoneStruct")
 
-    monkeypatch.setattr("bristle.engine.instance.Library", refuse)
+    monkeypatch.setattr("bristle.engine.instance.FmuLibrary", refuse)
     with pytest.raises(FmuError, match=r"_Py_NoneStruct(?s:.)*--enable-shared.*LD_PRELOAD"):
         run(scenario_of({"ramp": "Ramp"}))

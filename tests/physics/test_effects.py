@@ -764,7 +764,7 @@ def define(**data: Any) -> type[Effect]:
             "channels are what an effect of the damper alone may follow",
         ),
         ({"needs": ("x", "colour")}, r"needs \['colour'\]; q offers \['x', 'v'"),
-        ({"force": None}, r"defines no hook; there are \['voltage'"),
+        ({"force": None}, r"defines no hook; there are \['parallel', 'voltage'"),
         ({"__doc__": ""}, "a first docstring line"),
         ({"states": {"z": "m"}}, "has states and neither `rate` nor `advance`"),
         (
@@ -852,7 +852,9 @@ def test_states_that_move_by_rate_do_so_at_any_stiffness(law: str, rate: float) 
         exact = share * (rate * np.cos(omega * times) + omega * np.sin(omega * times))
         exact -= share * rate * np.exp(-rate * times)
         # A law's states are advanced with the effect's then, in shorter steps than alone: 0.004 N.
+        # One with a series element then takes a jump from rest to speed less exactly, by 1 %.
         within = 0.005 if ALL_LAWS[law].states else 2e-4
+        within = 0.07 if "series element" in ALL_LAWS[law].contains else within
         assert np.abs(added[1:] - 10.0 * exact[1:]).max() < within
     finally:
         EFFECTS.pop("trial", None)

@@ -103,7 +103,7 @@ def test_an_fmu_that_hangs_is_ended_after_the_time_of_one_call(
     changed: Changed, capsys: pytest.CaptureFixture[str]
 ) -> None:
     began = time.monotonic()
-    found = verdicts(capsys, changed(pause=0.1, hangs_at=0.25), "legal run", timeout=1.0)
+    found = verdicts(capsys, changed(pause=0.1, hangs_at=0.05), "legal run", timeout=1.0)
     assert found["legal run"] == ("fail", "hung in fmi2DoStep: no answer within 1 s")
     assert time.monotonic() - began < 10.0
 
