@@ -220,7 +220,15 @@ def print_json(answer: Any) -> None:
 def print_answer(
     arguments: argparse.Namespace, answer: Any, view: View, files: Iterable[Path | str] = ()
 ) -> None:
-    """Print an answer: as JSON where that is asked for, else its view and the files written."""
+    """Print an answer: as JSON where that is asked for, else its view and the files written.
+
+    Parameters
+    ----------
+    arguments : of the command line
+    answer : what JSON holds
+    view : of the result
+    files : that were written
+    """
     from ..view import terminal
 
     if arguments.json:

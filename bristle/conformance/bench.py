@@ -251,7 +251,13 @@ class WatchedLibrary(FmuLibrary):
     def instantiate(
         self, name: str, guid: str, resources: str, *, logging: bool = False, environment: int = 0
     ) -> Handle | None:
-        """Return a new instance; see `FmuLibrary`."""
+        """Return a new instance, whose messages are told apart by its name.
+
+        Parameters
+        ----------
+        name, guid, resources, logging, environment : as `FmuLibrary` takes them; FMI 3.0 is given
+            an environment of its own
+        """
         self._names.append(name)
         environment = len(self._names) if self.fmi3 else 0
         made = super().instantiate(name, guid, resources, logging=logging, environment=environment)

@@ -98,6 +98,15 @@ class CallsFmi3(Calls):
         return self._step() if name == "DoStep" else super().function(_STATE.get(name, name))
 
     def transfer(self, verb: str, kind: str, variables: Sequence[Variable], address: int) -> Status:
+        """Return what gets or sets the variables of a kind, each by the function of its type.
+
+        Parameters
+        ----------
+        verb : "Get" or "Set"
+        kind : "Real", "Integer", "Boolean"
+        variables : in the order of their values
+        address : of the memory of these
+        """
         types = dict(self._handle.by_type(kind, [v.reference for v in variables]))
         if kind != "Boolean" and list(types) == [NATURAL[kind]]:  # as the kind lies in memory
             function = self.function(verb + NATURAL[kind])

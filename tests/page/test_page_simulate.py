@@ -183,7 +183,7 @@ def test_without_zig_the_page_is_told_and_the_server_goes_on(
         importlib.util, "find_spec", lambda name: None if name == "ziglang" else find(name)
     )
     try:
-        with pytest.raises(BuildError, match=r"pip install bristle\[native\]"):
+        with pytest.raises(BuildError, match=r"pip install 'bristle\[native\]'"):
             simulate_views.module_view(home, {})
     finally:
         zig.version.cache_clear()
