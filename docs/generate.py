@@ -20,6 +20,7 @@ from component_pages import component_index, component_page
 from effect_pages import effect_index, effect_page, law_index, law_page, picture_of
 from reference import api_page
 
+from benchmarks._calibrate.page import every_field
 from bristle.fmu import catalogue
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
@@ -70,8 +71,6 @@ def pages() -> dict[str, str]:
 
 def rule_page() -> str:
     """Return the page of every number that decides a verdict, from the rule's own text."""
-    from benchmarks._calibrate.page import every_field
-
     return (
         "# All fields of the decision rule\n\nWhat each number of "
         "`bristle.diagnosis.rule.DecisionRule` decides, what it trades, and how its value was "
