@@ -86,9 +86,8 @@ def draw_budget(problem: Problem, model: Model) -> Page | None:
     with look():
         bars = _BAR * len(parts) + 0.75
         above = _PANELS if cycles else 0.0
-        heading = (
-            f"{' + '.join([shown_law(model.law), *map(effect_name, model.effects)])}: its force"
-        )
+        names = [shown_law(model.law), *map(effect_name, model.effects)]
+        heading = f"{' + '.join(names)}: the parts of its force"
         said = "Stacked over single cycles; the line is their sum, the model's force."
         page = Page(_WIDTH, above + bars, heading, said if cycles else "")
         if cycles:

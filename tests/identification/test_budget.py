@@ -79,7 +79,7 @@ def test_the_budget_of_a_table_is_headed_without_its_knots_and_its_times_stay_ap
     page = draw_budget(Problem(runs), Model("dahl[table 0 0.5 1.5]"))
     assert page is not None
     texts = [one.get_text() for one in page.figure.texts]
-    assert any("dahl[table]: its force" in text for text in texts)
+    assert any("dahl[table]: the parts" in text for text in texts)
     page.figure.canvas.draw()
     panels = page.figure.axes[:-1]
     assert len(panels) == 3
