@@ -87,7 +87,7 @@ def test_a_fit_is_shown_while_it_is_at_work_and_after_it_was_cancelled(
     fits.get_by_text(
         "search 1, step 3, RMS error 20.0 % of the force, z = 6.00", exact=True
     ).wait_for()
-    assert not page.get_by_role("heading", name="No fit yet").is_visible()
+    page.get_by_role("heading", name="No fit yet").wait_for(state="hidden")
     assert fits.get_by_text("fitting bingham: start 1 of 4").count() == 1
     assert fits.get_by_role("img", name=re.compile("force over .*RMS error")).count() == 3
     assert fits.get_by_role("list", name="least RMS error of each law so far").count() == 1
@@ -98,9 +98,9 @@ def test_a_fit_is_shown_while_it_is_at_work_and_after_it_was_cancelled(
     browsed.press("Cancel")
     page.get_by_role("heading", name="The fit was cancelled").wait_for()
     assert fits.get_by_text("step 3").count() >= 1
-    assert page.get_by_role("heading", name="No fit yet").is_visible()
+    page.get_by_role("heading", name="No fit yet").wait_for()
     browsed.press("Close")
-    assert not fits.is_visible()
+    fits.wait_for(state="hidden")
     commands_that_tell(
         monkeypatch, [], "print('StudyError: no force.', file=sys.stderr); sys.exit(2)"
     )
