@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..core.arrays import Array
-from .channels import DRIVE, UNITS, Label, Labels, varying
+from .channels import DRIVE, Label, Labels, label_unit, varying
 
 MOVED = ("frequency", "amplitude", *DRIVE)
 """Labels that say what the motion or the command was."""
@@ -38,7 +38,7 @@ class LabelOfRuns:
     @property
     def counts(self) -> bool:
         """Whether it only names the runs, or counts them from 0 or 1 on: each has its own value."""
-        if len(self.levels) < len(self.values) or len(self.values) < 3 or self.name in UNITS:
+        if len(self.levels) < len(self.values) or len(self.values) < 3 or label_unit(self.name):
             return False
         first = self.levels[0]
         return not self.is_number or (

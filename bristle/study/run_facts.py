@@ -12,7 +12,16 @@ from statistics import median
 from typing import NamedTuple
 
 from ..core.text import listed, quantity
-from ..data.channels import DRIVE, PLAIN, TEMPERATURE, UNITS, Label, label_text, meaning
+from ..data.channels import (
+    DRIVE,
+    PLAIN,
+    TEMPERATURE,
+    UNITS,
+    Label,
+    label_name,
+    label_text,
+    meaning,
+)
 from ..data.formats.delimited import decoded
 from ..data.titles import Column, title, unit_or_none
 from ..data.tone import (
@@ -38,14 +47,21 @@ from .study_file import EXCLUDE, ROLES
 DOUBTFUL = "_- xXdD'~=;"
 """What may part two numbers, or be a decimal mark."""
 
-SPELLED = {"pct": "%", "percent": "%", "C": "degC"}
+SPELLED = {
+    "pct": "%", "percent": "%", "C": "degC", "inch": "in", "PSI": "psi", "Nm": "N.m",
+}  # fmt: skip
 """Units as names spell them."""
 
 _LETTERS = "xXdD'~=;"  # of these, which hardly part numbers
 _SURE = r"(?:[.,]|[pP][tT]?|point|dot)"  # "1p5" stands for 1.5 where a point would end a name
-_UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|degF|C"
+_OF_LABELS = {"pressure": "psi|PSI|mbar|bar|hPa|kPa|MPa|Pa", "load": "kN|lbf", "torque": "Nm"}
+"""Units that tell a label by themselves, which is then called by both: pressure_psi."""
+_UNITS_IN_NAMES = "|".join(
+    ["mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|inch|in|degC|degF|C", *_OF_LABELS.values()]
+)
 SIGN = r"(?:(?<![^_= ])-)?"
 """T=-10C and cold_-10C have one; in run-10C the minus parts words."""
+_APART = r"(?:[ ]?|[_-](?=psi|PSI|bar|kPa|MPa))"  # 50_psi; but 3_A parts words
 _SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s1 is none
 _AFTER_UNIT = re.compile(
     rf"(?<![\d.])({SIGN}\d+)({_UNITS_IN_NAMES})(\d+)(?![A-Za-z0-9.,%])"
@@ -105,7 +121,7 @@ def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
     twice = set()
     number = number_in(reading.marks)
     wanted = re.compile(
-        rf"(?<![\d.]){_NO_POWER}({SIGN}{number})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
+        rf"(?<![\d.]){_NO_POWER}({SIGN}{number}){_APART}({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
     )
     stem = file.stem
     found = [(match.start(), match[1], match[2], match[0]) for match in wanted.finditer(stem)]
@@ -125,7 +141,7 @@ def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
             value /= 10.0**digits
         letter = re.search(r"[A-Za-z]*$", stem[:start])
         before = letter.group() if letter else ""
-        target = PLAIN.get(name) or UNITS[name]
+        target = PLAIN.get(name) or UNITS.get(name, unit)
         out[name] = Token(
             convert(value, unit, target), before + whole, text, f"{before}{{}}{spelled}"
         )
@@ -143,6 +159,9 @@ def quantity_of(unit: str) -> str:
     for name in (*DRIVE, *UNITS):
         if same_dimension(unit, PLAIN.get(name) or UNITS[name]):
             return name
+    for name, units in _OF_LABELS.items():
+        if unit in (SPELLED.get(one, one) for one in units.split("|")):
+            return f"{name}_{unit}"
     raise UnitError(f'unit "{unit}" tells neither a command nor a label.')
 
 
@@ -575,7 +594,8 @@ def _offered(
             continue
         unit = PLAIN[name] if drive else ""
         levels = ", ".join(label_text(name, value, unit) for value in sorted(set(values)))
-        text = f'{name} of each run: from the names of the files, as in "{seen}": {levels}'
+        from_names = f'from the names of the files, as in "{seen}"'
+        text = f"{label_name(name)} of each run: {from_names}: {levels}"
         if name in reading.doubts:
             text += f". Doubtful: {reading.doubts[name]}"
         if drive:

@@ -107,6 +107,31 @@ def test_names_alone_settle_what_counts_and_what_is_a_level(tmp_path, names, val
     assert [read[name][1] for name in names] == pytest.approx(values)
 
 
+@pytest.mark.parametrize(
+    ("names", "label", "values"),
+    [
+        (("run_0_50psi", "run_1_100psi", "run_2_75psi"), "pressure_psi", (50.0, 100.0, 75.0)),
+        (("speed6_100_PSI", "speed1_50_PSI"), "pressure_psi", (100.0, 50.0)),
+        (("run1_1bar", "run2_2bar", "run3_3bar"), "pressure_bar", (1.0, 2.0, 3.0)),
+        (("bolts20Nm", "bolts40Nm"), "torque_N.m", (20.0, 40.0)),
+        (("a_1in", "b_0.5in"), "amplitude", (0.0254, 0.0127)),
+        (("run_1", "run_2"), "", ()),
+        (("50psi_a", "b"), "", ()),
+    ],
+)
+def test_a_number_with_a_unit_is_a_label_where_all_names_have_one(
+    tmp_path, capsys, names, label, values
+) -> None:
+    data = made(tmp_path / "lab", {name: (1.0 + k, 0.0) for k, name in enumerate(names)}, 0.0127)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    said = capsys.readouterr().out.count("from the names of the files")
+    read = tomllib.loads((tmp_path / "rig" / "study.toml").read_text())["runs"]
+    told = {Path(run["file"]).stem: {**run.get("labels", {}), **run} for run in read}
+    assert [told[name].get(label) for name in names if label] == pytest.approx([*values])
+    assert said == (1 if label else 0)
+    assert label or not any("labels" in run for run in read)
+
+
 def test_a_power_of_ten_is_no_level_of_its_own(tmp_path) -> None:
     data = made(tmp_path / "lab", {"5E-1A_1Hz": (1.0, 0.5), "1E0A_2Hz": (2.0, 1.0)})
     assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
