@@ -82,7 +82,8 @@ def effect_index() -> str:
     ]
     return (
         "# Effects\n\nPhysics beyond the base laws, each in one file and switched on by a "
-        "parameter; `bristle list effects` prints the same. [Write your own](../own_effect.md).\n\n"
+        "parameter; `bristle list effects` prints the same. "
+        "[Write your own](../own_physics.md).\n\n"
         + table(["effect", "site", "what it does", "when it is missing"], rows)
     )
 

@@ -44,8 +44,8 @@ PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
 
 
 LONG = {f"docs/{name}.md" for name in (
-    "compare_controllers", "design", "elsewhere", "flow", "learn", "native", "own_law", "plan",
-    "shake_table", "tutorial_bench", "tutorial_code",
+    "controllers", "elsewhere", "flow", "learn", "native", "own_physics", "plan", "shake_table",
+    "tutorial_bench", "tutorial_code",
 )} | {"README.md"}  # fmt: skip
 """Pages whose commands search for effects, run scenarios at several steps, compile what is a
 user's own, or build FMUs for a host."""
@@ -221,7 +221,7 @@ def test_every_command_is_documented() -> None:
 
 
 def test_every_figure_of_the_paper_has_its_command() -> None:
-    text = (DOCS / "paper.md").read_text(encoding="utf-8")
+    text = (DOCS / "physics.md").read_text(encoding="utf-8")
     for name in paper_figures():
         assert f"python -m benchmarks paper figures {name}" in text
         assert f"(figures/{name}.png)" in text

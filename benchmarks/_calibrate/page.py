@@ -89,7 +89,10 @@ def table(rows: list[Traded], base: DecisionRule) -> str:
 
 
 def _marked(cells: list[str], today: list[bool]) -> str:
-    return " / ".join(f"**{c}**" if now else c for c, now in zip(cells, today, strict=True))
+    """Return the cells with today's in bold; one alone, where they are all the same."""
+    if len(set(cells)) == 1:
+        return cells[0]
+    return "/".join(f"**{c}**" if now else c for c, now in zip(cells, today, strict=True))
 
 
 def every_field() -> str:

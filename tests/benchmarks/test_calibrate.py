@@ -180,7 +180,7 @@ def test_the_table_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
     weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
     block = page.text(replay.both([weak]), [weak], 0)
     assert "1 cases on the bench, 0 buildings" in block
-    assert "| `gain` | 0.005 / 0.01 / **0.02** / 0.03 / 0.05 | 0 / 0 / **0** / 1 / 1 |" in block
+    assert "| `gain` | 0.005/0.01/**0.02**/0.03/0.05 | 0/0/**0**/1/1 |" in block
     file = tmp_path / "page.md"
     file.write_text(f"head\n{page.BEGIN}\nold\n{page.END}\ntail\n")
     page.write(file, block)

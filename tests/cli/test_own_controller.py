@@ -64,7 +64,7 @@ def test_the_template_builds_runs_and_conforms(
 
 def test_the_page_shows_the_template_without_its_comments(file: Path) -> None:
     lines = [line for line in file.read_text().splitlines() if not line.strip().startswith("#")]
-    page = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
     shown = page.partition("```py\n")[2].partition("```")[0]
     assert shown.splitlines() == lines
 

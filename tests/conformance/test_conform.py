@@ -282,14 +282,6 @@ def test_unknown_probe_and_bad_time_limit_are_refused(healthy: Path) -> None:
             conform(healthy, timeout=limit)
 
 
-def test_page_names_every_probe() -> None:
-    page = Path(__file__).parents[2] / "docs" / "conform.md"
-    table = page.read_text().split("## The probes")[1].split("The last group")[0]
-    cells = [line.split("|")[2] for line in table.splitlines() if line.count("|") == 3]
-    named = {name.strip() for cell in cells[2:] for name in cell.split(",")}
-    assert named == set(PROBES)
-
-
 # -- the command
 
 

@@ -296,12 +296,3 @@ def test_compiled_it_is_what_python_gives(tmp_path: Path) -> None:
     force = DamperForces("rubbing", []).force(x, v, 0.0 * v, 4.0 + 0.0 * v, 0.002, {})
     expected = 4.62 * np.tanh(v / 0.02) + 15.0 * v + 60.0 * x
     np.testing.assert_allclose(force, expected, rtol=1e-12, atol=1e-12)
-
-
-def test_the_law_with_a_table_in_the_documentation_conforms(tmp_path, capsys):
-    page = Path(__file__).parents[2] / "docs" / "own_law.md"
-    blocks = re.findall(r"```python[^\n]*\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    (text,) = [one for one in blocks if "Table(" in one]
-    file = tmp_path / "stepped.py"
-    file.write_text(text, encoding="utf-8")
-    assert main(["check", str(file), "--trust"]) == 0, capsys.readouterr()
