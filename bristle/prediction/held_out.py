@@ -97,10 +97,15 @@ class Proof:
         out.append(f"The FMU in FMPy {confirmed}: {self.fmu.text()} at a step of {step}{over}.")
         if self.part < 1.0 and self.expected is not None:
             out[-1] += f" Over the same part the model has {self.expected.text()}."
+        out.append(
+            f"Give FMPy this step, output_interval={self.step:.10g}: by itself it takes longer "
+            "ones, 1,000 per run at most."
+        )
         out.append(f"Again:  python {folder / FOLDER / CHECK}")
         if self.raw is None:
             return [*out, "It was not fed with measured columns: none is the motion of the damper."]
-        out.append(f"Fed with the measured columns as they are: {self.raw.text()}.")
+        there = "" if self.part == 1.0 else ", over the same part"
+        out.append(f"Fed with the measured columns as they are{there}: {self.raw.text()}.")
         return out
 
     def as_dict(self) -> dict[str, Any]:

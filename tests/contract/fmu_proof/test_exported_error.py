@@ -107,3 +107,16 @@ def test_without_a_proof_the_reason_is_told(tmp_path: Path) -> None:
     told = error_of(np.ones(50), np.zeros(50), {})
     lines = Proof(told, 5e-4, why="no library for this platform.").lines(tmp_path)
     assert lines[-1] == "The FMU was not run to confirm it: no library for this platform."
+
+
+def test_a_proof_names_the_step_that_fmpy_does_not_take_by_itself_and_what_it_is_over(
+    tmp_path: Path,
+) -> None:
+    from bristle.identification.error import error_of
+    from bristle.prediction.held_out import Proof
+
+    told = error_of(np.ones(50), np.zeros(50), {})
+    said = "\n".join(Proof(told, 3.125e-05, told, told, told, 0.5).lines(tmp_path))
+    assert "output_interval=3.125e-05:" in said
+    assert "the first 50 % of each run" in said
+    assert "columns as they are, over the same part:" in said
