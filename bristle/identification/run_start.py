@@ -115,33 +115,41 @@ def start_under_load(
     state: tuple[str, str],
     load: float,
     stroke: float,
-    settled: Callable[[Mapping[str, float]], float],
+    resting: Callable[[Mapping[str, float]], Array],
 ) -> dict[str, float]:
     """Return the start value of a state at which a damper at rest carries its load.
 
-    Nothing where no value of the state does: what the model holds at rest then is another part.
+    Nothing where no value of the state does: what the model holds at rest then is another part. Nor
+    where the force only passes the load as it fades, as a bristle's does behind a dashpot.
 
     Parameters
     ----------
     state : as `carrying_state` returns it
     load : measured [N]
     stroke : of the run, peak to peak [m]
-    settled : the model's force [N] at rest, for start values by name
+    resting : the model's force (n,) [N] over the rest, for start values by name
     """  # fmt: skip
     name, unit = state
     if not name:
         return {}
+
+    def settled(value: float) -> float:
+        force = resting({f"{name}_0": value})
+        return float(np.mean(force[len(force) // 2 :]))  # a series element has settled by then
+
     now, step = 0.0, NUDGE * (stroke if unit == "m" else 1.0)
-    force = settled({f"{name}_0": now})
+    force = settled(now)
     for _ in range(TURNS):
-        following = settled({f"{name}_0": now + step})
+        following = settled(now + step)
         slope = (following - force) / step
         now, force = now + step, following
         if not np.isfinite(slope) or slope == 0.0:
             return {}
         step = (load - force) / slope
         if abs(load - force) <= CARRIED * abs(load):
-            return {f"{name}_0": now + step}
+            found = {f"{name}_0": now + step}
+            stays = np.max(np.abs(resting(found) - load)) <= abs(load)
+            return found if stays else {}
     return {}
 
 

@@ -24,6 +24,14 @@ MODEL = Model(
     },
 )  # fmt: skip
 
+FADES = Model(  # behind a dashpot: 17 N at first would be the load of 7.5 N later
+    "modified_bouc_wen",
+    (),
+    {
+        "f_c": 12.0, "f_v": 0.0, "rho": 1000.0, "c_0": 5.0, "c_v": 0.0, "c_1": 3000.0, "c_1v": 0.0,
+    },
+)  # fmt: skip
+
 
 def recorded(x, begin=0, offset=0.0):
     """Return the run of a motion x from sample `begin` on, with the force that MODEL has had."""
@@ -96,6 +104,7 @@ def test_an_effect_in_the_place_of_the_sign_carries_the_load_of_a_law_without_st
     "model",
     [
         Model("bingham", (), {"f_c": 12.0}),  # nothing in it carries a force at rest
+        FADES,
         replace(MODEL, values={**MODEL.values, "sigma_a": np.nan}),
     ],
 )
