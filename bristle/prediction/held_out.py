@@ -98,8 +98,8 @@ class Proof:
         if self.part < 1.0 and self.expected is not None:
             out[-1] += f" Over the same part the model has {self.expected.text()}."
         out.append(
-            f"Give FMPy this step, output_interval={self.step:.10g}: by itself it takes longer "
-            "ones, 1,000 per run at most."
+            f"Give FMPy output_interval={self.step:.10g}: by itself it takes longer steps, "
+            "1,000 per run at most."
         )
         out.append(f"Again:  python {folder / FOLDER / CHECK}")
         if self.raw is None:
