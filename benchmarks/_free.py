@@ -1,6 +1,6 @@
 """Which model the package arrives at where nobody names law, effect or curve: on training runs.
 
-The same steps as `bristle study auto --law all --greedy --learn --closure`. Every one is judged on
+The same steps as `bristle study auto --law all --learn --closure`. Every one is judged on
 a part of the training runs, split off as `bristle study new` splits, so that runs held out see the
 end alone.
 """
@@ -20,7 +20,7 @@ from bristle.diagnosis.prepared import Prepared, Progress, corrected, silent
 from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
-from bristle.diagnosis.trials import judge
+from bristle.diagnosis.trials import Trial, judge
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem, has_offset, zero_of
 from bristle.identification.rig import DAMPER, Site
@@ -32,10 +32,11 @@ from bristle.learning.effect_file import effect_text
 from bristle.learning.fit import learn
 from bristle.model.model import Model
 from bristle.physics.laws import DEFAULT
-from bristle.study.auto import MOST_EFFECTS, gaining
+from bristle.study.auto import MOST_EFFECTS
 from bristle.study.identify import FitTask
 from bristle.study.inputs import runs_of
 from bristle.study.runs import Runs
+from bristle.study.unproven import unproven
 from bristle.user_code.load import defined
 
 from ._floor import errors_of, share_of
@@ -102,8 +103,9 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
 
     chosen = choose(search(rows, TrialsByLaw(data, say)))
     assert chosen.prepared is not None
-    opened = _with_effects(split, chosen.finding, chosen.prepared, say)
-    return (_found(opened, ()), *_with_curves(opened, say))
+    finding, opened = _with_effects(split, chosen.finding, chosen.prepared, say)
+    free = _found(_with_unproven(opened, finding.trials), ())
+    return (free, *_with_curves(opened, say))
 
 
 def _laws(
@@ -118,29 +120,29 @@ def _laws(
     return split, data, try_laws(*data.damper, Model(DEFAULT), bends=data.bends)
 
 
-def _with_effects(split: Runs, finding: SiteDiagnosis, opened: Prepared, say: Progress) -> Prepared:
-    """Add effects as long as one is named, or lowers the error beyond chance; see `study auto`."""
-    while len(opened.before.model.effects) < MOST_EFFECTS:
-        if finding.kind == "effect" and finding.model is not None:
-            models = [finding.model]
-        elif finding.kind == "unknown":
-            models = [one.model for one in gaining(opened.before, finding.trials)]
-        else:
-            break
-        if not models:
-            break
-        say(" or ".join(f"{one.law} + {' + '.join(one.effects)}" for one in models))
-        fitted = (_identified(one, opened.problem) for one in models)
-        judged = [judge(one, opened.problem, opened.held_out) for one in fitted]
-        model = min(judged, key=lambda one: one.z).model
-        runs = BenchRuns(split.train, split.holdout, model, identified=True)
-        again = runs.prepare(DAMPER)
+def _with_effects(
+    split: Runs, finding: SiteDiagnosis, opened: Prepared, say: Progress
+) -> tuple[SiteDiagnosis, Prepared]:
+    """Add effects as long as one is named; see `study auto`."""
+    while finding.kind == "effect" and finding.model is not None:
+        say(f"{finding.model.law} + {' + '.join(finding.model.effects)}")
+        model = _identified(finding.model, opened.problem)
+        again = BenchRuns(split.train, split.holdout, model, identified=True).prepare(DAMPER)
         if again is None:
             break
         opened = again
-        if len(model.effects) < MOST_EFFECTS:
-            finding, opened = diagnose_damper(opened)
-    return opened
+        if len(model.effects) >= MOST_EFFECTS:
+            break
+        finding, opened = diagnose_damper(opened)
+    return finding, opened
+
+
+def _with_unproven(opened: Prepared, trials: Sequence[Trial] = ()) -> Prepared:
+    """Add effects that improve the prediction on parts left out."""
+    if opened.before.z <= opened.rule.clean:
+        return opened
+    model = _identified(unproven(opened, trials, MOST_EFFECTS), opened.problem)
+    return replace(opened, before=judge(model, opened.problem, opened.held_out))
 
 
 def _with_curves(opened: Prepared, say: Progress) -> tuple[Found, Found]:
@@ -162,6 +164,7 @@ def _with_curves(opened: Prepared, say: Progress) -> tuple[Found, Found]:
                 opened, before=learned.after, problem=opened.problem.of(opened.problem.runs),
                 held_out=opened.held_out.of(opened.held_out.runs), part=None,
             )  # fmt: skip
+        opened = _with_unproven(opened)
         found = _found(opened, curves)
         say("a closure")
         return found, replace(found, closed=not learn_closure(opened, CLOSURE, names=False).refused)

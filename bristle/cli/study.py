@@ -274,8 +274,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="all: search for the law together with its effects (default on a test bench if no law "
         "was chosen); a name: begin with that law",
     )
-    text = "if no effect explains the error, add the one that lowers it most, and continue"
-    auto.add_argument("--greedy", action="store_true", help=text)
+    text = "leave out effects that improve the prediction and that no verdict names"
+    auto.add_argument("--proven", action="store_true", help=text)
     add_trust(auto)
     add_details(auto)
     add_json(auto, "print steps and verdict as JSON")
@@ -470,7 +470,7 @@ def _auto(arguments: argparse.Namespace) -> int:
 
     study = Study(arguments.folder)
     done = complete(
-        study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn,
+        study, law=arguments.law, proven=arguments.proven, curves=arguments.learn,
         closure=arguments.closure,
     )  # fmt: skip
     view = completed_view(study, done, verdict_of(study, done.verdict))

@@ -323,7 +323,8 @@ class ChannelSpec:
 
     `column` is its title in the file, or its name without the unit; `unit` that of the file, "" to
     take it from the title; `sign` 1 or -1; `noise` the standard deviation in that unit, None to
-    estimate it. For the time of a file without one, `step` [s] is the sampling step.
+    estimate it; `zero` what the column reads, in that unit, where the channel is 0. For the time of
+    a file without one, `step` [s] is the sampling step.
     """
 
     column: str = ""
@@ -331,3 +332,4 @@ class ChannelSpec:
     sign: int = 1
     noise: float | None = None
     step: float | None = None
+    zero: float = 0.0

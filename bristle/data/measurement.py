@@ -472,7 +472,7 @@ def in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
         factor, offset = conversion(unit, channel_unit(channel))
     except UnitError as error:
         raise RecordError(f'{table.source}: column "{column.text}" ({channel}): {error}') from None
-    si: Array = float(spec.sign) * (factor * table.values[column.text] + offset)
+    si: Array = float(spec.sign) * (factor * (table.values[column.text] - spec.zero) + offset)
     beyond = np.flatnonzero(np.abs(si) > _ABSURD)
     if len(beyond):
         raise RecordError(

@@ -9,53 +9,55 @@ from typing import Any
 from ..core.interrupt import keeps
 from ..core.progress import tell
 from ..diagnosis import Diagnosis
-from ..diagnosis.decision import missing
-from ..diagnosis.trials import Trial
+from ..errors import StudyError
 from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
 from ..physics.effect import closures
 from .changes import other_data
 from .forms import law_or_all
 from .history import Step
-from .identified import Identified, is_identified
+from .identified import is_identified
 from .identify import identify_study
-from .learn import learn_effect, learn_study_closure
-from .steps import Say, add_effects, diagnose_study, identify_with, take_law, verdict_of
+from .learn import learn_effect, learn_study_closure, opened_at
+from .steps import (
+    NOT_PROVEN,
+    Say,
+    add_effects,
+    diagnose_study,
+    identify_with,
+    take_law,
+    verdict_of,
+)
 from .study import Study
 from .study_file import ALL
+from .unproven import unproven
 
 MOST_EFFECTS = 4
 """Effects that `complete` adds at the most: a model that asks for more is the wrong model."""
-
-ABREAST = 1.1
-"""Effects whose z is up to this times the smallest are identified before one of them is added.
-
-The search fits each effect from the law's values without it. Where the law is far from the rig,
-that fit may end in a local minimum.
-"""
-
-MOST_ABREAST = 3
-"""Largest number of effects that are identified before one of them is added."""
 
 
 @dataclass(frozen=True)
 class Completed:
     """What `complete` came to: the last diagnosis, and the steps that it made.
 
-    `curves` are those learned where no effect of the library explained the error; `closure` what
-    the network came to that was asked for in the end.
+    `curves` are those learned where no effect of the library explained the error; `unproven` the
+    effects that improve the prediction and that the verdict does not name; `closure` what the
+    network came to that was asked for in the end, `no_closure` why these runs carry none.
     """
 
     verdict: Diagnosis
     steps: tuple[Step, ...]
     curves: tuple[LearnedEffect, ...] = ()
+    unproven: tuple[str, ...] = ()
     closure: LearnedClosure | None = None
+    no_closure: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         return {
             "verdict": self.verdict.as_dict(),
             **({"learned": [one.as_dict() for one in self.curves]} if self.curves else {}),
+            **({"unproven": list(self.unproven)} if self.unproven else {}),
             **({"closure": self.closure.as_dict()} if self.closure else {}),
             "steps": [
                 {
@@ -71,7 +73,7 @@ def complete(
     study: Study,
     *,
     law: str | None = None,
-    greedy: bool = False,
+    proven: bool = False,
     curves: bool = False,
     closure: bool = False,
     say: Say = tell,
@@ -86,8 +88,8 @@ def complete(
     study : the folder, opened
     law : "all" first seeks the law together with its effects; another name is taken first; None
         seeks it where nobody chose one (`laws.law_or_all`)
-    greedy : whether to go on where the verdict is unknown, by the effect that lowers the held-out
-        error most, as long as one does so by enough and beyond chance; see `gaining`
+    proven : whether to leave out effects that only improve the prediction; else, where the verdict
+        is unknown in the end, those are added that folds of the training runs choose
     curves : whether to go on where the verdict is unknown, by learning a curve
     closure : whether to end with a closure where the verdict is unknown then; the verdict stays
     say : called with a few words at each stage
@@ -106,32 +108,54 @@ def complete(
         keeps(_kept(steps))
         if free:
             found, free = _with_law_taken(study, found, stepped), False
-        names, abreast = found.effects if found.kind == "effect" else (), list[Trial]()
-        if greedy and found.kind == "unknown" and found.before is not None:
-            abreast = gaining(found.before, found.trials)
-        if found.kind == "unknown" and curves and not abreast:
+        names = found.effects if found.kind == "effect" else ()
+        if found.kind == "unknown" and curves:
             say("learning a curve")
             learned.append(learn_effect(study))
             names = (learned[-1].name,) if learned[-1].file is not None else ()
-        names = names or tuple(trial.effects[-1] for trial in abreast[:1])
         if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
-            network = None
-            if closure and found.kind == "unknown" and not closures(study.model().effects):
-                say("learning a closure")
-                network = learn_study_closure(study)
-                if network.file is not None:
-                    say(f"adding {network.name}")
-                    why = f"verdict: {found.kind}"
-                    stepped(add_effects(study, (network.name,), why=why, found=found).step)
-                    study.write_verdict(verdict_of(study, found))  # on the model without it
-            return Completed(found, tuple(steps), tuple(learned), network)
-        identified = None
-        if len(abreast) > 1:
-            names, identified = _best_identified(study, abreast, say)
+            done = Completed(found, (), tuple(learned))
+            if found.kind == "unknown" and not proven and not study.settings.has_building:
+                done = replace(done, unproven=_gained(study, found, say, stepped))
+            if found.kind == "unknown" and closure and not closures(study.model().effects):
+                try:
+                    done = replace(done, closure=_closed(study, found, say, stepped))
+                except StudyError as refused:  # the verdict and the steps stand without one
+                    done = replace(done, no_closure=str(refused))
+            return replace(done, steps=tuple(steps))
         say("adding " + " and ".join(names))
+        stepped(add_effects(study, names, why=f"verdict: {found.kind}", found=found).step)
+
+
+def _gained(
+    study: Study, found: Diagnosis, say: Say, stepped: Callable[[Step | None], None]
+) -> tuple[str, ...]:
+    """Add the effects that improve the prediction and are not proven; return their names."""
+    say("effects that improve the prediction")
+    before = study.model()
+    model = unproven(opened_at(study, "")[1], found.trials, MOST_EFFECTS)
+    names = tuple(one for one in model.effects if one not in before.effects)
+    if names:
+        say("adding " + " and ".join(names))
+        identified = identify_with(study, names, model.values)
+        why = f"improves the prediction on training runs left out; {NOT_PROVEN}"
+        stepped(add_effects(study, names, why=why, identified=identified).step)
+        study.write_verdict(verdict_of(study, found))  # on the model without them
+    return names
+
+
+def _closed(
+    study: Study, found: Diagnosis, say: Say, stepped: Callable[[Step | None], None]
+) -> LearnedClosure:
+    """Learn a closure and add it where it is kept."""
+    say("learning a closure")
+    network = learn_study_closure(study)
+    if network.file is not None:
+        say(f"adding {network.name}")
         why = f"verdict: {found.kind}"
-        added = add_effects(study, names, why=why, found=found, identified=identified)
-        stepped(added.step)
+        stepped(add_effects(study, (network.name,), why=why, found=found).step)
+        study.write_verdict(verdict_of(study, found))  # on the model without it
+    return network
 
 
 _ON = "the same command goes on there, a search for effects that was under way begins anew."
@@ -155,37 +179,6 @@ def _begun_free(
         say("identifying the model")
         stepped(identify_study(study, law=other, table=False).step)
     return law == ALL
-
-
-def gaining(before: Trial, trials: Sequence[Trial]) -> list[Trial]:
-    """Return the effects, each alone, that lower an error about as much as the best one.
-
-    Parameters
-    ----------
-    before : the trial of the model without them
-    trials : with one effect more each, the smallest z first
-
-    Returns
-    -------
-    list of Trial
-        The best first, `MOST_ABREAST` at most; none where no effect lowers the error by enough and
-        beyond chance.
-    """
-    able = [trial for trial in trials if missing(before, trial)]
-    return [trial for trial in able if trial.z <= ABREAST * able[0].z][:MOST_ABREAST]
-
-
-def _best_identified(
-    study: Study, abreast: Sequence[Trial], say: Say
-) -> tuple[tuple[str, ...], Identified]:
-    """Return the effect that leaves the least z once identified, and that identification."""
-    names = [trial.effects[-1:] for trial in abreast]
-    say("these gain about alike and are identified: " + ", ".join(name for (name,) in names))
-    found = [
-        identify_with(study, name, trial.model.values)
-        for name, trial in zip(names, abreast, strict=True)
-    ]
-    return min(zip(names, found, strict=True), key=lambda one: one[1].z)
 
 
 def _with_law_taken(

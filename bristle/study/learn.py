@@ -66,7 +66,7 @@ def learn_effect(
     given, name = name, name or _free_name(study)
     _refuse_no_word(name)
     _refuse_taken(study, name)
-    site, opened = _opened(study, at)
+    site, opened = opened_at(study, at)
     refuse_elsewhere(parts, along, CurvePlace(site), study.settings.beside)
     found = learn(opened, name, parts=parts, along=along)
     told = site if study.settings.has_building else ""
@@ -119,7 +119,7 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     given, name = name, name or _free_name(study, "closure")
     _refuse_no_word(name)
     _refuse_taken(study, name)
-    _, opened = _opened(study, "")
+    _, opened = opened_at(study, "")
     found = learn_closure(opened, name)
     if found.refused or found.closure is None:
         return found
@@ -180,8 +180,8 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     return replace(learned, file=file, picture=picture)
 
 
-def _opened(study: Study, at: str) -> tuple[str, Prepared]:
-    """Return the site to learn at, and what is known there."""
+def opened_at(study: Study, at: str) -> tuple[str, Prepared]:
+    """Return the site of a study to learn at, "" for that where the model errs, and its runs."""
     rig, nothing = _rig(study), f"{study.folder}: nothing can be learned from these runs."
     if rig.lacking is not None:
         raise StudyError(f"{nothing} {' '.join(rig.lacking.reasons)}")

@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import ceil, log10
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ from ..data.channels import (
 from ..data.decimate import FAST, RATE
 from ..data.extra_channels import found_in, raw_signals
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
-from ..data.measurement import measurements_of
+from ..data.measurement import in_si, measurements_of
 from ..data.noise import SHORTEST
 from ..data.pieces import holds_several, pieces_of
 from ..data.read import read_table
@@ -38,7 +39,7 @@ from ..model.model_file import model_text
 from ..physics.building import Building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
-from ..units import canonical
+from ..units import canonical, convert
 from .history import History, Step
 from .roles import for_test, roles_of
 from .run_facts import Facts, RunChoices, facts_of
@@ -51,6 +52,10 @@ _NO_COMMAND = (
     "no command was recorded: this is taken as a device that nothing commands, and laws of such "
     "devices are tried as well. If one acts on it, its column or --level is needed"
 )
+ENDS = (0.005, 0.995)
+"""Shares of the samples below the ends of the displacement's range: spikes are none."""
+NEAR_ZERO = 0.45
+"""Distance of the middle of the displacement's range from its zero, by the range, that is none."""
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
 
 
@@ -121,8 +126,9 @@ def make_folder(
     ignored = [guess.column for guess in seen if guess.channel in without]
     extra = found_in(first, [*taken, *ignored], specs)
     names = _names([Path(file) for file in files])
-    found = _parts(names, tables, specs, split)
     is_test = dict(zip(names, closed, strict=True))
+    specs, centred = _centred(specs, tables, closed) if rig == "bench" else (specs, "")
+    found = _parts(names, tables, specs, split)
     about, notes = facts_of(
         [Path(file) for file in files], choices, _commanded(specs, studied),
         _tones(names, found, is_test),
@@ -143,6 +149,7 @@ def make_folder(
         device=studied,
     )  # fmt: skip
     _refuse_one_role(settings.runs)
+    notes += [centred] if centred else []
     if rig == "bench" and not settings.drive:
         notes.append(_NO_COMMAND)
     if settings.excluded:
@@ -158,6 +165,37 @@ def make_folder(
     taken += [spec.column for spec in extra.values()]
     unused = tuple(text for text in left_out(first, guesses) if text not in taken)
     return NewStudy(tuple(guesses), extra, unused, tuple(notes))
+
+
+def _centred(
+    specs: dict[str, ChannelSpec], tables: Sequence[Table], closed: Sequence[bool]
+) -> tuple[dict[str, ChannelSpec], str]:
+    """Return where channels are, the displacement's zero in the middle of its range, and that.
+
+    Only where its range, over all runs but test runs, does not hold its zero: springs and stops
+    are then those of a rod that never comes there.
+    """
+    spec = specs.get("displacement")
+    if spec is None:
+        return specs, ""
+    seen = [
+        in_si(table, "displacement", replace(spec, sign=1))
+        for table, is_test in zip(tables, closed, strict=True)
+        if not is_test
+    ]
+    ends = [np.quantile(x, ENDS) for x in (one[np.isfinite(one)] for one in seen) if x.size]
+    low = min((float(low) for low, _ in ends), default=0.0)
+    high = max((float(high) for _, high in ends), default=0.0)
+    span, middle = high - low, 0.5 * (high + low)
+    if not 0.0 < NEAR_ZERO * span < abs(middle):
+        return specs, ""
+    unit = spec.unit or "m"
+    zero = round(convert(middle, "m", unit), max(0, 4 - ceil(log10(convert(span, "m", unit)))))
+    text = (
+        f"the displacement is counted from the middle of its range, {zero:g} {unit} as recorded: "
+        "zero in study.toml, under [channels.displacement]"
+    )
+    return {**specs, "displacement": replace(spec, zero=zero)}, text
 
 
 @dataclass(frozen=True)

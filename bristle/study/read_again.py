@@ -172,8 +172,8 @@ def _resolved(
             f'{name}: "{column.text}" in {unit}: that is no unit of this quantity; {right} or the '
             "like is right."
         )
-    noise = before.noise if before is not None and stays else None
-    return ChannelSpec(column.text, canonical(unit), spec.sign, noise)
+    kept = before if before is not None and stays else ChannelSpec()
+    return ChannelSpec(column.text, canonical(unit), spec.sign, kept.noise, zero=kept.zero)
 
 
 def _column(table: Table, spec: ChannelSpec) -> str:

@@ -173,6 +173,10 @@ def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
     return {**verdict, "notes": notes} if notes else verdict
 
 
+NOT_PROVEN = "not proven"
+"""How the reason ends of effects that improve the prediction and that no verdict names."""
+
+
 @dataclass(frozen=True)
 class Added:
     """What adding an effect did: the identification with it, and the step in the history.
@@ -225,10 +229,24 @@ def add_effects(
     why = why or (f"verdict: {verdict['kind']}" if agreed else "by hand")
     law = joined_form(verdict["law"], verdict["command"]) if agreed and "law" in verdict else ""
     other_law = law if law != identified.model.law else ""
-    step = study.add_step(
-        "add " + ", ".join(names), why, identified.model, *identified.for_history()
-    )
+    what = added_text(names, why)
+    step = study.add_step(what, why, identified.model, *identified.for_history())
     return Added(names, replace(identified, step=step), step, other_law)
+
+
+_ADD, _DOUBT = "add ", f" ({NOT_PROVEN})"
+
+
+def added_text(names: Sequence[str], why: str) -> str:
+    """Return what a step of the history says that adds effects, and whether they are proven."""
+    return _ADD + ", ".join(names) + (_DOUBT if why.endswith(NOT_PROVEN) else "")
+
+
+def unproven_of(step: Step) -> list[str]:
+    """Return the effects that a step added and that no verdict names."""
+    if not step.what.endswith(_DOUBT):
+        return []
+    return step.what.removeprefix(_ADD).removesuffix(_DOUBT).split(", ")
 
 
 def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]) -> Identified:

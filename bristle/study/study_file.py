@@ -46,6 +46,7 @@ CHANNELS = Spec(
         "column": Key(str, ""), "unit": Key(str, ""), "sign": Key(_sign, 1),
         "noise": Key(float, None, least=0.0, about="its standard deviation"),
         "step": Key(float, None, "s"),
+        "zero": Key(float, 0.0, about="what the column reads where the channel is 0"),
     })
 )  # fmt: skip
 """`[channels.NAME]` of study.toml."""
@@ -66,6 +67,8 @@ def channel_as_toml(spec: ChannelSpec) -> dict[str, Any]:
     found: dict[str, Any] = {"column": spec.column, "unit": spec.unit, "sign": spec.sign}
     if spec.noise is not None:
         found["noise"] = spec.noise
+    if spec.zero:
+        found["zero"] = spec.zero
     return found
 
 

@@ -32,7 +32,7 @@ from .fit_view import identified_view as identified_view
 from .forms import law_command
 from .history import HistoryStep, history_steps
 from .pictures import draw_run, staircase_page
-from .steps import Created
+from .steps import Created, unproven_of
 from .study import Study
 from .study_file import TEST
 
@@ -195,7 +195,8 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     if not judged:
         return view
     began = study.model_of(steps[0].number, to_show=True)
-    known = (*began.effects, *closures(model.effects))
+    doubtful = [one for step in study.steps() for one in unproven_of(step)]
+    known = (*began.effects, *closures(model.effects), *doubtful)
     added = [name for name in model.effects if name not in known]
     if not added:
         return view
@@ -252,8 +253,26 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     view = story_view(study, verdict)
     table = steps_table(history_steps(study.steps()), study.settings.cut_off)
     learned = [Text(" ".join(one.sentences())) for one in done.curves]
+    if done.unproven:
+        learned.append(Text(_unproven(study, done.unproven)))
     learned += map(Text, done.closure.sentences() if done.closure else ())
+    learned += [Text(f"No closure: {done.no_closure}")] if done.no_closure else []
     return view._replace(blocks=(*learned, *view.blocks, table))
+
+
+def _unproven(study: Study, names: Sequence[str]) -> str:
+    """Return the sentences about effects that improve the prediction and are not proven."""
+    step = next(one for one in reversed(study.steps()) if unproven_of(one) == [*names])
+    fall = [errors.get("error_share_holdout") for errors in (step.before, step.after)]
+    falls = " to ".join(percent(one) for one in fall if isinstance(one, float))
+    back = command("study", "auto", study.folder, "--proven")
+    them = "it" if len(names) == 1 else "them"
+    return (
+        f"Improves the prediction, is not proven: {effect_names(names)}. Chosen on training runs "
+        f"left out of the fit; with {them} the error on held-out runs goes from {falls} of the "
+        f"force. The verdict is on the model without {them}; undo takes {them} back, and from the "
+        f"begin on {back} leaves such effects out."
+    )
 
 
 def _sizes(model: Model, effect: str) -> dict[str, tuple[float, float | None, str]]:
@@ -389,8 +408,5 @@ def _gaining(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
     if not gains:
         return []
     best = max(gains, key=lambda row: row["gain"])
-    greedy = command("study", "auto", folder, "--greedy")
-    return [
-        Next(command("add", folder, *best["effects"]), f"error {100.0 * best['gain']:.0f} % lower"),
-        Next(greedy, "adds effects as long as one gains"),
-    ]
+    why = f"error {100.0 * best['gain']:.0f} % lower"
+    return [Next(command("add", folder, *best["effects"]), why)]

@@ -165,8 +165,22 @@ def test_without_play_it_is_dahls_law() -> None:
     np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-12)
 
 
-def test_a_long_step_with_a_reversal_of_the_plates_is_many_short_ones() -> None:
-    values = {"play": 1e-3, "rho": 500.0}
+@pytest.mark.parametrize("gamma", [0.0, 0.3, 0.99])
+def test_the_exponent_says_how_round_the_onset_of_slip_is(gamma: float) -> None:
+    """What is left to slip, w = 1 - rho b, falls as w^(1 - gamma) = 1 - (1 - gamma) rho s."""
+    values = {"f_c": 5.0, "c": 0.0, "k": 0.0, "rho": 400.0, "play": 0.0, "gamma": gamma}
+    t = DT * np.arange(1, 400)
+    force = Bench("friction_damper", values).play(lambda now: (0.05 * now, 0.05), 0.0, t)
+    left = np.maximum(1.0 - (1.0 - gamma) * 400.0 * 0.05 * (t - t[0]), 0.0) ** (1.0 / (1.0 - gamma))
+    assert force == pytest.approx(5.0 * (1.0 - left), abs=1e-9)
+    for amplitude in (1e-3, 0.03):
+        _, v, force, dt = last_cycle("friction_damper", values, amplitude, 2.0, 400)
+        assert loop_energy(force, v, dt) > 0.0
+
+
+@pytest.mark.parametrize("gamma", [0.0, 0.4, 1.0])
+def test_a_long_step_with_a_reversal_of_the_plates_is_many_short_ones(gamma: float) -> None:
+    values = {"play": 1e-3, "rho": 500.0, "gamma": gamma}
     for begin in (-3e-3, -2e-4, 2.5e-3):
         law = LAWS["friction_damper"]
         ends = []

@@ -313,3 +313,24 @@ def test_the_command_says_what_it_changes_and_what_no_longer_counts(
     assert 'force                        "F [N]" in kN, sign turned' in capsys.readouterr().out
     assert main(["study", "channels", str(found), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["force"]["sign"] == -1
+
+
+@pytest.mark.parametrize("sign", ["", "-"])
+def test_a_displacement_far_from_its_zero_is_counted_from_its_middle(tmp_path, capsys, sign):
+    apart = {"near": 0.0, "far": -110.0}
+    for name, offset in apart.items():
+        for seed in (1, 2):
+            columns = bench_run(seed, seconds=2.0)
+            columns["x [mm]"] = columns["x [mm]"] + offset
+            write(tmp_path / name / f"run_{seed}.csv", columns)
+    given = ["--channel", f"displacement={sign}x [mm]", "--law", "bingham"]
+    middles = {}
+    for name in apart:
+        made = ["study", "new", str(tmp_path / f"{name}_rig"), *given]
+        assert main([*made, "--data", str(tmp_path / name / "*.csv")]) == 0
+        said = "is counted from the middle of its range, -" in capsys.readouterr().out
+        assert said is (name == "far")
+        runs = Study(tmp_path / f"{name}_rig").runs().all
+        middles[name] = np.array([np.mean(run["displacement"]) for run in runs])
+    assert np.abs(middles["far"]).max() < 2e-3
+    assert np.ptp(middles["far"] - middles["near"]) < 1e-6

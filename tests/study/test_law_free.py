@@ -49,6 +49,9 @@ class Folder:
     def __init__(self):
         self.names = []
 
+    def write_verdict(self, found):
+        self.kept = found
+
     def model(self):
         found = new_model("bingham").with_values({"f_c": 1.0})
         return SimpleNamespace(law="bingham", facts=found.facts, effects=list(self.names))
@@ -73,47 +76,36 @@ def told(monkeypatch, answers):
     monkeypatch.setattr(auto, "diagnose_study", lambda _study, **_given: next(found))
 
 
-def test_greedy_adds_what_gains_most_until_nothing_gains(folder, monkeypatch):
-    answers = [
-        verdict("unknown", 6.0, ("stribeck", 4.0), ("coil_lag", 5.0)),
-        verdict("unknown", 4.0, ("coil_lag", 3.0)),
-        verdict("unknown", 3.0, ("drift", 2.99)),
-    ]
-    told(monkeypatch, answers)
-    done = complete(folder, greedy=True, say=print)
-    assert folder.names == ["stribeck", "coil_lag"]
-    assert done.verdict is answers[-1]
-    assert len(done.steps) == 2
+def test_an_unknown_error_is_lowered_by_effects_that_are_not_proven(folder, monkeypatch):
+    found = verdict("unknown", 6.0, ("stribeck", 4.0))
+    told(monkeypatch, [found])
+    asked = []
+
+    def chosen(prepared, trials, most):
+        asked.append((prepared, trials, most))
+        return SimpleNamespace(effects=["stribeck", "drift"], values={})
+
+    monkeypatch.setattr(auto, "opened_at", lambda _study, _at: ("damper", "prepared"))
+    monkeypatch.setattr(auto, "unproven", chosen)
+    monkeypatch.setattr(auto, "identify_with", lambda _study, names, _begin: names)
+    monkeypatch.setattr(auto, "verdict_of", lambda _study, found: found)
+    done = complete(folder, say=print)
+    assert asked == [("prepared", found.trials, MOST_EFFECTS)]
+    assert done.unproven == ("stribeck", "drift")
+    assert folder.names == ["stribeck", "drift"]
+    assert folder.kept is found, "the verdict stays, on the model without them"
 
 
-def test_of_effects_that_gain_about_alike_the_one_that_is_better_identified_is_added(
-    folder, monkeypatch
-):
-    answers = [
-        verdict("unknown", 6.0, ("stribeck", 4.0), ("drift", 4.3), ("coil_lag", 4.5)),
-        verdict("unknown", 3.8),
-    ]
-    told(monkeypatch, answers)
-    after = {"stribeck": 4.0, "drift": 3.8}
-    monkeypatch.setattr(
-        auto,
-        "identify_with",
-        lambda _study, names, _begin: SimpleNamespace(z=after[names[0]]),
-    )
-    complete(folder, greedy=True, say=print)
-    assert folder.names == ["drift"]
-
-
-def test_without_greedy_an_unknown_error_ends_it(folder, monkeypatch):
+def test_only_what_is_proven_is_added_where_that_is_asked_for(folder, monkeypatch):
     told(monkeypatch, [verdict("unknown", 6.0, ("stribeck", 4.0))])
-    assert complete(folder, say=print).steps == ()
+    assert complete(folder, proven=True, say=print).steps == ()
     assert folder.names == []
 
 
-def test_greedy_stops_at_the_largest_number_of_effects(folder, monkeypatch):
-    told(monkeypatch, [verdict("unknown", 9.0 - k, (NAMES[k], 8.0 - k)) for k in range(6)])
-    complete(folder, greedy=True, say=print)
-    assert len(folder.names) == MOST_EFFECTS
+def test_what_is_explained_gets_no_further_effect(folder, monkeypatch):
+    told(monkeypatch, [verdict("none", 1.0)])
+    assert complete(folder, say=print).unproven == ()
+    assert folder.names == []
 
 
 def test_in_a_building_identify_alone_refuses_all_laws():
