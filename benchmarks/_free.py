@@ -104,7 +104,7 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
     chosen = choose(search(rows, TrialsByLaw(data, say)))
     assert chosen.prepared is not None
     finding, opened = _with_effects(split, chosen.finding, chosen.prepared, say)
-    free = _found(_with_unproven(opened, finding.trials), ())
+    free = _found(_with_unproven(opened, finding.trials, rows), ())
     return (free, *_with_curves(opened, say))
 
 
@@ -137,11 +137,14 @@ def _with_effects(
     return finding, opened
 
 
-def _with_unproven(opened: Prepared, trials: Sequence[Trial] = ()) -> Prepared:
-    """Add effects that improve the prediction on parts left out."""
+def _with_unproven(
+    opened: Prepared, trials: Sequence[Trial] = (), laws: Sequence[LawTrial] = ()
+) -> Prepared:
+    """Add what improves the prediction on parts left out."""
     if opened.before.z <= opened.rule.clean:
         return opened
-    model = _identified(unproven(opened, trials, MOST_EFFECTS), opened.problem)
+    found = unproven(opened, trials, laws if not opened.before.effects else (), MOST_EFFECTS)
+    model = _identified(found.model, opened.problem)
     return replace(opened, before=judge(model, opened.problem, opened.held_out))
 
 

@@ -48,6 +48,9 @@ WORTH = 0.04
 BENT = 0.01
 """Largest probability that a straight line over the label explains the runs, for steps to do."""
 
+WARM = 2.0
+"""Kelvin by which runs differ at least for their temperature to be tried without proof."""
+
 FEWEST, MOST_LEVELS, MOST = 4, 6, 4
 """Runs that tell of a label, levels that have a step each, and dependences that are tried."""
 
@@ -251,6 +254,33 @@ def _dependence(
         return None
     text = _text(effect, name, label, model, sizes, None if stepped else (middle, numbers))
     return Dependence(effect, text, label.name, gain)
+
+
+def promising(problem: Problem, model: Model) -> dict[str, str]:
+    """Return the texts of effects by name: of each label the dependence that fits runs best.
+
+    Nothing is proven by that, of few runs least.
+
+    Parameters
+    ----------
+    problem : the training runs, which alone are looked at
+    model : fitted to them
+    """
+    runs, out = problem.runs, dict[str, str]()
+    for label in labels_of([run.labels for run in runs]):
+        numbers = label.numbers()
+        still = label.name == TEMPERATURE and float(np.ptp(numbers)) < WARM
+        with_motion = any(what.startswith(MOTION) for what in together(label, runs))
+        if still or with_motion or not label.is_number:
+            continue
+        fits, middle = RunwiseFit(problem, model), float(numbers.mean())
+        gains = [(*fits.gain(j, (numbers - middle)[:, None]), j) for j in range(len(fits.names))]
+        gain, size, j = max(gains, key=lambda one: one[0])
+        name = fits.names[j]
+        effect = f"{name.replace('.', '_')}_by_{as_word(label.name)}"
+        if gain >= WORTH and size.any() and effect.isidentifier() and effect not in EFFECTS:
+            out[effect] = _text(effect, name, label, model, size, (middle, numbers))
+    return out
 
 
 _made: ContextVar[dict[str, str] | None] = ContextVar("made", default=None)

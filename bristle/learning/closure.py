@@ -260,10 +260,12 @@ def errors_of(model: Model, problem: Problem) -> list[Array]:
     return [(run.force - problem.predict(model, run) - zero)[_counts(run)] for run in problem.runs]
 
 
-def lowers(before: Sequence[Array], after: Sequence[Array], gain: float) -> bool:
+def lowers(
+    before: Sequence[Array], after: Sequence[Array], gain: float, beyond: float = 2.0
+) -> bool:
     """Return whether errors (per run) fall by a gain, and beyond their scatter over the runs.
 
-    Of few runs it is that over stretches of them.
+    Of few runs it is that over stretches of them; `beyond` so many of its standard errors.
     """
     total = [float(np.mean(np.concatenate([*one]) ** 2)) for one in (before, after)]
     if total[1] > (1.0 - gain) ** 2 * total[0]:
@@ -277,7 +279,7 @@ def lowers(before: Sequence[Array], after: Sequence[Array], gain: float) -> bool
             if len(a)
         ]
     )
-    return bool(np.mean(falls) > 2.0 * np.std(falls, ddof=1) / np.sqrt(len(falls)))
+    return bool(np.mean(falls) > beyond * np.std(falls, ddof=1) / np.sqrt(len(falls)))
 
 
 def trained_beside(train: Problem, model: Model) -> tuple[Closure, Model, float] | None:

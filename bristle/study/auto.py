@@ -9,10 +9,12 @@ from typing import Any
 from ..core.interrupt import keeps
 from ..core.progress import tell
 from ..diagnosis import Diagnosis
+from ..diagnosis.by_label import promising
 from ..errors import StudyError
 from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
 from ..physics.effect import closures
+from ..user_code.load import defined
 from .changes import other_data
 from .forms import law_or_all
 from .history import Step
@@ -20,13 +22,13 @@ from .identified import is_identified
 from .identify import identify_study
 from .learn import learn_effect, learn_study_closure, opened_at
 from .steps import (
-    NOT_PROVEN,
     Say,
     add_effects,
+    add_unproven,
     diagnose_study,
-    identify_with,
     take_law,
     verdict_of,
+    write_effects,
 )
 from .study import Study
 from .study_file import ALL
@@ -41,14 +43,14 @@ class Completed:
     """What `complete` came to: the last diagnosis, and the steps that it made.
 
     `curves` are those learned where no effect of the library explained the error; `unproven` the
-    effects that improve the prediction and that the verdict does not name; `closure` what the
+    step that improves the prediction by what the verdict does not name; `closure` what the
     network came to that was asked for in the end, `no_closure` why these runs carry none.
     """
 
     verdict: Diagnosis
     steps: tuple[Step, ...]
     curves: tuple[LearnedEffect, ...] = ()
-    unproven: tuple[str, ...] = ()
+    unproven: Step | None = None
     closure: LearnedClosure | None = None
     no_closure: str = ""
 
@@ -57,7 +59,7 @@ class Completed:
         return {
             "verdict": self.verdict.as_dict(),
             **({"learned": [one.as_dict() for one in self.curves]} if self.curves else {}),
-            **({"unproven": list(self.unproven)} if self.unproven else {}),
+            **({"unproven": self.unproven.what} if self.unproven else {}),
             **({"closure": self.closure.as_dict()} if self.closure else {}),
             "steps": [
                 {
@@ -129,19 +131,23 @@ def complete(
 
 def _gained(
     study: Study, found: Diagnosis, say: Say, stepped: Callable[[Step | None], None]
-) -> tuple[str, ...]:
-    """Add the effects that improve the prediction and are not proven; return their names."""
+) -> Step | None:
+    """Add what improves the prediction and is not proven; return the step, None where nothing."""
     say("effects that improve the prediction")
-    before = study.model()
-    model = unproven(opened_at(study, "")[1], found.trials, MOST_EFFECTS)
-    names = tuple(one for one in model.effects if one not in before.effects)
-    if names:
-        say("adding " + " and ".join(names))
-        identified = identify_with(study, names, model.values)
-        why = f"improves the prediction on training runs left out; {NOT_PROVEN}"
-        stepped(add_effects(study, names, why=why, identified=identified).step)
-        study.write_verdict(verdict_of(study, found))  # on the model without them
-    return names
+    before, opened = study.model(), opened_at(study, "")[1]
+    texts = promising(opened.searched, opened.before.model)
+    trials = () if texts else found.trials
+    laws = found.laws.rows if found.laws is not None and not before.effects else ()
+    with defined(texts):
+        best = unproven(opened, trials, laws, MOST_EFFECTS)
+        names = tuple(one for one in best.model.effects if one not in before.effects)
+    if not names and not best.law:
+        return None
+    write_effects(study, {name: texts[name] for name in names if name in texts})
+    say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
+    step = add_unproven(study, best.law, names, best.model.values, found)
+    stepped(step)
+    return step
 
 
 def _closed(

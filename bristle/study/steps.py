@@ -119,20 +119,20 @@ def diagnose_study(
         rig = rig_of(study, model, runs)
         found = replace(found, error=force_errors(site_models(rig, model)))
     if write:
-        _write_effects(study, found)
+        write_effects(study, found.written)
         study.write_verdict(verdict_of(study, found))
         keeps("The verdict is kept in verdict.json.")
     return found
 
 
-def _write_effects(study: Study, found: Diagnosis) -> None:
-    """Keep the effects that a diagnosis made and names as files of the study's own."""
-    for name, text in found.written.items():
+def write_effects(study: Study, texts: Mapping[str, str]) -> None:
+    """Keep effects that bristle made, by name, as files of the study's own."""
+    for name, text in texts.items():
         file = study.effects_folder / f"{name}.py"
         write_whole(file, text)
         remember_made(file, text)
         undefine(name)  # the file's takes its place
-    if found.written:
+    if texts:
         study.usable_effects()
 
 
@@ -204,7 +204,6 @@ def add_effects(
     *,
     why: str = "",
     found: Diagnosis | None = None,
-    identified: Identified | None = None,
 ) -> Added:
     """Add effects to a study's model, refit it, and write the step.
 
@@ -214,42 +213,59 @@ def add_effects(
     names : of the effects
     why : the reason for the history; else the verdict at hand, or "by hand"
     found : the diagnosis that named them: the fit then begins from its values
-    identified : what `identify_with` found for these effects, where it was asked before
 
     Raises
     ------
     StudyError
         If an effect is not known, is there already, or cannot join the model.
     """
-    if identified is None:
-        identified = identify_with(study, names, found.values if found is not None else {})
+    identified = identify_with(study, names, found.values if found is not None else {})
     names = _named_here(study, names)
     verdict = study.verdict() or {}
     agreed = bool(verdict) and set(names) <= set(verdict.get("effects", []))
     why = why or (f"verdict: {verdict['kind']}" if agreed else "by hand")
     law = joined_form(verdict["law"], verdict["command"]) if agreed and "law" in verdict else ""
     other_law = law if law != identified.model.law else ""
-    what = added_text(names, why)
-    step = study.add_step(what, why, identified.model, *identified.for_history())
+    step = study.add_step(
+        "add " + ", ".join(names), why, identified.model, *identified.for_history()
+    )
     return Added(names, replace(identified, step=step), step, other_law)
 
 
 _ADD, _DOUBT = "add ", f" ({NOT_PROVEN})"
 
 
-def added_text(names: Sequence[str], why: str) -> str:
-    """Return what a step of the history says that adds effects, and whether they are proven."""
-    return _ADD + ", ".join(names) + (_DOUBT if why.endswith(NOT_PROVEN) else "")
+def add_unproven(
+    study: Study, law: str, names: Sequence[str], begin: Mapping[str, float], found: Diagnosis
+) -> Step:
+    """Add what improves the prediction and is not proven; the verdict stays on the model before.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    law : another law that is taken, "" for none
+    names : of the effects
+    begin : values in SI by name from which one more fit begins
+    found : the verdict at hand
+    """
+    identified = identify_with(study, names, begin, law)
+    parts = ([f"take {law}"] if law else []) + ([_ADD + ", ".join(names)] if names else [])
+    why = f"improves the prediction on training runs left out; {NOT_PROVEN}"
+    what = "; ".join(parts) + _DOUBT
+    step = study.add_step(what, why, identified.model, *identified.for_history())
+    study.write_verdict(verdict_of(study, found))
+    return step
 
 
 def unproven_of(step: Step) -> list[str]:
     """Return the effects that a step added and that no verdict names."""
-    if not step.what.endswith(_DOUBT):
-        return []
-    return step.what.removeprefix(_ADD).removesuffix(_DOUBT).split(", ")
+    _, add, names = step.what.partition(_ADD)
+    return names.removesuffix(_DOUBT).split(", ") if add and names.endswith(_DOUBT) else []
 
 
-def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]) -> Identified:
+def identify_with(
+    study: Study, names: Sequence[str], begin: Mapping[str, float], law: str = ""
+) -> Identified:
     """Identify a study's model with effects added; the study stays as it is.
 
     Parameters
@@ -257,6 +273,7 @@ def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]
     study : the folder, opened
     names : of the effects
     begin : values in SI by name from which one more fit begins
+    law : another law that the model takes first, "" for none
 
     Raises
     ------
@@ -267,7 +284,8 @@ def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]
     for name in names:
         refuse_left_out(study.effects_folder / f"{name}.py")
     tell("reading the runs")
-    model = present = study.model()
+    present = study.model()
+    model = with_law(present, law) if law else present
     for name in _named_here(study, names):
         refuse_effect(model, name, not study.settings.has_building)
         model = model.with_effect(name)

@@ -1,18 +1,19 @@
-"""Effects that improve the prediction and are not proven: folds of the training runs choose them.
+"""What improves the prediction and is not proven: folds of the training runs choose it.
 
-A verdict names an effect where held-out runs prove it. Where they prove none, several effects
-together may still predict better. What is taken is what lowers the error on the training runs left
-out of the fit; the held-out runs only judge it.
+A verdict names an effect where held-out runs prove it. Where they prove none, another law, several
+effects together, or a parameter that depends on a label may still predict better. What is taken is
+what lowers the error on the training runs left out of the fit; the held-out runs only judge it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core.arrays import Array
+from ..diagnosis.law_trials import LawTrial
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import LONG, SECONDS, Trial, missed_by, try_all
 from ..identification.problem import Problem
@@ -26,43 +27,70 @@ FOLDS = 3
 """Parts of the training runs that are left out in turn: whole runs, of a single one stretches."""
 
 TRIED = 3
-"""Effects, those that fit the training runs best, that folds compare at each step."""
+"""Laws, then effects, those that fit the training runs best, that folds compare at each step."""
 
 SWEEPS = 4
 """Jacobians of the fit to a fold's runs, which begins at the values of all."""
 
-GAIN = 0.03
-"""Share of the error on the runs left out that an effect takes at least."""
+GAIN, BEYOND = 0.03, 1.0
+"""Share of the error on the runs left out that a law or an effect takes at least, and by how many
+standard errors over them: the rule of one, as in cross-validation, for nothing is proven by it."""
 
 
-def unproven(prepared: Prepared, trials: Sequence[Trial], most: int) -> Model:
-    """Return the model with the effects that lower its error on runs left out, itself if none do.
+@dataclass(frozen=True)
+class Unproven:
+    """A model that predicts better: `law` the name of another law that it has, "" for the same."""
+
+    model: Model
+    law: str = ""
+
+
+def unproven(
+    prepared: Prepared, trials: Sequence[Trial], laws: Sequence[LawTrial], most: int
+) -> Unproven:
+    """Return the model with the law and effects that lower its error on runs left out.
 
     Parameters
     ----------
     prepared : the runs, and the model that effects join
     trials : of that model with one effect more each, as far as they are known
+    laws : all laws, fitted, where another one may be taken
     most : how many effects a model has at the most
     """
     missed = missed_by(prepared.before, prepared.searched)
     data = prepared.with_excess(missed) if missed > 0.0 else prepared
     problem = data.searched
-    best = refine(prepared.before.model, problem, SWEEPS)
+    best, law = refine(prepared.before.model, problem, SWEEPS), ""
     errors = left_out_errors(best, problem)
+
+    def gaining(models: Sequence[Model]) -> int | None:
+        """Return which model lowers the error most, beyond chance; its errors are then those."""
+        nonlocal best, errors
+        found = in_threads(lambda model: left_out_errors(model, problem), models)
+        able = [
+            (_mean_square(one), k)
+            for k, one in enumerate(found)
+            if lowers(errors, one, GAIN, BEYOND)
+        ]
+        if not able:
+            return None
+        _, k = min(able)
+        best, errors = refine(models[k], problem, LONG), found[k]
+        return k
+
+    others = [row for row in laws if row.trial.model.law != best.law]
+    others = sorted(others, key=lambda row: row.error_train.rms)[:TRIED]
+    taken = gaining([refine(row.trial.model, problem, LONG) for row in others])
+    if taken is not None:
+        law = others[taken].law
     while len(best.effects) < most:
         able = [one for one in trials if _joins(one, best)]
         if not able:
             able = try_all(best, problem, data.held_out, shown=data.shown, most=SECONDS)
-        models = [one.model for one in sorted(able, key=lambda one: one.train)[:TRIED]]
-        found = in_threads(lambda model: left_out_errors(model, problem), models)
-        better = [
-            (_mean_square(one), k) for k, one in enumerate(found) if lowers(errors, one, GAIN)
-        ]
-        if not better:
+        able.sort(key=lambda one: one.train)
+        if gaining([one.model for one in able[:TRIED]]) is None:
             break
-        _, k = min(better)
-        best, errors = refine(models[k], problem, LONG), found[k]
-    return best
+    return Unproven(best, law)
 
 
 def _joins(trial: Trial, model: Model) -> bool:
@@ -81,8 +109,27 @@ def left_out_errors(model: Model, problem: Problem) -> list[Array]:
     return [
         error
         for others, own in folds(problem)
-        for error in errors_of(refine(model, others, SWEEPS), own)
+        for error in errors_of(refine(_blind(model, others), others, SWEEPS), own)
     ]
+
+
+def _blind(model: Model, problem: Problem) -> Model:
+    """Return a model that knows no more of labels than its runs tell.
+
+    A dependence begins at none, and stays there where the runs have one level of its label alone.
+    """
+    values, fixed = {**model.values}, [*model.fixed]
+    for name in model.effects:
+        effect = EFFECTS[name]
+        if not (effect.changes and effect.labels and effect.amount in effect.parameters):
+            continue
+        own = f"{name}.{effect.amount}"
+        values[own] = 0.0
+        if all(
+            len({run.labels[one] for run in problem.runs}) < 2 for one in effect.labels.values()
+        ):
+            fixed.append(own)
+    return replace(model, values=values, fixed=tuple(fixed))
 
 
 def folds(problem: Problem) -> Iterator[tuple[Problem, Problem]]:

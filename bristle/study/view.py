@@ -30,7 +30,7 @@ from .auto import Completed
 from .data_check import DataCheck
 from .fit_view import identified_view as identified_view
 from .forms import law_command
-from .history import HistoryStep, history_steps
+from .history import HistoryStep, Step, history_steps
 from .pictures import draw_run, staircase_page
 from .steps import Created, unproven_of
 from .study import Study
@@ -260,18 +260,16 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     return view._replace(blocks=(*learned, *view.blocks, table))
 
 
-def _unproven(study: Study, names: Sequence[str]) -> str:
-    """Return the sentences about effects that improve the prediction and are not proven."""
-    step = next(one for one in reversed(study.steps()) if unproven_of(one) == [*names])
+def _unproven(study: Study, step: Step) -> str:
+    """Return the sentences about a step that improves the prediction and is not proven."""
     fall = [errors.get("error_share_holdout") for errors in (step.before, step.after)]
     falls = " to ".join(percent(one) for one in fall if isinstance(one, float))
     back = command("study", "auto", study.folder, "--proven")
-    them = "it" if len(names) == 1 else "them"
     return (
-        f"Improves the prediction, is not proven: {effect_names(names)}. Chosen on training runs "
-        f"left out of the fit; with {them} the error on held-out runs goes from {falls} of the "
-        f"force. The verdict is on the model without {them}; undo takes {them} back, and from the "
-        f"begin on {back} leaves such effects out."
+        f"Improves the prediction, is not proven: {effect_names(unproven_of(step)) or step.what}. "
+        "Chosen on training runs left out of the fit; the error on held-out runs goes from "
+        f"{falls} of the force. The verdict is on the model without that. undo takes it back; "
+        f"from the begin on {back} leaves it out."
     )
 
 

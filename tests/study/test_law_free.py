@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ import pytest
 from studies import case_study
 
 from bristle.cli import main
-from bristle.diagnosis.trials import Trial
+from bristle.diagnosis.trials import Trial, judge
 from bristle.errors import StudyError
 from bristle.model.model import Model, new_model
 from bristle.physics.building import paper_building
@@ -19,8 +20,10 @@ from bristle.study import auto
 from bristle.study.api import diagnose, identify
 from bristle.study.auto import MOST_EFFECTS, complete
 from bristle.study.forms import law_command, law_or_all, with_law
+from bristle.study.learn import opened_at
 from bristle.study.steps import create_study, diagnose_study
 from bristle.study.study import Study
+from bristle.study.unproven import unproven
 from tests.independent.generate import make_case
 from tests.made import bench_run, write_runs
 
@@ -36,7 +39,7 @@ def trial(z, *effects):
 def verdict(kind, z, *gains):
     """Return a diagnosis of a model with this z; `gains` are z with one more effect."""
     tried = tuple(trial(after, name) for name, after in gains)
-    return SimpleNamespace(kind=kind, effects=(), before=trial(z), trials=tried)
+    return SimpleNamespace(kind=kind, effects=(), before=trial(z), trials=tried, laws=None)
 
 
 class Folder:
@@ -48,9 +51,6 @@ class Folder:
 
     def __init__(self):
         self.names = []
-
-    def write_verdict(self, found):
-        self.kept = found
 
     def model(self):
         found = new_model("bingham").with_values({"f_c": 1.0})
@@ -76,24 +76,28 @@ def told(monkeypatch, answers):
     monkeypatch.setattr(auto, "diagnose_study", lambda _study, **_given: next(found))
 
 
-def test_an_unknown_error_is_lowered_by_effects_that_are_not_proven(folder, monkeypatch):
+def test_an_unknown_error_is_lowered_by_what_is_not_proven(folder, monkeypatch):
     found = verdict("unknown", 6.0, ("stribeck", 4.0))
     told(monkeypatch, [found])
-    asked = []
+    opened = SimpleNamespace(searched=None, before=trial(6.0))
+    asked, added = [], []
 
-    def chosen(prepared, trials, most):
-        asked.append((prepared, trials, most))
-        return SimpleNamespace(effects=["stribeck", "drift"], values={})
+    def chosen(*given):
+        asked.append(given)
+        return SimpleNamespace(model=Model("bingham", ("stribeck", "drift")), law="")
 
-    monkeypatch.setattr(auto, "opened_at", lambda _study, _at: ("damper", "prepared"))
+    def add(_study, law, names, values, of):
+        added.append((law, names, of))
+        return "add stribeck, drift (not proven)"
+
+    monkeypatch.setattr(auto, "opened_at", lambda _study, _at: ("damper", opened))
+    monkeypatch.setattr(auto, "promising", lambda _problem, _model: {})
     monkeypatch.setattr(auto, "unproven", chosen)
-    monkeypatch.setattr(auto, "identify_with", lambda _study, names, _begin: names)
-    monkeypatch.setattr(auto, "verdict_of", lambda _study, found: found)
+    monkeypatch.setattr(auto, "add_unproven", add)
     done = complete(folder, say=print)
-    assert asked == [("prepared", found.trials, MOST_EFFECTS)]
-    assert done.unproven == ("stribeck", "drift")
-    assert folder.names == ["stribeck", "drift"]
-    assert folder.kept is found, "the verdict stays, on the model without them"
+    assert asked == [(opened, found.trials, (), MOST_EFFECTS)]
+    assert added == [("", ("stribeck", "drift"), found)]
+    assert done.steps == ("add stribeck, drift (not proven)",)
 
 
 def test_only_what_is_proven_is_added_where_that_is_asked_for(folder, monkeypatch):
@@ -104,8 +108,16 @@ def test_only_what_is_proven_is_added_where_that_is_asked_for(folder, monkeypatc
 
 def test_what_is_explained_gets_no_further_effect(folder, monkeypatch):
     told(monkeypatch, [verdict("none", 1.0)])
-    assert complete(folder, say=print).unproven == ()
+    assert complete(folder, say=print).unproven is None
     assert folder.names == []
+
+
+def test_folds_of_the_training_runs_choose_what_lowers_their_error(bench_study):
+    opened = opened_at(Study(bench_study), "")[1]
+    found = unproven(opened, (), (), 1)
+    assert (found.model.effects, found.law) == (("gas_spring",), "")
+    known = replace(opened, before=judge(found.model, opened.problem, opened.held_out))
+    assert unproven(known, (), (), 2).model.effects == ("gas_spring",), "nothing else is missing"
 
 
 def test_in_a_building_identify_alone_refuses_all_laws():
