@@ -27,7 +27,7 @@ from bristle.study.learn import learn_effect
 from bristle.study.steps import add_effects
 from bristle.study.study import Study
 
-OPENED = curves._opened
+OPENED = curves.opened_at
 KNOTS = np.linspace(-0.015, 0.015, 13)  # m
 NONE = np.zeros(0)
 
@@ -62,7 +62,7 @@ def learned(monkeypatch):
     """Let nothing be fitted: what was learned is given."""
 
     def given(refused: str = "") -> None:
-        monkeypatch.setattr(curves, "_opened", lambda study, at: ("damper", None))
+        monkeypatch.setattr(curves, "opened_at", lambda study, at: ("damper", None))
 
         def learn(_opened, name, **_options):
             return replace(found_of(refused), name=name)
@@ -174,7 +174,7 @@ def house(study, learned, monkeypatch):
     """Let the study be that of a building in which nothing is learned."""
     learned("No curve lowers the error.")
     monkeypatch.setattr(type(study.settings), "has_building", True)
-    monkeypatch.setattr(curves, "_opened", OPENED)
+    monkeypatch.setattr(curves, "opened_at", OPENED)
     monkeypatch.setattr(curves, "_rig", lambda _: House(damper=3.0, layer=1.2, storey1=2.0))
     return study
 
