@@ -34,6 +34,10 @@ TURNS = 15
 """How often at the most the lateness is estimated anew with runs set right and the law refitted:
 it is linear only where small, and a law bends to be late with the runs."""
 
+LOOKED, TAKEN = 3, 0.3
+"""Turns after which the clocks must have taken that share of the excess: `_explain` asks for more
+than twice as much in the end."""
+
 SETTLED = 0.03
 """Share of a sampling step by which no run may move any more."""
 
@@ -92,6 +96,10 @@ def clock_faults(
             return None
         if _largest(left, runs) < SETTLED:
             break
+        if turn + 1 == LOOKED:
+            both = train.of(moved[:count]), held_out.of(moved[count:])
+            if _taken([robust_z(one, model) for one in both], before, rule) < TAKEN:
+                return None
     moved = [_set_right(run, clocks, k) for k, run in enumerate(runs)]
     right = train.of(moved[:count]), held_out.of(moved[count:])
     trial = judge(refine(model, right[0]), *right)
@@ -207,8 +215,16 @@ def _explain(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
 
     A run apart may be one that the model was fitted to, so that runs held out show nothing of it.
     """
-    was, now = ((one.z**2 + one.train**2) / 2.0 - 1.0 for one in (before, trial))
-    return was > rule.gain and 1.0 - max(now, 0.0) / was > rule.share_when_clean
+    return _taken([trial.train, trial.z], before, rule) > rule.share_when_clean
+
+
+def _taken(z: list[float], before: Trial, rule: DecisionRule) -> float:
+    """Return the share of the excess that is gone where z is this on runs to fit to and held out.
+
+    Nothing of an excess that is none.
+    """
+    was, now = (sum(one**2 for one in each) / 2.0 - 1.0 for each in ((before.train, before.z), z))
+    return 1.0 - max(now, 0.0) / was if was > rule.gain else 0.0
 
 
 def _rate_matters(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> bool:

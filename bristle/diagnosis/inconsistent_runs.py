@@ -13,7 +13,7 @@ from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identification.building_sites import StructureProblem
 from ..identification.fit import fit, fit_from_starts
-from ..identification.problem import Problem, Run, in_noises, residuals, robust_z
+from ..identification.problem import Expected, Problem, Run, in_noises, residuals, robust_z
 from ..identification.rig import DAMPER
 from ..identification.search import z_scale
 from ..model.model import Model
@@ -35,6 +35,14 @@ TINY = 1e-300
 
 SUSPECTS = 3
 """Runs whose force is farthest from that of the others, each of which is left out of a fit."""
+
+STANDS_OUT = 3.0
+"""Times the error that others show, at the most, that is asked of a run without which they would
+have none: least squares leave the one of n runs n - 1 times as much as each of the others."""
+
+QUICK = 3
+"""Jacobians of a first fit without a run, which shows where others are unexplained without it too.
+"""
 
 
 def odd_run(
@@ -60,13 +68,23 @@ def odd_run(
     runs = [*train.runs, *held_out.runs]
     if len(runs) < FEWEST:
         return ""
+    expected = train.of(runs).expectation(model)
     apart = np.array([
-        _amount(model, train.of([run]), train.predict(model, run))[0] for run in runs
+        _amount(model, train.of([run]), train.predict(model, run), [own])[0]
+        for run, own in zip(runs, expected, strict=True)
     ])  # fmt: skip
     farthest = np.argsort(-np.abs(apart - np.median(apart)))
+    z = _z_of_runs(model, train.of(runs), expected)
+    asked = max(1.0, min(0.25 * (len(runs) - 1), STANDS_OUT))
     for k in farthest[:SUSPECTS].tolist():
         run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
         if not is_covered([(one.v, one.V) for one in (run, *others)], 1):
+            continue
+        usual = float(np.median(np.delete(z, k)))
+        if usual > rule.misfit and z[k] < asked * usual:
+            continue
+        theirs = [*expected[:k], *expected[k + 1 :]]
+        if _unexplained(model, train.of(others), theirs, rule):
             continue
         fitted = fit(train.of(others), model, with_std=False).model
         if max(robust_z(train.of([one]), fitted) for one in others) > rule.misfit:
@@ -79,7 +97,26 @@ def odd_run(
     return ""
 
 
-def _amount(model: Model, one: Problem, shape: Array) -> tuple[float, float]:
+def _unexplained(model: Model, others: Problem, expected: Expected, rule: DecisionRule) -> bool:
+    """Return whether a quick fit to runs leaves half of them unexplained.
+
+    One run among those that a model was fitted to bends it little, so that a fit without it comes
+    near at once.
+    """
+    quick = fit(others, model, expectation=expected, max_evaluations=QUICK, with_std=False).model
+    return float(np.median(_z_of_runs(quick, others, expected))) > rule.misfit
+
+
+def _z_of_runs(model: Model, problem: Problem, expected: Expected) -> Array:
+    """Return z of each run (k,)."""
+    edges = np.cumsum([len(run.force) - run.skip for run in problem.runs])[:-1]
+    left = residuals(problem, model, expected)
+    return np.array([z_scale(part) for part in np.split(left, edges)])
+
+
+def _amount(
+    model: Model, one: Problem, shape: Array, expected: Expected | None = None
+) -> tuple[float, float]:
     """Return how much of a shape a run's force shows beyond a model, and z of what then remains.
 
     Parameters
@@ -87,8 +124,9 @@ def _amount(model: Model, one: Problem, shape: Array) -> tuple[float, float]:
     model : as fitted to the runs
     one : the run
     shape : (n,) N
+    expected : what a true model would show on it; None draws it for this model
     """
-    (run,), expected = one.runs, one.expectation(model)
+    (run,), expected = one.runs, expected or one.expectation(model)
     normalised = shape[run.skip :] / expected[0][1][run.skip :]
     left = residuals(one, model, expected)
     amount = float(left @ normalised) / max(float(normalised @ normalised), TINY)
