@@ -78,11 +78,15 @@ def _corrected(run: Measurement, faults: Sequence[Finding]) -> Measurement:
 DRAWS = Seeds(train=0, holdout=1000, apart=1)
 """Draws of the motion's error of a diagnosis's own: what a fit was drawn from does not judge it."""
 
-MANY = 150_000
+MANY = 60_000
 """Samples of the training runs from which on effects are searched on a part of them."""
 
-ENOUGH, FEWEST = 75_000, 8
-"""Samples, about, of that part, for a search takes as long as they are; and its runs."""
+ENOUGH, FEWEST = 30_000, 8
+"""Samples, about, of that part, for a search takes as long as they are; its runs at the least."""
+
+LONG = 150.0
+"""Seconds, about, of that part at the most: where samples are far apart a model with a joint takes
+many steps from one to the next."""
 
 Progress = Callable[[str], None]
 
@@ -191,8 +195,13 @@ def part_of(problem: Problem) -> Problem | None:
         return round(level, 1), float(np.std(run.v))
 
     ordered = sorted(runs, key=place)
-    chosen = np.linspace(0, len(runs) - 1, min(FEWEST, len(runs))).round().astype(int)
-    return problem.of([ordered[k].of(slice(ENOUGH // len(chosen))) for k in chosen])
+    samples = sum(len(run.force) for run in runs)
+    seconds = sum(len(run.force) * run.dt for run in runs)
+    whole = int(len(runs) * min(ENOUGH / samples, LONG / seconds))
+    count = min(max(FEWEST, whole), len(runs))
+    chosen = np.linspace(0, len(runs) - 1, count).round().astype(int)
+    begins = [ordered[k].first(LONG / count) for k in chosen]
+    return problem.of([run.of(slice(ENOUGH // count)) for run in begins])
 
 
 def of_layer(model: Model, problem: Problem) -> list[str]:

@@ -62,6 +62,10 @@ class StructureRun(Run):
         """Return the run with these of the samples that count; `whole` stays, for its history."""
         return replace(super().of(part), keep=self.keep[part])
 
+    def first(self, seconds: float) -> Self:
+        """Return the run as it is: of `whole` each sample is made, however few count."""
+        return self
+
     def entire(self) -> StructureRun:
         """Return the run with all samples of `whole`, those at rest too."""
         whole = self.whole

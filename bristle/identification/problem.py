@@ -391,6 +391,11 @@ class Run:
             finer=self.finer.of(part) if self.finer and dense else None,
         )  # fmt: skip
 
+    def first(self, seconds: float) -> Self:
+        """Return the first so many seconds of the run, or all of it."""
+        count = max(4 * self.skip, round(seconds / self.dt))
+        return self.of(slice(count)) if count < len(self.force) else self
+
     def every(self, count: int) -> Self:
         """Return the run with one of so many samples, for what has no memory."""
         part = self.of(slice(None, None, count))
@@ -546,13 +551,15 @@ class Problem:
         if not run.rest:
             return {}
         part = run.of(slice(0, run.rest))
+        late = slice(run.rest // 2, None)  # a series element has settled by then
 
-        def resting(start: Mapping[str, float]) -> Array:
-            return self._force(replace(model, values={**model.values, **start}), part)
+        def settled(start: Mapping[str, float]) -> float:
+            begun = replace(model, values={**model.values, **start})
+            return float(np.mean(self._force(begun, part)[late]))
 
-        load, stroke = float(np.mean(part.force[run.rest // 2 :])), float(np.ptp(run.x))
+        load, stroke = float(np.mean(part.force[late])), float(np.ptp(run.x))
         state = carrying_state(model.base_law, model.effects)
-        return start_under_load(state, load, stroke, resting)
+        return start_under_load(state, load, stroke, settled)
 
     def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, its states beginning as the model says."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from operator import is_
 from threading import Lock
 
 import numpy as np
@@ -116,6 +117,10 @@ for an effect of speed: a fit without it inflates that part."""
 
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
+
+TOUGH = 30.0
+"""Seconds, over all runs, that suffice for a search where the model has a joint: each is integrated
+in the same short steps, however few samples it has."""
 
 KEPT = {"none": 24, "memory": 2, "joint": 6}
 """From how many starts a search is made, by what the model has that makes it dear."""
@@ -282,7 +287,7 @@ class SearchContext:
                 left = search.residuals(search.start)
                 known = search.jacobian(search.start, left)
                 cost = mean_loss(loss(left))
-                if len(problem.runs) < len(self.train.runs):
+                if kind == "joint" and problem is not self.train:
                     # What the law gains by following these runs alone is no gain of an effect.
                     cost = search.run(FOLLOWED)[1].cost
                 self._screening[kind] = ScreeningData(
@@ -304,11 +309,16 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
     """Return less data for a search: some of the samples without memory, of the runs with a joint.
 
     Without states a law is a function of the motion at each sample. A series element costs many
-    times as much as another effect.
+    times as much as another effect: of every other run the begin serves.
     """
     if kind == "joint":
-        few = slice(0, None, 2) if len(problem.runs) > 1 else slice(None)
-        return problem.of(problem.runs[few]), expected[few]
+        few = problem.runs[::2]
+        begins = [run.first(TOUGH / len(few)) for run in few]
+        if len(begins) == len(problem.runs) and all(map(is_, begins, few)):
+            return problem, expected
+        counts = [len(run.force) for run in begins]
+        ends = zip(expected[::2], counts, strict=True)
+        return problem.of(begins), [(b[:n], sigma[:n], d[:, :n]) for (b, sigma, d), n in ends]
     if kind == "memory":
         return problem, expected
     runs, thinned = [], []
