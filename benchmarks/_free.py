@@ -101,7 +101,8 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
     """
     split, data, rows = _laws(train, say)
 
-    chosen = choose(search(rows, TrialsByLaw(data, say)))
+    by_law = TrialsByLaw(data, say)
+    chosen = by_law.settled(choose(search(rows, by_law)), data)
     assert chosen.prepared is not None
     finding, opened = _with_effects(split, chosen.finding, chosen.prepared, say)
     free = _found(_with_unproven(opened, finding.trials, rows), ())

@@ -184,6 +184,7 @@ def diagnose_rig(
     if prepared is None:
         return conclude(findings, runs.context(None))
     found, prepared = _at_damper(prepared, runs, say)
+    say("whether runs contradict each other")
     found = settled(found, prepared, runs, findings)
     say(f"verdict {found.briefly}")
     if prepared.scope.any_law:

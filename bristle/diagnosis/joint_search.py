@@ -7,20 +7,28 @@ from dataclasses import dataclass, replace
 
 from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..identification.problem import Problem
+from ..identification.histories import Effort, counted
 from ..identification.rig import DAMPER
 from ..model.model import Model
 from ..physics.building import Building
 from .by_label import with_labels
 from .conclusion import conclude, insufficient
 from .diagnosis import diagnose_lines, settled, with_evidence
-from .law_choice import LawAndEffects, LawVerdict, choose, equivalents, search, simplest
+from .law_choice import (
+    LawAndEffects,
+    LawVerdict,
+    choose,
+    equivalents,
+    search,
+    simplest,
+    survivors,
+)
 from .law_trials import KeptFits, LawTrial, fitted_anew, not_finite, try_laws
-from .prepared import Prepared, Progress, part_of, silent
+from .prepared import Prepared, Progress, silent
 from .rig_runs import RigRuns, runs_of_rig
 from .rule import BENCH, DecisionRule
-from .site import Trials, diagnose_damper, noise_is_all
-from .trials import missed_by
+from .site import Trials, diagnose_damper, noise_is_all, with_zero_free
+from .trials import Trial, missed_by
 from .verdict import Diagnosis
 
 
@@ -71,13 +79,13 @@ def diagnose_laws(
     runs.correct(findings)
 
     def searched(kept: KeptFits | None) -> _Sought:
-        assert runs.damper is not None
-        whole, held_out = runs.damper
-        tried = (part_of(whole) if building is None else None) or whole
+        there = runs.in_part()
+        assert there.damper is not None
         say("trying every law")
-        rows = try_laws(tried, held_out, present, bends=bends, kept=kept)
-        by_law = TrialsByLaw(runs, say, in_part=tried is not whole)
-        sought = _sought(rows, by_law, (tried, held_out), say, rule)
+        rows = try_laws(*there.damper, present, bends=bends, kept=kept)
+        if kept:
+            kept.stands(rows[0].law, rows[0].trial.effects, rows[0].trial.z)
+        sought = _sought(rows, TrialsByLaw(there, say, kept), runs, say, rule)
         runs.suppose(sought.chosen.row.trial.model)
         return sought
 
@@ -85,10 +93,11 @@ def diagnose_laws(
     if runs.suit(sought.chosen.finding):
         sought = searched(None)  # what was kept was fitted to the force of the file's numbers
     prepared = sought.prepared
+    say("whether runs contradict each other")
     found = settled(sought.chosen.finding, prepared, runs, findings)
     say(f"verdict on {sought.chosen.row.law}, {found.briefly}")
     findings[DAMPER] = with_evidence(found, prepared, profile=profile)
-    laws = sought.verdict(named, runs.damper[0], present, rule)
+    laws = sought.verdict(named, present)
     return replace(conclude(findings, runs.context(prepared)), laws=laws)
 
 
@@ -99,6 +108,8 @@ class _Sought:
     chosen: LawAndEffects
     pairs: tuple[LawAndEffects, ...]
     rows: tuple[LawTrial, ...]
+    by_law: TrialsByLaw
+    equivalents: tuple[tuple[str, tuple[str, ...], float], ...]
 
     @property
     def prepared(self) -> Prepared:
@@ -106,39 +117,57 @@ class _Sought:
         assert self.chosen.prepared is not None
         return self.chosen.prepared
 
-    def verdict(
-        self, named: str, problem: Problem, present: Model, rule: DecisionRule
-    ) -> LawVerdict:
+    def verdict(self, named: str, present: Model) -> LawVerdict:
         """Return what a verdict tells of the laws."""
-        equal = equivalents(self.chosen, self.pairs, self.rows, rule)
-        unfit = tuple(not_finite(problem, present))
-        return LawVerdict(self.chosen.row, named, self.rows, self.pairs, tuple(equal), unfit)
+        assert self.by_law.runs.damper is not None
+        unfit = tuple(not_finite(self.by_law.runs.damper[0], present))
+        return LawVerdict(
+            self.chosen.row, named, self.rows, self.pairs, self.equivalents, unfit,
+            self.by_law.not_tried,
+        )  # fmt: skip
 
 
 def _sought(
     rows: tuple[LawTrial, ...],
     by_law: TrialsByLaw,
-    runs: tuple[Problem, Problem],
+    runs: RigRuns,
     say: Progress,
     rule: DecisionRule,
 ) -> _Sought:
     """Search the effects that laws lack; return the pair that the runs ask for, and the others.
 
     Where no pair explains the runs, what the nearest one misses counts beside the noise for all.
+    The one that is chosen is looked at in full, on all runs: where it explains them no more, the
+    next one is.
     """
-    pairs = search(rows, by_law, rule)
-    nearest = min(pairs, key=lambda pair: pair.reach(rule).z)
-    assert nearest.prepared is not None
-    by_law.excess = missed_by(nearest.reach(rule), nearest.prepared.problem)
-    if by_law.excess:
-        say("what no law explains counts beside the noise")
-        train, held_out = (one.with_excess(by_law.excess) for one in runs)
-        rows = fitted_anew(rows, train, held_out)
-        pairs = search(rows, by_law, rule)
-    chosen = choose(pairs, rule)
+    with counted() as by_law.effort:
+        pairs = search(rows, by_law, rule, by_law.enough)
+        nearest = min(pairs, key=lambda pair: pair.reach(rule).z)
+        assert nearest.prepared is not None
+        assert by_law.runs.damper is not None
+        by_law.excess = missed_by(nearest.reach(rule), nearest.prepared.problem)
+        if by_law.excess:
+            say("what no law explains counts beside the noise: fitting the laws anew")
+            train, held_out = (one.with_excess(by_law.excess) for one in by_law.runs.damper)
+            rows = fitted_anew(rows, train, held_out)
+            pairs = search(by_law.left_of(rows, rule), by_law, rule, by_law.enough)
+    whole: dict[str, LawAndEffects] = {}
+    while (found := choose(pairs, rule)).row.law not in whole:
+        chosen = whole[found.row.law] = by_law.settled(found, runs)
+        pairs = [chosen if pair is found else pair for pair in pairs]
+        if chosen.explains or not found.explains:
+            break
+    else:
+        chosen = found
     of_all = {row.law: row for row in (*rows, *(pair.row for pair in pairs))}
-    ranked = sorted(of_all.values(), key=lambda row: row.trial.z)
-    return _Sought(chosen, tuple(pairs), tuple(ranked))
+    ranked = tuple(sorted(of_all.values(), key=lambda row: row.trial.z))
+    equal = tuple(equivalents(chosen, pairs, ranked, rule))
+    return _Sought(chosen, tuple(pairs), ranked, by_law, equal)
+
+
+MOST_SPENT = 400e6
+"""Steps of dampers' forces, those of the laws alone not counted, from which on no further law is
+searched for its effects, and none for two: half a minute to a minute."""
 
 
 class TrialsByLaw:
@@ -148,21 +177,47 @@ class TrialsByLaw:
     ----------
     runs : of the rig
     say : called with a few words at each stage
-    in_part : whether laws were tried on a part of the runs: one that is searched is fitted to all
+    kept : where trials are kept, and told what comes nearest
     """
 
-    def __init__(self, runs: RigRuns, say: Progress = silent, *, in_part: bool = False) -> None:
-        self.runs, self.say, self.in_part = runs, say, in_part
+    def __init__(self, runs: RigRuns, say: Progress = silent, kept: KeptFits | None = None) -> None:
+        self.runs, self.say, self.kept = runs, say, kept
+        self._nearest: Trial | None = None
         self.made: dict[str, Trials] = {}
         self.excess = 0.0  # N2, see `diagnose_damper`
+        self.effort = Effort()
+        self.not_tried: dict[str, bool] = {}
+        self._two: set[str] = set()
+        self._shortened: set[str] = set()
+
+    @property
+    def _spent(self) -> bool:
+        return self.effort.steps > MOST_SPENT
+
+    def left_of(self, rows: Sequence[LawTrial], rule: DecisionRule) -> Sequence[LawTrial]:
+        """Return the laws for a second search: those of the first where enough was spent on it."""
+        if not self._spent:
+            return rows
+        more = [row.law for row in survivors(rows, rule) if row.law not in self.made]
+        self.not_tried |= dict.fromkeys(more, False)
+        for made in self.made.values():
+            made.closed = True
+        return [row for row in rows if row.law in self.made]
+
+    def enough(self, row: LawTrial, pairs: bool) -> bool:
+        """Return whether so much was spent that this is not tried of a law; see `search`."""
+        if not self._spent or row.law in (self._two if pairs else self.made):
+            return False
+        self.not_tried[row.law] = row.law in self.made
+        return True
 
     def __call__(self, row: LawTrial, pairs: bool) -> LawAndEffects:
         """Return what a law lacks: single effects alone, or pairs as well where none suffices."""
         made = self.made.get(row.law)
+        if made is None or not made.closed:
+            self.not_tried.pop(row.law, None)
+            self._two |= {row.law} if pairs else set()
         if made is None:
-            if self.in_part and self.runs.damper:
-                self.say(f"fitting {row.law} to all runs")
-                (row,) = fitted_anew([row], *self.runs.damper)
             prepared = self.runs.prepare(DAMPER, row.trial)
             assert prepared is not None
             if noise_is_all(prepared):
@@ -170,11 +225,45 @@ class TrialsByLaw:
                     row, *diagnose_damper(prepared, self.say, pairs=pairs, excess=0.0)
                 )
             self.say(f"effects that {row.law} lacks (error / noise {row.trial.z:.2f})")
-            made = Trials(prepared, self.say)
-            self.made[row.law] = made
+            free = with_zero_free(prepared)
+            if free is not prepared:
+                self._shortened.add(row.law)
+            ends = self.kept.ends_of(row.law) if self.kept else None
+            made = self.made[row.law] = Trials(free, self.say, ends=ends)
         elif pairs:
             self.say(f"two effects that {row.law} lacks")
-        finding, prepared = diagnose_damper(
-            made.prepared, self.say, made, pairs=pairs, excess=self.excess
-        )
-        return LawAndEffects(row, finding, prepared)
+        found = self._lacking(row, made, pairs)
+        reached = found.reach()
+        if self.kept and (self._nearest is None or reached.z < self._nearest.z):
+            self._nearest = reached
+            self.kept.stands(row.law, reached.effects, reached.z)
+        return found
+
+    def settled(self, found: LawAndEffects, runs: RigRuns) -> LawAndEffects:
+        """Return what a law lacks on all runs of the rig, every search begun where one ended.
+
+        Itself where nothing was left out: neither runs, nor the look at the force with its zero
+        taken as right.
+        """
+        law, made = found.row.law, self.made.get(found.row.law)
+        shortened = law in self._shortened
+        if made is not None:
+            made.closed = False
+        if made is None or (self.runs is runs and not shortened):
+            return found
+        row = found.row
+        if self.runs is not runs:
+            assert runs.damper is not None
+            self.say(f"fitting {law} to all runs")
+            (row,) = fitted_anew([row], *runs.damper)
+        prepared = runs.prepare(DAMPER, row.trial)
+        assert prepared is not None
+        again = Trials(prepared, self.say, *((None, made) if shortened else (made,)))
+        # Where two effects explained nothing they are not sought once more.
+        whole = self._lacking(row, again, found.explains and law in self._two)
+        together = whole.finding.together or found.finding.together
+        return replace(whole, finding=replace(whole.finding, together=together))
+
+    def _lacking(self, row: LawTrial, made: Trials, pairs: bool) -> LawAndEffects:
+        found = diagnose_damper(made.prepared, self.say, made, pairs=pairs, excess=self.excess)
+        return LawAndEffects(row, *found)

@@ -7,8 +7,8 @@ and its effects, by held-out runs, the simpler pair where both explain them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..physics.forms import CURVED, LINEAR_FORM, split_form
@@ -187,6 +187,7 @@ def search(
     rows: Sequence[LawTrial],
     lacking: Callable[[LawTrial, bool], LawAndEffects],
     rule: DecisionRule = BENCH,
+    enough: Callable[[LawTrial, bool], bool] = lambda _row, _pairs: False,
 ) -> list[LawAndEffects]:
     """Return the pairs that decide; `lacking` searches the effects that a law lacks.
 
@@ -204,6 +205,8 @@ def search(
     rows : the laws tried
     lacking : called with a row, and whether to try two effects; returns what its law lacks
     rule : the numbers that decide
+    enough : called as `lacking` is; returns whether so much was spent that this is not tried: what
+        the best law lacks always is, and two effects of the law that comes nearest
     """
     first, begun = simplest(rows, rule), list[LawAndEffects]()
     if first.trial.z <= rule.complete:
@@ -211,11 +214,14 @@ def search(
         if begun[0].finding.kind == "none" and not first.contains:
             return begun
     others = [row for row in survivors(rows, rule) if row is not first or not begun]
+    best = others[0] if others else None
     others.sort(key=lambda row: (row.fitted, row.trial.z))
     single = list(begun)
 
     def look(row: LawTrial, found: list[LawAndEffects], pairs: bool) -> None:
-        if not _waits(row, found, rule) and _could_be_simpler(row, found, rule):
+        if _waits(row, found, rule) or not _could_be_simpler(row, found, rule):
+            return
+        if (row is best and not pairs) or not enough(row, pairs):
             found.append(lacking(row, pairs))
 
     for row in others:
@@ -230,7 +236,8 @@ def search(
     found, far = list(begun), float("inf")
     for pair in sorted(single[len(begun) :], key=lambda pair: pair.reach(rule).z):
         left = rule.excess(pair.reach(rule).z)
-        if left <= far and _could_be_simpler(pair.row, found, rule):
+        able = left <= far and _could_be_simpler(pair.row, found, rule)
+        if able and not (found and enough(pair.row, True)):
             pair = lacking(pair.row, True)
             far = min(far, rule.within * left) if pair.explains else far
         found.append(pair)
@@ -367,7 +374,8 @@ class LawVerdict:
     `row` is the law chosen; `before` the law that the model had, "" where nobody chose one; `rows`
     all laws tried, the best first; `pairs` those whose effects were searched; `equivalents` what
     explains the runs as well: law, effects, z on held-out runs; `left_out` the laws whose force is
-    not a number on these runs.
+    not a number on these runs; `not_tried` the laws for which two effects were not tried (True), or
+    none (False), because enough had been searched.
     """
 
     row: LawTrial
@@ -376,6 +384,7 @@ class LawVerdict:
     pairs: tuple[LawAndEffects, ...]
     equivalents: tuple[tuple[str, tuple[str, ...], float], ...] = ()
     left_out: tuple[str, ...] = ()
+    not_tried: Mapping[str, bool] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -393,7 +402,13 @@ class LawVerdict:
                 for law, effects, z in self.equivalents
             ],
             **({"laws_left_out": list(self.left_out)} if self.left_out else {}),
+            **({"not_tried": self._not_tried()} if self.not_tried else {}),
         }  # fmt: skip
+
+    def _not_tried(self) -> dict[str, list[str]]:
+        """Return the laws of which effects, and two effects, were not tried."""
+        two = [law for law, own in self.not_tried.items() if own]
+        return {"effects": [law for law in self.not_tried if law not in two], "two_effects": two}
 
 
 def rows_of(

@@ -23,7 +23,7 @@ from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form,
 from ..physics.laws import base_and_variant, law_names
 from .decision import NOISE
 from .rule import BENCH, DecisionRule
-from .trials import Trial, judge
+from .trials import KeptEnds, Trial, judge
 
 STARTS = 2
 """Starting points of each law."""
@@ -97,6 +97,12 @@ class KeptFits(Protocol):
 
     def keep(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
         """Keep the values of more laws."""
+
+    def ends_of(self, law: str) -> KeptEnds:
+        """Return where the trials of effects beside a law are kept."""
+
+    def stands(self, law: str, effects: Sequence[str], z: float) -> None:
+        """Take note of what comes nearest so far, and its z on held-out runs."""
 
 
 def try_laws(

@@ -9,6 +9,7 @@ layer and the damper are one unknown, and effects that act alike are named toget
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Protocol
 
@@ -221,6 +222,9 @@ class RigRuns(Protocol):
             the rig
         """
 
+    def in_part(self) -> RigRuns:
+        """Return the same with a part of the training runs, where that says nearly as much."""
+
     def suppose(self, damper: Model) -> None:
         """Take a damper's law, fitted, in the place of the model's, whose other effects stay."""
 
@@ -431,6 +435,10 @@ class BuildingRuns:
         """The damper's runs for training and held out, None where no damper was measured."""
         return self._problems.get(DAMPER)
 
+    def in_part(self) -> BuildingRuns:
+        """Return these runs: of a building's the begins are searched, see `shortened`."""
+        return self
+
     def suppose(self, damper: Model) -> None:
         """Take a damper's law, fitted, in the place of the model's, whose other effects stay."""
         own = self.part(DAMPER).effects
@@ -607,6 +615,15 @@ class BenchRuns:
         return Prepared(
             before, problem, held_out, faults, self._noise, self._shown, part_of(problem)
         )
+
+    def in_part(self) -> BenchRuns:
+        """Return the same with a part of the training runs, where that says nearly as much."""
+        part = part_of(self.damper[0]) if self.damper else None
+        if self.damper is None or part is None:
+            return self
+        made = copy(self)
+        made.damper = part, self.damper[1]
+        return made
 
     def suppose(self, damper: Model) -> None:
         """Take a damper's law, fitted, in the place of the model's."""

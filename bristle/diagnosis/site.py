@@ -42,7 +42,7 @@ from .prepared import IN_BUILDING, Prepared, Progress, of_layer, silent
 from .remaining import patterns_of
 from .rule import BENCH, SENSOR, SITE, DecisionRule
 from .site_diagnosis import SiteDiagnosis, of_decision
-from .trials import SECONDS, Trial, judge, missed_by, paired, try_all, try_members
+from .trials import SECONDS, End, KeptEnds, Trial, judge, missed_by, paired, try_all, try_members
 
 
 def diagnose_line(site: str, prepared: Prepared) -> SiteDiagnosis:
@@ -204,18 +204,32 @@ class Trials:
     ----------
     prepared : the runs and the present model
     say : is told what is being done
-    earlier : the same trials by other weights, whose ends are where these begin
+    earlier : the same trials by other weights or of fewer runs, whose ends are where these begin
+    free : those with the zero of the force fitted along, where they were made of fewer runs
+    ends : where trials that are made from the very begin are kept, and taken up
+
+    Attributes
+    ----------
+    closed : whether no further pairs are tried, neither here nor in trials that go on from these
     """
 
     def __init__(
-        self, prepared: Prepared, say: Progress = silent, earlier: Trials | None = None
+        self,
+        prepared: Prepared,
+        say: Progress = silent,
+        earlier: Trials | None = None,
+        free: Trials | None = None,
+        ends: KeptEnds | None = None,
     ) -> None:
         self.prepared, self.say = prepared, say
         self.before = prepared.before
         self.pairs: list[Trial] = []
+        self.closed = False
         self._found: dict[tuple[str, ...], list[Trial]] = {}
         self._alone: dict[tuple[str, ...], list[Trial]] = {}
-        self._earlier = earlier._found if earlier else {}
+        self._earlier = earlier
+        self._ends = ends
+        self._free = free or (vars(earlier).get("freed") if earlier else None)
         self._weighed: dict[float, Trials] = {}
         if earlier is None:
             try_labels(prepared)
@@ -240,7 +254,7 @@ class Trials:
     def freed(self) -> Trials:
         """The trials with the zero of the force fitted along."""
         self.say("the zero of the force is fitted along with every effect")
-        return Trials(self.prepared.freed, self.say)
+        return Trials(self.prepared.freed, self.say, self._free)
 
     @cached_property
     def patterns(self) -> list[ResidualPattern]:
@@ -258,6 +272,7 @@ class Trials:
         """Return the trials of a pair's members alone."""
         if pair.effects not in self._alone:
             prepared = self.prepared
+            self.say(f"each of {' and '.join(pair.effects)} alone, as they were fitted together")
             alone = try_members(pair, self.before.model, prepared.searched, prepared.held_out)
             lesser = min(one.z for one in alone) < min(one.z for one in self.single)
             self._alone[pair.effects] = self._on_all_runs(alone) if lesser else alone
@@ -268,9 +283,12 @@ class Trials:
             return [*self._found[first.effects]]
         prepared = self.prepared
         held_out = prepared.held_out
-        if first.effects in self._earlier:
+        known = self._known(first)
+        if known:
             self._noise  # noqa: B018  # before threads ask for it
-            trials = in_threads(self._again, self._earlier[first.effects])
+            trials = in_threads(self._again, known)
+        elif most is not None and (self.closed or (self._earlier and self._earlier.closed)):
+            return []
         else:
             trials = try_all(
                 first.model, prepared.searched, held_out, shown=prepared.shown, most=most
@@ -280,7 +298,17 @@ class Trials:
         if most is None or self._may_be_needed(trials[0]):
             trials = self._on_all_runs(trials)
         self._found[first.effects] = trials
+        if self._ends and not known:
+            self._ends.keep(first.effects, trials)
         return [*trials]
+
+    def _known(self, first: Trial) -> Sequence[Trial | End]:
+        """Return where the trials of effects beside a model ended before, none if they are new."""
+        if self._earlier and first.effects in self._earlier._found:
+            return self._earlier._found[first.effects]
+        kept = self._ends.found.get(first.effects, ()) if self._ends else ()
+        defined = all(name in EFFECTS for end in kept for name in end.model.effects)
+        return kept if defined else ()
 
     def _may_be_needed(self, pair: Trial) -> bool:
         """Return whether two effects leave as little as `decide` asks of them, or nearly so."""
@@ -299,7 +327,7 @@ class Trials:
                     trials[k] = judge(fitted, prepared.problem, prepared.held_out)
         return sorted(trials, key=lambda trial: trial.z)
 
-    def _again(self, trial: Trial) -> Trial:
+    def _again(self, trial: Trial | End) -> Trial:
         """Return a trial fitted and judged by these runs' weights, from where it ended before."""
         train, held_out = self.prepared.searched, self.prepared.held_out
         if trial.refined:
@@ -360,6 +388,20 @@ def free_zero(
         return prepared.freed
     alone = len(decision.effects) == 1
     return None if alone and missing(prepared.freed.before, decision.best) else prepared.freed
+
+
+def with_zero_free(prepared: Prepared) -> Prepared:
+    """Return what a search begins with, the zero of the force free where the model leaves one.
+
+    So laws are compared in one pass: an effect that has a constant force of its own has no zero
+    beside it there either.
+    """
+    problem, model = prepared.problem, prepared.before.model
+    if problem.free_zero or problem.reconstructed or not prepared.held_out.noise_known:
+        return prepared
+    if has_offset(model) or not _significant(problem, model, SENSOR):
+        return prepared
+    return prepared.freed
 
 
 def zero_fault(problem: Problem, decision: Decision, rule: DecisionRule = SENSOR) -> Finding | None:

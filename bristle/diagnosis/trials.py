@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -11,7 +12,15 @@ from ..core.arrays import Array
 from ..core.progress import Count
 from ..identification.error import ForceError, judged_errors
 from ..identification.problem import EXPLAINS, Expected, Problem, excess_of, in_noises, residuals
-from ..identification.search import in_threads, loss, losses, mean_loss, z_of, z_scale
+from ..identification.search import (
+    HUBER_AT_ONE,
+    in_threads,
+    loss,
+    losses,
+    mean_loss,
+    z_of,
+    z_scale,
+)
 from ..identification.start_grid import (
     Candidate,
     ScreeningData,
@@ -87,6 +96,25 @@ class Trial:
     def effects(self) -> tuple[str, ...]:
         """The effects of the model."""
         return self.model.effects
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a trial's search ended, as it is kept; see `Trial`."""
+
+    model: Model
+    refined: bool
+
+
+class KeptEnds(Protocol):
+    """Where the trials of effects beside a law are kept, for a search that is interrupted."""
+
+    @property
+    def found(self) -> Mapping[tuple[str, ...], Sequence[End]]:
+        """What was kept, by the effects that the model had before."""
+
+    def keep(self, before: tuple[str, ...], trials: Sequence[Trial]) -> None:
+        """Keep the trials of all effects beside a model with these."""
 
 
 def judge(
@@ -206,8 +234,8 @@ def try_all(
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
     A very short search shows which effects could win. These are searched shortly from their best
-    starts; those that gain a fair share of what the best one gains on the training runs are
-    refined.
+    starts, those with a joint that hardly could from one; those that gain a fair share of what the
+    best one gains on the training runs are refined, where that is enough for a verdict.
 
     Parameters
     ----------
@@ -225,14 +253,19 @@ def try_all(
         name: 1.0 - own[0].cost / (context.screening(name).cost or 1.0)
         for name, own in guesses.items()
     }
-    enough = max(POSSIBLE * max(first.values()), POSSIBLE * WORTH / PROMISING)
+    # What takes less of the excess neither explains it nor is the first of two that do.
+    asked = BENCH.first * max(0.0, 1.0 - HUBER_AT_ONE / context.cost) if context.cost else 0.0
+    fair = max(*first.values(), asked)
+    enough = max(POSSIBLE * fair, POSSIBLE * WORTH / PROMISING)
     able = sorted(names, key=lambda name: -first[name])[:most]
     able = [name for name in able if first[name] >= enough] or able[:1]
     ends: dict[str, float] = {}
     count = Count("effect", len(able))
 
     def look(name: str) -> Candidate:
-        end = short_search(name, context, guesses[name], most is not None)
+        slight = first[name] < PROMISING * fair and is_rough(guesses[name][0].model)
+        own = guesses[name][: 1 if slight else None]
+        end = short_search(name, context, own, most is not None)
         ends[name] = end.cost
         share = 100.0 * end.cost / context.cost if context.cost > 0.0 else 100.0
         best = min(dict(ends), key=lambda one: ends[one])
@@ -241,7 +274,7 @@ def try_all(
 
     found = in_threads(look, able)
     gained = max(context.cost - one.cost for one in found)
-    least = max(PROMISING * gained, WORTH * context.cost)
+    least = max(PROMISING * gained, PROMISING * asked * context.cost, WORTH * context.cost)
     promising = [one.model for one in found if context.cost - one.cost >= least]
     rest = [one.model for one in found if context.cost - one.cost < least]
     if most is None:
@@ -268,20 +301,20 @@ def try_members(pair: Trial, base: Model, train: Problem, held_out: Problem) -> 
     base : the model without them
     train, held_out : runs to fit to, and those that decide
     """
-    out = []
-    for name in pair.effects:
-        if name in base.effects:
-            continue
-        others = [e for e in pair.effects if e not in base.effects and e != name]
+    new = [name for name in pair.effects if name not in base.effects]
+
+    def alone(name: str) -> Trial:
+        others = [one for one in new if one != name]
         kept = tuple(e for e in pair.effects if e not in others)
         values = {
             key: value
             for key, value in pair.model.values.items()
             if key.partition(".")[0] not in others
         }
-        alone = refine(replace(pair.model, effects=kept, values=values), train, 2 * LONG)
-        out.append(judge(alone, train, held_out))
-    return out
+        begin = replace(pair.model, effects=kept, values=values)
+        return judge(refine(begin, train, 2 * LONG), train, held_out)
+
+    return in_threads(alone, new)
 
 
 # Significance that accounts for correlation: blocks, not samples, are what is independent.

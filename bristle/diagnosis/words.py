@@ -79,6 +79,8 @@ def law_sentences(verdict: Row) -> list[str]:
         ]
     if unfit:
         out.append(left_out(unfit))
+    if cut := verdict.get("not_tried"):
+        out.append(_not_tried(cut))
     equal = [_pair_name(row) for row in verdict.get("equivalent") or []]
     if equal:
         more = f", and {len(equal) - MOST_EQUAL} more" if len(equal) > MOST_EQUAL else ""
@@ -92,6 +94,16 @@ def left_out(laws: Sequence[str]) -> str:
     """Return the sentence that tells which laws were not tried, and why."""
     verb = "are" if len(laws) > 1 else "is"
     return f"{joined(laws)} {verb} left out: the force is not a number on these runs."
+
+
+def _not_tried(cut: Mapping[str, Sequence[str]]) -> str:
+    """Return the sentence that tells where the search ended: of which laws what was not tried."""
+    parts = [
+        f"{what} of {joined(cut[key])}"
+        for key, what in (("effects", "effects"), ("two_effects", "two effects at once"))
+        if cut.get(key)
+    ]
+    return f"Not tried, because the search had taken long enough: {joined(parts)}."
 
 
 def _pair_name(row: Row) -> str:

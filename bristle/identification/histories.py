@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from math import ceil
 from pathlib import Path
 from threading import Lock
 from types import MappingProxyType
@@ -33,6 +36,7 @@ from ..physics.damper_source import LIBRARY, evaluate, functions_of, step_law
 from ..physics.effect import effects_of
 from ..physics.generate import Functions, Slots
 from ..physics.laws import LAWS, laws_of
+from ..physics.series import IMPLICIT_STEP
 from ..physics.structure import advance_effects, contact_force, effect_forces
 from ..physics.tuples import Inputs, Setup
 
@@ -250,6 +254,37 @@ def keep(name: str, wanted: str) -> None:
     print(name, flush=True)
 
 
+BESIDES = 1000
+"""Steps that take about as long as what stands around a simulation."""
+
+
+class Effort:
+    """What a search has spent: `steps` of dampers' forces, which are as many on every machine."""
+
+    def __init__(self) -> None:
+        self.steps = 0
+        self._lock = Lock()
+
+    def add(self, steps: int) -> None:
+        """Count more steps; from any thread."""
+        with self._lock:
+            self.steps += steps
+
+
+_effort: ContextVar[Effort | None] = ContextVar("effort", default=None)
+
+
+@contextmanager
+def counted() -> Iterator[Effort]:
+    """Count the steps of all dampers' forces in this context, and in threads begun in it."""
+    effort = Effort()
+    before = _effort.set(effort)
+    try:
+        yield effort
+    finally:
+        _effort.reset(before)
+
+
 class DamperForces:
     """Predicts the damper's force for one law and one set of effects.
 
@@ -281,6 +316,7 @@ class DamperForces:
             if (slot := self._state_places.get(f"{state}_0")) is not None
         ]
         self._states, self._work = slots.z_size, room(slots.z_size)
+        self._joint = any(one.joint for one in slots.effects if one.name in effects)
 
     def force(
         self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float],
@@ -297,6 +333,9 @@ class DamperForces:
             states end in `_0`; those that start with a signal take its first value
         tracks : (n,) in SI by name, of parameters of effects that change over the run
         """
+        if (effort := _effort.get()) is not None:
+            substeps = ceil(dt / IMPLICIT_STEP) if self._joint else 1
+            effort.add(len(x) * substeps + BESIDES)
         p, z = self._plain.copy(), np.zeros(self._states)
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
         for slot, signal in self._begins:

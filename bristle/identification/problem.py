@@ -551,15 +551,13 @@ class Problem:
         if not run.rest:
             return {}
         part = run.of(slice(0, run.rest))
-        late = slice(run.rest // 2, None)  # a series element has settled by then
 
-        def settled(start: Mapping[str, float]) -> float:
-            begun = replace(model, values={**model.values, **start})
-            return float(np.mean(self._force(begun, part)[late]))
+        def resting(start: Mapping[str, float]) -> Array:
+            return self._force(replace(model, values={**model.values, **start}), part)
 
-        load, stroke = float(np.mean(part.force[late])), float(np.ptp(run.x))
+        load, stroke = float(np.mean(part.force[run.rest // 2 :])), float(np.ptp(run.x))
         state = carrying_state(model.base_law, model.effects)
-        return start_under_load(state, load, stroke, settled)
+        return start_under_load(state, load, stroke, resting)
 
     def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, its states beginning as the model says."""

@@ -5,17 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..comparison.names import joined
 from ..core.files import read_json
 from ..core.interrupt import keeps
 from ..core.progress import tell
-from ..core.text import command, unknown
+from ..core.text import command, short_z, unknown
 from ..data.checks.runs import LEAST_LEVELS, command_levels, drives_of, tells_a_bend
 from ..data.measurement import Measurement
 from ..errors import BristleError, PhysicsError, StudyError
@@ -34,6 +35,7 @@ from .study_file import ALL
 
 if TYPE_CHECKING:
     from ..diagnosis.law_trials import LawTrial
+    from ..diagnosis.trials import End, Trial
 
 
 _MOVING_KNOTS = 5  # of a table where the command moves continuously
@@ -220,35 +222,109 @@ class LawFits:
     def __init__(self, study: Study, model: Model) -> None:
         self._study = study
         self._key = _key(study, model)
-        self.known: dict[str, dict[str, float]] = _read(study, self._key)
+        self.known, self._effects = _read(study, self._key)
+        self._nearest = ""
         self._lock = threading.Lock()
 
     def keep(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
         """Write the values of laws [SI] by law and name, beside those that are there."""
         with self._lock:
             self.known |= {law: dict(values) for law, values in fitted.items()}
-            content = {"schema": 1, "key": self._key, "laws": self.known}
-            self._study.write_report(NAME, json.dumps(content, indent=1) + "\n")
-            count = len(self.known)
+            self._write()
+        self._tell()
+
+    def ends_of(self, law: str) -> _Ends:
+        """Return where the trials of effects beside a law are kept."""
+        return _Ends(self._effects.setdefault(law, []), self._keep_effects)
+
+    def stands(self, law: str, effects: Sequence[str], z: float) -> None:
+        """Take note of what comes nearest so far, and its z on held-out runs."""
+        beside = f" with {joined(effects)}" if effects else ""
+        self._nearest = (
+            f"Nearest so far: {law}{beside}, error / noise (z) {short_z(z)} on held-out runs "
+            f"({law_command(self._study.folder, law)} takes the law). "
+        )
+        self._tell()
+
+    def _keep_effects(self) -> None:
+        with self._lock:
+            self._write()
+        self._tell()
+
+    def _write(self) -> None:
+        content = {
+            "schema": 1, "key": self._key, "laws": self.known,
+            "effects": {law: own for law, own in self._effects.items() if own},
+        }  # fmt: skip
+        self._study.write_report(NAME, json.dumps(content, indent=1) + "\n")
+
+    def _tell(self) -> None:
+        count, searched = len(self.known), sum(map(bool, self._effects.values()))
+        effects = (
+            f"and the effects tried of {searched} of them" if searched else "no effects were tried"
+        )
+        one = count == 1
         keeps(
-            f"The fit{'s' * (count > 1)} of {count} law{'s' * (count > 1)} "
-            f"{'are' if count > 1 else 'is'} kept, the search for effects is not: the same command "
-            "goes on there."
+            f"{self._nearest}The fit{'' if one else 's'} of {count} law{'' if one else 's'} "
+            f"{'is' if one else 'are'} kept, {effects}: the same command goes on there."
         )
 
 
-def _read(study: Study, key: str) -> dict[str, dict[str, float]]:
+class _Ends:
+    """The trials of effects beside a law: what is `found` of them, and where more go.
+
+    Parameters
+    ----------
+    kept : what the file has of them, one entry for the effects that the model had before
+    write : writes the file
+    """
+
+    def __init__(self, kept: list[dict[str, Any]], write: Callable[[], None]) -> None:
+        self._kept, self._write = kept, write
+        self.found: dict[tuple[str, ...], list[End]] = {}
+        for one in kept:
+            self.found[tuple(one["before"])] = [_end(end) for end in one["ends"]]
+
+    def keep(self, before: tuple[str, ...], trials: Sequence[Trial]) -> None:
+        """Keep the trials of all effects beside a model with these."""
+        self._kept.append({"before": before, "ends": [_end_as_dict(one) for one in trials]})
+        self._write()
+
+
+_OF_MODEL = ("law", "effects", "values", "fixed", "limits")
+
+
+def _end_as_dict(trial: Trial) -> dict[str, Any]:
+    return {name: getattr(trial.model, name) for name in _OF_MODEL} | {"refined": trial.refined}
+
+
+def _end(kept: Mapping[str, Any]) -> End:
+    from ..diagnosis.trials import End
+
+    law, effects, values, fixed, limits = (kept[name] for name in _OF_MODEL)
+    pairs = {name: (float(low), float(high)) for name, (low, high) in limits.items()}
+    return End(Model(law, tuple(effects), values, tuple(fixed), pairs), kept["refined"])
+
+
+def _read(
+    study: Study, key: str
+) -> tuple[dict[str, dict[str, float]], dict[str, list[dict[str, Any]]]]:
+    """Return the laws' values that were kept, and the trials of effects beside them."""
     path = study.reports_folder / NAME
     try:
         found = read_json(path) if path.is_file() else {}
         if found.get("key") != key:
-            return {}
-        return {
+            return {}, {}
+        laws = {
             str(law): {str(n): float(v) for n, v in values.items()}
             for law, values in found["laws"].items()
         }
+        effects = {str(law): [*own] for law, own in found.get("effects", {}).items()}
+        for own in effects.values():
+            _Ends(own, lambda: None)  # refuses what is none
+        return laws, effects
     except (BristleError, KeyError, TypeError, ValueError, AttributeError):
-        return {}  # a file that somebody changed: the fits are made anew
+        return {}, {}  # a file that somebody changed: the fits are made anew
 
 
 def _key(study: Study, model: Model) -> str:

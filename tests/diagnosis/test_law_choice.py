@@ -382,3 +382,34 @@ def test_a_law_that_waited_is_searched_once_two_effects_of_the_simpler_one_leave
     assert ("lugre", False) not in asked
     assert asked[-1] == ("lugre", True)
     assert choose(found).row.law == "lugre"
+
+
+def test_where_enough_was_searched_the_best_law_is_still_looked_at_and_two_effects_of_the_nearest():
+    z = {"lugre": 5.0, "dahl": 5.05, "bouc_wen": 4.0, "bingham": 9.0}
+    asked = []
+
+    def look(one, pairs):
+        asked.append((one.law, pairs))
+        return pair(one.law, one.trial.z, "unknown", z=0.9 * one.trial.z)
+
+    found = search([row(law, z[law]) for law in z], look, enough=lambda _row, _pairs: True)
+    assert asked == [("bouc_wen", False), ("bouc_wen", True)]
+    assert [one.row.law for one in found] == ["bouc_wen"]
+
+    asked.clear()
+    found = search([row(law, z[law]) for law in z], look, enough=lambda _row, pairs: pairs)
+    assert [law for law, pairs in asked if pairs] == ["bouc_wen"]
+    assert {one.row.law for one in found} == {*z}, "the others stay with a single effect"
+
+
+def test_the_verdict_says_of_which_laws_not_all_was_tried():
+    rows = (row("lugre", 5.0), row("dahl", 5.05), row("bouc_wen", 6.0))
+    pairs = tuple(pair(one.law, one.trial.z, "unknown") for one in rows[:2])
+    laws = LawVerdict(rows[0], "", rows, pairs, not_tried={"bouc_wen": False, "dahl": True})
+    said = laws.as_dict()
+    assert said["not_tried"] == {"effects": ["bouc_wen"], "two_effects": ["dahl"]}
+    (text,) = [one for one in law_sentences(said | {"kind": "unknown"}) if "Not tried" in one]
+    assert text == (
+        "Not tried, because the search had taken long enough: effects of bouc_wen and two effects "
+        "at once of dahl."
+    )

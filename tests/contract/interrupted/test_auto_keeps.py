@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bristle.cli import main
-from bristle.diagnosis import joint_search, law_trials, rig_runs
+from bristle.diagnosis import joint_search, law_trials, rig_runs, site
 from bristle.study.forms import NAME
 from bristle.study.study import Study
 
@@ -62,9 +62,11 @@ def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, mo
     told = auto(rig, capsys)
     known = json.loads((rig / "reports" / NAME).read_text())["laws"]
     assert len(known) == len(fitted) > 5
-    assert told == (
-        f"interrupted. The fits of {len(known)} laws are kept, the search for effects is not: the "
-        "same command goes on there."
+    assert told.startswith("interrupted. Nearest so far: "), told
+    assert f" on held-out runs (bristle identify {rig} --law " in told
+    assert told.endswith(
+        f" takes the law). The fits of {len(known)} laws are kept, no effects were tried: the same "
+        "command goes on there."
     )
     assert len(Study(rig).steps()) == 1  # no step was made, and none is claimed
 
@@ -81,6 +83,34 @@ def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, mo
     fitted.clear()
     auto(rig, capsys)
     assert len(fitted) == len(known)
+
+
+def test_the_effects_that_were_tried_of_a_law_are_kept_and_not_searched_again(
+    rig, capsys, monkeypatch
+):
+    searched: list[tuple[str, ...]] = []
+    whole = site.try_all
+
+    def try_all(base, *given, **named):
+        if len(searched) == 2:
+            raise KeyboardInterrupt
+        searched.append((base.law, *base.effects))
+        return whole(base, *given, **named)
+
+    with monkeypatch.context() as stopped:
+        stopped.setattr(site, "try_all", try_all)
+        told = auto(rig, capsys)
+    assert " and the effects tried of 2 of them: the same command goes on there." in told
+    kept = json.loads((rig / "reports" / NAME).read_text())["effects"]
+    first = [(own[0]["ends"][0]["law"], *own[0]["before"]) for own in kept.values()]
+    assert first == searched
+
+    def go_on(base, *_given, **_named):
+        assert (base.law, *base.effects) not in first
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(site, "try_all", go_on)
+    assert told == auto(rig, capsys)
 
 
 def test_a_step_is_there_when_it_is_told(rig, capsys, monkeypatch):
