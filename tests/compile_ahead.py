@@ -6,6 +6,8 @@ for two minutes.
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import studies
 
@@ -27,4 +29,5 @@ def compile_ahead() -> None:
 
 
 if __name__ == "__main__":
+    gc.disable()  # as tests/conftest.py says
     compile_ahead()

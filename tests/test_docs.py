@@ -45,7 +45,7 @@ PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
 
 LONG = {f"docs/{name}.md" for name in (
     "controllers", "elsewhere", "flow", "learn", "native", "own_physics", "plan", "shake_table",
-    "tutorial_bench", "tutorial_code",
+    "simulate", "tutorial_bench", "tutorial_code",
 )} | {"README.md"}  # fmt: skip
 """Pages whose commands search for effects, run scenarios at several steps, compile what is a
 user's own, or build FMUs for a host."""

@@ -199,6 +199,7 @@ def test_stock_designs_stay_on_the_building_they_were_made_for() -> None:
     assert found.setting.folder is None
 
 
+@pytest.mark.slow
 def test_a_controller_of_ones_own_is_stepped_as_an_fmu(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -68,7 +68,10 @@ def run(script: str, module: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-@pytest.mark.parametrize("module", DURING)
+@pytest.mark.parametrize(
+    "module",
+    [pytest.param(one, marks=pytest.mark.slow) if one in DURING[1:3] else one for one in DURING],
+)
 def test_numba_is_whole_behind_it(module: str) -> None:
     assert run(SCRIPT, module) == ["interrupted True", "42.0"]
 

@@ -21,7 +21,7 @@ from tests.identification.truths import hidden_case, true_case
 
 @pytest.mark.parametrize(
     ("law", "other"),
-    [pytest.param("bingham", "bench_2kN", marks=pytest.mark.slow), ("lugre", "bench_10N")],
+    [("bingham", "bench_2kN"), pytest.param("lugre", "bench_10N", marks=pytest.mark.slow)],
 )
 def test_runs_of_two_rigs_are_named(law, other):
     first, _, truth = true_case(3, law)

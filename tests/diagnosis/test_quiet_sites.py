@@ -57,6 +57,7 @@ def test_masses_that_are_off_are_found_beside_an_effect(hidden, name, at):
     assert np.diag(masses.M)[1:] == pytest.approx(np.diag(b.M)[1:], rel=6e-3)
 
 
+@pytest.mark.slow
 def test_an_acceleration_that_was_not_measured_is_known_less_well():
     b, runs = recorded(without=("floor1_acceleration_absolute",))
     layer = diagnose_lines(runs_of_rig(runs[:2], runs[2:], Model("tanh"), b))["layer"]

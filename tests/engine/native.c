@@ -1,6 +1,7 @@
 /* An FMU in C for the tests of the master: y = u summed over steps, twice = 2 u follows u at once.
  * The Integer parameter `how` spoils the step that begins at `at`. With INTERPOLATES it takes the
  * derivative of u for one step, and y is the mean of u^2 over each step, summed. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -71,6 +72,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
     Native *me = c;
     if (me->how != FINE && time > me->real[3] - step / 2) {
         if (me->how == ABORT) abort();
+        if (me->how == HANG) fclose(fopen("hangs", "w")); /* tells that it does */
         while (me->how == HANG) usleep(1000);
         if (me->how == DISCARD) return fmi2Discard;
         if (me->how == ERROR) {

@@ -1,14 +1,16 @@
-"""Runs a function in a Python of its own, in which the project cannot be imported.
+"""Runs a function in a process of its own, in which the project cannot be imported.
 
-FMUs must work without it, and the modules of one FMU must not lean on what another has left.
+FMUs must work without it, and the modules of one FMU must not lean on what another has left. Each
+process is a copy of one that has read fmpy and no FMU: to start Python anew takes twice as long.
 """
 
 from __future__ import annotations
 
+import atexit
 import functools
 import inspect
 import json
-import os
+import select
 import subprocess
 import sys
 import tempfile
@@ -16,6 +18,8 @@ import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 HERE = Path(__file__).resolve().parent
 LIMIT = 120
@@ -30,20 +34,39 @@ class Absent:
             raise ModuleNotFoundError("the project is not here", name=name)
 
 sys.meta_path.insert(0, Absent())
-job = json.load(open(sys.argv[1], encoding="utf-8"))
-sys.path.append(job["folder"])
-namespace = {}
-exec(compile(job["source"], job["file"], "exec"), namespace)
-answer = namespace[job["name"]](*job["arguments"])
-try:
-    import bristle
-except ModuleNotFoundError:
-    pass
-else:
-    sys.exit("the project could be imported after all")
-with open(sys.argv[2], "w", encoding="utf-8") as file:
-    json.dump(answer, file)
+sys.path.append(sys.argv[1])
+import live
+
+for line in sys.stdin:
+    os.chdir(line.rstrip("\\n"))
+    if child := os.fork():
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+        continue
+    said = os.open("said", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
+    for stream in (1, 2):
+        os.dup2(said, stream)
+    job = json.load(open("job.json", encoding="utf-8"))
+    namespace = {}
+    exec(compile(job["source"], job["file"], "exec"), namespace)
+    answer = namespace[job["name"]](*job["arguments"])
+    try:
+        import bristle
+    except ModuleNotFoundError:
+        pass
+    else:
+        sys.exit("the project could be imported after all")
+    with open("answer.json", "w", encoding="utf-8") as file:
+        json.dump(answer, file)
+    break
 """
+
+
+@functools.cache
+def _mother() -> subprocess.Popen[str]:
+    command = [sys.executable, "-I", "-c", _BOOT, str(HERE)]
+    mother = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    atexit.register(mother.kill)
+    return mother
 
 
 def fresh(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -55,31 +78,28 @@ def fresh(function: Callable[..., Any]) -> Callable[..., Any]:
     source = "from __future__ import annotations\n" + source[source.index("def ") :]
 
     @functools.wraps(function)
-    def call(*arguments: Any, **environment: str) -> Any:
-        with tempfile.TemporaryDirectory() as folder:
-            job, answer = Path(folder, "job.json"), Path(folder, "answer.json")
-            job.write_text(
-                json.dumps(
-                    {
-                        "folder": str(HERE),
-                        "source": source,
-                        "file": f"<{function.__name__}>",
-                        "name": function.__name__,
-                        "arguments": [str(a) if isinstance(a, Path) else a for a in arguments],
-                    }
-                ),
-                encoding="utf-8",
-            )
-            command = [sys.executable, "-I", "-c", _BOOT, str(job), str(answer)]
-            done = subprocess.run(
-                command,
-                capture_output=True,
-                text=True,
-                cwd=folder,
-                timeout=LIMIT,
-                env={**os.environ, **environment},
-            )
-            assert done.returncode == 0, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
-            return json.loads(answer.read_text(encoding="utf-8"))
+    def call(*arguments: Any) -> Any:
+        if sys.platform == "win32":
+            pytest.skip("a process is copied on POSIX")
+        mother = _mother()
+        assert mother.stdin is not None
+        assert mother.stdout is not None
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            job = {
+                "source": source,
+                "file": f"<{function.__name__}>",
+                "name": function.__name__,
+                "arguments": [str(a) if isinstance(a, Path) else a for a in arguments],
+            }
+            (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+            print(folder, file=mother.stdin, flush=True)
+            if not select.select([mother.stdout], [], [], LIMIT)[0]:
+                mother.kill()
+                _mother.cache_clear()
+                pytest.fail(f"{function.__name__} hangs")
+            status = int(mother.stdout.readline())
+            assert status == 0, f"exit {status}\n{(folder / 'said').read_text()}"
+            return json.loads((folder / "answer.json").read_text(encoding="utf-8"))
 
     return call

@@ -14,7 +14,6 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy.fmi2 import FMU2Slave
-from kinds import ONE_OF_EACH
 
 from bristle.fmu import build, catalogue
 from bristle.fmu.archive import extract, library_member
@@ -23,6 +22,7 @@ from bristle.fmu.description import Description, read_description
 SOURCE = Path(__file__).with_name("host.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 STEPS, STEP = 40, 0.002
+BY_DEFAULT = ("Structure", "LuGreDamper", "Sensors", "Skyhook")
 MOTION = {"V": (4.0, 3.0), "m": (0.0, 5e-3), "m/s": (0.0, 0.1), "m/s2": (0.0, 2.0), "N": (0.0, 1.0)}
 
 
@@ -101,7 +101,7 @@ def _in_python(about: Description, folder: Path) -> list[float]:
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        pytest.param(n, c, marks=() if c == 8 and n in ONE_OF_EACH else pytest.mark.slow)
+        pytest.param(n, c, marks=() if c == 8 and n in BY_DEFAULT else pytest.mark.slow)
         for n in catalogue.component_names()
         for c in (8, 20)
     ],

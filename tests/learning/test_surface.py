@@ -112,7 +112,7 @@ def test_a_channel_besides_is_the_second_signal():
 @pytest.mark.parametrize(
     ("part", "second"),
     [
-        ("force", "voltage"), ("friction", "speed"),
+        ("friction", "speed"), pytest.param("force", "voltage", marks=pytest.mark.slow),
         pytest.param("viscous", "slowing", marks=pytest.mark.slow),
         pytest.param("fluid", "acceleration", marks=pytest.mark.slow),
         *(pytest.param(part, "travel", marks=pytest.mark.slow) for part in PARTS_OF_SURFACE),

@@ -74,6 +74,7 @@ def test_two_builds_are_identical_whatever_the_cache(
     assert found[0].read_bytes() == found[1].read_bytes()
 
 
+@pytest.mark.slow  # libraries of another processor
 def test_what_stands_there_already_is_kept_unless_a_platform_is_missing(tmp_path: Path) -> None:
     what = plan("ConstantVoltage")
     path = build_build(what, tmp_path, [here()])

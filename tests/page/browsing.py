@@ -37,6 +37,14 @@ needs_browser = [
 ]
 
 
+def expect(part: Any) -> Any:
+    """Return Playwright's assertions on a part of a page: each waits until it holds."""
+    from playwright.sync_api import expect as found
+
+    found.set_options(timeout=30_000)
+    return found(part)
+
+
 class Watched:
     """A page of the browser, with what its console and its network saw."""
 

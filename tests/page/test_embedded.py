@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import base64
-import importlib.util
 import re
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from page.browsing import expect, needs_browser, shots
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "comparison"))
 from predictions_made import predictions_with
@@ -18,8 +18,6 @@ from bristle.comparison.comparison import compare_predictions
 from bristle.page.embedded import linked_section, script
 from bristle.view.html import page as whole_page
 from bristle.view.page_data import unpack
-
-PICTURES = Path(__file__).resolve().parents[2] / "docs" / "page_pictures.py"
 
 
 @pytest.fixture(scope="module")
@@ -58,17 +56,18 @@ def test_nothing_is_fetched_and_the_modules_are_one_script(found):
     assert "@media print { .linked { display: none; } }" in section
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
-@pytest.mark.parametrize("theme", ["light", "dark"])
+DRAWN = """() => [...document.querySelectorAll('#linked canvas')].every((c) =>
+  c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((one) => one !== 0))"""
+
+
+@pytest.mark.parametrize(
+    "theme",
+    [
+        pytest.param("light", marks=needs_browser),
+        pytest.param("dark", marks=[*needs_browser, pytest.mark.slow]),
+    ],
+)
 def test_a_browser_shows_them_and_a_choice_in_one_is_told(found, tmp_path, theme):
-    pytest.importorskip("playwright")
-    spec = importlib.util.spec_from_file_location("docs_page_pictures_embedded", PICTURES)
-    assert spec is not None
-    assert spec.loader is not None
-    shots = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(shots)
-    if shots.browser_path() is None:
-        pytest.skip("there is no Chromium")
     file = tmp_path / "report.html"
     file.write_text(whole_page("A report", [linked_section(found)], ""), encoding="utf-8")
     errors: list[str] = []
@@ -76,19 +75,15 @@ def test_a_browser_shows_them_and_a_choice_in_one_is_told(found, tmp_path, theme
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
         page.goto(file.as_uri())
-        assert page.locator("section.linked").is_visible()
+        page.locator("section.linked").wait_for()
         canvases = page.locator("#linked canvas")
-        assert canvases.count() == 5  # force and error over time, two loops, the map
-        drawn = page.evaluate(
-            "() => [...document.querySelectorAll('#linked canvas')].map((c) => {"
-            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
-            "return d.some((one) => one !== 0); })"
-        )
-        assert drawn == [True] * 5
+        expect(canvases).to_have_count(5)  # force and error over time, two loops, the map
+        page.wait_for_function(DRAWN)
         canvases.nth(2).focus()
         page.keyboard.press("ArrowRight")
-        told = page.locator("#linked [role=status]").inner_text()
-        assert told.startswith("Chosen: ")
+        status = page.locator("#linked [role=status]")
+        expect(status).to_contain_text("Chosen: ")
+        told = status.inner_text()
         assert np.isfinite(float(told.rpartition(" ")[2].rstrip(".")))
         ground = page.evaluate("() => getComputedStyle(document.body).backgroundColor")
         assert ground == ("rgb(255, 255, 255)" if theme == "light" else "rgb(20, 25, 29)")

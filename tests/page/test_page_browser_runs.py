@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made import write_runs
-from page.browsing import Watched, needs_browser, shots
+from page.browsing import Watched, expect, needs_browser, shots
 from page.served import page_on
 
 from bristle.study import create_study
@@ -74,7 +74,7 @@ def test_a_slider_moves_the_building_and_two_settings_are_compared(home: Path) -
         slider.focus()
         page.keyboard.press("End")
         seen.wait("voltage.level=10", 60.0)
-        assert page.get_by_text(re.compile(r"17501 rows in \d+ ms")).count() == 1
+        expect(page.get_by_text(re.compile(r"17501 rows in \d+ ms"))).to_have_count(1)
         seen.wait("kept: el_centro_lugre_passive, voltage.level = 0", 10.0)
         row = page.get_by_role("row", name=re.compile("structure.base_displacement"))
         kept, now = (float(row.locator("td").nth(k).inner_text()) for k in (0, 1))
@@ -85,8 +85,7 @@ def test_a_slider_moves_the_building_and_two_settings_are_compared(home: Path) -
         seen.wait("kept: el_centro_lugre_passive, voltage.level = 0", 10.0)
         page.get_by_role("button", name="Play").click()
         page.get_by_role("button", name="Pause").wait_for()
-        page.wait_for_timeout(400)
-        assert page.locator(".play output").inner_text() != "0.0 s"
+        expect(page.locator(".play output")).not_to_have_text("0.0 s")
         assert not seen.errors
 
 
@@ -98,8 +97,8 @@ def test_a_record_is_dropped_onto_the_simulation(home: Path) -> None:
         simulation(page, seen)
         page.evaluate(DROP, "time [s],acceleration [m/s2]\n" + rows)
         page.get_by_text(re.compile("now: el_centro_lugre_passive, shake.csv")).wait_for()
-        assert "shake.csv (dropped)" in page.locator("#record").inner_text()
-        assert page.get_by_text(re.compile(r"--set ground.record=uploads/record-")).count() > 0
+        expect(page.locator("#record")).to_contain_text("shake.csv (dropped)")
+        page.get_by_text(re.compile(r"--set ground.record=uploads/record-")).first.wait_for()
         page.evaluate(DROP, "a,b\nx,y\n")
         page.get_by_role("alert").get_by_text("shake.csv").wait_for()
         seen.press("Back to the first scenario")
@@ -134,7 +133,7 @@ def test_weights_are_moved_solved_and_the_closed_loop_is_drawn(home: Path) -> No
         slider = page.locator(r"#weight-acceleration\.corner")
         slider.focus()
         page.keyboard.press("End")
-        assert "200 rad/s" in page.locator("form .slider").nth(1).inner_text()
+        expect(page.locator("form .slider").nth(1)).to_contain_text("200 rad/s")
         page.keyboard.press("Home")
         page.locator("form").get_by_text("1 rad/s", exact=True).wait_for()
         seen.press("Default values")
@@ -163,7 +162,9 @@ def test_controllers_are_compared_and_a_comparison_is_cancelled(home: Path) -> N
         page.get_by_label("clipped LQG").uncheck()
         seen.press("Compare")
         page.get_by_text("Skyhook has the lowest peak acceleration").wait_for(timeout=300_000)
-        assert page.locator("table").get_by_role("row", name=re.compile("^Skyhook")).count() == 1
+        expect(page.locator("table").get_by_role("row", name=re.compile("^Skyhook"))).to_have_count(
+            1
+        )
         with page.expect_download() as download:
             seen.press("Download the report")
         assert download.value.suggested_filename == "report.html"
@@ -173,7 +174,7 @@ def test_controllers_are_compared_and_a_comparison_is_cancelled(home: Path) -> N
         seen.press("Cancel")
         page.get_by_text("Cancelled", exact=True).wait_for(timeout=60_000)
         page.get_by_text("Skyhook has the lowest peak acceleration").wait_for()
-        assert page.locator("#comparison option").count() == 1
+        expect(page.locator("#comparison option")).to_have_count(1)
         page.evaluate(DROP, "time [s],acceleration [m/s2]\n0,0\n0.02,1\n0.04,0\n")
         page.locator("#motion-1").get_by_text("shake.csv (dropped)").first.wait_for(
             state="attached"

@@ -386,6 +386,7 @@ def test_roles_are_written_by_a_command(client: Client, home: Path) -> None:
     assert 'role = "test"' in text
 
 
+@pytest.mark.slow
 def test_channels_are_previewed_and_corrected_by_a_command(client: Client, home: Path) -> None:
     asked = {"channels": ["force=-F [N]@kN"], "without": []}
     seen = client.post("/api/studies/rig/preview", asked)

@@ -190,9 +190,14 @@ def test_the_template_conforms(
     ("changes", "falls_short"),
     [
         ({FORCE: "return -p.f_s * tanh(q.v / p.v_s)"}, "a closed cycle gives no energy"),
-        ({FORCE: "return p.f_s * (1.0 + tanh(q.v / p.v_s))"}, "no force at rest"),
-        ({"Leaves out": "Lacks"}, "name, texts and source are complete"),
-        ({"Parameter(0.2,": "Parameter(1e-6,"}, "changes the force by more than 1 %"),
+        *(
+            pytest.param(changes, falls_short, marks=pytest.mark.slow)
+            for changes, falls_short in (
+                ({FORCE: "return p.f_s * (1.0 + tanh(q.v / p.v_s))"}, "no force at rest"),
+                ({"Leaves out": "Lacks"}, "name, texts and source are complete"),
+                ({"Parameter(0.2,": "Parameter(1e-6,"}, "changes the force by more than 1 %"),
+            )
+        ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

@@ -223,7 +223,7 @@ def test_a_plan_of_a_new_rig_keeps_its_limits_and_sees_what_it_is_for(sheet: Pat
 
 
 def test_force_and_heat_are_kept_by_the_model_or_the_plan_is_refused(sheet: Path) -> None:
-    found = bristle.plan(sheet, sharpen=True, heat="200 J", force="1.5 kN")
+    found = bristle.plan(sheet, sharpen=True, heat="200 J", force="1.5 kN", motions=["sine"])
     for run, one in zip(found.runs(), found.signals, strict=True):
         assert run.signals["voltage"].max() < 0.75 * 5.0  # at 5 V the data sheet has 2 kN
         assert np.sum(np.abs(one.v)) * one.dt < 0.5  # m of travel: 200 J at 400 N
@@ -245,7 +245,9 @@ def test_a_sheet_that_is_not_there_is_no_study(
 
 
 def test_the_pause_between_tests_is_told(sheet: Path, tmp_path: Path) -> None:
-    found = bristle.plan(sheet, sharpen="f_c", pause="30 s").write(tmp_path / "plan")
+    found = bristle.plan(
+        sheet, sharpen="f_c", pause="30 s", motions=["sine"], commands=["stairs"]
+    ).write(tmp_path / "plan")
     assert "rests for 30 s between" in (found / "plan.md").read_text()
 
 

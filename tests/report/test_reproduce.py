@@ -127,6 +127,7 @@ def test_a_fit_with_a_table_of_the_command_is_repeated_by_its_form(study: Study)
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_printed_hints_can_be_pasted(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
     assert main(["report", "my rig"]) == 0

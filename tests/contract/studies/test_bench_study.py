@@ -124,7 +124,7 @@ def test_auto_comes_to_the_same_model(bench_study: Path, capsys: Capture) -> Non
     assert "gas_spring" in (bench_study / "model.toml").read_text()
 
 
-@pytest.mark.parametrize("command", ["compare", "diagnose"])
+@pytest.mark.parametrize("command", ["compare", pytest.param("diagnose", marks=pytest.mark.slow)])
 def test_what_leaves_the_screen_is_in_the_details_and_in_the_report(
     command: str, bench_study: Path, capsys: Capture
 ) -> None:
