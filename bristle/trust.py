@@ -16,11 +16,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
 
 from .core.files import state_folder
 from .errors import TrustError
-from .user_code import load as user
 
 VARIABLE = "BRISTLE_TRUST"
 """The environment variable that consents to all code, for CI: 1 is yes."""
@@ -132,51 +130,6 @@ def can_do_without(untrusted: TrustError) -> None:
         raise untrusted
 
 
-def load(folder: Path, word: str = "effect", *, trust: bool = False) -> list[user.Loaded]:
-    """Return the effects or laws of a folder's files, registered, and those that are left out.
-
-    Parameters
-    ----------
-    folder : path
-        The folder with one file per effect or law; it need not exist.
-    word : str
-        "effect" or "law". Load laws first: an effect joins those that are there.
-    trust : bool
-        Whether to consent to what they hold. Without it a text that has not run here before is
-        left out, and `user_code.load.waiting` says so.
-
-    Raises
-    ------
-    TrustError
-        If consent cannot be kept.
-    """
-    with granted(trust):
-        return user.load(folder, word)
-
-
-def load_file(path: Path, word: str = "effect", *, trust: bool = False) -> Any:
-    """Return the effect or law of one file, registered.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-    word : str
-        "effect" or "law".
-    trust : bool
-        Whether to consent to what it holds.
-
-    Raises
-    ------
-    PhysicsError
-        If there is no such file or it is not right: with file and line.
-    TrustError
-        If nobody consented to its code.
-    """
-    with granted(trust):
-        return user.load_file(path, word)
-
-
 def _consent(text: str) -> Path:
     return state_folder() / "trusted" / digest(text)
 
@@ -196,6 +149,3 @@ def _write(file: Path, content: dict[str, object], path: Path) -> None:
             draft.unlink(missing_ok=True)
         why = f"{file.parent} cannot be written ({error.strerror or error})"
         raise TrustError(path, why=why) from None
-
-
-user.ask_before_running(require)

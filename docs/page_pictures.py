@@ -90,8 +90,7 @@ def shoot(page: Page, out: Path, name: str, width: int, theme: str) -> None:
 
 def views_at_rest(study: Path, out: Path, views: tuple[str, ...]) -> None:
     """Write the pictures of views of a study."""
-    from bristle.page.app import App
-    from bristle.page.run import serving
+    from bristle.page.app import App, serving
 
     with serving(App(study)) as server:
         for width in WIDTHS:
@@ -106,8 +105,7 @@ def views_at_rest(study: Path, out: Path, views: tuple[str, ...]) -> None:
 
 def views_at_work(study: Path, out: Path, views: tuple[str, ...]) -> None:
     """Write the pictures of views while their command is at work on a copy of a study."""
-    from bristle.page.app import App
-    from bristle.page.run import serving
+    from bristle.page.app import App, serving
 
     with tempfile.TemporaryDirectory() as folder:
         copy = shutil.copytree(study, Path(folder, study.name))

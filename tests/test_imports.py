@@ -23,7 +23,7 @@ BASE = (
     {"units"},
     {"physics"},
     {"core"},
-    {"component", "view"},
+    {"component", "trust", "view"},
     {"data", "user_code"},
     {"model"},
 )
@@ -42,8 +42,6 @@ ROOF = (
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))
 PLAIN = ("physics", "component", "units", "errors")
 """What imports the standard library alone."""
-DOORS = {"trust": "user_code"}
-"""A public module beside the package that it belongs to."""
 
 SKIPPED = {".git", "fmus", "__pycache__", "build", "dist", "results", "node_modules", "site"}
 TEXTS = {".py", ".toml", ".md", ".yml", ".yaml", ".cfg", ".txt", ".json", ".c", ".cff", ".sh"}
@@ -86,8 +84,7 @@ def is_module(name: str) -> bool:
 def unit_of(name: str) -> str | None:
     """Return the part of the package that a module belongs to, None outside it."""
     parts = name.split(".")
-    part = parts[1] if parts[0] == PACKAGE.name and len(parts) > 1 else None
-    return DOORS.get(part, part) if part else None
+    return parts[1] if parts[0] == PACKAGE.name and len(parts) > 1 else None
 
 
 @cache

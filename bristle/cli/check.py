@@ -122,7 +122,8 @@ def _own(file: Path, as_json: bool) -> int:
     """
     from ..core.progress import tell
     from ..errors import PhysicsError
-    from ..trust import is_made_here, load_file
+    from ..trust import is_made_here
+    from ..user_code.load import load_file
 
     word = _word(file)
     made = load_file(file, word, trust=is_made_here(file))  # refuses with file and line

@@ -239,7 +239,7 @@ def _read_own(study: Path | None, word: str) -> dict[str, str]:
     if study is None:
         return {}
     from ..errors import PhysicsError
-    from ..trust import load
+    from ..user_code.load import load
 
     if not study.is_dir():
         raise PhysicsError(f"--study {study}: there is no such folder.")

@@ -24,8 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     from ..core.progress import tell
-    from ..page.app import App
-    from ..page.run import open_browser, serve
+    from ..page.app import App, open_browser, serve
 
     def ready(address: str) -> None:
         tell("")

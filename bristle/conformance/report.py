@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 from ..view import Viewable
+from ..view.blocks import Table, View, view_of
 
 VERDICTS = {"pass": "pass", "error": "fail", "note": "note"}
 """What a report calls the level of a finding."""
@@ -92,3 +93,16 @@ class Report(Viewable):
             f"{self.fmu} {verdict}: {counts['pass']} passed, {counts['fail']} failed{robust}, "
             f"{counts['note']} noted."
         )
+
+
+@view_of(Report)
+def report_view(report: Report) -> View:
+    """Return the view of a judgement."""
+    tables = [
+        Table(("probe", "seen"), [[row.probe, row.seen] for row in rows], (), heading)
+        for rule, heading in RULES.items()
+        if (rows := report.failures(rule))
+    ]
+    header = ("probe", "verdict", "tried", "seen", "standard")
+    cells = [[row.probe, row.verdict, row.tried, row.seen, row.standard] for row in report.rows]
+    return View(report.summary(), tuple(tables), (Table(header, cells, (), "Every probe"),))

@@ -278,7 +278,7 @@ def _own() -> dict[str, list[str]]:
 
 def serve() -> None:
     """Compile what stands on the standard input; the other end of `module`."""
-    from ..trust import load_file
+    from ..user_code.load import load_file
 
     given = json.load(sys.stdin)
     for kind, files in given["own"].items():

@@ -29,8 +29,8 @@ from ..core.text import unknown
 from ..errors import BuildError
 from ..physics.drive import VOLTAGE
 from ..physics.forms import split_form
-from ..trust import load_file, require
-from ..user_code.load import own_laws
+from ..trust import require
+from ..user_code.load import load_file, own_laws
 from . import binary, catalogue, documentation
 from .archive import DESCRIPTION, parse_xml, write_archive
 from .component import SWITCH

@@ -191,7 +191,7 @@ def instantiate(
     BuildError, DesignError, PhysicsError
         If there is no such component; if a file is wrong.
     """
-    from ..trust import load_file
+    from ..user_code.load import load_file
 
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
     kind = component_class(source(name))

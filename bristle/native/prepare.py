@@ -95,7 +95,7 @@ def component_of(what: BuildPlan) -> ComponentSlave:
     BuildError
         If it is not made of flat functions.
     """
-    from ..trust import load_file
+    from ..user_code.load import load_file
 
     own = [load_file(path).name for path in what.effects]
     for path in what.laws:

@@ -20,8 +20,8 @@ from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..model.model import Model
 from ..model.model_file import model_text, read_model
-from ..trust import can_do_without, load
-from ..user_code.load import Loaded, waiting
+from ..trust import can_do_without
+from ..user_code.load import Loaded, load, waiting
 from ..version import __version__
 from ..view import Viewable
 from .changes import additions, behind_data, data_digest, note_undone, other_than

@@ -96,7 +96,7 @@ def damper_of(law: str | Path, form: str = "", knots: tuple[float, ...] = ()) ->
         If nobody consented to the file's code.
     """
     from ..fmu import catalogue
-    from ..trust import load_file
+    from ..user_code.load import load_file
 
     file = law if isinstance(law, Path) else None
     name = str(law) if file is None else load_file(file, "law").name

@@ -164,7 +164,7 @@ class Component:
         if self.law is None:
             return self.kind
         if self.law.file is not None:  # this process may not have read it yet
-            from ..trust import load_file
+            from ..user_code.load import load_file
 
             load_file(self.law.file, "law")
         return self.law.component

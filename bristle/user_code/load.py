@@ -26,6 +26,7 @@ from ..errors import PhysicsError, TrustError, UnitError
 from ..physics.effect import EFFECTS, Effect, laws_joined
 from ..physics.law import LAWS, Law, law_names
 from ..physics.parameter import fields_of
+from ..trust import granted, require
 from . import trial
 from .reading import EFFECT, LAW, Dialect, FlawError, read, text_of
 from .trial import probe, probe_law
@@ -73,24 +74,7 @@ _known: dict[Path, tuple[str, Loaded]] = {}  # by file: digest of its text, and 
 _waiting: dict[Path, TrustError] = {}  # by file: why its code may not run yet
 
 
-def _nobody(path: Path, text: str) -> None:
-    """Refuse: nobody was asked whether a text may run."""
-    raise TrustError(path, text)
-
-
-_require: Callable[[Path, str], None] = _nobody
-
-
-def ask_before_running(require: Callable[[Path, str], None]) -> None:
-    """Set what is called with file and text before any code of a user runs.
-
-    It raises TrustError where the code must not run; until it is set, none does.
-    """
-    global _require
-    _require = require
-
-
-def load(folder: Path, word: str = "effect") -> list[Loaded]:
+def load(folder: Path, word: str = "effect", *, trust: bool = False) -> list[Loaded]:
     """Return the effects or laws of a folder's files, registered, and those that are left out.
 
     Read again, an unchanged file costs nothing; a changed one replaces what it gave, and one that
@@ -100,28 +84,37 @@ def load(folder: Path, word: str = "effect") -> list[Loaded]:
     ----------
     folder : it need not exist
     word : "effect" or "law". Load laws first: an effect joins those that are there.
+    trust : whether to consent to what they hold. Without it a text that has not run here before is
+        left out, and `waiting` says so.
+
+    Raises
+    ------
+    TrustError
+        If consent cannot be kept.
     """
     files = sorted(folder.glob("*.py")) if folder.is_dir() else []
     here = {path.resolve() for path in files}
     for path in [*_known, *_waiting]:
         if path.parent == folder.resolve() and path not in here:
             _forget(path)
-    return _load(files, word)
+    with granted(trust):
+        return _load(files, word)
 
 
-def load_file(path: Path, word: str = "effect") -> Any:
-    """Return the effect or law of one file, registered.
+def load_file(path: Path, word: str = "effect", *, trust: bool = False) -> Any:
+    """Return the effect or law of one file, registered; parameters as for `load`.
 
     Raises
     ------
     PhysicsError
         If there is no such file or it is not right: with file and line.
     TrustError
-        If its code must not run yet.
+        If nobody consented to its code.
     """
     if not path.is_file():
         raise PhysicsError(f"{path}: there is no such file with {_a(word)}.")
-    (loaded,) = _load([path], word)
+    with granted(trust):
+        (loaded,) = _load([path], word)
     if path.resolve() in _waiting:
         raise _waiting[path.resolve()]
     if loaded.made is None:
@@ -253,7 +246,7 @@ def _load(files: list[Path], word: str) -> list[Loaded]:
                 continue
         _forget(path)
         try:
-            _require(shown, text)
+            require(shown, text)
         except TrustError as error:
             _waiting[path] = error
             found[shown] = Loaded(shown, None, str(error))

@@ -16,8 +16,7 @@ import pytest
 
 from bristle.core import progress
 from bristle.page import jobs
-from bristle.page.app import App, PageServer
-from bristle.page.run import serving
+from bristle.page.app import App, PageServer, serving
 
 
 @dataclass(frozen=True)

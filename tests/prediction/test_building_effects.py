@@ -10,8 +10,8 @@ from bristle.learning.effect_file import effect_text
 from bristle.model.model import new_model
 from bristle.physics.building import paper_building
 from bristle.prediction.model_system import BuildingWithFile, Excitation, building_system, loads
-from bristle.trust import load_file
 from bristle.user_code import load
+from bristle.user_code.load import load_file
 
 TIME = 0.01 * np.arange(200)
 

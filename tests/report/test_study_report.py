@@ -15,8 +15,7 @@ from made import write_runs
 from bristle.cli import main
 from bristle.core.text import with_interval
 from bristle.model.model import Fact, Model
-from bristle.report.figures import curves_section, parameter_table
-from bristle.report.study_page import gather, render, study_report
+from bristle.report.study_page import curves_section, gather, parameter_table, render, study_report
 from bristle.study import Study, create_study
 
 VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.01, "v_n": 5.0, "exponent": 0.0}

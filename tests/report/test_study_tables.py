@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made import bench_run, write
 
-from bristle.report.figures import data_table
+from bristle.report.study_page import data_table
 from bristle.study import Study, create_study
 from bristle.study.run_facts import RunChoices
 

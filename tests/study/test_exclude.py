@@ -7,7 +7,7 @@ from made import write_runs
 
 from bristle.cli import main
 from bristle.errors import StudyError
-from bristle.report.figures import data_table
+from bristle.report.study_page import data_table
 from bristle.study.study import Study
 
 

@@ -12,7 +12,7 @@ from made import bench_run, write, write_runs
 from bristle.data.corrections import Correction
 from bristle.data.measurement import names_of_files
 from bristle.errors import StudyError
-from bristle.report.figures import data_table
+from bristle.report.study_page import data_table
 from bristle.study.extend import extend_study
 from bristle.study.inputs import measurements, runs_of
 from bristle.study.study import Study

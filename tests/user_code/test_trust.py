@@ -301,12 +301,12 @@ def test_a_file_made_here_is_trusted_and_checking_it_is_consent(
     monkeypatch.chdir(tmp_path)
     assert main(["new", "effect", "rub"]) == 0
     file = tmp_path / "rub.py"
-    assert trust.load_file(file).name == "rub"
+    assert load.load_file(file).name == "rub"
     file.write_text(file.read_text().replace("Parameter(0.2,", "Parameter(0.4,"))
     with pytest.raises(TrustError):
-        trust.load_file(file)
+        load.load_file(file)
     assert main(["check", "rub.py"]) == 0
-    assert trust.load_file(file).parameters["f_s"].value == 0.4
+    assert load.load_file(file).parameters["f_s"].value == 0.4
     other = tmp_path / "sent.py"
     other.write_text(file_text("effect", "sent"))
     assert main(["check", "sent.py"]) == 2
@@ -323,14 +323,14 @@ def test_links_and_odd_files_are_no_way_round(tmp_path: Path, marker: Path) -> N
     (folder / "folder.py").mkdir()
     os.mkfifo(folder / "pipe.py")
     (folder / "gone.py").symlink_to(tmp_path / "nowhere")
-    found = {one.name: one.error for one in trust.load(folder)}
+    found = {one.name: one.error for one in load.load(folder)}
     assert set(found) == {"linked", "folder", "pipe", "gone"}
     assert all(found.values())
     assert not marker.exists()
     through = tmp_path / "door"
     through.symlink_to(folder, target_is_directory=True)
     with pytest.raises(TrustError):
-        trust.load_file(through / ".." / "effects" / "linked.py")
+        load.load_file(through / ".." / "effects" / "linked.py")
     assert not marker.exists()
 
 
@@ -340,7 +340,7 @@ def test_a_file_imports_nothing_beside_it(tmp_path: Path, marker: Path) -> None:
         file = tmp_path / "rub.py"
         file.write_text(file_text("effect", "rub").replace("from math import tanh", line))
         with pytest.raises(PhysicsError, match=r"is imported"):
-            trust.load_file(file, trust=True)
+            load.load_file(file, trust=True)
     assert not marker.exists()
 
 
@@ -348,7 +348,7 @@ def test_a_text_in_another_coding_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "rub.py"
     file.write_text("# -*- coding: utf-7 -*-\n" + file_text("effect", "rub"))
     with pytest.raises(PhysicsError, match="utf-8 is right"):
-        trust.load_file(file, trust=True)
+        load.load_file(file, trust=True)
 
 
 def test_nothing_hides_in_what_is_shown() -> None:
@@ -356,7 +356,7 @@ def test_nothing_hides_in_what_is_shown() -> None:
     assert trust.readable("x = 1\x1b[2K\rgood \u202e\u200b") == r"x = 1\x1b[2K\rgood \u202e\u200b"
 
 
-def test_without_the_gate_nothing_runs(tmp_path: Path) -> None:
+def test_without_consent_nothing_runs(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path; from bristle.user_code import load as user\n"
         "print(user.load(Path(sys.argv[1]))[0].error)"
@@ -364,7 +364,7 @@ def test_without_the_gate_nothing_runs(tmp_path: Path) -> None:
     (tmp_path / "rub.py").write_text(file_text("effect", "rub"))
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True,
-        env={**os.environ, trust.VARIABLE: "1"},
+        env={**os.environ, trust.VARIABLE: ""},
     )  # fmt: skip
     assert "has not run here before" in done.stdout
 
