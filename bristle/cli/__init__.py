@@ -18,7 +18,7 @@ from difflib import get_close_matches
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
-from ._options import add_common
+from ._options import Parser
 
 _BLAS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """How many threads a product of matrices takes, read when numpy is imported. The matrices here are
@@ -69,14 +69,14 @@ What is made on the way is told by who makes it, as by `study auto`, `run` and `
 """
 
 
-def build_parser(only: str = "") -> argparse.ArgumentParser:
+def build_parser(only: str = "") -> Parser:
     """Return the parser with one subcommand per module of this package.
 
     Parameters
     ----------
     only : the command whose options are wanted: the modules of the others stay unread; "" for all
     """
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="bristle",
         description="Find the physics that a damper model misses; simulate buildings with MR "
         "dampers as FMUs.",
@@ -94,7 +94,7 @@ def build_parser(only: str = "") -> argparse.ArgumentParser:
             continue
         module = importlib.import_module(f"{__name__}.{found.name}")
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
-        add_common(sub)
+        sub.add_common()
         module.add_arguments(sub)
         sub.set_defaults(main=module.main)
     return parser

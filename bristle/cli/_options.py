@@ -23,16 +23,108 @@ if TYPE_CHECKING:
     from ..view.blocks import View
 
 
-def add_run_facts(parser: argparse.ArgumentParser) -> None:
-    """Add what is known of whole runs beside their files."""
-    for option, value, text in (
-        ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
-         "--level 'I{}A'"),
-        ("--label", "NAME=PATTERN", "other labels in the names of files: --label 'oil=batch{}'"),
-    ):  # fmt: skip
-        parser.add_argument(option, action="append", default=[], metavar=value, help=text)
-    text = "a table with a row per run: file, role, current [A], temperature [degC], ..."
-    parser.add_argument("--runs", type=Path, metavar="FILE", help=text)
+class Parser(argparse.ArgumentParser):
+    """The parser of a command or action: it knows the options that several of them share.
+
+    Of an option that takes a value, `value` is what help calls that; `more` is as argparse has it.
+    """
+
+    def flag(self, name: str, text: str, default: object = False) -> None:
+        """Add an option that is there or not."""
+        self.add_argument(name, action="store_true", default=default, help=text)
+
+    def option(self, name: str, value: str, text: str, **more: Any) -> None:
+        """Add an option that takes a value."""
+        self.add_argument(name, metavar=value, help=text, **more)
+
+    def several(self, name: str, value: str, text: str, **more: Any) -> None:
+        """Add an option that may be repeated, each time with a value."""
+        self.add_argument(name, metavar=value, help=text, action="append", default=[], **more)
+
+    def add_common(self, default: object = False) -> None:
+        """Add --quiet and --debug, which every command takes."""
+        self.flag("--quiet", "print no progress", default=default)
+        self.flag("--debug", "show the traceback of an error", default=default)
+
+    def add_study(self) -> None:
+        """Add the folder of the study that a command is about."""
+        self.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+
+    def add_json(self, text: str = "print the answer as JSON") -> None:
+        """Add --json."""
+        self.flag("--json", text)
+
+    def add_no_figure(self, text: str = "draw nothing") -> None:
+        """Add --no-figure."""
+        self.flag("--no-figure", text)
+
+    def add_out(self, text: str, metavar: str = "FOLDER") -> None:
+        """Add --out, the file or folder that a command writes."""
+        self.add_argument("-o", "--out", type=Path, metavar=metavar, help=text)
+
+    def add_overrides(self, of: str = "file", example: str = "damper.f_c=2") -> None:
+        """Add --set to a command that loads a scenario; `of` is what the values are else from."""
+        text = f"use this value instead of the {of}'s, e.g. --set {example}"
+        self.several("--set", "NAME=VALUE", text, dest="overrides")
+
+    def add_dry_run(self) -> None:
+        """Add --dry-run to a command that changes a study."""
+        self.flag("--dry-run", "show the result; write nothing")
+
+    def add_details(self) -> None:
+        """Add --details to a command whose answer has some."""
+        self.flag("--details", "print the evidence below the answer: all tables")
+
+    def add_trust(self) -> None:
+        """Add --trust to a command that may run effects of somebody's own."""
+        what = "effects and laws that came with a study or scenario"
+        self.flag("--trust", f"consent to run {what}; bristle remembers it")
+
+    def add_channel(self) -> None:
+        """Add --channel, which says where a channel is in a file."""
+        text = (
+            "the column of a channel; a minus before COLUMN reverses its sign: --channel "
+            "'force=-Ch3@kN'; without @UNIT the unit is that of the title"
+        )
+        self.several("--channel", "CHANNEL=COLUMN@UNIT", text)
+
+    def add_channels_of_data(self) -> None:
+        """Add what says where the channels are in a study's files."""
+        self.add_channel()
+        text = "do not read this channel, whatever column it was taken from"
+        self.several("--without", "CHANNEL", text)
+        self.option("--step", "S", "sampling step in s of files without a time", type=float)
+
+    def add_run_facts(self) -> None:
+        """Add what is known of whole runs beside their files."""
+        text = "the command's level in the names of files, {} in its place: --level 'I{}A'"
+        self.several("--level", "PATTERN", text)
+        text = "other labels in the names of files: --label 'oil=batch{}'"
+        self.several("--label", "NAME=PATTERN", text)
+        text = "a table with a row per run: file, role, current [A], temperature [degC], ..."
+        self.option("--runs", "FILE", text, type=Path)
+
+    def add_judged(self) -> None:
+        """Add the output that is minimised, and its statistic."""
+        text = "the output to minimise; else the second floor's absolute acceleration"
+        default = "structure.floor2_acceleration_absolute"
+        self.option("--output", "NAME", text, default=default)
+        text = "its statistic; else peak"
+        self.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
+
+    def add_native(self) -> None:
+        """Add --native, --platform and --fmi."""
+        text = "FMUs that need no Python: compiled, with a library for each platform"
+        self.flag("--native", text)
+        text = (
+            "with --native: linux64, win64, darwin64, aarch64-linux or aarch64-darwin, several "
+            "separated by commas; else all"
+        )
+        self.several("--platform", "NAME", text, dest="platforms")
+        text = "with --native: include the C sources in the FMU, for hosts that compile them"
+        self.flag("--sources", text)
+        text = "version of FMI; 3 needs --native (default: 2)"
+        self.add_argument("--fmi", type=int, choices=(2, 3), default=2, help=text)
 
 
 def test_files(patterns: list[str], files: list[str]) -> list[str]:
@@ -120,91 +212,10 @@ def import_ahead(*names: str) -> None:
 # Options that every command takes, or every action of a command, or several commands.
 
 
-def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add --quiet and --debug."""
-    _add(parser, False)
-
-
-def add_common_to_actions(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_common_to_actions(commands: argparse._SubParsersAction[Parser]) -> None:
     """Add them to the actions of a command: after an action they count as before it."""
     for action in commands.choices.values():
-        _add(action, argparse.SUPPRESS)
-
-
-def add_study(parser: argparse.ArgumentParser) -> None:
-    """Add the folder of the study that a command is about."""
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-
-
-def add_json(parser: argparse.ArgumentParser, text: str = "print the answer as JSON") -> None:
-    """Add --json."""
-    parser.add_argument("--json", action="store_true", help=text)
-
-
-def add_no_figure(parser: argparse.ArgumentParser, text: str = "draw nothing") -> None:
-    """Add --no-figure."""
-    parser.add_argument("--no-figure", action="store_true", help=text)
-
-
-def add_out(parser: argparse.ArgumentParser, text: str, metavar: str = "FOLDER") -> None:
-    """Add --out, the file or folder that a command writes."""
-    parser.add_argument("-o", "--out", type=Path, metavar=metavar, help=text)
-
-
-def add_overrides(
-    parser: argparse.ArgumentParser, of: str = "file", example: str = "damper.f_c=2"
-) -> None:
-    """Add --set to a command that loads a scenario; `of` is what the values are else taken from."""
-    parser.add_argument(
-        "--set", dest="overrides", action="append", default=[], metavar="NAME=VALUE",
-        help=f"use this value instead of the {of}'s, e.g. --set {example}",
-    )  # fmt: skip
-
-
-def add_dry_run(parser: argparse.ArgumentParser) -> None:
-    """Add --dry-run to a command that changes a study."""
-    parser.add_argument("--dry-run", action="store_true", help="show the result; write nothing")
-
-
-def add_channel(parser: argparse.ArgumentParser) -> None:
-    """Add --channel, which says where a channel is in a file."""
-    parser.add_argument(
-        "--channel", action="append", default=[], metavar="CHANNEL=COLUMN@UNIT",
-        help="the column of a channel; a minus before COLUMN reverses its sign: --channel "
-        "'force=-Ch3@kN'; without @UNIT the unit is that of the title",
-    )  # fmt: skip
-
-
-def add_channels_of_data(parser: argparse.ArgumentParser) -> None:
-    """Add what says where the channels are in a study's files."""
-    add_channel(parser)
-    text = "do not read this channel, whatever column it was taken from"
-    parser.add_argument("--without", action="append", default=[], metavar="CHANNEL", help=text)
-    text = "sampling step in s of files without a time"
-    parser.add_argument("--step", type=float, metavar="S", help=text)
-
-
-def add_judged(parser: argparse.ArgumentParser) -> None:
-    """Add the output that is minimised, and its statistic."""
-    parser.add_argument(
-        "--output", default="structure.floor2_acceleration_absolute", metavar="NAME",
-        help="the output to minimise; else the second floor's absolute acceleration",
-    )  # fmt: skip
-    text = "its statistic; else peak"
-    parser.add_argument("--statistic", choices=("peak", "rms"), default="peak", help=text)
-
-
-def add_details(parser: argparse.ArgumentParser) -> None:
-    """Add --details to a command whose answer has some."""
-    text = "print the evidence below the answer: all tables"
-    parser.add_argument("--details", action="store_true", help=text)
-
-
-def _add(parser: argparse.ArgumentParser, default: object) -> None:
-    text = "print no progress"
-    parser.add_argument("--quiet", action="store_true", default=default, help=text)
-    text = "show the traceback of an error"
-    parser.add_argument("--debug", action="store_true", default=default, help=text)
+        action.add_common(argparse.SUPPRESS)
 
 
 def json_text(answer: Any) -> str:
@@ -286,14 +297,6 @@ def finite(value: Any) -> Any:
 # Asks on a terminal whether code that came with a file may run; shows it first.
 
 
-def add_trust(parser: argparse.ArgumentParser) -> None:
-    """Add --trust to a command that may run effects of somebody's own."""
-    text = (
-        "consent to run effects and laws that came with a study or scenario; bristle remembers it"
-    )
-    parser.add_argument("--trust", action="store_true", help=text)
-
-
 def given(error: TrustError) -> bool:
     """Return whether the user consents to a text that is shown, and remember that.
 
@@ -317,25 +320,6 @@ def given(error: TrustError) -> bool:
 
 
 # Options of the commands that write FMUs: those that need no Python, and for which platforms.
-
-
-def add_native(parser: argparse.ArgumentParser) -> None:
-    """Add --native, --platform and --fmi."""
-    text = "FMUs that need no Python: compiled, with a library for each platform"
-    parser.add_argument("--native", action="store_true", help=text)
-    parser.add_argument(
-        "--platform",
-        dest="platforms",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="with --native: linux64, win64, darwin64, aarch64-linux or aarch64-darwin, several "
-        "separated by commas; else all",
-    )
-    text = "with --native: include the C sources in the FMU, for hosts that compile them"
-    parser.add_argument("--sources", action="store_true", help=text)
-    text = "version of FMI; 3 needs --native (default: 2)"
-    parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help=text)
 
 
 def builder(arguments: argparse.Namespace) -> Callable[[BuildPlan, Path], Path]:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import add_json, add_study, add_trust, print_answer
+from ._options import Parser, print_answer
 
 HELP = (
     "add an effect to a study's model and refit it: error before and after, a step in the history"
 )
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle add`."""
-    add_study(parser)
+    parser.add_study()
     parser.add_argument("effects", nargs="+", metavar="EFFECT", help="see `bristle list effects`")
     parser.add_argument("--why", default="", help="the reason, for the history")
-    add_trust(parser)
-    add_json(parser)
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from ..core.text import plain
 from ..errors import BristleError, StudyError
-from ._options import add_json, print_json
+from ._options import Parser, print_json
 
 HELP = "pack what a bug report needs, without measurements"
 TEXTS = (
@@ -29,16 +29,14 @@ LARGEST = 500_000
 """Largest text that is packed [bytes]."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle bug-report`."""
     text = "the study; without one, versions and the last traceback alone"
     parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help=text)
     text = "file to write; else bristle_bug_report.zip"
-    parser.add_argument(
-        "--out", type=Path, default=Path("bristle_bug_report.zip"), metavar="FILE.zip", help=text
-    )
-    parser.add_argument("--yes", action="store_true", help="write it without asking")
-    add_json(parser)
+    parser.option("--out", "FILE.zip", text, type=Path, default=Path("bristle_bug_report.zip"))
+    parser.flag("--yes", "write it without asking")
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

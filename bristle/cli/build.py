@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
-from ._options import add_json, add_native, add_out, add_trust, builder, print_json
+from ._options import Parser, builder, print_json
 
 if TYPE_CHECKING:
     from ..fmu.build import BuildPlan
@@ -18,36 +18,28 @@ if TYPE_CHECKING:
 HELP = "build a component into an FMU"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle build`."""
     text = (
         "a name of `bristle list components`, or the Python file of your own component (this runs "
         "it)"
     )
     parser.add_argument("component", metavar="COMPONENT", help=text)
-    text = "building file, for a Structure"
-    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
+    parser.option("--building", "FILE", "building file, for a Structure", type=Path)
     text = "ground motion (PEER AT2, CSV or a name), for a GroundMotion"
-    parser.add_argument("--record", type=Path, metavar="FILE", help=text)
+    parser.option("--record", "FILE", text, type=Path)
     text = "controller file of `bristle design`, for a controller of its kind"
-    parser.add_argument("--controller", type=Path, metavar="FILE", help=text)
-    parser.add_argument(
-        "--effect",
-        dest="effects",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="file with your own effect, for a damper or a Structure; may be repeated",
-    )
+    parser.option("--controller", "FILE", text, type=Path)
+    text = "file with your own effect, for a damper or a Structure; may be repeated"
+    parser.several("--effect", "FILE", text, dest="effects", type=Path)
     text = "effects that are in the FMU and on: gas_spring,coil_lag; all: every one, off; else none"
-    parser.add_argument("--effects", dest="offers", default="", metavar="NAMES", help=text)
+    parser.option("--effects", "NAMES", text, dest="offers", default="")
     parser.add_argument("--name", help="name of the model and its file; else the component's")
     text = "folder of NAME.fmu; an older one is replaced; else the current folder"
-    add_out(parser, text)
-    add_native(parser)
-    add_trust(parser)
-    add_json(parser)
+    parser.add_out(text)
+    parser.add_native()
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import cut_short
-from ._options import add_json, add_overrides, add_trust, print_json
+from ._options import Parser, print_json
 
 if TYPE_CHECKING:
     from ..core.finding import Finding
@@ -29,15 +29,14 @@ WITHIN = 300.0
 _COLOURS = {"error": "31", "warning": "33", "note": "36"}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle check`."""
     text = "scenario files, names of stock scenarios, or the file of your own effect or law"
     parser.add_argument("files", nargs="*", metavar="FILE", help=text)
-    add_overrides(parser)
-    add_trust(parser)
-    add_json(parser, "print the findings as JSON")
-    text = "print the JSON schema of scenario files"
-    parser.add_argument("--schema", action="store_true", help=text)
+    parser.add_overrides()
+    parser.add_trust()
+    parser.add_json("print the findings as JSON")
+    parser.flag("--schema", "print the JSON schema of scenario files")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Block, Next, Text
-from ._options import add_details, add_json, add_out, add_study, add_trust, print_json
+from ._options import Parser, print_json
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
 HELP = "show where a study's model deviates from measurements: text and figure"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle compare`."""
     parser.epilog = (
         "z is the error divided by the noise floor, the error of a true model: 1 is the best that "
         "the data can confirm."
     )
-    add_study(parser)
+    parser.add_study()
     add_role(parser)
-    add_out(parser, "file of the picture", "FILE")
-    add_trust(parser)
-    add_details(parser)
-    add_json(parser)
+    parser.add_out("file of the picture", "FILE")
+    parser.add_trust()
+    parser.add_details()
+    parser.add_json()
 
 
-def add_role(parser: argparse.ArgumentParser) -> None:
+def add_role(parser: Parser) -> None:
     """Add --role, the runs of a study that a model is held against."""
+    text = (
+        "runs of the study: held-out runs, training runs, or the test runs (the study counts "
+        "each use)"
+    )
     parser.add_argument(
-        "--role",
-        choices=("holdout", "train", "test"),
-        default="holdout",
-        help="runs of the study: held-out runs, training runs, or the test runs (the study counts "
-        "each use)",
+        "--role", choices=("holdout", "train", "test"), default="holdout", help=text
     )
 
 

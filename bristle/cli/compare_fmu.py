@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_channel, add_details, add_json, add_out, channels_of, print_json
+from ._options import Parser, channels_of, print_json
 
 if TYPE_CHECKING:
     from ..prediction.compare_fmu import FmuComparison
@@ -17,32 +17,19 @@ if TYPE_CHECKING:
 HELP = "show where an FMU of any tool deviates from a measurement: text and figure"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle compare-fmu`."""
     parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="an FMU of any tool")
-    parser.add_argument("--data", type=Path, metavar="FILE", required=True, help="the measurement")
-    parser.add_argument(
-        "--set",
-        dest="values",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="a parameter's or input's value, in the FMU's unit",
-    )
-    parser.add_argument(
-        "--map",
-        dest="maps",
-        action="append",
-        default=[],
-        metavar="PORT=CHANNEL@UNIT",
-        help="the channel that feeds an input, or that an output is compared with",
-    )
-    add_channel(parser)
-    text = "time limit of the run in s"
-    parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help=text)
-    add_out(parser, "file of the picture", "FILE")
-    add_details(parser)
-    add_json(parser)
+    parser.option("--data", "FILE", "the measurement", type=Path, required=True)
+    text = "a parameter's or input's value, in the FMU's unit"
+    parser.several("--set", "NAME=VALUE", text, dest="values")
+    text = "the channel that feeds an input, or that an output is compared with"
+    parser.several("--map", "PORT=CHANNEL@UNIT", text, dest="maps")
+    parser.add_channel()
+    parser.option("--timeout", "S", "time limit of the run in s", type=float, default=300.0)
+    parser.add_out("file of the picture", "FILE")
+    parser.add_details()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import add_details, add_json
+from ._options import Parser
 
 HELP = "check an FMU against FMI 2.0 or 3.0 co-simulation"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle conform`."""
     parser.epilog = (
         "Exit codes: 0 no rule is broken (a lack of robustness is reported; it counts with "
@@ -18,16 +18,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in separate processes, with a time limit, with your rights."
     )
     parser.add_argument("fmu", metavar="FILE.fmu", help="an FMU of any tool")
-    add_details(parser)
-    add_json(parser, "print the table as JSON")
-    text = "exit with 1 for a lack of robustness as well"
-    parser.add_argument("--strict", action="store_true", help=text)
+    parser.add_details()
+    parser.add_json("print the table as JSON")
+    parser.flag("--strict", "exit with 1 for a lack of robustness as well")
     text = "time limit of one call in s (default: %(default)g)"
-    parser.add_argument("--timeout", type=float, default=20.0, metavar="S", help=text)
+    parser.option("--timeout", "S", text, type=float, default=20.0)
     text = "try this probe only; may be repeated"
     parser.add_argument("--only", action="append", metavar="PROBE", help=text)
-    text = "another FMU to load into the same process"
-    parser.add_argument("--beside", metavar="OTHER.fmu", help=text)
+    parser.option("--beside", "OTHER.fmu", "another FMU to load into the same process")
 
 
 def main(arguments: argparse.Namespace) -> int:

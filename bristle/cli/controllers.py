@@ -11,15 +11,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import (
-    add_json,
-    add_no_figure,
-    add_out,
-    add_trust,
-    finite,
-    print_answer,
-    share_of,
-)
+from ._options import Parser, finite, print_answer, share_of
 
 if TYPE_CHECKING:
     from ..controller_comparison.result import ControllerComparison
@@ -35,56 +27,51 @@ ANSWER = "answer.json"
 """What --json prints, beside the report: the page shows it."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle controllers`."""
     text = (
         "ground motions: names or files, with values, e.g. el_centro_1940_ns,peak=0.4g,factor=0.5"
     )
-    parser.add_argument("--motions", nargs="+", metavar="RECORD", help=text)
-    parser.add_argument(
-        "--controller", nargs="+", action="extend", metavar="WHAT",
-        help="stock names, controller files (.json) or design files (.toml) of `bristle design`, "
-        "your own components (.py), FMUs, with values, e.g. Skyhook,gain=80,label=mine",
-    )  # fmt: skip
-    text = "building file; else the library's building"
-    parser.add_argument("--building", metavar="FILE", help=text)
-    parser.add_argument(
-        "--damper", metavar="WHAT",
-        help="a component, a law, the folder of a study or a model.toml, an FMU, with values; "
-        "else LuGreDamper",
-    )  # fmt: skip
+    parser.option("--motions", "RECORD", text, nargs="+")
+    text = (
+        "stock names, controller files (.json) or design files (.toml) of `bristle design`, "
+        "your own components (.py), FMUs, with values, e.g. Skyhook,gain=80,label=mine"
+    )
+    parser.option("--controller", "WHAT", text, nargs="+", action="extend")
+    parser.option("--building", "FILE", "building file; else the library's building")
+    text = (
+        "a component, a law, the folder of a study or a model.toml, an FMU, with values; "
+        "else LuGreDamper"
+    )
+    parser.option("--damper", "WHAT", text)
     text = "device of the building that the controllers command; else the damper on the first level"
-    parser.add_argument("--device", metavar="NAME", help=text)
-    text = "judged output; else the top level's absolute acceleration"
-    parser.add_argument("--output", metavar="NAME", help=text)
+    parser.option("--device", "NAME", text)
+    parser.option("--output", "NAME", "judged output; else the top level's absolute acceleration")
     parser.add_argument("--statistic", choices=("peak", "rms"), help="its statistic; else peak")
-    text = "number of constant voltages to try; else 17"
-    parser.add_argument("--grid", type=int, metavar="N", help=text)
+    parser.option("--grid", "N", "number of constant voltages to try; else 17", type=int)
     text = "compute the limit of any voltage under each motion: up to a minute each"
     parser.add_argument("--limit", action="store_const", const=True, help=text)
     text = "run each case with N varied buildings, dampers and sensors, to find the worst case"
-    parser.add_argument("--ensemble", type=int, metavar="N", help=text)
+    parser.option("--ensemble", "N", text, type=int)
     text = "variation of masses, stiffnesses and damper parameters to either side; else 10%%"
-    parser.add_argument("--spread", metavar="SHARE", help=text)
+    parser.option("--spread", "SHARE", text)
     text = "noise of the sensors, a share of each signal's RMS; else 1%%"
-    parser.add_argument("--noise", metavar="SHARE", help=text)
-    text = "longest delay of the sensors [s]; else 0.004"
-    parser.add_argument("--delay", type=float, metavar="S", help=text)
+    parser.option("--noise", "SHARE", text)
+    parser.option("--delay", "S", "longest delay of the sensors [s]; else 0.004", type=float)
     text = "interval of the rows and step of FMUs [s]; else 0.002, or a share of a sample period"
-    parser.add_argument("--step", type=float, metavar="S", help=text)
+    parser.option("--step", "S", text, type=float)
     text = "solve built-in components together (compiled), or step all as FMUs (fmu)"
     parser.add_argument("--engine", choices=("compiled", "fmu"), help=text)
     parser.add_argument("--fmus", choices=("python", "native"), help="kind of FMUs")
-    text = "number of processes; else one per core"
-    parser.add_argument("--workers", type=int, metavar="N", help=text)
-    add_no_figure(parser, "write only tables, no report")
+    parser.option("--workers", "N", "number of processes; else one per core", type=int)
+    parser.add_no_figure("write only tables, no report")
     text = (
         "folder of report, tables and scenarios; older ones are replaced; else "
         "results/comparison/BUILDING/"
     )
-    add_out(parser, text)
-    add_json(parser)
-    add_trust(parser)
+    parser.add_out(text)
+    parser.add_json()
+    parser.add_trust()
 
 
 def main(arguments: argparse.Namespace) -> int:

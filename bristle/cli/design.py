@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next
-from ._options import add_json, add_out, print_answer
+from ._options import Parser, print_answer
 
 if TYPE_CHECKING:
     from ..synthesis import DesignResult
@@ -23,13 +23,13 @@ HELP = "design a controller and verify it"
 _COMPONENTS = {"hinf": "HinfInverse or ClippedOptimal", "lpv": "Lpv", "lqg": "LqgClipped"}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle design`."""
     parser.add_argument("kind", choices=tuple(_COMPONENTS), help="kind of controller")
     parser.add_argument("file", type=Path, metavar="FILE", help="design file, TOML")
     text = "controller file, with figure and answer beside it; else named after the design file"
-    add_out(parser, text, "FILE.json")
-    add_json(parser)
+    parser.add_out(text, "FILE.json")
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import add_details, add_dry_run, add_json, add_study, add_trust, print_study_answer
+from ._options import Parser, print_study_answer
 
 HELP = "find the effects that a study's model misses, with confidence and alternatives"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle diagnose`."""
-    add_study(parser)
-    parser.add_argument(
-        "--law",
-        help="all: search for the law together with its missing effects (default on a test bench "
-        "if no law was chosen); the model's law: keep it",
+    parser.add_study()
+    text = (
+        "all: search for the law together with its missing effects (default on a test bench "
+        "if no law was chosen); the model's law: keep it"
     )
+    parser.add_argument("--law", help=text)
     text = (
         "refit the model at the limit of every effect: exact also if the model is far from linear"
     )
-    parser.add_argument("--limits", action="store_true", help=text)
-    add_dry_run(parser)
-    add_trust(parser)
-    add_details(parser)
-    add_json(parser, "print verdict.json")
+    parser.flag("--limits", text)
+    parser.add_dry_run()
+    parser.add_trust()
+    parser.add_details()
+    parser.add_json("print verdict.json")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_json, add_no_figure, add_out, add_trust, print_answer
+from ._options import Parser, print_answer
 
 if TYPE_CHECKING:
     from ..campaign.ensemble import Ensemble
@@ -15,11 +15,10 @@ if TYPE_CHECKING:
 HELP = "run a scenario hundreds of times with varied parameters"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle ensemble`."""
     parser.add_argument("file", metavar="FILE", help="ensemble file, or name of a stock ensemble")
-    text = "number of runs, instead of the file's"
-    parser.add_argument("--runs", type=int, metavar="N", help=text)
+    parser.option("--runs", "N", "number of runs, instead of the file's", type=int)
     where = parser.add_mutually_exclusive_group()
     text = "number of processes; else one per core"
     where.add_argument("--workers", type=int, metavar="N", help=text)
@@ -29,18 +28,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "folder of runs, quantiles and figure; a stopped ensemble continues there; else "
         "results/NAME/"
     )
-    add_out(parser, text)
-    parser.add_argument("--fresh", action="store_true", help="start again and replace earlier runs")
-    text = "repeat runs that failed, alone or with an effect"
-    parser.add_argument("--retry", action="store_true", help=text)
-    parser.add_argument(
-        "--with-limits", action="store_true",
-        help="widen the quantiles by the effects that the verdict of [identified] does not "
-        "exclude, and list the part of each in the variance",
-    )  # fmt: skip
-    add_no_figure(parser)
-    add_trust(parser)
-    add_json(parser)
+    parser.add_out(text)
+    parser.flag("--fresh", "start again and replace earlier runs")
+    parser.flag("--retry", "repeat runs that failed, alone or with an effect")
+    text = (
+        "widen the quantiles by the effects that the verdict of [identified] does not "
+        "exclude, and list the part of each in the variance"
+    )
+    parser.flag("--with-limits", text)
+    parser.add_no_figure()
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

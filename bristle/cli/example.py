@@ -5,59 +5,56 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ._options import add_common_to_actions, add_json, print_json
+from ._options import Parser, add_common_to_actions, print_json
 
 HELP = "make an example study: measurements of a rig with a hidden effect"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle example`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     shown = commands.add_parser("list", help="list the effects that each rig can hide")
-    add_json(shown, "print as JSON")
+    shown.add_json("print as JSON")
     shown.set_defaults(act=_list)
     bench = commands.add_parser("bench", help="an MR damper, or another device, on a test bench")
     _add_choices(bench)
     text = "keep the voltage constant in each run, at 2 or 6 V, as many laboratories do"
-    bench.add_argument("--held", action="store_true", help=text)
+    bench.flag("--held", text)
     bench.set_defaults(act=_make)
     building = commands.add_parser("building", help="a base-isolated building on a shake table")
     _add_choices(building)
-    text = "leave the damper's force out of the files"
-    building.add_argument("--no-load-cell", action="store_true", help=text)
+    building.flag("--no-load-cell", "leave the damper's force out of the files")
     building.set_defaults(act=_make)
     reveal = commands.add_parser("reveal", help="show the hidden answer and what the study found")
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
-    add_json(reveal)
+    reveal.add_json()
     reveal.set_defaults(act=_reveal)
     performing = commands.add_parser("perform", help="perform a plan on the simulated rig")
     performing.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     performing.add_argument("plan", type=Path, metavar="PLAN", help="the folder of the plan")
     text = "name the runs NAME_1, NAME_2 ...; else they have the names of the plan"
-    performing.add_argument("--as-runs", default="", metavar="NAME", help=text)
-    text = "perform the plan even if it was made for another study"
-    performing.add_argument("--insist", action="store_true", help=text)
-    add_json(performing)
+    performing.option("--as-runs", "NAME", text, default="")
+    performing.flag("--insist", "perform the plan even if it was made for another study")
+    performing.add_json()
     performing.set_defaults(act=_perform)
     add_common_to_actions(commands)
 
 
-def _add_choices(parser: argparse.ArgumentParser) -> None:
+def _add_choices(parser: Parser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the new study")
     text = (
         "effect to hide, see bristle example list; give it twice for two; else the seed draws one"
     )
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME", help=text)
-    parser.add_argument("--none", action="store_true", help="hide nothing")
-    text = "hide an effect that is not in the library"
-    parser.add_argument("--outside", action="store_true", help=text)
+    parser.several("--effect", "NAME", text)
+    parser.flag("--none", "hide nothing")
+    parser.flag("--outside", "hide an effect that is not in the library")
     text = (
         "law of the damper: bingham or lugre; in a building lugre; on a bench also shock_absorber, "
         "friction_damper, isolator or fluid_viscous, which nothing commands"
     )
     parser.add_argument("--law", default="", help=text)
     text = "noise on every channel as a share of its RMS; 0.01 by default"
-    parser.add_argument("--noise", type=float, default=0.01, metavar="SHARE", help=text)
+    parser.option("--noise", "SHARE", text, type=float, default=0.01)
     parser.add_argument("--seed", type=int, default=1, help="draws the rig; 1 by default")
 
 

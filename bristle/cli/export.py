@@ -12,21 +12,12 @@ from pathlib import Path
 
 from ..core.text import command
 from ..errors import ScenarioError, StudyError
-from ._options import (
-    add_json,
-    add_native,
-    add_out,
-    add_overrides,
-    add_trust,
-    builder,
-    print_answer,
-    print_json,
-)
+from ._options import Parser, builder, print_answer, print_json
 
 HELP = "write a study's model as an FMU; or a scenario as one FMU, or as a web page"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle export`."""
     text = (
         "the study; with --as-one a scenario file, or the name of a scenario; with --web a study, "
@@ -34,24 +25,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("what", metavar="FOLDER", help=text)
     text = "output folder; else export/ in the study, with --as-one the current folder"
-    add_out(parser, text)
-    text = "write the whole scenario as one FMU, with --native"
-    parser.add_argument("--as-one", action="store_true", help=text)
+    parser.add_out(text)
+    parser.flag("--as-one", "write the whole scenario as one FMU, with --native")
     text = (
         "a port, or a parameter of a source, that becomes an input, with --as-one: --input "
         "structure.ground_acceleration"
     )
-    parser.add_argument(
-        "--input", dest="inputs", action="append", default=[], metavar="PART.PORT", help=text
-    )
+    parser.several("--input", "PART.PORT", text, dest="inputs")
     text = "write the scenario as a WebAssembly module with a page that computes it"
-    parser.add_argument("--web", type=Path, metavar="DIR", help=text)
+    parser.option("--web", "DIR", text, type=Path)
     text = "a parameter with a slider, with --web: --slider voltage.level=0..8"
-    parser.add_argument("--slider", action="append", default=[], metavar="NAME[=A..B]", help=text)
-    add_overrides(parser)
-    add_native(parser)
-    add_trust(parser)
-    add_json(parser)
+    parser.several("--slider", "NAME[=A..B]", text)
+    parser.add_overrides()
+    parser.add_native()
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

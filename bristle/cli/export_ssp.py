@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._options import add_json, add_native, add_out, add_overrides, add_trust, builder, print_json
+from ._options import Parser, builder, print_json
 
 if TYPE_CHECKING:
     from ..engine.coupling_error import Expected
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 HELP = "write a scenario as an SSP package for other tools"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle export-ssp`."""
     text = "scenario file, or name of a stock scenario"
     parser.add_argument("scenario", metavar="SCENARIO", help=text)
     text = "file of the package; an older one is replaced; else NAME.ssp in the current folder"
-    add_out(parser, text, "FILE.ssp")
+    parser.add_out(text, "FILE.ssp")
     text = "also write OspSystemStructure.xml with the FMUs beside it"
-    parser.add_argument("--osp", type=Path, metavar="FOLDER", help=text)
-    add_overrides(parser)
+    parser.option("--osp", "FOLDER", text, type=Path)
+    parser.add_overrides()
     text = "do not estimate the coupling error in other tools (runs nothing)"
-    parser.add_argument("--no-coupling-error", action="store_true", help=text)
-    add_native(parser)
-    add_trust(parser)
-    add_json(parser)
+    parser.flag("--no-coupling-error", text)
+    parser.add_native()
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -4,54 +4,43 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import (
-    add_details,
-    add_dry_run,
-    add_json,
-    add_study,
-    add_trust,
-    import_ahead,
-    json_text,
-    print_answer,
-    print_study_answer,
-)
+from ._options import Parser, import_ahead, json_text, print_answer, print_study_answer
 
 HELP = (
     "fit a study's model: parameters with intervals, what the data do not identify, errors of laws"
 )
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle identify`."""
-    add_study(parser)
-    parser.add_argument(
-        "--law",
-        help="another law than the model's, see `bristle list laws`; all: keep the model's law, "
-        "and compare all laws on a test bench",
+    parser.add_study()
+    text = (
+        "another law than the model's, see `bristle list laws`; all: keep the model's law, "
+        "and compare all laws on a test bench"
     )
+    parser.add_argument("--law", help=text)
     text = (
         "how the command enters: linear, quadratic or table; several with commas, or all, to "
         "compare their errors on held-out runs; else the form of the model"
     )
-    parser.add_argument("--command", dest="form", metavar="FORM", help=text)
+    parser.option("--command", "FORM", text, dest="form")
     text = (
         "low-pass for the table of laws and for the low-passed errors beside the error; 0 for "
         "none; else study.toml's cut_off (18 Hz)"
     )
-    parser.add_argument("--cutoff", type=float, metavar="HZ", help=text)
+    parser.option("--cutoff", "HZ", text, type=float)
     text = "number of starting points of the fit; else 4"
-    parser.add_argument("--starts", type=int, default=4, metavar="N", help=text)
-    text = "leave out the table that compares the laws"
-    parser.add_argument("--no-table", action="store_true", help=text)
-    add_dry_run(parser)
+    parser.option("--starts", "N", text, type=int, default=4)
+    parser.flag("--no-table", "leave out the table that compares the laws")
+    parser.add_dry_run()
     text = (
         "for a building: identify only the building (stiffnesses, frequencies and damping ratios "
         "from its response) and write a building file"
     )
-    parser.add_argument("--structure", action="store_true", help=text)
-    add_trust(parser)
-    add_details(parser)
-    add_json(parser)
+    parser.flag("--structure", text)
+    parser.add_trust()
+    parser.add_details()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

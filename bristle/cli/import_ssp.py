@@ -9,17 +9,17 @@ import argparse
 from pathlib import Path
 
 from ..core.text import command, cut_short
-from ._options import add_json, add_out, print_json
+from ._options import Parser, print_json
 
 HELP = "convert an SSP package of another tool to a scenario"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle import-ssp`."""
     parser.add_argument("package", type=Path, metavar="FILE.ssp", help="SSP 1.0 or 2.0")
     text = "folder of scenario and FMUs; else NAME/ in the current folder"
-    add_out(parser, text)
-    add_json(parser)
+    parser.add_out(text)
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

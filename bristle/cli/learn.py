@@ -14,7 +14,7 @@ import argparse
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-from ._options import add_details, add_dry_run, add_json, add_study, add_trust, print_study_answer
+from ._options import Parser, print_study_answer
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -22,35 +22,34 @@ if TYPE_CHECKING:
 HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle learn`."""
-    add_study(parser)
-    parser.add_argument(
-        "--along", metavar="SIGNAL[,SIGNAL]", default="",
-        help="signals that the curve may depend on, such as displacement,speed, or an extra "
-        "channel of the study; of several, curves along each and surfaces over two; default all",
-    )  # fmt: skip
-    parser.add_argument(
-        "--as", dest="parts", metavar="PART[,PART]", default="",
-        help="parts that the curve may act on: force, friction, yield, viscous, fluid, "
+    parser.add_study()
+    text = (
+        "signals that the curve may depend on, such as displacement,speed, or an extra "
+        "channel of the study; of several, curves along each and surfaces over two; default all"
+    )
+    parser.option("--along", "SIGNAL[,SIGNAL]", text, default="")
+    text = (
+        "parts that the curve may act on: force, friction, yield, viscous, fluid, "
         "yield_field, fluid_field, command, slip, resonance; in a layer or storey force, "
-        "friction, spring, damping, slip; default all",
-    )  # fmt: skip
-    parser.add_argument(
-        "--at", metavar="SITE", default="",
-        help="site in a building: damper, layer, storey1, storey2 ...; by default the site whose "
-        "verdict is unknown, or else the one with the largest error",
-    )  # fmt: skip
+        "friction, spring, damping, slip; default all"
+    )
+    parser.option("--as", "PART[,PART]", text, dest="parts", default="")
+    text = (
+        "site in a building: damper, layer, storey1, storey2 ...; by default the site whose "
+        "verdict is unknown, or else the one with the largest error"
+    )
+    parser.option("--at", "SITE", text, default="")
     text = "name of the effect; default learned_1, learned_2"
     parser.add_argument("--name", default="", help=text)
     text = "learn a closure: a small network in parallel with the model, for what no curve serves"
-    parser.add_argument("--closure", action="store_true", help=text)
-    text = "keep the table even if a formula fits as well"
-    parser.add_argument("--table", action="store_true", help=text)
-    add_dry_run(parser)
-    add_trust(parser)
-    add_details(parser)
-    add_json(parser)
+    parser.flag("--closure", text)
+    parser.flag("--table", "keep the table even if a formula fits as well")
+    parser.add_dry_run()
+    parser.add_trust()
+    parser.add_details()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

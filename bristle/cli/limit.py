@@ -11,15 +11,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import (
-    add_json,
-    add_judged,
-    add_no_figure,
-    add_out,
-    add_overrides,
-    add_trust,
-    print_answer,
-)
+from ._options import Parser, print_answer
 
 if TYPE_CHECKING:
     from ..optimal_control import Limit
@@ -27,32 +19,26 @@ if TYPE_CHECKING:
 HELP = "compute the smallest peak or RMS that any control of a scenario's damper can give"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle limit`."""
+    text = "file or stock scenario with one damper; else El Centro 0.6 g with a LuGre damper"
     parser.add_argument(
         "scenario",
         nargs="?",
         default="el_centro_0p6g_constant_voltage",
         metavar="SCENARIO",
-        help="file or stock scenario with one damper; else El Centro 0.6 g with a LuGre damper",
+        help=text,
     )
-    add_judged(parser)
-    parser.add_argument(
-        "--preview",
-        nargs="*",
-        type=float,
-        default=[0.0, 0.1, 0.5],
-        metavar="S",
-        help="preview times [s] of a receding horizon; none: no such runs; else 0 0.1 0.5",
-    )
-    text = "number of starts of the search; else 3"
-    parser.add_argument("--starts", type=int, default=3, metavar="N", help=text)
+    parser.add_judged()
+    text = "preview times [s] of a receding horizon; none: no such runs; else 0 0.1 0.5"
+    parser.option("--preview", "S", text, nargs="*", type=float, default=[0.0, 0.1, 0.5])
+    parser.option("--starts", "N", "number of starts of the search; else 3", type=int, default=3)
     text = "folder of voltage, scenario, results and picture; else results/limit/SCENARIO/"
-    add_out(parser, text)
-    add_no_figure(parser)
-    add_overrides(parser, "scenario", "ground.peak=3.924")
-    add_trust(parser)
-    add_json(parser)
+    parser.add_out(text)
+    parser.add_no_figure()
+    parser.add_overrides("scenario", "ground.peak=3.924")
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..core.text import tick, typed
 from ..view.blocks import Table
 from ..view.terminal import lines
-from ._options import add_json, add_trust, print_json
+from ._options import Parser, print_json
 
 if TYPE_CHECKING:
     from ..fmu.description import Description, Variable
@@ -26,18 +26,17 @@ _UNITS = {"peak": "m/s2", "duration": "s"}
 Rows = list[dict[str, Any]]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle list`."""
     text = "what to list; else everything but ports"
     parser.add_argument("kind", nargs="?", choices=_KINDS, metavar="KIND", help=text)
     text = "with effects, laws: the one to describe; with ports: a component or an FMU's path"
     parser.add_argument("name", nargs="?", metavar="NAME", help=text)
-    text = "with ports Structure: a building's data file"
-    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
+    parser.option("--building", "FILE", "with ports Structure: a building's data file", type=Path)
     text = "with effects, laws: a study whose own count too"
-    parser.add_argument("--study", type=Path, metavar="FOLDER", help=text)
-    add_trust(parser)
-    add_json(parser, "print as JSON")
+    parser.option("--study", "FOLDER", text, type=Path)
+    parser.add_trust()
+    parser.add_json("print as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -10,23 +10,23 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from ._options import add_json
+from ._options import Parser
 
 HELP = "start your own effect, law, controller or scenario"
 
 _KINDS = ("effect", "law", "controller", "scenario")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle new`."""
     parser.add_argument("kind", choices=_KINDS, metavar="KIND", help=", ".join(_KINDS))
     text = "your name for it; the file is NAME.py, of a scenario NAME.toml"
     parser.add_argument("name", metavar="NAME", help=text)
     text = "with effect, law: the study whose folder the file goes to"
-    parser.add_argument("--study", type=Path, metavar="FOLDER", help=text)
+    parser.option("--study", "FOLDER", text, type=Path)
     text = "with scenario: the stock scenario to begin with, see `bristle list scenarios`"
-    parser.add_argument("--like", metavar="SCENARIO", help=text)
-    add_json(parser, "print as JSON")
+    parser.option("--like", "SCENARIO", text)
+    parser.add_json("print as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import add_json, add_judged, add_no_figure, add_overrides, add_trust, print_answer
+from ._options import Parser, print_answer
 
 if TYPE_CHECKING:
     from ..campaign.best_constant import Passive
@@ -14,44 +14,28 @@ if TYPE_CHECKING:
 HELP = "find the best constant voltage for a set of ground motions"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle optimise`."""
     parser.add_argument("what", choices=("passive",), help="quantity to optimise")
     _add_problem(parser)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("results", "optimise"),
-        metavar="FOLDER",
-        help="folder of passive.csv, .json and .png; else results/optimise/",
-    )
-    add_no_figure(parser)
-    add_trust(parser)
-    add_json(parser)
+    text = "folder of passive.csv, .json and .png; else results/optimise/"
+    parser.option("--out", "FOLDER", text, type=Path, default=Path("results", "optimise"))
+    parser.add_no_figure()
+    parser.add_trust()
+    parser.add_json()
 
 
-def _add_problem(parser: argparse.ArgumentParser) -> None:
+def _add_problem(parser: Parser) -> None:
     """Add what is optimised: scenario, ground motions, the output and its statistic."""
-    parser.add_argument(
-        "--scenario",
-        default="el_centro_0p6g_constant_voltage",
-        metavar="FILE",
-        help="scenario with a GroundMotion and a ConstantVoltage; else El Centro with a LuGre "
-        "damper",
-    )
-    parser.add_argument(
-        "--motions",
-        nargs="+",
-        default=["el_centro_1940_ns"],
-        metavar="RECORD",
-        help="names of ground motions, or files; see `bristle list records`",
-    )
+    text = "scenario with a GroundMotion and a ConstantVoltage; else El Centro with a LuGre damper"
+    parser.option("--scenario", "FILE", text, default="el_centro_0p6g_constant_voltage")
+    text = "names of ground motions, or files; see `bristle list records`"
+    parser.option("--motions", "RECORD", text, nargs="+", default=["el_centro_1940_ns"])
     text = "peaks [g] to which each motion is scaled, 0: as recorded; else 0.2 0.4 0.6 0.8"
-    parser.add_argument("--intensities", nargs="+", type=float, metavar="G", help=text)
-    add_judged(parser)
-    text = "number of voltages in the grid; else 17"
-    parser.add_argument("--grid", type=int, default=17, metavar="N", help=text)
-    add_overrides(parser, "scenario", "damper.sigma_a=600")
+    parser.option("--intensities", "G", text, nargs="+", type=float)
+    parser.add_judged()
+    parser.option("--grid", "N", "number of voltages in the grid; else 17", type=int, default=17)
+    parser.add_overrides("scenario", "damper.sigma_a=600")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -9,16 +9,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ._options import Parser
+
 HELP = "open a local page in the browser: data, fit, diagnosis, and simulation with sliders"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle page`."""
     text = "a study, or a folder of studies; else the current folder"
     parser.add_argument("folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help=text)
-    text = "port of the server; else a free one"
-    parser.add_argument("--port", type=int, default=0, metavar="N", help=text)
-    parser.add_argument("--no-browser", action="store_true", help="print the address; open nothing")
+    parser.option("--port", "N", "port of the server; else a free one", type=int, default=0)
+    parser.flag("--no-browser", "print the address; open nothing")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Next, Text
-from ._options import add_details, add_dry_run, add_json, add_out, add_trust, print_json
+from ._options import Parser, print_json
 
 if TYPE_CHECKING:
     from ..planning.plan import Plan
@@ -25,32 +25,31 @@ if TYPE_CHECKING:
 HELP = "plan the next tests of a rig: motions and commands as files for its controller"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle plan`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", nargs="?", help="the study")
     text = "a rig.toml with [damper] and [limits]: plan before the first measurement"
-    parser.add_argument("--new", type=Path, metavar="FILE", help=text)
+    parser.option("--new", "FILE", text, type=Path)
     text = "distinguish alternatives: effects, laws, or none for the present model"
-    parser.add_argument("--separate", nargs="+", metavar="NAME", help=text)
-    text = "make effects visible; without names, all effects"
-    parser.add_argument("--see", nargs="*", metavar="EFFECT", help=text)
+    parser.option("--separate", "NAME", text, nargs="+")
+    parser.option("--see", "EFFECT", "make effects visible; without names, all effects", nargs="*")
     text = "narrow the intervals of parameters, or of those of an effect; without names, of all"
-    parser.add_argument("--sharpen", nargs="*", metavar="PARAMETER", help=text)
+    parser.option("--sharpen", "PARAMETER", text, nargs="*")
     text = "cover coordinates on which an unknown part may depend; without names, the usual ones"
-    parser.add_argument("--learn", nargs="*", metavar="COORDINATE", help=text)
-    parser.add_argument("--rig", type=Path, metavar="FILE", help="a rig.toml with [limits]")
+    parser.option("--learn", "COORDINATE", text, nargs="*")
+    parser.option("--rig", "FILE", "a rig.toml with [limits]", type=Path)
     for name, text in LIMITS.items():
-        parser.add_argument(f"--{name.replace('_', '-')}", metavar="QUANTITY", help=text)
+        parser.option(f"--{name.replace('_', '-')}", "QUANTITY", text)
     text = "for a building: more ground motions that the plan may scale, files or names"
-    parser.add_argument("--record", nargs="+", default=[], metavar="FILE", help=text)
-    parser.add_argument("--runs", type=int, metavar="N", help="number of tests; 4 by default")
+    parser.option("--record", "FILE", text, nargs="+", default=[])
+    parser.option("--runs", "N", "number of tests; 4 by default", type=int)
     parser.add_argument("--seed", type=int, default=1, help="seed of the candidate tests")
     text = "folder of the files; by default plan, plan_2 ... in the study"
-    add_out(parser, text)
-    add_dry_run(parser)
-    add_trust(parser)
-    add_details(parser)
-    add_json(parser, "print the plan as JSON")
+    parser.add_out(text)
+    parser.add_dry_run()
+    parser.add_trust()
+    parser.add_details()
+    parser.add_json("print the plan as JSON")
 
 
 LIMITS = {

@@ -11,34 +11,33 @@ import argparse
 from math import isfinite
 from pathlib import Path
 
-from ._options import add_details, add_json, add_study, add_trust, print_study_answer
+from ._options import Parser, print_study_answer
 from .compare import add_role
 
 HELP = "simulate a study's damper in its building: peaks and RMS, with a 95 %% band"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle predict`."""
-    add_study(parser)
+    parser.add_study()
     add_role(parser)
     text = "simulate a damper from a bench in the building of this file, under --record or --data"
-    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
-    text = "with --building: a measurement of that building"
-    parser.add_argument("--data", type=Path, metavar="FILE", help=text)
+    parser.option("--building", "FILE", text, type=Path)
+    parser.option("--data", "FILE", "with --building: a measurement of that building", type=Path)
     text = "with --building: name or file of a ground motion, where nothing was measured"
-    parser.add_argument("--record", metavar="RECORD", help=text)
+    parser.option("--record", "RECORD", text)
     text = "with --building: the damper's constant command if the ground motion has none; else 0"
-    parser.add_argument("--level", type=float, metavar="V", help=text)
+    parser.option("--level", "V", text, type=float)
     text = "number of draws of the parameters for the band; 0 for no band; else 20"
-    parser.add_argument("--draws", type=int, metavar="N", help=text)
+    parser.option("--draws", "N", text, type=int)
     text = (
         "widen the band by the effects that the verdict's limits do not exclude, and list the part "
         "of each"
     )
-    parser.add_argument("--with-limits", action="store_true", help=text)
-    add_trust(parser)
-    add_details(parser)
-    add_json(parser)
+    parser.flag("--with-limits", text)
+    parser.add_trust()
+    parser.add_details()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -5,26 +5,24 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
-from ._options import add_json, add_out, add_study, add_trust, print_json
+from ._options import Parser, print_json
 
 HELP = "write a study's report as one HTML file: verdict, history, loops, parameters, data"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle report`."""
-    add_study(parser)
+    parser.add_study()
     text = "file of the report; else FOLDER/reports/report.html"
-    add_out(parser, text, "FILE")
-    text = "leave the study's test runs closed"
-    parser.add_argument("--keep-test-closed", action="store_true", help=text)
+    parser.add_out(text, "FILE")
+    parser.flag("--keep-test-closed", "leave the study's test runs closed")
     text = (
         "add sliders for the model's parameters; the page computes the run (needs bristle[native])"
     )
-    parser.add_argument("--what-if", action="store_true", help=text)
-    text = "leave out the interactive pictures and all scripts"
-    parser.add_argument("--static", action="store_true", help=text)
-    add_trust(parser)
-    add_json(parser)
+    parser.flag("--what-if", text)
+    parser.flag("--static", "leave out the interactive pictures and all scripts")
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -8,15 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import (
-    add_json,
-    add_no_figure,
-    add_out,
-    add_overrides,
-    add_trust,
-    print_answer,
-    share_of,
-)
+from ._options import Parser, print_answer, share_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +19,7 @@ if TYPE_CHECKING:
 HELP = "run a scenario: results, a figure, peaks and RMS"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle run`."""
     text = "scenario file, name of a stock scenario, or SSP package"
     parser.add_argument("file", metavar="FILE", help=text)
@@ -35,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "folder of results, figure and log; older ones are replaced; else results/NAME/, or "
         "results/NAME_a.b=value/ with --set a.b=value"
     )
-    add_out(parser, text)
-    add_overrides(parser)
+    parser.add_out(text)
+    parser.add_overrides()
     text = "step FMUs (fmu), or solve built-in components together (compiled)"
     parser.add_argument("--engine", choices=("fmu", "compiled"), default="fmu", help=text)
     text = "kind of FMUs: those that run in Python, or compiled native ones"
@@ -44,14 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "format of the results"
     parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help=text)
     text = "estimate the coupling error of every output with additional runs"
-    parser.add_argument("--coupling-error", action="store_true", help=text)
+    parser.flag("--coupling-error", text)
     text = "find the step at which the coupling error stays below a share of the peaks, e.g. 0.2%%"
-    parser.add_argument("--tolerance", metavar="SHARE", help=text)
+    parser.option("--tolerance", "SHARE", text)
     text = "write the response spectra of ground and floors, 5 %% damped, as spectrum.csv"
-    parser.add_argument("--spectrum", action="store_true", help=text)
-    add_no_figure(parser)
-    add_trust(parser)
-    add_json(parser)
+    parser.flag("--spectrum", text)
+    parser.add_no_figure()
+    parser.add_trust()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -10,14 +10,8 @@ from typing import TYPE_CHECKING, Any
 from ..core.text import command
 from ..view.blocks import Next
 from ._options import (
-    add_channels_of_data,
+    Parser,
     add_common_to_actions,
-    add_details,
-    add_dry_run,
-    add_json,
-    add_run_facts,
-    add_study,
-    add_trust,
     channels_of,
     files_of,
     print_answer,
@@ -39,12 +33,12 @@ if TYPE_CHECKING:
 # `bristle study channels`: which column each channel of a study is, in which unit and sign.
 
 
-def add_channels(parser: argparse.ArgumentParser) -> None:
+def add_channels(parser: Parser) -> None:
     """Add the arguments of `bristle study channels`."""
-    add_study(parser)
-    add_channels_of_data(parser)
-    add_dry_run(parser)
-    add_json(parser)
+    parser.add_study()
+    parser.add_channels_of_data()
+    parser.add_dry_run()
+    parser.add_json()
     parser.set_defaults(act=_channels)
 
 
@@ -125,20 +119,20 @@ def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
 # `bristle study extend`: more runs in a study, held against the plan that asked for them.
 
 
-def add_extend(parser: argparse.ArgumentParser) -> None:
+def add_extend(parser: Parser) -> None:
     """Add the arguments of `bristle study extend`."""
-    add_study(parser)
+    parser.add_study()
     text = "measurement files, or a folder of them, with the columns of the study's others"
     parser.add_argument("data", nargs="+", metavar="FILES", help=text)
-    parser.add_argument(
-        "--holdout", nargs="+", action="extend", default=[], metavar="GLOB",
-        help="held-out runs among them, by file name; else those of the plan, or by the usual "
-        "names, or every third run",
-    )  # fmt: skip
-    add_run_facts(parser)
+    text = (
+        "held-out runs among them, by file name; else those of the plan, or by the usual "
+        "names, or every third run"
+    )
+    parser.option("--holdout", "GLOB", text, nargs="+", action="extend", default=[])
+    parser.add_run_facts()
     text = "the plan of these tests: take its roles, and report differences from it"
-    parser.add_argument("--plan", type=Path, metavar="PLAN", help=text)
-    add_json(parser)
+    parser.option("--plan", "PLAN", text, type=Path)
+    parser.add_json()
     parser.set_defaults(act=_extend)
 
 
@@ -207,15 +201,15 @@ ROLES = {
 """The roles, with what is said of runs that get them."""
 
 
-def add_roles(parser: argparse.ArgumentParser) -> None:
+def add_roles(parser: Parser) -> None:
     """Add the arguments of `bristle study roles`."""
-    add_study(parser)
+    parser.add_study()
     for role, text in ROLES.items():
         parser.add_argument(
             f"--{role}", nargs="+", action="extend", default=[], metavar="RUN",
             help=f"these runs are {text}" if role != "test" else f"these are {text}",
         )  # fmt: skip
-    add_json(parser, "print the runs as JSON")
+    parser.add_json("print the runs as JSON")
     parser.set_defaults(act=_roles)
 
 
@@ -247,7 +241,7 @@ def _roles(arguments: argparse.Namespace) -> int:
 HELP = "make and change studies of measurements: new, extend, check, roles, channels, auto"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle study`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     _add_new(commands.add_parser("new", help="make a study from measurement files"))
@@ -264,21 +258,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     auto = commands.add_parser(
         "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
-    add_study(auto)
-    text = "if no known effect explains the error, learn a curve and continue"
-    auto.add_argument("--learn", action="store_true", help=text)
+    auto.add_study()
+    auto.flag("--learn", "if no known effect explains the error, learn a curve and continue")
     text = "if the verdict is unknown in the end, add a closure; the verdict stays unknown"
-    auto.add_argument("--closure", action="store_true", help=text)
-    auto.add_argument(
-        "--law",
-        help="all: search for the law together with its effects (default on a test bench if no law "
-        "was chosen); a name: begin with that law",
+    auto.flag("--closure", text)
+    text = (
+        "all: search for the law together with its effects (default on a test bench if no law "
+        "was chosen); a name: begin with that law"
     )
-    text = "leave out effects that improve the prediction and that no verdict names"
-    auto.add_argument("--proven", action="store_true", help=text)
-    add_trust(auto)
-    add_details(auto)
-    add_json(auto, "print steps and verdict as JSON")
+    auto.add_argument("--law", help=text)
+    auto.flag("--proven", "leave out effects that improve the prediction and that no verdict names")
+    auto.add_trust()
+    auto.add_details()
+    auto.add_json("print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
     add_common_to_actions(commands)
 
@@ -288,20 +280,19 @@ def main(arguments: argparse.Namespace) -> int:
     return int(arguments.act(arguments))
 
 
-def _add_check(parser: argparse.ArgumentParser) -> None:
-    add_study(parser)
-    text = "treat isolated spikes as not measured from now on"
-    parser.add_argument("--mask", action="store_true", help=text)
-    parser.add_argument(
-        "--correct", action="store_true",
-        help="correct what can be corrected in study.toml: lines, and gain, zero or sign of a run "
-        "that differs, and of the verdict on these data the delay of a run, clock, slew and range",
-    )  # fmt: skip
-    add_json(parser, "print the findings as JSON")
+def _add_check(parser: Parser) -> None:
+    parser.add_study()
+    parser.flag("--mask", "treat isolated spikes as not measured from now on")
+    text = (
+        "correct what can be corrected in study.toml: lines, and gain, zero or sign of a run "
+        "that differs, and of the verdict on these data the delay of a run, clock, slew and range"
+    )
+    parser.flag("--correct", text)
+    parser.add_json("print the findings as JSON")
     parser.set_defaults(act=_check)
 
 
-def _add_new(parser: argparse.ArgumentParser) -> None:
+def _add_new(parser: Parser) -> None:
     parser.add_argument("name", type=Path, metavar="NAME", help="folder of the new study")
     parser.add_argument(
         "--data", nargs="+", action="extend", required=True, metavar="GLOB",
@@ -310,33 +301,32 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     text = "motion prescribed and force measured, or ground motion in and response out"
     parser.add_argument("--rig", choices=("bench", "structure"), default="bench", help=text)
     text = "the structure's data file, with --rig structure"
-    parser.add_argument("--building", type=Path, metavar="FILE", help=text)
-    text = "device to identify, if the building has several"
-    parser.add_argument("--device", metavar="NAME", help=text)
-    add_channels_of_data(parser)
+    parser.option("--building", "FILE", text, type=Path)
+    parser.option("--device", "NAME", "device to identify, if the building has several")
+    parser.add_channels_of_data()
     text = "test runs, which no fit and no verdict uses: names among the data, or more files"
     parser.add_argument("--test", nargs="+", action="extend", default=[], metavar="GLOB", help=text)
     _add_runs(parser)
-    parser.add_argument(
-        "--law",
-        help="law of the first model; else lugre, and on a test bench diagnose searches for the "
-        "law together with its effects",
+    text = (
+        "law of the first model; else lugre, and on a test bench diagnose searches for the "
+        "law together with its effects"
     )
+    parser.add_argument("--law", help=text)
     parser.add_argument("--title", default="", help="the study's title; else its name")
-    add_json(parser)
+    parser.add_json()
     parser.set_defaults(act=_new)
 
 
-def _add_runs(parser: argparse.ArgumentParser) -> None:
+def _add_runs(parser: Parser) -> None:
     """Add what is known of whole runs, and how files hold them."""
-    add_run_facts(parser)
+    parser.add_run_facts()
     text = "files hold several runs: 'restart' of the time, 'rests', 'column TITLE', or 'sheets'"
-    parser.add_argument("--split", default="", metavar="HOW", help=text)
+    parser.option("--split", "HOW", text, default="")
     text = "sheet of a workbook, else the likeliest; '*' for all with the same columns, each a run"
-    parser.add_argument("--sheet", default="", metavar="NAME", help=text)
+    parser.option("--sheet", "NAME", text, default="")
     text = "decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on"
-    parser.add_argument("--rate", type=float, metavar="HZ", help=text)
-    parser.add_argument("--mask", action="store_true", help="treat isolated spikes as not measured")
+    parser.option("--rate", "HZ", text, type=float)
+    parser.flag("--mask", "treat isolated spikes as not measured")
 
 
 def _new(arguments: argparse.Namespace) -> int:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import add_json, add_study, print_json
+from ._options import Parser, print_json
 
 HELP = "undo the last step of a study's model"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle undo`."""
-    add_study(parser)
-    add_json(parser)
+    parser.add_study()
+    parser.add_json()
 
 
 def main(arguments: argparse.Namespace) -> int:

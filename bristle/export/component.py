@@ -10,9 +10,8 @@ from xml.etree.ElementTree import Element
 
 from pythonfmu import DefaultExperiment
 
-from bristle.export import composite_functions, rows
+from bristle.export import composite_functions as whole
 from bristle.export.composite import Assembly
-from bristle.export.rows import fitted
 from bristle.fmu.component import STEP_LENGTH, ComponentSlave, Played
 
 
@@ -20,7 +19,7 @@ class Composite(ComponentSlave):
     """A whole scenario as one component."""
 
     icon: ClassVar[str] = "scenario"
-    functions: ClassVar[Any] = composite_functions
+    functions: ClassVar[Any] = whole
     in_place: ClassVar[bool] = True
 
     def declare(self) -> None:
@@ -74,12 +73,12 @@ class Composite(ComponentSlave):
 
     def _texts(self) -> dict[int, str]:
         """Return what the codes of all parts mean, each beginning with the part."""
-        found = {rows.TOO_LONG: "a step of {step_length:g} s holds too many substeps."}
+        found = {whole.TOO_LONG: "a step of {step_length:g} s holds too many substeps."}
         for k, (part, slave) in enumerate(self.assembly.parts.items()):
             for code, text in slave.texts.items():
-                found[rows.coded(code, k)] = f"{part}: {_named_for(part, text)}"
-            if self.assembly.kind(part) == rows.DAMPER:
-                found[rows.coded(rows.UNSETTLED, k)] = (
+                found[whole.coded(code, k)] = f"{part}: {_named_for(part, text)}"
+            if self.assembly.kind(part) == whole.DAMPER:
+                found[whole.coded(whole.UNSETTLED, k)] = (
                     f"{part}: force and motion do not agree. A shorter step or parameters within "
                     "their bounds would be right."
                 )
@@ -87,7 +86,7 @@ class Composite(ComponentSlave):
 
     def part_of(self, code: int) -> str:
         """Return the output with the fault of the part that a code is about."""
-        k = -code // rows.PER_PART - 1
+        k = -code // whole.PER_PART - 1
         parts = list(self.assembly.parts)
         return f"{parts[k]}.fault" if code < 0 <= k < len(parts) else ""
 
@@ -97,7 +96,7 @@ class Composite(ComponentSlave):
 
     def flat_functions(self) -> Any:
         """Return the functions, fitted to the laws and effects of the parts."""
-        return fitted(self.assembly.system).all_of(composite_functions)
+        return whole.fitted(self.assembly.system).all_of(whole)
 
     def played(self) -> list[Played]:
         """Return from what the signals of all sources are read."""

@@ -20,11 +20,11 @@ from ..physics.linear import packed
 from ..system.library import run_name
 from ..system.model import System
 from ..system.scenario import load_scenario, resolve_scenario
-from . import rows
+from . import composite_functions as functions
 
 KINDS: dict[Any, int] = {
-    source: rows.SOURCE, damper: rows.DAMPER, structure: rows.STRUCTURE,
-    controller: rows.CONTROLLER, sensors: rows.SENSORS,
+    source: functions.SOURCE, damper: functions.DAMPER, structure: functions.STRUCTURE,
+    controller: functions.CONTROLLER, sensors: functions.SENSORS,
 }  # fmt: skip
 
 FOUND_BY_THE_STEP = "holding_force"
@@ -103,7 +103,7 @@ class Assembly:
         if one.is_value:
             return True
         slave = self.parts[one.part]
-        return self.kind(one.part) == rows.DAMPER and one.port == slave.drive.name
+        return self.kind(one.part) == functions.DAMPER and one.port == slave.drive.name
 
     def over_step(self, one: Input) -> str:
         """Return how an input is taken over a step."""
@@ -145,7 +145,7 @@ class Assembly:
     # -- what the functions compute with
 
     def bake(self) -> list[float]:
-        """Return what the build fixes, as `rows` takes it apart."""
+        """Return what the build fixes, as `composite_functions` takes it apart."""
         system = self.system
         starts = {
             f"{part}.{name}": value
@@ -164,7 +164,7 @@ class Assembly:
             slot = len(signals) - 1 if one.is_value else system.slots[one.part, one.port]
             slots.append(slot)
             held.append(self.is_held(one))
-            given = self.kind(one.part) == rows.DAMPER and one.port == "acceleration"
+            given = self.kind(one.part) == functions.DAMPER and one.port == "acceleration"
             measures.append(self._number(one.part) if given else NOWHERE)
             set_by.append(list(starts).index(one.name) if one.is_value else NOWHERE)
             of.append(parts.index(one.part) if one.is_value else NOWHERE)
@@ -196,7 +196,7 @@ class Assembly:
 
     def _wiring(self, part: str) -> list[float]:
         wiring = self.system.wiring(part)
-        if self.kind(part) == rows.DAMPER:
+        if self.kind(part) == functions.DAMPER:
             given = self.parts[part].constants.measured  # the scenario holds it constant
             wiring[MEASURED] = bool(wiring[MEASURED] or given)
         return wiring
@@ -229,7 +229,10 @@ class Assembly:
 
     def _inputs_of(self, part: str, port: str, initial: bool) -> Sequence[str]:
         slave = self.parts[part]
-        if initial and self.kind(part) in (rows.CONTROLLER, rows.SENSORS):
+        if initial and self.kind(part) in (
+            functions.CONTROLLER,
+            functions.SENSORS,
+        ):
             return [slave.vars[index].name for index in slave._inputs]
         follows: Sequence[str] = slave._depends[port]
         return follows
