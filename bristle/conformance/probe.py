@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal
 
 from ..core.finding import Finding
@@ -12,76 +12,42 @@ from .bench import Bench, ProbePlan
 
 Needs = Literal["file", "library", "run"]
 Rule = Literal["standard", "robustness", "bristle"]
+Try = Callable[[Bench], Finding]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Probe:
     """One row to be: what it tries, the rule it holds the FMU to, and the code that tries it.
 
-    `needs` is what must have worked before: "file" nothing, "library" that the library loads,
-    "run" that a legal run gave a reference. `unless` returns why a probe does not apply, or None.
-    `bare` runs it in an interpreter without site-packages. `rule` says what a failure is: a
-    violation of the "standard"; a lack of "robustness" against what the standard forbids the
-    importer or says nothing of; or a violation of a rule of "bristle" for its own FMUs. `fmi3` is
-    the rule of FMI 3.0 where that is another; `only_fmi2` why it does not apply to FMI 3.0, or "".
+    It decorates that code, which enters it into the list of probes. `needs` is what must have
+    worked before: "file" nothing, "library" that the library loads, "run" that a legal run gave a
+    reference. `unless` returns why a probe does not apply, or None. `bare` runs it in an
+    interpreter without site-packages. `rule` says what a failure is: a violation of the "standard";
+    a lack of "robustness" against what the standard forbids the importer or says nothing of; or a
+    violation of a rule of "bristle" for its own FMUs. `fmi3` is the rule of FMI 3.0, where that is
+    another one and not only told in other names; `only_fmi2` why it does not apply to FMI 3.0.
     """
 
     name: str
+    _: KW_ONLY
     tried: str
     standard: str
-    run: Callable[[Bench], Finding]
-    needs: Needs
-    unless: Callable[[ProbePlan], str | None]
-    bare: bool
-    rule: Rule
+    needs: Needs = "run"
+    unless: Callable[[ProbePlan], str | None] = lambda plan: None
+    bare: bool = False
+    rule: Rule = "standard"
     fmi3: str = ""
     only_fmi2: str = ""
+    run: Try = field(init=False)
+
+    def __call__(self, run: Try) -> Try:
+        """Take a function as the code that tries it."""
+        self.run = run
+        PROBES[self.name] = self
+        return run
 
 
 PROBES: dict[str, Probe] = {}
-
-
-def probe(
-    name: str,
-    *,
-    tried: str,
-    standard: str,
-    needs: Needs = "run",
-    unless: Callable[[ProbePlan], str | None] = lambda plan: None,
-    bare: bool = False,
-    rule: Rule = "standard",
-    fmi3: str = "",
-    only_fmi2: str = "",
-) -> Callable[[Callable[[Bench], Finding]], Callable[[Bench], Finding]]:
-    """Return a decorator that enters a function into the list of probes.
-
-    Parameters
-    ----------
-    name : str
-        Name of the row, used once.
-    tried, standard : str
-        What is tried, and the rule that it holds the FMU to, for the row.
-    needs : "file", "library" or "run"
-        What must have worked before; see `Probe`.
-    unless : callable
-        Returns why the probe does not apply to a plan, or None.
-    bare : bool
-        Whether it runs without site-packages.
-    rule : "standard", "robustness" or "bristle"
-        What a failure is; see `Probe`.
-    fmi3 : str
-        The rule of FMI 3.0, where it is another one and not only told in other names.
-    only_fmi2 : str
-        Why it does not apply to FMI 3.0, or "".
-    """
-
-    def enter(function: Callable[[Bench], Finding]) -> Callable[[Bench], Finding]:
-        PROBES[name] = Probe(
-            name, tried, standard, function, needs, unless, bare, rule, fmi3, only_fmi2
-        )
-        return function
-
-    return enter
 
 
 def passed(seen: str) -> Finding:

@@ -182,27 +182,33 @@ _DEFAULT_STEPS = 100  # where the FMU names no step
 _MOST_INNER = 100  # steps of its own that such a step holds at most, where the FMU names theirs
 
 
-def judge(
-    path: Path,
-    timeout: float,
-    only: Collection[str] | None,
-    beside: Path | None,
-    progress: Callable[[str], None] | None,
+def conform(
+    path: Path | str,
+    timeout: float = 20.0,
+    *,
+    only: Collection[str] | None = None,
+    beside: Path | str | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Report:
-    """Try the probes of an FMU, each in a process of its own, and return what was seen.
+    """Try a co-simulation FMU of FMI 2.0 or 3.0 against the standard; return what was seen.
 
     Parameters
     ----------
-    path : Path
-        The .fmu file.
+    path : Path or str
+        The .fmu file, anybody's.
     timeout : float
-        Time limit of one call [s].
-    only : collection of str or None
-        Names of the probes to try; None: all.
-    beside : Path or None
-        Another FMU to load into the same process; None: a trivial one of our own.
-    progress : callable or None
+        Time limit of one call in s; an FMU that does not answer by then fails the probe.
+    only : collection of str, optional
+        Names of the probes to try; all of them otherwise.
+    beside : Path or str, optional
+        Another FMU to load into the same process; a trivial one of our own otherwise.
+    progress : callable, optional
         Called with the name of each probe before it starts.
+
+    Returns
+    -------
+    Report
+        `rows` (probe, tried, seen, standard, verdict), `ok` (no verdict is "fail"), `to_json()`.
 
     Raises
     ------
@@ -210,6 +216,7 @@ def judge(
         If a file cannot or must not be opened, ports of FMI 3.0 are arrays or belong to clocks, a
         probe is unknown, or the time limit is not positive and finite.
     """
+    path = Path(path)
     if not 0.0 < timeout < math.inf:
         raise FmuError(f"the time limit is {timeout} s; it must be positive and finite.")
     unknown = sorted(set(only or ()) - set(PROBES))
@@ -224,8 +231,9 @@ def judge(
     with tempfile.TemporaryDirectory(prefix="bristle-conform-") as folder:
         plan = make_plan(path, root, Path(folder), timeout)
         if beside is not None:
-            read_description(beside)  # which says what is wrong with it
-            plan.beside = make_plan(beside, read_root(beside), Path(folder) / "beside", timeout)
+            other = Path(beside)
+            read_description(other)  # which says what is wrong with it
+            plan.beside = make_plan(other, read_root(other), Path(folder) / "beside", timeout)
         elif only is None or any(name.startswith("another FMU") for name in only):
             plan.beside = _companion(plan, Path(folder))
         with Subprocesses(Path(plan.work)) as subprocesses:

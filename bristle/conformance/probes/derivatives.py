@@ -7,7 +7,7 @@ from ctypes import c_void_p
 from ...core.finding import Finding
 from ...fmu.library import Handle
 from ..bench import Bench, ProbePlan, Values, finite, good
-from ..probe import passed, probe, unless_claimed
+from ..probe import Probe, passed, unless_claimed
 from .order import forbidden
 
 _FLAG = "canInterpolateInputs"
@@ -43,7 +43,7 @@ def _run(bench: Bench, instance: Handle, share: float, first: int, last: int) ->
     return rows
 
 
-@probe(
+@Probe(
     "input derivatives",
     tried="runs with derivatives of 0 and of moving inputs; a reset after them; a state copied "
     "behind them and set back",
@@ -91,7 +91,7 @@ def _replay(bench: Bench, instance: Handle) -> None:
     bench.same([found], [wanted], "by derivatives behind a copied state: ", half + 1)
 
 
-@probe(
+@Probe(
     "input derivative of order 0",
     rule="robustness",
     tried="fmi2SetRealInputDerivatives with the order 0, which is that of the value",

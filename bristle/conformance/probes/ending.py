@@ -6,10 +6,10 @@ from pathlib import Path
 
 from ...core.finding import Finding
 from ..bench import Bench, good, some
-from ..probe import failed, noted, passed, probe, unless_single
+from ..probe import Probe, failed, noted, passed, unless_single
 
 
-@probe(
+@Probe(
     "terminate and free",
     tried="a run, fmi2Terminate, outputs read, fmi2FreeInstance, unloading, end of the process",
     standard="FMI 2.0 sections 2.1.6 and 4.2.4: final values may be read after fmi2Terminate; "
@@ -31,7 +31,7 @@ def terminate_and_free(bench: Bench) -> Finding:
     return passed("ends cleanly; outputs can be read to the end")
 
 
-@probe(
+@Probe(
     "free without terminate",
     tried="fmi2FreeInstance after fmi2Instantiate, in initialisation mode and in mid-run",
     standard="FMI 2.0 section 4.2.4: fmi2FreeInstance is allowed in each of these states",
@@ -47,7 +47,7 @@ def free_without_terminate(bench: Bench) -> Finding:
     return passed("freed")
 
 
-@probe(
+@Probe(
     "free nothing",
     tried="fmi2FreeInstance with a null pointer",
     standard="FMI 2.0 section 2.1.5: a null pointer is ignored",
@@ -59,7 +59,7 @@ def free_nothing(bench: Bench) -> Finding:
     return passed("ignored")
 
 
-@probe(
+@Probe(
     "logging",
     tried="a run with loggingOn, fmi2SetDebugLogging for all and for each category",
     standard="FMI 2.0 section 2.1.5: the logger gets the instance's name, a status, a category of "
@@ -87,7 +87,7 @@ def logging(bench: Bench) -> Finding:
     return passed(f"{len(library.messages)} messages, all well formed")
 
 
-@probe(
+@Probe(
     "claimed capabilities",
     tried="the calls behind capability flags: input and output derivatives, directional derivative",
     standard="FMI 2.0 section 4.3.1: a flag that is set promises that the call works",

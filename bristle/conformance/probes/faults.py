@@ -15,7 +15,7 @@ from operator import methodcaller
 from ...core.finding import Finding
 from ...fmu.library import DISCARD, ERROR, Handle, UnexpectedError
 from ..bench import GOOD, Bench, good, not_finite, status_name
-from ..probe import failed, passed, probe
+from ..probe import Probe, failed, passed
 
 INPUT, STEP, ORDER, PARAMETER = 1, 2, 3, 5
 _REFUSED = (DISCARD, ERROR)
@@ -72,7 +72,7 @@ def _feed(bench: Bench, setting: Callable[[Handle], int], what: str) -> None:
     _mended(bench, _faulted(bench, act, INPUT, what), what)
 
 
-@probe(
+@Probe(
     "fault: input",
     tried="each real input, and its derivative where that is taken, set to NaN and to infinity, a "
     "step, another step, reset",
@@ -91,7 +91,7 @@ def fault_input(bench: Bench) -> Finding:
     return passed(f"{len(bench.inputs)} inputs, three values each")
 
 
-@probe(
+@Probe(
     "fault: step",
     tried="steps of 0, -h, NaN and infinity, another step, reset",
     standard=_RULE.format(STEP),
@@ -108,7 +108,7 @@ def fault_step(bench: Bench) -> Finding:
     return passed("four steps that are none")
 
 
-@probe(
+@Probe(
     "fault: order",
     tried="fmi2DoStep before initialisation, inside it and after fmi2Terminate",
     standard=_RULE.format(ORDER),
@@ -133,7 +133,7 @@ def fault_order(bench: Bench) -> Finding:
     return passed("three steps out of order")
 
 
-@probe(
+@Probe(
     "fault: parameter",
     tried="each real parameter set to NaN before initialisation, one step, reset",
     standard=_RULE.format(PARAMETER) + "; real outputs are 0 from initialisation on",
@@ -158,7 +158,7 @@ def fault_parameter(bench: Bench) -> Finding:
     return passed(f"{len(parameters)} parameters")
 
 
-@probe(
+@Probe(
     "fault: earlier state",
     tried="a state copied, a fault, the state set back, on to the end",
     standard=_RULE.format("0 again"),

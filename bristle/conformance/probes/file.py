@@ -14,7 +14,7 @@ from ...errors import FmuError
 from ...fmu.description import Variable, describe, read_root
 from ...fmu.library import UnexpectedError
 from ..bench import Bench, ProbePlan, some
-from ..probe import failed, noted, passed, probe
+from ..probe import Probe, failed, noted, passed
 
 _UNIT_IN_WORDS = re.compile(r"\[.+\]|\bin the unit of\b")
 """What a description says where FMI has no way to write the unit, or any will do."""
@@ -28,7 +28,7 @@ def _unreadable(plan: ProbePlan) -> str | None:
     return None if plan.description is not None else "the variables cannot be read"
 
 
-@probe(
+@Probe(
     "archive",
     tried="member names of the zip file",
     standard="FMI 2.0 section 2.3: one zip file with modelDescription.xml at its root; names in a "
@@ -48,7 +48,7 @@ def archive(bench: Bench) -> Finding:
     return passed(f"{len(names)} members, all named soundly")
 
 
-@probe(
+@Probe(
     "modelDescription.xml",
     tried="the XML schema; names, causalities, required starts, units, ModelStructure",
     standard="FMI 2.0 section 2.2 and its schema files, with the rules of 2.2.7 (variables) and "
@@ -69,7 +69,7 @@ def model_description(bench: Bench) -> Finding:
     return passed("no problem found")
 
 
-@probe(
+@Probe(
     "guid",
     tried="the guid in modelDescription.xml",
     standard="FMI 2.0 section 2.2.1: guid is required; it ties the file to the code",
@@ -85,7 +85,7 @@ def guid(bench: Bench) -> Finding:
     return passed(text)
 
 
-@probe(
+@Probe(
     "value references",
     tried="whether two variables of one type share a reference",
     standard="FMI 2.0 section 2.2.7: variables of one base type with one value reference are "
@@ -125,7 +125,7 @@ def _unique_references(bench: Bench) -> Finding:
     return passed(f"{len(counts)} references, {aliases} aliases")
 
 
-@probe(
+@Probe(
     "start values",
     tried="start against min and max, and whether it is a finite number",
     standard="FMI 2.0 section 2.2.7: min <= start <= max; inputs and parameters have a start",
@@ -149,7 +149,7 @@ def start_values(bench: Bench) -> Finding:
     return passed("all inside their bounds")
 
 
-@probe(
+@Probe(
     "units",
     tried="which real inputs, outputs and parameters have a unit, and whether it is defined",
     standard="FMI 2.0 sections 2.2.2 and 2.2.7: a unit in use is defined in UnitDefinitions. "
@@ -175,7 +175,7 @@ def units(bench: Bench) -> Finding:
     return passed(f"{len(defined)} units defined, none missing")
 
 
-@probe(
+@Probe(
     "default experiment",
     tried="start, stop and step of the default experiment",
     standard="FMI 2.0 section 2.2.5: optional; where it is given, the stop lies after the start",

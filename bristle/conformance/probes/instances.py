@@ -11,10 +11,10 @@ from ...core.finding import Finding
 from ...fmu.archive import extract
 from ...fmu.library import FatalAnswerError, Handle, UnexpectedError
 from ..bench import GOOD, Bench, Values, good
-from ..probe import failed, noted, passed, probe, unless_single
+from ..probe import Probe, failed, noted, passed, unless_single
 
 
-@probe(
+@Probe(
     "reset",
     tried="a run, fmi2Reset in mid-run and after terminate, and the run again each time",
     standard="FMI 2.0 section 2.1.6: after fmi2Reset the FMU is in the state it has after "
@@ -54,7 +54,7 @@ def judged(bench: Bench, difference: str) -> Finding:
     return noted(f"cannot be judged, since no two runs are equal: {difference}")
 
 
-@probe(
+@Probe(
     "many instances",
     tried="instantiate, initialise, three steps, terminate, free; again and again",
     standard="FMI 2.0 section 2.1.5: fmi2Instantiate returns a new instance each time; "
@@ -75,7 +75,7 @@ def many_instances(bench: Bench) -> Finding:
     return passed(f"{bench.plan.instances} instances, the last run equals the first")
 
 
-@probe(
+@Probe(
     "two instances",
     tried="two live instances stepped in turn, the second with other inputs and parameters",
     standard="FMI 2.0 section 2.1.5: instances are independent of each other unless "
@@ -106,7 +106,7 @@ def two_instances(bench: Bench) -> Finding:
     return passed("the first runs as if it were alone")
 
 
-@probe(
+@Probe(
     "two libraries",
     rule="robustness",
     tried="the same FMU unpacked and loaded a second time from another folder",
@@ -121,7 +121,7 @@ def two_libraries(bench: Bench) -> Finding:
     return _beside(bench, _bench_of(bench, copy), companion_first=True)
 
 
-@probe(
+@Probe(
     "another FMU before",
     rule="robustness",
     tried="another FMU loaded and running in the same process, then this one",
@@ -135,7 +135,7 @@ def another_before(bench: Bench) -> Finding:
     return _beside(bench, Bench(bench.plan.beside, bench.box), companion_first=True)
 
 
-@probe(
+@Probe(
     "another FMU after",
     rule="robustness",
     tried="this FMU running, then another one loaded and run in the same process",
@@ -175,7 +175,7 @@ def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
     return passed(f"runs beside {name} exactly as alone")
 
 
-@probe(
+@Probe(
     "bare interpreter",
     rule="robustness",
     tried="a run in an interpreter without installed packages",
@@ -201,7 +201,7 @@ def bare_interpreter(bench: Bench) -> Finding:
     return passed("needs nothing that is installed here")
 
 
-@probe(
+@Probe(
     "memory",
     rule="robustness",
     tried="resident memory over instantiate, three steps, free",

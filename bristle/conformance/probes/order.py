@@ -14,7 +14,7 @@ from ...core.finding import Finding
 from ...fmu.description import Variable
 from ...fmu.library import FatalAnswerError, Handle
 from ..bench import GOOD, Bench, finite, good, not_finite, some, status_name
-from ..probe import failed, noted, passed, probe, unless_claimed, unless_single
+from ..probe import Probe, failed, noted, passed, unless_claimed, unless_single
 
 _ORDER = (
     "FMI 2.0 section 4.2.4: the environment must not; the answer is left open, Error being the "
@@ -39,7 +39,7 @@ def forbidden(bench: Bench, act: Callable[[], int], instance: Handle) -> Finding
     return passed(f"refused with {status_name(status)}")
 
 
-@probe(
+@Probe(
     "wrong guid",
     rule="robustness",
     tried="fmi2Instantiate with a guid that is not the FMU's",
@@ -55,7 +55,7 @@ def wrong_guid(bench: Bench) -> Finding:
     return forbidden(bench, lambda: 0, instance)
 
 
-@probe(
+@Probe(
     "step before initialisation",
     rule="robustness",
     tried="fmi2DoStep right after fmi2Instantiate",
@@ -67,7 +67,7 @@ def step_first(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
 
 
-@probe(
+@Probe(
     "step in initialisation",
     rule="robustness",
     tried="fmi2DoStep between entering and leaving initialisation mode",
@@ -79,7 +79,7 @@ def step_in_initialisation(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
 
 
-@probe(
+@Probe(
     "step after terminate",
     rule="robustness",
     tried="fmi2DoStep after fmi2Terminate",
@@ -92,7 +92,7 @@ def step_last(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.step(bench.time(2), bench.plan.step), instance)
 
 
-@probe(
+@Probe(
     "initialise twice",
     rule="robustness",
     tried="fmi2EnterInitializationMode in mid-run",
@@ -104,7 +104,7 @@ def initialise_twice(bench: Bench) -> Finding:
     return forbidden(bench, instance.enter, instance)
 
 
-@probe(
+@Probe(
     "leave what was not entered",
     rule="robustness",
     tried="fmi2ExitInitializationMode right after fmi2Instantiate",
@@ -121,7 +121,7 @@ def _fixed(bench: Bench) -> Variable | None:
     return next((v for v in fixed if v.kind == "Real"), fixed[0] if fixed else None)
 
 
-@probe(
+@Probe(
     "fixed parameter in mid-run",
     rule="robustness",
     tried="setting a fixed parameter after a step",
@@ -140,7 +140,7 @@ def fixed_parameter(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.set(v.kind, [v.reference], [value]), instance)
 
 
-@probe(
+@Probe(
     "setting an output",
     rule="robustness",
     tried="fmi2SetReal on an output in mid-run",
@@ -156,7 +156,7 @@ def set_output(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.set("Real", reference, [12.5]), instance)
 
 
-@probe(
+@Probe(
     "step past the stop time",
     rule="robustness",
     tried="fmi2DoStep beyond the stop time of fmi2SetupExperiment",
@@ -201,7 +201,7 @@ for _name, _words, _share in (
     ("infinite", "an infinite step", math.inf),
 ):
 
-    @probe(f"{_name} step", rule="robustness", tried=f"fmi2DoStep with {_words}", standard=_STEP)
+    @Probe(f"{_name} step", rule="robustness", tried=f"fmi2DoStep with {_words}", standard=_STEP)
     def odd_step(bench: Bench, share: float = _share) -> Finding:
         """Take a step of a length that is none; an endless one must end all the same."""
         return _odd_step(bench, share * bench.plan.step)
@@ -210,7 +210,7 @@ for _name, _words, _share in (
 _VARIABLE = "canHandleVariableCommunicationStepSize"
 
 
-@probe(
+@Probe(
     "variable steps",
     tried="steps of 1, 1/2, 1/4, 1 and 3/4 of the default, in turn",
     standard=f"FMI 2.0 section 4.3.1: {_VARIABLE} promises that steps may differ",
@@ -229,7 +229,7 @@ def variable_steps(bench: Bench) -> Finding:
     return passed(f"{bench.plan.steps} steps accepted")
 
 
-@probe(
+@Probe(
     "split steps",
     tried="each step as two halves",
     standard=f"FMI 2.0 section 4.3.1: {_VARIABLE} promises that shorter steps are taken; FMI 2.0 "

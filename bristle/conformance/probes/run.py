@@ -9,12 +9,12 @@ from ...core.finding import Finding
 from ...fmu.description import Value
 from ...fmu.library import DISCARD
 from ..bench import Bench, finite, good, not_finite, some
-from ..probe import failed, noted, passed, probe
+from ..probe import Probe, failed, noted, passed
 
 _MOST_STEPS = 20_000
 
 
-@probe(
+@Probe(
     "library",
     tried="loading the binary, its functions, fmi2GetVersion, fmi2GetTypesPlatform",
     standard='FMI 2.0 sections 2.1.2 and 2.1.4: the version is "2.0", the types platform '
@@ -40,7 +40,7 @@ def library(bench: Bench) -> Finding:
     return passed(f"loads; all functions exported, version {wanted}")
 
 
-@probe(
+@Probe(
     "legal run",
     tried="the default experiment with inputs left at their start values",
     standard="FMI 2.0 section 4.2.4: set up, initialise, step, read, terminate, free, each "
@@ -74,7 +74,7 @@ def legal_run(bench: Bench) -> Finding:
     return passed(f"{done + 1} of {total} steps of {plan.step:g} s, {1e6 * per_step:.0f} us each")
 
 
-@probe(
+@Probe(
     "outputs at the start",
     tried="reading every variable in initialisation mode and after it, before the first step",
     standard="FMI 2.0 sections 2.1.7 and 4.2.4: outputs are computed when initialisation ends, and "
@@ -96,7 +96,7 @@ def outputs_at_start(bench: Bench) -> Finding:
     return passed(f"{len(outputs)} outputs finite, all {len(everything)} variables readable")
 
 
-@probe(
+@Probe(
     "start values in the code",
     tried="reading inputs and parameters that nobody has set, against modelDescription.xml",
     standard="FMI 2.0 section 2.2.7: start is the value that the variable has in the code, unless "
@@ -126,7 +126,7 @@ def _agree(found: Value, given: Value | None) -> bool:
     return found == given
 
 
-@probe(
+@Probe(
     "driven run",
     tried="legal steps while every real input moves about its start value",
     standard="FMI 2.0 section 4.2.1: inputs may be set before every step",
@@ -142,7 +142,7 @@ def driven_run(bench: Bench) -> Finding:
     return passed(f"{bench.plan.steps} steps with {moved}")
 
 
-@probe(
+@Probe(
     "repeatable",
     tried="the same run in another process",
     standard="No clause. Reset, replay and any comparison of two runs rest on it.",

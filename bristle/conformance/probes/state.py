@@ -9,12 +9,12 @@ from pathlib import Path
 from ...core.finding import Finding
 from ...fmu.library import UnexpectedError
 from ..bench import Bench, good
-from ..probe import failed, noted, passed, probe, unless_claimed, unless_single
+from ..probe import Probe, failed, noted, passed, unless_claimed, unless_single
 
 _COPY, _BYTES = "canGetAndSetFMUstate", "canSerializeFMUstate"
 
 
-@probe(
+@Probe(
     "state replay",
     tried="fmi2GetFMUstate in mid-run, on to the end, fmi2SetFMUstate, on to the end; twice, and "
     "once after the same copy was overwritten at another time",
@@ -46,7 +46,7 @@ def state_replay(bench: Bench) -> Finding:
     return passed(f"{steps - half} steps replayed {bench.equal}, three times")
 
 
-@probe(
+@Probe(
     "state across reset",
     tried="a copy set back after fmi2Reset and initialisation of the same instance",
     standard=f"FMI 2.0 section 2.1.8, with {_COPY}: the copy is set back as the actual state",
@@ -69,7 +69,7 @@ def state_across_reset(bench: Bench) -> Finding:
     return passed(f"replayed {bench.equal}")
 
 
-@probe(
+@Probe(
     "freeing states",
     tried="30 copies made and freed in mid-run; fmi2FreeFMUstate of a null pointer",
     standard="FMI 2.0 section 2.1.8: memory is given back; a null pointer is ignored",
@@ -122,7 +122,7 @@ def _revived(bench: Bench, data: bytes, wanted: list[list[float | int | bool | s
     return bench.differs(bench.run(instance, half), wanted, half + 1)
 
 
-@probe(
+@Probe(
     "serialised state",
     tried="the state as bytes, brought to life in a fresh instance",
     standard=f"FMI 2.0 section 2.1.8, with {_BYTES}: bytes become a state again, equal to the "
@@ -137,7 +137,7 @@ def serialised_state(bench: Bench) -> Finding:
     return passed(f"{len(data)} bytes; a fresh instance continues {bench.equal}")
 
 
-@probe(
+@Probe(
     "state across processes",
     tried="the state as bytes from the run of another process",
     standard=f"FMI 2.0 section 2.1.8, with {_BYTES}: the bytes can be kept, and read when the FMU "

@@ -11,7 +11,7 @@ from ...core.finding import Finding
 from ...fmu.description import Value, Variable
 from ...fmu.library import FatalAnswerError, Handle, UnexpectedError
 from ..bench import GOOD, Bench, Values, good, not_finite, some, status_name
-from ..probe import failed, noted, passed, probe, unless_single
+from ..probe import Probe, failed, noted, passed, unless_single
 from .order import forbidden
 
 _MOST_INPUTS = 12
@@ -67,7 +67,7 @@ for _name, _words, _value in (
     ("huge", "1e300, a step, a reset", 1e300),
 ):
 
-    @probe(
+    @Probe(
         f"{_name} input",
         rule="robustness",
         tried=f"each real input set to {_words}",
@@ -101,7 +101,7 @@ _REFERENCE = (
 )
 
 
-@probe(
+@Probe(
     "reading what is not there",
     rule="robustness",
     tried="fmi2GetReal with value references that no variable has",
@@ -112,7 +112,7 @@ def read_unknown(bench: Bench) -> Finding:
     return _bad_reference(bench, lambda instance, r: instance.get("Real", [r])[0])
 
 
-@probe(
+@Probe(
     "setting what is not there",
     rule="robustness",
     tried="fmi2SetReal with value references that no variable has",
@@ -123,7 +123,7 @@ def set_unknown(bench: Bench) -> Finding:
     return _bad_reference(bench, lambda instance, r: instance.set("Real", [r], [0.0]))
 
 
-@probe(
+@Probe(
     "empty lists",
     rule="robustness",
     tried="fmi2GetReal ... fmi2SetString with no variable at all",
@@ -146,7 +146,7 @@ def empty_lists(bench: Bench) -> Finding:
     return passed("answered OK")
 
 
-@probe(
+@Probe(
     "set values stay",
     tried="inputs set in mid-run and read back before and after a step",
     standard="FMI 2.0 section 2.1.7: a variable that was set has that value until it is set again",
@@ -175,7 +175,7 @@ def set_values_stay(bench: Bench) -> Finding:
     return passed(f"{len(bench.inputs)} inputs keep their values")
 
 
-@probe(
+@Probe(
     "direct dependencies",
     tried="each real input moved between two steps, outputs read at once",
     standard="FMI 2.0 section 2.2.8: an output depends directly on the inputs that its "
@@ -213,7 +213,7 @@ def direct_dependencies(bench: Bench) -> Finding:
     return passed(f"{len(seen)} direct dependencies seen, all listed")
 
 
-@probe(
+@Probe(
     "parameters in initialisation",
     tried="real parameters changed by 1 % before entering initialisation mode, and inside it",
     standard="FMI 2.0 sections 2.1.7 and 4.2.4: a variable with initial = exact may be set until "
