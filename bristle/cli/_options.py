@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
 import sys
 import threading
 from collections.abc import Callable, Iterable
@@ -218,13 +217,10 @@ def add_common_to_actions(commands: argparse._SubParsersAction[Parser]) -> None:
         action.add_common(argparse.SUPPRESS)
 
 
-def json_text(answer: Any) -> str:
-    """Return an answer as JSON has it: what is not finite is null."""
-    return json.dumps(finite(answer), indent=2, ensure_ascii=False)
-
-
 def print_json(answer: Any) -> None:
     """Print an answer as JSON."""
+    from ..core.files import json_text
+
     print(json_text(answer))
 
 
@@ -281,17 +277,6 @@ def share_of(text: str) -> float:
         return float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
     except ValueError:
         return float("nan")
-
-
-def finite(value: Any) -> Any:
-    """Return plain data with None, which JSON has, in place of NaN and infinities."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
-        return None
-    return value
 
 
 # Asks on a terminal whether code that came with a file may run; shows it first.

@@ -11,7 +11,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._options import Parser, finite, print_answer, share_of
+from ._options import Parser, print_answer, share_of
 
 if TYPE_CHECKING:
     from ..controller_comparison.result import ControllerComparison
@@ -149,14 +149,15 @@ def _share(option: str, text: str | None) -> float | None:
 
 def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
     from ..controller_comparison.view import footnotes, header, lowest, rows
+    from ..core.files import as_json
 
     judged = found.setting.judged
     return {
         "verdict": found.verdict,
         "judged": {"output": judged.column, "statistic": judged.statistic, "unit": judged.unit},
         "units": found.units,
-        "cases": finite(found.table.to_dict(orient="records")),
-        "worst": None if found.worst is None else finite(found.worst.to_dict(orient="records")),
+        "cases": as_json(found.table.to_dict(orient="records")),
+        "worst": None if found.worst is None else as_json(found.worst.to_dict(orient="records")),
         "limits": {name: one._asdict() for name, one in found.limits.items()},
         "notes": list(found.notes),
         "tables": [

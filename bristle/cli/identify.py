@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ._options import Parser, import_ahead, json_text, print_answer, print_study_answer
+from ._options import Parser, import_ahead, print_answer, print_study_answer
 
 HELP = (
     "fit a study's model: parameters with intervals, what the data do not identify, errors of laws"
@@ -47,6 +47,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Identify, write the step and the picture, print the tables."""
     if arguments.structure:
         return _main_building(arguments)
+    from ..core.files import json_text
     from ..core.interrupt import keeps
     from ..core.progress import Progress, tell
     from ..study.fit_view import identified_with_next

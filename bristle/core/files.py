@@ -86,8 +86,13 @@ def replaced_by(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write a JSON file whole; numbers that are not finite become null."""
-    write_whole(path, json.dumps(_plain(data), indent=2, ensure_ascii=False) + "\n")
+    """Write a JSON file whole, as `json_text`."""
+    write_whole(path, json_text(data) + "\n")
+
+
+def json_text(data: Any) -> str:
+    """Return data as the text of a JSON file; numbers that are not finite become null."""
+    return json.dumps(as_json(data), indent=2, ensure_ascii=False)
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -101,14 +106,21 @@ def read_json(path: Path) -> dict[str, Any]:
     return found
 
 
-def _plain(value: Any) -> Any:
-    """Return a value as JSON has it: numbers of numpy and tuples turned, NaN and infinity null."""
+def as_json(value: Any, of_array: Callable[[Any], Any] | None = None) -> Any:
+    """Return a value as JSON has it: NaN and infinity null, numbers of numpy and tuples turned.
+
+    Parameters
+    ----------
+    value : plain data with numpy arrays in it
+    of_array : what becomes of an array; else a list
+    """
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): as_json(item, of_array) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [as_json(item, of_array) for item in value]
     if hasattr(value, "tolist"):
-        return _plain(value.tolist())
+        whole = of_array is not None and getattr(value, "ndim", 0) > 0
+        return of_array(value) if of_array and whole else as_json(value.tolist(), of_array)
     if isinstance(value, float) and not isfinite(value):
         return None
     return value

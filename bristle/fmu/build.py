@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 import zipfile
@@ -24,6 +22,7 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID, uuid5
 
+from ..core.child import in_child
 from ..core.files import fmus_folder, writing
 from ..core.text import unknown
 from ..errors import BuildError
@@ -292,12 +291,7 @@ def _pythonfmu_is_whole() -> bool:
 def _build_elsewhere(what: BuildPlan, guid: str, target: Path) -> None:
     """Build in a fresh interpreter, where no FMU was loaded."""
     order = {"plan": what.as_data(), "guid": guid, "target": str(target)}
-    path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
-    child = subprocess.run(
-        [sys.executable, "-c", "from bristle.fmu.build import _serve; _serve()"],
-        input=json.dumps(order), env={**os.environ, "PYTHONPATH": path}, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
+    child = in_child("from bristle.fmu.build import _serve; _serve()", order)
     if child.returncode != 0:
         raise BuildError(f"{what.component}: cannot be built: {child.stderr.strip()[-500:]}")
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core.child import in_child
 from ..core.jit import digest
 from ..errors import BristleError, BuildError
 from ..fmu import catalogue
-from ..fmu.build import PACKAGE, BuildPlan
+from ..fmu.build import BuildPlan
 from ..fmu.component import ComponentSlave
 from ..fmu.controller import SampledSlave
 from ..fmu.own_controller import COMPILED_MAY_USE, OwnController
@@ -139,12 +138,7 @@ def answer_of(module: str, order: Mapping[str, Any], about: str) -> str:
     BuildError
         With what the process said, if it fails.
     """
-    path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
-    child = subprocess.run(
-        [sys.executable, "-c", f"from {module} import serve; serve()"],
-        input=json.dumps(order), env={**os.environ, **COMPILER, "PYTHONPATH": path},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    child = in_child(f"from {module} import serve; serve()", order, more=COMPILER)
     if child.returncode != 0:
         said = child.stderr.strip() or f"its process ended with {child.returncode}"
         raise BuildError(f"{about}: {said[-1000:]}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import faulthandler
 import json
-import os
 import re
 import subprocess
 import sys
@@ -14,9 +13,9 @@ from contextlib import suppress
 from functools import partial
 from itertools import pairwise, product
 from math import copysign, cos, inf, isfinite, pi, sin
-from pathlib import Path
 from typing import Any
 
+from ..core.child import in_child
 from ..physics import damper
 from ..physics.effect import OFFERED, Effect, Q, Sizes
 from ..physics.law import Law
@@ -726,13 +725,8 @@ def tried(orders: list[dict[str, str]]) -> list[FlawError | None]:
 
 def _answers(orders: list[dict[str, str]]) -> list[FlawError | None]:
     """Return what a child says of the files, as far as it came: at least of one."""
-    root = str(Path(__file__).resolve().parents[2])
-    path = os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])
-    child = subprocess.run(
-        [sys.executable, "-c", f"from {__package__}.load import serve; serve()"],
-        input=json.dumps(orders), env={**os.environ, "PYTHONPATH": path}, capture_output=True,
-        text=True, check=False, timeout=(SECONDS + 10.0) * len(orders) + 60.0,
-    )  # fmt: skip
+    most = (SECONDS + 10.0) * len(orders) + 60.0
+    child = in_child(f"from {__package__}.load import serve; serve()", orders, most)
     rows = [json.loads(row) for row in child.stdout.splitlines() if row.startswith("{")]
     found = [FlawError(row["error"], row["line"]) if row["error"] else None for row in rows]
     if len(found) < len(orders):  # the child ended at the next one

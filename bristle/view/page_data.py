@@ -11,13 +11,13 @@ parsing a number: 40,000 samples of a dozen signals in a millisecond.
 from __future__ import annotations
 
 import json
-import math
 import struct
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from ..core.files import as_json
 from .blocks import Block, Table, Text
 
 ALIGN = 4
@@ -44,24 +44,14 @@ def pack(content: Any) -> bytes:
     arrays: list[bytes] = []
     count = 0
 
-    def plain(value: Any) -> Any:
+    def laid(value: Any) -> Any:
         nonlocal count
-        if isinstance(value, np.ndarray):
-            flat = np.ascontiguousarray(value, dtype="<f4").ravel()
-            arrays.append(flat.tobytes())
-            count += len(flat)
-            return {"array": [count - len(flat), len(flat)]}
-        if isinstance(value, dict):
-            return {str(key): plain(one) for key, one in value.items()}
-        if isinstance(value, list | tuple):
-            return [plain(one) for one in value]
-        if isinstance(value, np.generic):
-            value = value.item()
-        if isinstance(value, float) and not math.isfinite(value):
-            return None
-        return value
+        flat = np.ascontiguousarray(value, dtype="<f4").ravel()
+        arrays.append(flat.tobytes())
+        count += len(flat)
+        return {"array": [count - len(flat), len(flat)]}
 
-    head = json.dumps(plain(content), ensure_ascii=False).encode()
+    head = json.dumps(as_json(content, laid), ensure_ascii=False).encode()
     head += b" " * (-len(head) % ALIGN)
     return b"".join([struct.pack("<I", len(head)), head, *arrays])
 
