@@ -97,14 +97,8 @@ def _physics(word: str, name: str, study: Path | None) -> Path:
 
 def _written(file: Path, name: str, text: str, error: Callable[[str], Exception]) -> Path:
     """Write the text that a template has for a name into a file that is not there yet."""
+    from ..core.files import write_new
+
     if not name.isidentifier() or not name.isascii() or name != name.lower() or name[0] == "_":
         raise error(f'"{name}": expected a name of small letters, digits and _.')
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with file.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except FileExistsError:
-        raise error(f"{file} is there already; another name, or remove it.") from None
-    except OSError as flaw:
-        raise error(f"{file}: cannot be written ({flaw.strerror or flaw}).") from None
-    return file
+    return write_new(file, text, error)

@@ -69,6 +69,25 @@ def write_whole(path: Path, content: str | bytes) -> None:
             draft.unlink(missing_ok=True)
 
 
+def write_new(path: Path, text: str, raises: Callable[[str], Exception]) -> Path:
+    """Write a file that is not there yet; return its path.
+
+    Parameters
+    ----------
+    path, text : of the file
+    raises : makes the error from its text, where it is there already or cannot be written
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+    except FileExistsError:
+        raise raises(f"{path} is there already; another name, or remove it.") from None
+    except OSError as error:
+        raise raises(f"{path}: cannot be written ({error.strerror or error}).") from None
+    return path
+
+
 def replaced_by(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` make a file beside another, and put it in that one's place once it is whole.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -16,7 +15,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.text import listed
-from ..errors import PhysicsError, RecordError
+from ..errors import PhysicsError, RecordError, StudyError
 from ..physics.motion_file import (
     HEADER,
     LARGEST,
@@ -241,7 +240,7 @@ def _column_of(table: Table, quantity: str, called: tuple[str, ...]) -> Column:
 
 def _cached(motion: GroundMotion) -> Path:
     """Write a ground motion as the FMU reads it, whole or not at all; return its path."""
-    from ..core.files import cache_folder
+    from ..core.files import cache_folder, write_whole
 
     lines = [f"# {motion.name}", f"# {' '.join(motion.source.split())}", HEADER]
     samples = zip(motion.time.tolist(), motion.acceleration.tolist(), strict=True)
@@ -257,26 +256,12 @@ def _cached(motion: GroundMotion) -> Path:
     path = cache_folder() / "records" / f"{_plain(motion.name)}-{digest}.csv"
     try:
         if not (path.is_file() and path.read_bytes() == content):
-            _write_whole(path, content)
-    except OSError as error:
+            write_whole(path, content)
+    except (OSError, StudyError) as error:
         raise RecordError(
-            f"{error.filename or path}: the converted record cannot be written "
-            f"({error.strerror}). Set BRISTLE_CACHE to a folder that can be."
+            f"the converted record {error} Set BRISTLE_CACHE to a folder that can be written to."
         ) from None
     return path
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-")
-    draft = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        draft.replace(path)
-    except BaseException:
-        draft.unlink(missing_ok=True)
-        raise
 
 
 def _plain(name: str) -> str:

@@ -470,6 +470,9 @@ class _Handler(BaseHTTPRequestHandler):
                 self.wfile.write(piece)
 
 
+# Runs the page's server until Ctrl-C, and opens the browser.
+
+
 def serve(app: App, port: int, ready: Callable[[str], None]) -> None:
     """Serve an app until Ctrl-C, then interrupt its commands.
 

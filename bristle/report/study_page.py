@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from ..study.history import Step
     from ..study.study import Study
 
+# The tables of the parameters and the data.
 
 _COLOURS = {
     "white": "estimated from the samples: white",

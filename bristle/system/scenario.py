@@ -262,22 +262,10 @@ def copy_scenario(name: str, target: Path | None = None) -> Path:
     text = source.read_text(encoding="utf-8")
     components = toml_content(source)["components"].values()
     buildings = [component["building"] for component in components if "building" in component]
-    _write_new(file, _SCHEMA.sub("", text))
+    files.write_new(file, _SCHEMA.sub("", text), ScenarioError)
     for building in buildings:
         copied = file.parent / building
         content = (source.parent / building).read_text(encoding="utf-8")
         if not copied.is_file() or copied.read_text(encoding="utf-8") != content:
-            copied.parent.mkdir(parents=True, exist_ok=True)
-            _write_new(copied, content)
+            files.write_new(copied, content, ScenarioError)
     return file
-
-
-def _write_new(file: Path, text: str) -> None:
-    """Write a file that is not there yet."""
-    try:
-        with file.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except FileExistsError:
-        raise ScenarioError(f"{file} is there already; another file, or remove it.") from None
-    except OSError as error:
-        raise ScenarioError(f"{file}: cannot be written ({error.strerror or error}).") from None

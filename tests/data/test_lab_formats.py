@@ -14,7 +14,7 @@ import openpyxl
 import pytest
 from nptdms import ChannelObject, RootObject, TdmsWriter
 
-from bristle.data.formats._instants import seconds_of
+from bristle.data.formats._rows import seconds_of
 from bristle.data.guess import guess_channels
 from bristle.data.measurement import measurements_of
 from bristle.data.pieces import pieces_of, wrong_split

@@ -21,6 +21,12 @@ from ...core.text import install
 from ...errors import RecordError
 from ..table import Table, without_codes
 
+DAMAGED = (
+    OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, EOFError,
+    RuntimeError, MemoryError,
+)  # fmt: skip
+"""What a damaged file surfaces as from the parsing of a library that reads its format."""
+
 
 @cache
 def formats() -> tuple[ModuleType, ...]:

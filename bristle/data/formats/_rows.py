@@ -5,16 +5,20 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
+from functools import partial
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array, Indices
+from ...core.arrays import Array, Flags, Indices
+from ...core.text import plain
 from ...errors import RecordError
 from ...physics.motion_file import shortened
+from ..titles import Column
 
 _MISSING = frozenset(
     ("", "-", "--", "nan", "-nan", "nan(ind)", "na", "n/a", "#n/a", "null", "none", "1.#qnan")
@@ -220,3 +224,217 @@ def _value(text: str, comma: bool) -> float | None:
     if lower in _INFINITE:
         return float("inf")
     return float("nan") if lower in _MISSING else None
+
+
+# Groups of thousands: 1.234 for 1234 beside decimal commas, "1,234.5", 1'234.5, 1 234,5.
+#
+# A mark that is no decimal mark can only part groups. A decimal mark parts groups where the values
+# of a column say so: all that have one have three digits behind it, none without one reaches 1000,
+# and the values follow each other evenly only so.
+
+_EVEN = 0.9  # by what factor a column is more even with groups than with decimals
+
+
+def read_groups(
+    columns: tuple[Column, ...], body: Body, lines: list[str], layout: Layout
+) -> tuple[Column, ...]:
+    """Read the groups of thousands in a body, in place; return the columns with what is doubted.
+
+    Parameters
+    ----------
+    columns : of the file
+    body : as read, with decimal marks wherever they can be meant
+    lines : the whole text, line by line
+    layout : how its fields are parted
+    """
+    mark = "," if layout.comma else "."
+
+    def texts(index: int, of: Flags | None = None) -> list[str]:
+        places = body.lines if of is None else body.lines[of]
+        rows = (layout.split(lines[at - 1].strip(" \r\n")) for at in places)
+        return [row[index].strip().strip('"').strip() for row in rows]
+
+    kinds = {
+        k: _kind(values, partial(texts, k), mark)
+        for k, values in enumerate(body.values)
+        if k not in body.not_numeric and k not in body.grouped
+    }
+    for k in body.grouped:
+        if k not in body.not_numeric:
+            kinds[k] = _refused(k, body, texts(k), layout)
+    of_kind = {kind: [k for k, own in kinds.items() if own == kind] for kind in kinds.values()}
+    decimal, groups = of_kind.get("decimal", []), of_kind.get("groups", [])
+    out = list(columns)
+    if groups and not decimal:
+        groups = groups + [k for k in (*of_kind.get("open", []), *of_kind.get("whole", []))
+                           if any(mark in text for text in texts(k))]  # fmt: skip
+    elif not decimal:
+        for k in of_kind.get("open", []):
+            out[k] = replace(columns[k], doubt=_open_text(texts(k), mark))
+    for k in groups:
+        own = texts(k)
+        body.grouped[k] = next(text for text in own if mark in text)
+        if decimal:
+            body.not_numeric[k] = (
+                f'"{body.grouped[k]}" must be a group of thousands, where "{mark}" is the decimal '
+                f'mark in "{columns[decimal[0]].text}": write numbers without groups'
+            )
+        else:
+            body.values[k] = np.array([plain_number(text.replace(mark, "")) for text in own])
+    for k, text in body.grouped.items():
+        if k not in body.not_numeric:
+            bare = text.replace(mark, "") if k in groups else without_groups(text, layout.comma)
+            value = plain(plain_number(bare), 12)
+            body.notes.append(f'"{columns[k].text}" has groups of thousands: "{text}" is {value}')
+    return tuple(out)
+
+
+def _refused(k: int, body: Body, texts: list[str], layout: Layout) -> str:
+    """Return "groups" where decimal marks part them as well; refuse numbers without groups."""
+    mark = "," if layout.comma else "."
+    if any(text.count(mark) > 1 for text in texts):
+        return "groups"
+    for text, value, at in zip(texts, np.abs(body.values[k]), body.lines, strict=True):
+        if value >= 1000.0 and not is_grouped(text, layout.comma):
+            body.not_numeric[k] = (
+                f'line {at}: "{text}" has no group of thousands, and "{body.grouped[k]}" has one'
+            )
+            break
+    return ""
+
+
+def _kind(values: Array, texts: Callable[[Flags], list[str]], mark: str) -> str:
+    """Return what the marks in a column are: "decimal", "groups", or "open" where nothing tells.
+
+    "whole" where no value has decimals, so that it may have no marks at all.
+
+    Parameters
+    ----------
+    values : (n,) as read with decimals
+    texts : returns the fields of some rows (n,)
+    mark : the decimal mark
+    """
+    finite = np.isfinite(values)
+    good = np.abs(values[finite])
+    parts = good[good != np.round(good)]
+    if not parts.size:
+        return "whole"
+    if parts.min() < 1.0 or parts.max() >= 1000.0 or not _whole(1e3 * parts).all():
+        return "decimal"
+    # All others have three digits behind the mark.
+    own = _numbers(texts(finite & _whole(100.0 * np.where(finite, values, 0.0))), mark)
+    bare = [abs(int(text)) for text in own if mark not in text]
+    grouped = re.compile(rf"[+-]?[1-9]\d{{0,2}}\{mark}\d{{3}}")
+    if max(bare, default=0) >= 1000 or not all(
+        grouped.fullmatch(text) for text in own if mark in text
+    ):
+        return "decimal"
+    if not any(bare):
+        return "open"
+    own = _numbers(texts(finite), mark)
+    with_decimals = _unevenness(np.array([plain_number(text.replace(mark, ".")) for text in own]))
+    with_groups = _unevenness(np.array([plain_number(text.replace(mark, "")) for text in own]))
+    if with_groups < _EVEN * with_decimals:
+        return "groups"
+    return "decimal" if with_decimals < _EVEN * with_groups else "open"
+
+
+def _whole(values: Array) -> Flags:
+    return np.asarray(np.abs(values - np.round(values)) <= 1e-6)
+
+
+def _numbers(texts: list[str], mark: str) -> list[str]:
+    return [text for text in texts if text.lstrip("+-").replace(mark, "").isdigit()]
+
+
+def _unevenness(values: Array) -> float:
+    """Return how far a column goes from sample to sample in all, by its range."""
+    span = float(np.ptp(values))
+    return float(np.sum(np.abs(np.diff(values)))) / span if span else 0.0
+
+
+def _open_text(texts: list[str], mark: str) -> str:
+    text = next(text for text in texts if mark in text)
+    return (
+        f'"{text}" is read with decimals, and nothing in the file tells whether its "{mark}" parts '
+        "thousands: then give a unit 1000 times as large"
+    )
+
+
+# Dates and times of day, as recorders of several countries write them, as seconds.
+
+_CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
+_DATES = (
+    "%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%Y/%m/%d", "%d-%m-%Y",
+    "%m-%d-%Y",
+)  # fmt: skip
+_FORMS = (*(f"{date} {clock}" for date in _DATES for clock in _CLOCKS), *_CLOCKS)
+_DAY = 86400.0
+
+
+def seconds_of(texts: Sequence[str]) -> Array | None:
+    """Return instants as seconds since the first (n,), None where they are none.
+
+    ISO 8601, `12.03.2024 10:00:00.000` and its like, or a time of day alone, which may pass
+    midnight; seconds with a point or a comma. Of `03/12/2024` either number may be the month, which
+    matters where a date changes: what gives the shorter record counts, else the day comes first.
+    """
+    plain = [text.strip().strip('"').strip() for text in texts]
+    if not plain or not plain[0]:
+        return None
+    found = _by_iso(plain)
+    if found is None:
+        plain = [_with_point(text) for text in plain]
+        able = (one for form in _FORMS if (one := _by_form(plain, form)) is not None)
+        day, last = (text.partition(" ")[0] for text in (plain[0], plain[-1]))
+        found = (
+            next(able, None) if day == last or ":" in day else min(able, key=_span, default=None)
+        )
+    if found is None:
+        return None
+    instants, clock = found
+    try:
+        seconds = np.array([(one - instants[0]).total_seconds() for one in instants])
+    except TypeError:  # some have a time zone, some none: nothing tells how far apart they are
+        return None
+    if clock:
+        seconds += _DAY * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY)
+    return seconds
+
+
+def _span(found: tuple[list[datetime], bool]) -> timedelta:
+    """Return how long instants with a date last."""
+    return max(found[0]) - min(found[0])
+
+
+def _by_iso(texts: Sequence[str]) -> tuple[list[datetime], bool] | None:
+    try:
+        return [datetime.fromisoformat(text) for text in texts], False
+    except ValueError:
+        return None
+
+
+def _by_form(texts: Sequence[str], form: str) -> tuple[list[datetime], bool] | None:
+    try:
+        _read(texts[0], form)  # most forms fail here
+        return [_read(text, form) for text in texts], form in _CLOCKS
+    except ValueError:
+        return None
+
+
+def _read(text: str, form: str) -> datetime:
+    """Return an instant; whole seconds may be written without their fraction."""
+    try:
+        return datetime.strptime(text, form)
+    except ValueError:
+        if ".%f" not in form:
+            raise
+        return datetime.strptime(text, form.replace(".%f", ""))
+
+
+def _with_point(text: str) -> str:
+    """Return a text with at most six digits of seconds, after a point."""
+    day, colon, rest = text.rpartition(":")
+    seconds, mark, more = rest.replace(",", ".").partition(".")
+    digits = more[: len(more) - len(more.lstrip("0123456789"))]
+    return f"{day}{colon}{seconds}{mark}{digits[:6]}{more[len(digits) :]}" if colon else text

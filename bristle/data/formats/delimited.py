@@ -20,9 +20,17 @@ from ...physics.motion_file import shortened, without_end_mark
 from ...units import parse as parse_unit
 from ..table import Table
 from ..titles import Column, is_unit_row, title_rows, titles
-from ._instants import seconds_of
-from ._rows import Body, Layout, is_comment, is_grouped, read_fast, read_slow, state_of
-from ._thousands import read_groups
+from ._rows import (
+    Body,
+    Layout,
+    is_comment,
+    is_grouped,
+    read_fast,
+    read_groups,
+    read_slow,
+    seconds_of,
+    state_of,
+)
 
 ORDER = 2
 HEADER = 4

@@ -23,7 +23,7 @@ from ..noise import SHORTEST
 from ..pieces import SHEET
 from ..table import Table, one_below_the_other
 from ..titles import title_rows
-from . import delimited, library
+from . import DAMAGED, delimited, library
 
 ENTRY = "xl/workbook.xml"
 LARGEST = 512 * 1024**2
@@ -87,11 +87,7 @@ def read_sheet(content: bytes, name: str, sheet: str) -> Table:
                        f'{name}, sheet "{one.title}"')
                 for one in book.worksheets if one.sheet_state == "visible" or one.title == sheet
             ]  # fmt: skip
-    # A damaged file surfaces as any of these from the library's own parsing.
-    except (
-        zipfile.BadZipFile, ElementTree.ParseError, ValueError, KeyError, TypeError, OSError,
-        IndexError, AttributeError, MemoryError, EOFError,
-    ) as error:  # fmt: skip
+    except (zipfile.BadZipFile, ElementTree.ParseError, *DAMAGED) as error:
         raise RecordError(f"{name}: no Excel workbook, or damaged ({error}).") from None
     notes = ("the workbook holds macros, which are not run",) if macros else ()
     if sheet not in ("", "*", *(one.title for one in read)):

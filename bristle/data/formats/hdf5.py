@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import RecordError
 from ..table import Table
-from . import library
+from . import DAMAGED, library
 from ._tree import TELL_TIME, TELLS_SCALE, Bare, Leaf, Node, Unread, table_of
 
 _MARK = b"\x89HDF\r\n\x1a\n"
@@ -37,8 +37,7 @@ def read(content: bytes, name: str) -> Table:
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             tree = _group(file, h5py)
-    # A damaged file surfaces as any of these from the library's own parsing.
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, MemoryError) as error:
+    except DAMAGED as error:
         raise RecordError(f"{name}: no HDF5 file, or damaged ({error}).") from None
     return table_of(tree, name)
 

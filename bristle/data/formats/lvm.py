@@ -10,8 +10,8 @@ import numpy as np
 from ...errors import RecordError
 from ..table import Table, from_arrays
 from . import delimited
-from ._instants import seconds_of
 from ._one_time import Series, on_one_time, unset_step
+from ._rows import seconds_of
 
 _BEGINS = b"LabVIEW Measurement"
 

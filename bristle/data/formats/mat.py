@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import RecordError
 from ..table import Table
+from . import DAMAGED
 from ._tree import Leaf, Node, Unread, table_of
 
 
@@ -35,11 +36,7 @@ def read(content: bytes, name: str) -> Table:
 
     try:
         loaded = loadmat(io.BytesIO(content), squeeze_me=True, struct_as_record=False)
-    # A damaged file surfaces as any of these from the reader's own parsing.
-    except (
-        MatReadError, ValueError, LookupError, TypeError, ArithmeticError, OSError, MemoryError,
-        NotImplementedError,
-    ) as error:  # fmt: skip
+    except (MatReadError, *DAMAGED) as error:
         raise RecordError(f"{name}: no MAT file, or damaged ({error}).") from None
     tree = {key: _node(value) for key, value in loaded.items() if not key.startswith("__")}
     return table_of(tree, name)

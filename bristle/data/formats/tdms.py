@@ -20,7 +20,7 @@ from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
 from ..table import Table, from_arrays
 from ..titles import unit_or_none
-from . import library
+from . import DAMAGED, library
 from ._one_time import SAME, AnyArray, Series, by_length, on_one_time, overlap, unset_step
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
@@ -58,9 +58,7 @@ def read(content: bytes, name: str) -> Table:
     try:
         file = tdms.TdmsFile.read(io.BytesIO(content))
         groups = {group.name: _channels(group, file.properties) for group in file.groups()}
-    # A damaged file surfaces as any of these from the library's own parsing.
-    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError,
-            MemoryError, RuntimeError, ArithmeticError) as error:  # fmt: skip
+    except DAMAGED as error:
         raise RecordError(f"{name}: no TDMS file, or damaged ({error}).") from None
     groups = {key: channels for key, channels in groups.items() if channels}
     if not groups:
