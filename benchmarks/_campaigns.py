@@ -11,8 +11,7 @@ import numpy as np
 
 from bristle.data.measurement import Measurement
 from bristle.examples.hidden import seal, unseal
-from bristle.examples.make import Choice, make_bench
-from bristle.examples.perform import motion_of, programme_of
+from bristle.examples.make import Choice, make_bench, motion_of, programme_of
 from bristle.examples.rigs import Damper, Signals, perform, recorded, rig_of, scales_of, write_csv
 from bristle.planning.folder import PlannedRun
 from bristle.planning.limits import RigLimits, Test

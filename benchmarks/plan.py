@@ -30,8 +30,7 @@ from bristle.diagnosis.effect_limits import limit_of
 from bristle.diagnosis.effect_size import Sized, SizeSearch
 from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.trials import joinable
-from bristle.examples.make import Choice
-from bristle.examples.perform import perform_plan
+from bristle.examples.make import Choice, perform_plan
 from bristle.identification.fit import intervals_of
 from bristle.identification.rig import DAMPER
 from bristle.model.model import Model

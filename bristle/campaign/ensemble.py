@@ -16,6 +16,7 @@ from ..errors import EnsembleError, RunError
 from ..view import Viewable
 from .campaign import Campaign, RunOutcome
 from .ensemble_file import EnsemblePlan, read_ensemble
+from .pool import run_cluster, run_local
 from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
 
 if TYPE_CHECKING:
@@ -208,11 +209,7 @@ def run_all(
     cluster : address of a scheduler that runs them in their place
     """
     if cluster is not None:
-        from .cluster import run_cluster
-
         return run_cluster(campaign, runs, cluster)
-    from .pool import run_local
-
     campaign.prepare()
     return run_local(campaign, runs, min(workers, len(runs)))
 

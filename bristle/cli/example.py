@@ -111,7 +111,7 @@ def _make(arguments: argparse.Namespace) -> int:
 
 
 def _perform(arguments: argparse.Namespace) -> int:
-    from ..examples.perform import perform_plan
+    from ..examples.make import perform_plan
     from .study import print_added
 
     extended = perform_plan(

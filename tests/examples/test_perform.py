@@ -15,8 +15,15 @@ from bristle.data.measurement import read_measurement
 from bristle.errors import StudyError
 from bristle.examples import rigs
 from bristle.examples.hidden import seal, unseal
-from bristle.examples.make import Choice, make_bench
-from bristle.examples.perform import ground_of, motion_of, perform_plan, programme_of, seconds_of
+from bristle.examples.make import (
+    Choice,
+    ground_of,
+    make_bench,
+    motion_of,
+    perform_plan,
+    programme_of,
+    seconds_of,
+)
 from bristle.examples.rigs import Damper, in_library_names, instruments, write_csv
 from bristle.planning.folder import PlanFolder, PlannedRun, write_plan
 from bristle.study.steps import create_study

@@ -19,8 +19,7 @@ from bristle.cli import main
 from bristle.data.ground_motion import GroundMotion, read_ground_motion
 from bristle.data.measurement import Measurement
 from bristle.errors import RecordError, StudyError
-from bristle.examples.make import Choice, make_building
-from bristle.examples.perform import perform_plan
+from bristle.examples.make import Choice, make_building, perform_plan
 from bristle.planning.added_sensors import AddedSensors
 from bristle.planning.building import ONE_FORCE, BuildingPlan, limits_of_shaking
 from bristle.planning.folder import ROLES, read_plan
