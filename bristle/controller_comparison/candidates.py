@@ -214,7 +214,7 @@ class Maker:
     # -- kinds of choices
 
     def _of_stock(self, choice: Selection, name: str) -> ComparedController:
-        known = controllers()
+        known = [CONSTANT, *catalogue.controllers()]
         if choice.what not in known:
             hint = did_you_mean(choice.what, known)
             raise ScenarioError(
@@ -370,7 +370,7 @@ class Maker:
 
     def _component(self, kind: str) -> str:
         """Return the component that takes designs of a kind; one that inverts where it can."""
-        able = [name for name in controllers() if design_of(name) == kind]
+        able = [name for name in catalogue.controllers() if design_of(name) == kind]
         if not able:
             raise DesignError(f"no controller takes a design of the kind {kind}.")
         inverts = [one for one in able if "inverse" in catalogue.describe(one).variables]
@@ -395,16 +395,6 @@ class Maker:
         kept = f"{plain_name(name)}.json"
         found.save(self.folder.path / FILES / kept)
         return f"{ABOVE}/{FILES}/{kept}"
-
-
-def controllers() -> list[str]:
-    """Return the names of the stock controllers: what has their ports, and the constant voltage."""
-    found = [CONSTANT]
-    for name in catalogue.component_names():
-        kind: Any = catalogue.component_class(catalogue.source(name))
-        if hasattr(kind, "law_kind"):
-            found.append(name)
-    return found
 
 
 def design_of(component: str) -> str:

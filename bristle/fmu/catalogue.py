@@ -56,6 +56,11 @@ def component_names() -> list[str]:
     return sorted(sources())
 
 
+def controllers() -> list[str]:
+    """Return the names of the library's controllers: of what has a controller's ports."""
+    return [one for one in component_names() if hasattr(component_class(source(one)), "law_kind")]
+
+
 def source(name: str) -> Path:
     """Return the source file of a component, or the file itself where a name is that of one.
 

@@ -15,6 +15,7 @@ from ..core.files import read_json
 from ..data import list_ground_motions
 from ..engine.coupled import Coupled
 from ..errors import BristleError, DesignError, ScenarioError, StudyError
+from ..fmu import catalogue
 from ..physics.drive import VOLTAGE
 from ..physics.law import base_and_variant
 from ..study.study import Study
@@ -44,7 +45,6 @@ from .requests import RequestError
 from .simulate_views import (
     RunRequest,
     damper_of,
-    library_controllers,
     record_of,
     records,
     stock_file,
@@ -298,7 +298,7 @@ def controllers_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, An
     numbers = numbers_of(folder)
     return {
         "records": [{"name": n, "peak": peaks.get(n)} for n in records(folder.parent)],
-        "controllers": list(library_controllers()),
+        "controllers": catalogue.controllers(),
         "designs": [n for n in names_of(folder) if (folder / FOLDER / f"{n}.json").is_file()],
         "buildings": _buildings(folder),
         "most": {"motions": COMPARED_MOTIONS, "members": MEMBERS, "peak": COMPARED_PEAK},

@@ -389,10 +389,6 @@ def _building(options: Options, folder: str) -> list[str]:
     return ["--rig", "structure", "--building", f"{folder}/building/{file}"]
 
 
-def _check(study: str, options: Options) -> list[str]:
-    return ["study", "check", study, *_flags(options, "mask", "correct")]
-
-
 def _roles(study: str, options: Options) -> list[str]:
     words = ["study", "roles", study]
     for role in ("train", "holdout", "test", "exclude"):
@@ -404,34 +400,12 @@ def _roles(study: str, options: Options) -> list[str]:
     return words
 
 
-def _identify(study: str, options: Options) -> list[str]:
-    law, form = _word(options, "law"), _word(options, "command")
-    return ["identify", study, *_option("law", law), *_option("command", form)]
-
-
-def _diagnose(study: str, options: Options) -> list[str]:
-    law = _word(options, "law")
-    return ["diagnose", study, *_option("law", law), *_flags(options, "limits")]
-
-
 def _add(study: str, options: Options) -> list[str]:
     effects = _words(options, "effects")
     if not effects:
         raise RequestError("effects: name one or more.")
     why = _text(options, "why")
     return ["add", study, *effects, *([f"--why={why}"] if why else [])]
-
-
-def _plan(study: str, options: Options) -> list[str]:
-    words = ["plan", study]
-    for name in ("stroke", "speed", "acceleration", "force", "heat", "duration"):
-        if text := _text(options, name, 30):
-            words.append(f"--{name}={text}")
-    return words
-
-
-def _auto(study: str, options: Options) -> list[str]:
-    return ["study", "auto", study, *_flags(options, "learn")]
 
 
 def _design(study: str, options: Options) -> list[str]:
@@ -467,30 +441,40 @@ def _export_ssp(study: str, options: Options) -> list[str]:
     return ["export-ssp", f"{study}/export/{file}", f"--out={study}/export/{stem}{dot}ssp"]
 
 
-def _simple(*before: str) -> Callable[[str, Options], list[str]]:
-    """Return the function of a command that takes the study alone."""
-    return lambda study, options: [*before, study]
+def _plain(
+    *before: str, words: Sequence[str] = (), texts: Sequence[str] = (), flags: Sequence[str] = ()
+) -> Callable[[str, Options], list[str]]:
+    """Return the function of a command that takes the study, and options by their own names."""
+
+    def found(study: str, options: Options) -> list[str]:
+        named = [word for key in words for word in _option(key, _word(options, key))]
+        given = [f"--{key}={text}" for key in texts if (text := _text(options, key, 30))]
+        return [*before, study, *named, *given, *_flags(options, *flags)]
+
+    return found
 
 
+PLANNED = ("stroke", "speed", "acceleration", "force", "heat", "duration")
+"""Options of `bristle plan` that the page may set."""
 COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "add": _add,
-    "auto": _auto,
+    "auto": _plain("study", "auto", flags=("learn",)),
     "channels": _channels,
-    "check": _check,
+    "check": _plain("study", "check", flags=("mask", "correct")),
     "controllers": _controllers,
     "design": _design,
-    "diagnose": _diagnose,
+    "diagnose": _plain("diagnose", words=("law",), flags=("limits",)),
     "example": _example,
-    "export": _simple("export"),
+    "export": _plain("export"),
     "export_ssp": _export_ssp,
-    "identify": _identify,
-    "learn": _simple("learn"),
+    "identify": _plain("identify", words=("law", "command")),
+    "learn": _plain("learn"),
     "new": _new,
     "passive": _passive,
-    "plan": _plan,
-    "report": _simple("report"),
-    "reveal": _simple("example", "reveal"),
+    "plan": _plain("plan", texts=PLANNED),
+    "report": _plain("report"),
+    "reveal": _plain("example", "reveal"),
     "roles": _roles,
-    "undo": _simple("undo"),
+    "undo": _plain("undo"),
 }
 """What the page may ask for."""

@@ -23,7 +23,6 @@ from ..export.web import Shown, described, offered
 from ..export.web_module import PageNumbers, module
 from ..fmu import catalogue
 from ..fmu.catalogue import component_of_law
-from ..fmu.controller import ControllerSlave
 from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
@@ -82,7 +81,7 @@ def controls(name: str) -> dict[str, Control]:
     if place is None:
         return {}
     found: dict[str, Control] = {}
-    for control in (CONSTANT, *library_controllers()):
+    for control in (CONSTANT, *catalogue.controllers()):
         for candidate in sorted(_candidates(own, name, control), key=lambda one: len(one[1])):
             try:
                 load_scenario(stock_file(candidate[0]), candidate[1])
@@ -149,16 +148,6 @@ def _made(component: Component) -> tuple[Any, ...]:
 @cache
 def _stock(name: str) -> System:
     return load_scenario(stock_file(name))
-
-
-@cache
-def library_controllers() -> tuple[str, ...]:
-    """Return the names of the library's controllers."""
-    return tuple(
-        name
-        for name in catalogue.component_names()
-        if issubclass(catalogue.component_class(catalogue.source(name)), ControllerSlave)
-    )
 
 
 # A run that the page asks for: a stock scenario with another damper, control or ground motion.
