@@ -326,7 +326,7 @@ def measurements_of(
         notes += [f"guessed: {guess}" for guess in guesses]
         channels = specs(table, guesses)
         known = replace(known, extra=found_in(table, [g.column for g in guesses], channels))
-    time = _time(table, channels.get("time"))
+    time = time_of(table, channels.get("time"))
     units, values = {}, {}
     for channel, spec in channels.items():
         if channel == "time":
@@ -417,7 +417,8 @@ def stem_of(source: str) -> str:
     return name.removesuffix(".gz").rpartition(".")[0] or name
 
 
-def _time(table: Table, spec: ChannelSpec | None) -> Array:
+def time_of(table: Table, spec: ChannelSpec | None) -> Array:
+    """Return the time (n,) s of a table's rows; RecordError if nothing says it."""
     if spec is not None and spec.step is not None:
         if not spec.step > 0.0:
             raise RecordError(f"{table.source}: time: step = {spec.step!r} s must be positive.")

@@ -17,6 +17,7 @@ from ..data.channels import DRIVE, MOTION, PLAIN, ChannelSpec, channel_unit, is_
 from ..data.decimate import between
 from ..data.guess import guess_channels, specs
 from ..data.left_out import MISSING, SETTLING
+from ..data.measurement import in_si, time_of
 from ..data.noise import estimate_noise
 from ..data.read import read_table
 from ..data.sampling import evenly
@@ -166,17 +167,20 @@ def signals_of(
     guesses = guess_channels(table, rig)
     notes = [f"guessed: {one}" for one in guesses if one.channel not in channels and one.doubt]
     chosen = {**specs(table, guesses), **channels}
-    time, columns = _time(table, chosen.pop("time", None)), {}
+    if (clock := chosen.pop("time", None)) is None:
+        raise RecordError(
+            f"{table.source}: no column is the time. --channel time=COLUMN@s names one."
+        )
+    if clock.step is None:
+        clock = replace(clock, unit=clock.unit or table.find(clock.column).stated or "s")
+    time, columns = time_of(table, clock), {}
     for name, spec in chosen.items():
         column = table.find(spec.column)
-        unit = spec.unit or (column.unit.name if column.unit else "")
-        if not unit or column.text in table.not_numeric:
+        if not (spec.unit or column.stated) or column.text in table.not_numeric:
             if name in channels:
                 raise RecordError(f'{table.source}: "{column.text}" has no numbers or no unit.')
             continue
-        factor, offset = conversion(unit, channel_unit(name))
-        si = spec.sign * (factor * table.values[column.text] + offset)
-        columns[name] = si, channel_unit(name)
+        columns[name] = in_si(table, name, spec), channel_unit(name)
     taken = {table.find(spec.column).text for spec in chosen.values()}
     for column in table.columns:
         if column.text in taken or column.text in table.not_numeric or column.name in columns:
@@ -203,19 +207,6 @@ def signals_of(
         for k, (_, piece, measured) in enumerate(even.pieces, 1)
     ]  # fmt: skip
     return found, notes + even.notes
-
-
-def _time(table: Table, spec: ChannelSpec | None) -> Array:
-    """Return the time of a table [s]."""
-    if spec is not None and spec.step is not None:
-        return np.arange(table.rows, dtype=float) * spec.step
-    if spec is None:
-        raise RecordError(
-            f"{table.source}: no column is the time. --channel time=COLUMN@s names one."
-        )
-    column = table.find(spec.column)
-    factor, _ = conversion(spec.unit or (column.unit.name if column.unit else "s"), "s")
-    return np.asarray(factor * table.values[column.text], dtype=float)
 
 
 def _signals(
