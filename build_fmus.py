@@ -1,18 +1,17 @@
 """Fills fmus/ with the built-in components as FMUs."""
 
-import argparse
 import sys
 from pathlib import Path
 
-from bristle.cli._options import add_native, builder
+from bristle.cli._options import Parser, builder
 from bristle.errors import BristleError
 from bristle.fmu.build import plan
 from bristle.fmu.catalogue import component_names
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser(description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="components; else all of them")
-    add_native(parser)
+    parser.add_native()
     parser.add_argument("--list", action="store_true", help="list the components, build nothing")
     given = parser.parse_args()
     try:

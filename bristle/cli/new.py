@@ -101,4 +101,4 @@ def _written(file: Path, name: str, text: str, error: Callable[[str], Exception]
 
     if not name.isidentifier() or not name.isascii() or name != name.lower() or name[0] == "_":
         raise error(f'"{name}": expected a name of small letters, digits and _.')
-    return write_new(file, text, error)
+    return write_new(file, text, error, folder=True)

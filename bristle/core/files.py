@@ -69,16 +69,20 @@ def write_whole(path: Path, content: str | bytes) -> None:
             draft.unlink(missing_ok=True)
 
 
-def write_new(path: Path, text: str, raises: Callable[[str], Exception]) -> Path:
+def write_new(
+    path: Path, text: str, raises: Callable[[str], Exception], folder: bool = False
+) -> Path:
     """Write a file that is not there yet; return its path.
 
     Parameters
     ----------
     path, text : of the file
     raises : makes the error from its text, where it is there already or cannot be written
+    folder : True makes its folder as well
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        if folder:
+            path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("x", encoding="utf-8") as stream:
             stream.write(text)
     except FileExistsError:
