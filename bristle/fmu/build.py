@@ -134,6 +134,7 @@ def plan(
     drive: str = VOLTAGE.name,
     step: float | None = None,
     offers: Iterable[str] | None = None,
+    about: str = "",
 ) -> BuildPlan:
     """Return what to build.
 
@@ -162,6 +163,8 @@ def plan(
     offers : iterable of str, optional
         Names of the effects that it offers besides those of `effects`; None: all of its site. A
         component without effects takes none.
+    about : str
+        What is known of how far a damper's model reaches, behind its description.
 
     Raises
     ------
@@ -200,6 +203,8 @@ def plan(
         baked["drive"] = drive
     if step is not None:
         baked["step"] = step
+    if about:
+        baked["about"] = about
     if starts or offers is not None:
         known = catalogue.describe(component, building, effects=effects, drive=drive).variables
         if offers is not None:

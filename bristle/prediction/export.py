@@ -12,9 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.arrays import Array
 from ..core.files import writing
+from ..core.text import percent, plain
+from ..data.channels import channel_unit, label_name, label_text
 from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.measurement import Measurement
+from ..data.run_labels import labels_of
 from ..errors import RecordError, StudyError
 from ..fmu.build import BuildPlan, build, plan
 from ..fmu.catalogue import component_of_law
@@ -24,6 +28,7 @@ from ..model.model import Model
 from ..physics.building import GROUND
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
+from ..study.history import history_steps
 from ..study.rig import building_of, rig_of
 from ..study.runs import Runs
 from ..study.study import Study
@@ -225,7 +230,40 @@ def _damper(
         offers=own.effects,
         drive=drive_named(runs.all[0].drive).name,
         step=step,
+        about=_reach(study, model, runs),
     )
+
+
+_APART = 8
+"""Samples between which a displacement's difference counts as its speed: over fewer it is noise."""
+
+
+def _reach(study: Study, model: Model, runs: Runs) -> str:
+    """Return what the model was fitted to, over which range, and how far off it is elsewhere."""
+    train = [_with_stroke(study, model, run) for run in runs.train]
+    seen: dict[str, list[Array]] = {}
+    for run in train:
+        for channel in ("displacement", run.drive):
+            if channel and run.has(channel):
+                seen.setdefault(channel, []).append(run[channel])
+        if run.has("velocity"):
+            seen.setdefault("velocity", []).append(run["velocity"])
+        elif run.has("displacement"):
+            x = run["displacement"]
+            moved = (x[_APART:] - x[:-_APART]) / (_APART * run.step)
+            seen.setdefault("velocity", []).append(moved)
+    ranges = []
+    for channel, values in seen.items():
+        low, high = (plain(float(end(np.concatenate(values))), 4) for end in (np.nanmin, np.nanmax))
+        ranges.append(f"{channel} {low} to {high} {channel_unit(channel)}")
+    for label in labels_of([run.labels for run in train]):
+        texts = [label_text(label.name, one) for one in label.levels]
+        told = f"{texts[0]} to {texts[-1]}" if label.is_number else ", ".join(texts)
+        ranges.append(f"{label_name(label.name)} {told}")
+    share = history_steps(study.steps())[-1].share
+    off = "" if share is None else f" Error on {len(runs.holdout)} held-out: {percent(share)} RMS."
+    counted = f"{len(train)} run{'s' * (len(train) > 1)}"
+    return f"Fitted to {counted} (data {study.data[:14]}): {'; '.join(ranges)}.{off}"
 
 
 def _with_stroke(study: Study, model: Model, measurement: Measurement) -> Measurement:

@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -150,6 +151,16 @@ def test_ports_are_those_of_the_stock_damper_and_defaults_are_baked(
     assert main(["export", str(bench.folder), "--out", str(tmp_path / "there"), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     described = read_description(Path(told["fmu"]), any_platform=True)
+    with zipfile.ZipFile(told["fmu"]) as archive:
+        page = archive.read("documentation/index.html").decode()
+    for reach in (
+        "Fitted to 1 run (data ",
+        "displacement -0.0097",
+        "voltage 1 to 5 V",
+        "velocity -",
+    ):
+        assert reach in described.description
+        assert reach in page
     from bristle.fmu import catalogue
 
     stock = catalogue.describe("LuGreDamper")
