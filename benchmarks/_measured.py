@@ -346,8 +346,8 @@ def shake_table(folder: Path, law: str) -> Row:
         strict=True,
     )  # fmt: skip
     told = [
-        f"{f:.3g} +- {1.96 * s:.1g} Hz"
-        + (f" ({r:.1%} +- {1.96 * spread:.1%})" if np.isfinite(spread) else "")
+        f"{f:.3g} ± {1.96 * s:.1g} Hz"
+        + (f" ({r:.1%} ± {1.96 * spread:.1%})" if np.isfinite(spread) else "")
         for f, s, r, spread in modes
     ]
     again = identify_structure(held, given)

@@ -298,7 +298,7 @@ def run() -> list[Row]:
     for law, times, version in JOBS:
         one = done[json.dumps([law, times, version])]
         what = "its equations as an own law" if law == OWN else f"the library's {law}"
-        told = ", ".join(f"{n} {plain(v, 3)} +- {plain(one['std'].get(n, 0.0), 2)}"
+        told = ", ".join(f"{n} {plain(v, 3)} ± {plain(one['std'].get(n, 0.0), 2)}"
                          for n, v in one["values"].items() if n in one["std"])  # fmt: skip
         rows.append(
             Row(

@@ -50,23 +50,20 @@ def main(arguments: argparse.Namespace) -> int:
     scenario = load_scenario(file, overrides)
     target = arguments.out or Path(f"{run_name(file, overrides)}.ssp")
     exported = export_ssp(scenario, target, arguments.osp, builder(arguments))
+    if not arguments.json:  # at once: the error below takes a while
+        print("\n".join([*map(str, exported.files), *exported.notes]), flush=True)
     expected: tuple[Expected, ...] = ()
     if not arguments.no_coupling_error:
         from ..core.progress import tell
         from ..engine.cosimulation import Cosimulation, ignore
         from ..engine.coupling_error import again_by, expect
 
-        tell("estimating the coupling error in other tools")
+        tell("estimating the coupling error in other tools (--no-coupling-error leaves it out)")
         expected = expect(scenario, again_by(Cosimulation(listen=ignore, progress=True)))
     if arguments.json:
         _print_json(exported, expected)
-    else:
-        for written in exported.files:
-            print(written)
-        for note in exported.notes:
-            print(note)
-        if expected:
-            print(f"Coupling error to expect at {1e3 * scenario.step:g} ms:")
+    elif expected:
+        print(f"Coupling error to expect at {1e3 * scenario.step:g} ms:")
         for one in expected:
             print(f"  {one}")
     return 0

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..campaign.distributions import Distribution, share
+from ..core.text import percent
 from ..core.toml_write import toml_table
 from ..errors import ScenarioError
 from ..fmu.controller import SAMPLE_PERIOD
@@ -77,9 +78,9 @@ class Spread:
         if self.share and what:
             *before, last = what
             listed = " and ".join([", ".join(before), last] if before else [last])
-            parts.append(f"{listed} within {self.share:.0%}")
+            parts.append(f"{listed} within {percent(self.share, 0)}")
         if self.noise:
-            parts.append(f"sensor noise of {self.noise:.0%} of each signal")
+            parts.append(f"sensor noise of {percent(self.noise, 0)} of each signal")
         if self.delay:
             parts.append(f"sensor delays up to {1e3 * self.delay:g} ms")
         return ", ".join(parts).replace("%", " %")

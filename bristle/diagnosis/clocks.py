@@ -263,7 +263,7 @@ def _faults(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[Findin
             Finding(
                 "clock", "warning",
                 f"The clock of the force's logger runs {plain(1e6 * abs(clocks.rate), 2)} ppm "
-                f"(+-{plain(1.96e6 * clocks.rate_std, 1)}) {way} relative to that of the motion: "
+                f"(± {plain(1.96e6 * clocks.rate_std, 1)}) {way} relative to that of the motion: "
                 f"{plain(1e3 * abs(clocks.rate) * length, 2)} ms in {plain(length, 3)} s. Record "
                 "both on one logger, or set it right in study.toml: correct = "
                 f'[{{channel = "force", fault = "clock", value = {clocks.rate:.3g}}}].',

@@ -182,7 +182,7 @@ def _fault(limit: _Limit, train: Problem, held_out: Problem) -> Finding:
     samples = f"{plain(100.0 * float(np.mean(np.concatenate(apart))), 2)} % of the samples"
     where = f"{sum(bool(one.any()) for one in apart)} of {len(runs)} runs"
     unit = DRIVES[drive].unit + ("/s" if limit.fault == "slew" else "")
-    size = f"{quantity(limit.value, unit)} (+-{plain(1.96 * limit.std, 2)})"
+    size = f"{quantity(limit.value, unit)} (± {plain(1.96 * limit.std, 2)})"
     late = plain(1e3 * max(float(gap.max()) for gap in gaps) / limit.value, 2)
     name = drive.capitalize()
     words = {

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.finding import Finding
-from ..core.text import plain
+from ..core.text import percent, plain
 from ..data.corrections import LIMITS, TIMING, Correction, set_right
 from ..data.cut_off import beyond_range, ends_of
 from ..data.decimate import in_time
@@ -336,7 +336,7 @@ def _saturated(
     if count <= rule.cut * total:
         return []
     return [
-        f"The force is saturated in {count:,} of {total:,} samples ({count / total:.0%}) "
-        f"{_where(runs, cut[0].runs)}; {rule.cut:.0%} is the most. Measure with a wider range, or "
-        "leave these runs out."
+        f"The force is saturated in {count:,} of {total:,} samples ({percent(count / total, 0)}) "
+        f"{_where(runs, cut[0].runs)}; {percent(rule.cut, 0)} is the most. Measure "
+        "with a wider range, or leave these runs out."
     ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.text import plain
+from ..core.text import percent, plain
 from ..data.cycles import largest
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
@@ -252,7 +252,7 @@ class _DrawnRun:
         ratios = [name for name in self.reals() if name.endswith(".stroke_ratio")]
         if len(ratios) != 1:
             return ""
-        return f", {np.nanmax(self.frame[ratios[0]].to_numpy()):.0%} of the damper's stroke"
+        return f", {percent(np.nanmax(self.frame[ratios[0]].to_numpy()), 0)} of the damper's stroke"
 
     def others(self) -> list[Draw]:
         """Return what is drawn of the components that no other panel shows, by their units."""

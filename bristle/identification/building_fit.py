@@ -351,7 +351,7 @@ def _with_intervals(key: str, unit: str, values: Sequence[float] | Array, std: A
     rows = [
         f"  {float(value)!r}, "
         + (
-            f"# +- {1.96 * s:.2g} {unit}"
+            f"# ± {1.96 * s:.2g} {unit}"
             if np.isfinite(s)
             else "# as given: the data do not identify it"
         )

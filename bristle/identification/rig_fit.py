@@ -366,11 +366,11 @@ def _line_text(found: Fit, site: Site) -> str:
     texts = []
     if "k" in found.std:
         k, error = plain(found.model.value("k"), 5), plain(1.96 * found.std["k"], 2)
-        texts.append(f"k = {k} +- {error} N/m")
+        texts.append(f"k = {k} ± {error} N/m")
     if DAMPING in found.std and not at_bound(found.model):
         whole = plain(already + found.model.value(DAMPING), 4)
         error = plain(1.96 * found.std[DAMPING], 2)
-        texts.append(f"c = {whole} +- {error} N s/m, {plain(already, 4)} of the file")
+        texts.append(f"c = {whole} ± {error} N s/m, {plain(already, 4)} of the file")
     text = ", ".join(texts) + " (fitted too, not in model.toml)."
     if at_bound(found.model):
         text += (

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..comparison.comparison import compare_predictions
 from ..comparison.predictions import RunPrediction, coordinates_of, rms
 from ..comparison.result import Comparison
+from ..core.text import percent
 from ..data.channels import DRIVE, MOTION, PLAIN, ChannelSpec, channel_unit, is_channel
 from ..data.decimate import between
 from ..data.guess import guess_channels, specs
@@ -409,7 +410,7 @@ def _one(
     if noise < floor:
         noise = floor
         notes.append(
-            f"{signal} has almost no noise: errors are in units of {SILENT:.1%} of its RMS"
+            f"{signal} has almost no noise: errors are in units of {percent(SILENT)} of its RMS"
         )
     spread = draws - middle
     bias = spread.mean(axis=0)

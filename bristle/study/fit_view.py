@@ -220,7 +220,7 @@ def law_errors(found: Identified) -> Table:
         if variant.lacks and own[name] and base.name in own:
             gain = 1.0 - own[base.name] / own[name]
             way = "lowers" if gain >= 0.0 else "raises"
-            notes.append(f"{base.name}: {variant.lacks} {way} the error by {abs(gain):.1%}.")
+            notes.append(f"{base.name}: {variant.lacks} {way} the error by {percent(abs(gain))}.")
     header = ("law", "training", "held out", "of force", low, "starts")
     return Table(header, rows, range(1, 6), "Laws", note=" ".join(notes))
 
@@ -295,14 +295,14 @@ def _better(found: Identified, folder: Path) -> list[Block]:
         best = min(found.forms, key=lambda row: row.judged)
         if best.judged < BETTER * own.judged:
             gain = 1.0 - best.judged / own.judged
-            out.append(Text(f"{best.form} errs {gain:.0%} less than {own.form}."))
+            out.append(Text(f"{best.form} errs {percent(gain, 0)} less than {own.form}."))
             out.append(Next(command("identify", folder, "--command", best.form), "takes it"))
     errors, mine = {row.law: row.error.headline[0] for row in found.table}, found.model.law
     law = min(errors, key=lambda one: errors[one], default=mine)
     if mine not in errors or errors[law] >= BETTER * errors[mine]:
         return out
     gain = 1.0 - errors[law] / errors[mine]
-    told = f"The law {law} errs {gain:.0%} less than {shown_law(mine)}"
+    told = f"The law {law} errs {percent(gain, 0)} less than {shown_law(mine)}"
     has, holds = (set(base_and_variant(one)[0].contains) for one in (mine, law))
     if more := sorted(holds - has):  # it may stand for an effect: the diagnosis comes first
         return [
@@ -399,7 +399,8 @@ def building_view(found: IdentifiedBuilding) -> View:
 
 
 def _equilibrium(errors: Mapping[str, float], role: str) -> str:
-    return f"{errors[f'share_equilibrium_{role}']:.1%} (z = {errors[f'z_equilibrium_{role}']:.3g})"
+    share, z = (errors[f"{what}_equilibrium_{role}"] for what in ("share", "z"))
+    return f"{percent(share)} (z = {z:.3g})"
 
 
 def _interval(value: float, std: float) -> str:

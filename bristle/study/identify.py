@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.progress import tell
-from ..core.text import plain, unknown
+from ..core.text import percent, plain, unknown
 from ..data.cut_off import saturated_share
 from ..data.measurement import Measurement
 from ..diagnosis.by_label import extrapolated
@@ -63,13 +63,15 @@ def doubts(runs: list[Measurement]) -> list[str]:
         share = saturated_share(run["force"])
         if share > _SATURATED:
             raise StudyError(
-                f"{run.name}: {share:.0%} of the force's samples are at its extremes: the load "
-                "cell or its amplifier is saturated, or this is a friction without noise that "
+                f"{run.name}: {percent(share, 0)} of the force's samples are at its extremes: the "
+                "load cell or its amplifier is saturated, or this is a friction without noise that "
                 "nothing changes, and no law is told by it. Measure with a wider range or with "
                 "other motions, or leave the run out in study.toml."
             )
         if share > 0.0:
-            notes.append(f"{run.name}: {share:.1%} of the force's samples are at its extremes.")
+            notes.append(
+                f"{run.name}: {percent(share)} of the force's samples are at its extremes."
+            )
     doubtful: dict[str, int] = {}
     for run in runs:
         for channel, fact in run.noise_facts.items():

@@ -81,7 +81,7 @@ def test_a_damper_adds_its_loops_and_the_share_of_its_stroke() -> None:
     wires = '"damper.displacement" = "house.base_displacement"'
     frame = a_run(columns, UNITS, wires)
     assert titles(frame)[2:] == ["Damper force [N] over displacement"]
-    assert any(note.endswith("19% of the damper's stroke") for note in notes(frame))
+    assert any(note.endswith("19 % of the damper's stroke") for note in notes(frame))
 
 
 def test_a_voltage_is_drawn_only_if_it_varies() -> None:

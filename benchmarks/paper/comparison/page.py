@@ -21,19 +21,32 @@ if TYPE_CHECKING:
     from .make import Report
 
 CAPTIONS = {
-    "fig5-stiction": "The structure shaken by a sine, damper at constant voltage.",
-    "fig9-passive-optimum": "El Centro at four intensities, damper at constant voltage.",
-    "fig13-anti-windup": "The strong Northridge case, LPV with three anti-windup rates.",
-    "fig14-northridge-strong": "Ground motion, voltages and responses: clipped, H-infinity.",
-    "fig15-northridge-strong-lpv": "The same motion: 0 V, LPV with its voltage and parameter.",
-    "fig16-northridge-weak": "The weak Northridge case: clipped, LPV with its parameter.",
-    "fig17-el-centro": "El Centro at 0.6 g: clipped, LPV with its parameter.",
-    "summary": "All cases of Tables IV and V at a glance.",
-    "accelerations-el-centro": "Acceleration of floor 2 over time, weak and strong.",
-    "drift-el-centro": "Displacement of the base relative to the table.",
-    "accelerations-northridge": "Acceleration of floor 2 over time, weak and strong.",
-    "voltages": "Voltage and hysteresis loops of the three controllers.",
+    "fig5-stiction": "Base acceleration, ground shaken by a sine of 1.5 m/s² and 1.5 Hz: Bingham "
+    "beside LuGre, constant voltages.",
+    "fig9-passive-optimum": "Peak acceleration of floor 2 over constant voltage: El Centro, "
+    "nominal 0.2, 0.4, 0.6 and 0.8 g.",
+    "fig13-anti-windup": "{strong}: LPV with anti-windup rates of 0, 200 and 400 1/s; command, "
+    "voltage and acceleration of floor 2.",
+    "fig14-northridge-strong": "{strong}: clipped beside H-infinity; ground motion, voltage, "
+    "acceleration of floor 2 and base drift.",
+    "fig15-northridge-strong-lpv": "{strong}: 0 V beside LPV; acceleration of floor 2, base "
+    "drift, voltage and parameter of LPV.",
+    "fig16-northridge-weak": "{weak}: clipped beside LPV; voltage, acceleration of floor 2, base "
+    "drift, parameter of LPV.",
+    "fig17-el-centro": "El Centro, nominal 0.6 g: clipped beside LPV; voltage, acceleration of "
+    "floor 2, base drift, parameter of LPV.",
+    "summary": "Peak and RMS acceleration of floor 2 in all cases of Tables IV and V, per cent of "
+    "those at 0 V: 4 V beside the three controllers.",
+    "accelerations-el-centro": "Acceleration of floor 2 under El Centro at two intensities: 4 V "
+    "beside the three controllers.",
+    "drift-el-centro": "Base drift under El Centro at two intensities: 4 V beside the three "
+    "controllers.",
+    "accelerations-northridge": "Acceleration of floor 2 under {motion} at two intensities: 4 V "
+    "beside the three controllers.",
+    "voltages": "El Centro, nominal 0.6 g: voltage over time and force over velocity of the three "
+    "controllers.",
 }
+"""Motion, scale and what is compared of each figure; all motions are at 0.45 of the nominal."""
 DOTS = 160
 """Dots per inch of the images."""
 
@@ -146,10 +159,14 @@ def _text(text: str, sentence: bool = True) -> str:
 
 
 def _figures(report: Report) -> str:
+    motion = report.comparison.strong[0]
+    listed = next(m for m in report.comparison.motions if m.name == motion).intensities
+    strong, weak = (f"{motion}, nominal {g:g} g" for g in (max(listed), min(listed)))
+    said = {n: c.format(motion=motion, strong=strong, weak=weak) for n, c in CAPTIONS.items()}
     figures = [
         html.figure(
-            Path(report.folder, f"{name}.png").read_bytes(), number or CAPTIONS[name],
-            f"{number}. {CAPTIONS[name]}" if number else CAPTIONS[name],
+            Path(report.folder, f"{name}.png").read_bytes(), number or said[name],
+            f"{number}. {said[name]}" if number else said[name],
         )
         for name, number in sorted(report.figures.items(), key=lambda item: item[0] != "summary")
     ]  # fmt: skip
@@ -157,7 +174,8 @@ def _figures(report: Report) -> str:
         "Figures",
         html.paragraphs(
             "Figure numbers are the paper's. Its text says what each figure shows; the arrangement "
-            "is this project's. Figures without a number are this project's own."
+            "is this project's. Figures without a number are this project's own. Every ground "
+            "motion is at 0.45 of its nominal peak, a factor that is reconstructed."
         ),
         *figures,
         name="figures",

@@ -135,7 +135,7 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
         )
         return
     gain = (
-        f"{upper} is {plain(found.gain, 4)} (+-{plain(2 * found.gain_std, 1)}) times the "
+        f"{upper} is {plain(found.gain, 4)} (± {plain(2 * found.gain_std, 1)}) times the "
         f"derivative of {lower}"
     )
     after = f"; the remainder is {plain(100 * found.residual, 2)} % of it"
@@ -155,7 +155,7 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
         late = "later" if found.delay > 0.0 else "earlier"
         text = (
             f"{upper} comes {plain(1e3 * abs(found.delay))} ms "
-            f"(+-{plain(2e3 * found.delay_std, 1)}) {late} "
+            f"(± {plain(2e3 * found.delay_std, 1)}) {late} "
             f"than {lower}."
         )
         do = "Filters of two instruments differ: use the same on both, or one of the channels."

@@ -95,7 +95,7 @@ def test_a_force_saturated_in_more_than_half_is_told_and_carries_no_verdict(
     assert main(["diagnose", str(rig)]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "The force is saturated in" in told
-    assert " samples); 20% is the most" in told
+    assert " samples); 20 % is the most" in told
     assert "Measure with a wider range, or leave these runs out." in told
     assert (rig / "model.toml").read_bytes() == model
 
