@@ -412,9 +412,12 @@ def _check(arguments: argparse.Namespace) -> int:
     picture = study.write_report("data_check.png", png(found.page(), 110))
     answer = {**found.as_dict(), "picture": str(picture.absolute())}
     answer |= {"not_corrected": apart} if apart else {}
-    then = Next(command("identify", study.folder), "fits the model")
+    then = (
+        Next(command("identify", study.folder), "fits the model"),
+        Next(command("study", "auto", study.folder), "takes all steps from here on"),
+    )
     view = found.view()
-    view = view._replace(blocks=(*view.blocks, *([then] if found.ok else [])))
+    view = view._replace(blocks=(*view.blocks, *(then if found.ok else ())))
     print_answer(arguments, answer, view)
     if not arguments.json:
         print(f"Picture: {picture}")

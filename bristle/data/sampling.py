@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.arrays import Array, Flags, Indices
+from ..core.text import plain
 from ..errors import RecordError
 from ..physics.motion_file import GAP
 from .noise import SHORTEST, is_switched, stretches
@@ -325,15 +326,33 @@ def _in_order(
             for values in channels.values()
         )
         if not same:
+            step = plain((time[-1] - time[0]) / (len(time) - 1), 3)
+            do = (
+                "If times were written with too few digits, --step S, the sampling step in s (here "
+                f"about {step}), takes their place."
+                if all(_one_signal(values, double) for values in channels.values())
+                else "Channels jump to and fro there: two runs may lie in one file."
+            )
             raise RecordError(
                 f"{name}, {place} {lines[k + 1]}: the time {time[k]:.9g} s appears twice with "
-                f"different values ({len(double)} such times in all). If times were written with "
-                "too few digits, --step S, the sampling step in s, takes their place."
+                f"different values ({len(double)} such times in all). {do}"
             )
     keep = np.ones(len(time), dtype=bool)
     keep[double + 1] = False
     notes.append(f"{len(double)} samples that repeat the one before are left out")
     return time[keep], {key: values[keep] for key, values in channels.items()}, lines[keep]
+
+
+def _one_signal(values: Array, double: Indices) -> bool:
+    """Return whether a channel moves on through the samples whose times are there twice.
+
+    Without the second of two such samples a channel moves as far, or half as far where all of it
+    is noise; two channels that are written by turns move much less.
+    """
+    own = values[np.isfinite(values)]
+    once = np.delete(values, double + 1)
+    once = once[np.isfinite(once)]
+    return bool(np.abs(np.diff(own)).sum() <= 2.5 * np.abs(np.diff(once)).sum())
 
 
 def goes_on(values: Array, places: Indices) -> bool:

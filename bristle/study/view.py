@@ -202,16 +202,16 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
         return view
     own = [effect_text(name, _sizes(model, name), DRIVES[model.drive]) for name in added]
     told = [Text(text, "say") for text in own]
-    title = f"Found and added: {effect_names(added)}."
     if verdict.get("kind") != "none":
-        title, told = view.title, [Text(title, "say"), *told]
+        told.insert(0, Text(view.title, "say"))
     # The errors of earlier versions are low-passed: they and the others show no fall together.
     alike = [one for one in judged if one.cut_off == judged[-1].cut_off]
     fall = Text(_fall(alike[0], alike[-1], study.settings.cut_off))
     # What a missing effect would gain stands in the verdict's sentence alone.
     said = Text(error_text(verdict)) if verdict.get("kind") != "effect" else None
     rest = [one for one in view.blocks if one != said]
-    return view._replace(title=title, blocks=(*told, fall, *rest))
+    title = f"Found and added: {effect_names(added)}."
+    return view._replace(title=title, blocks=(fall, *told, *rest))
 
 
 def learned_with_next(found: LearnedEffect, folder: Path) -> View:
@@ -376,9 +376,7 @@ def _then(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
         return [
             *([every] if other_law else []),
             Next(command("learn", folder), "learns what is missing"),
-            *_gaining(verdict, folder),
-            Next(command("compare", folder), "shows where the error is"),
-            Next("bristle new effect NAME", "starts your own effect"),
+            _gaining(verdict, folder),
         ]
     if kind == "insufficient":
         right = f"after {folder / 'study.toml'} is set right where the text says so, or new runs"
@@ -400,11 +398,11 @@ def not_excited(verdict: Mapping[str, Any]) -> list[str]:
     return sorted({row["effect"] for row in hidden if row["why"] != NO_AMOUNT})
 
 
-def _gaining(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
-    """Return the commands that add what gains most where nothing explains the error, if any."""
+def _gaining(verdict: Mapping[str, Any], folder: Path) -> Next:
+    """Return the command that adds what gains, where an effect does; else one to look."""
     gains = verdict.get("gains") or []
     if not gains:
-        return []
+        return Next(command("compare", folder), "shows where the error is")
     best = max(gains, key=lambda row: row["gain"])
     why = f"error {100.0 * best['gain']:.0f} % lower"
-    return [Next(command("add", folder, *best["effects"]), why)]
+    return Next(command("add", folder, *best["effects"]), why)
