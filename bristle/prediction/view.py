@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from ..comparison.names import effect_name, name_of
 from ..core.text import capital, command, percent, plain, scale
 from ..view.blocks import Next, Table, Text, View, view_of
@@ -30,31 +28,27 @@ def closed_loop_view(found: ClosedLoop) -> View:
     """Return the view of a closed-loop prediction: how wrong it is, its peaks, then its RMS."""
     title, *rest = found.sentences()
     runs = list(dict.fromkeys(row.run for row in found.rows))
-    peaks, rms = (_table(found, kind, runs) for kind in KINDS)
+    peaks, rms = ([_table(found, kind, run) for run in runs] for kind in KINDS)
     # A command that ends a note is copied to a shell: no full stop is part of it.
     notes = [
         Text(f"{capital(note, runs)}{'' if note.endswith('.') or ':  bristle ' in note else '.'}",
              "note")
         for note in found.notes
     ]  # fmt: skip
-    return View(title, (*map(Text, rest), peaks, *notes), (rms,))
+    return View(title, (*map(Text, rest), *peaks, *notes), tuple(rms))
 
 
-def _table(found: ClosedLoop, kind: str, runs: Sequence[str]) -> Table:
-    """Return the table of peaks, or of RMS values, of all runs."""
-    rows = [row for row in found.rows if row.kind == kind]
+def _table(found: ClosedLoop, kind: str, run: str) -> Table:
+    """Return the table of the peaks, or of the RMS values, of a run."""
+    rows = [row for row in found.rows if (row.kind, row.run) == (kind, run)]
     measured = any(row.measured is not None for row in rows)
     parts = any(row.parts for row in rows)
-    header = ["run", *(["response", "measured"] if measured else ["response"]), "predicted"]
+    header = [*(["response", "measured"] if measured else ["response"]), "predicted"]
     header += ["95 % band", *(["widened by"] if parts else []), *(["error"] if measured else [])]
-    if found.step:
-        header += ["before", *(["error before"] if measured else [])]
-    cells = [[row.run, *_cells(row, measured, bool(found.step), parts)] for row in rows]
-    one = len(runs) == 1
-    title = f"{KINDS[kind]} of {runs[0]}" if one else KINDS[kind]
-    header, cells = (header[1:], [row[1:] for row in cells]) if one else (header, cells)
-    words = {"run", "response", "widened by"}
-    return Table(header, cells, [k for k, name in enumerate(header) if name not in words], title)
+    header += ["error before" if measured else "before"] if found.step else []
+    cells = [_cells(row, measured, bool(found.step), parts) for row in rows]
+    numbers = [k for k, name in enumerate(header) if name not in ("response", "widened by")]
+    return Table(header, cells, numbers, f"{KINDS[kind]} of {run}")
 
 
 def _cells(row: Predicted, measured: bool, with_before: bool, parts: bool) -> list[str]:
@@ -69,7 +63,7 @@ def _cells(row: Predicted, measured: bool, with_before: bool, parts: bool) -> li
     cells += [text(row.predicted), band, *([_widening(row)] if parts else [])]
     cells += [_signed(row.error)] if measured else []
     if with_before:
-        cells += [text(row.before), *([_signed(row.error_before)] if measured else [])]
+        cells.append(_signed(row.error_before) if measured else text(row.before))
     return cells
 
 

@@ -257,7 +257,8 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
         learned.append(Text(_unproven(study, done.unproven)))
     learned += map(Text, done.closure.sentences() if done.closure else ())
     learned += [Text(f"No closure: {done.no_closure}")] if done.no_closure else []
-    return view._replace(blocks=(*learned, *view.blocks, table))
+    first, *rest = view.blocks  # the error
+    return view._replace(blocks=(first, *learned, *rest, table))
 
 
 def _unproven(study: Study, step: Step) -> str:

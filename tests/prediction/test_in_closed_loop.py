@@ -95,7 +95,7 @@ def test_the_model_before_the_last_step_stands_beside_it(found: ClosedLoop) -> N
     assert one.measured is not None
     assert one.measured > one.before_band[1]
     header = next(found.view().every(Table)).header
-    assert header[-2:] == ["before", "error before"]
+    assert header[-2:] == ["error", "error before"]
 
 
 def test_the_band_is_that_of_the_drag(made: Path, found: ClosedLoop) -> None:
