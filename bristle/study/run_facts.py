@@ -53,7 +53,9 @@ SPELLED = {
 """Units as names spell them."""
 
 _LETTERS = "xXdD'~=;"  # of these, which hardly part numbers
-_SURE = r"(?:[.,]|[pP][tT]?|point|dot)"  # "1p5" stands for 1.5 where a point would end a name
+_POINTS = ".,\u00b7\u2219\u22c5"  # and raised points: 0·5A
+_SURE = rf"(?:[{_POINTS}]|[pP][tT]?|point|dot)"  # "1p5", where a point would end a name
+_NO_DECIMALS = rf"(?<![\d.])(?<!\d[{_POINTS}])"  # of 0,5_1Hz, "5_1" is no number
 _OF_LABELS = {"pressure": "psi|PSI|mbar|bar|hPa|kPa|MPa|Pa", "load": "kN|lbf", "torque": "Nm"}
 """Units that tell a label by themselves, which is then called by both: pressure_psi."""
 _UNITS_IN_NAMES = "|".join(
@@ -121,7 +123,7 @@ def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
     twice = set()
     number = number_in(reading.marks)
     wanted = re.compile(
-        rf"(?<![\d.]){_NO_POWER}({SIGN}{number}){_APART}({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
+        rf"{_NO_DECIMALS}{_NO_POWER}({SIGN}{number}){_APART}({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
     )
     stem = file.stem
     found = [(match.start(), match[1], match[2], match[0]) for match in wanted.finditer(stem)]

@@ -48,12 +48,21 @@ CAMPAIGN = {
 }
 
 
-@pytest.mark.parametrize("mark", ["_", "-", "x", "X", "d", "p", "P", "pt", ",", ".", "point", " "])
+@pytest.mark.parametrize(
+    "mark", ["_", "-", "x", "X", "d", "p", "P", "pt", ",", ".", "·", "point", " "]
+)
 def test_a_decimal_mark_is_settled_by_the_measured_frequency(tmp_path, mark) -> None:
     names = {f"run_{told(name, mark)}": value for name, value in CAMPAIGN.items()}
     data = made(tmp_path / "lab", names)
     assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
     assert runs(tmp_path / "rig") == names
+
+
+def test_decimals_of_a_number_without_a_unit_begin_no_other(tmp_path) -> None:
+    names = {"i0,5_1Hz": (1.0, 0.5), "i1,0_1Hz": (1.0, 1.0), "i1,5_2Hz": (2.0, 1.5)}
+    data = made(tmp_path / "lab", names)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert runs(tmp_path / "rig") == {name: (f, None) for name, (f, _) in names.items()}
 
 
 @pytest.mark.parametrize("mark", ["x", "_"])
