@@ -369,6 +369,7 @@ _DATES = (
     "%m-%d-%Y",
 )  # fmt: skip
 _FORMS = (*(f"{date} {clock}" for date in _DATES for clock in _CLOCKS), *_CLOCKS)
+_COLON = re.compile(r"(\d\d?:\d\d:\d\d):(?=\d{3,6}\b)")  # 10:00:00:250, before its milliseconds
 _DAY = 86400.0
 
 
@@ -376,10 +377,11 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
     """Return instants as seconds since the first (n,), None where they are none.
 
     ISO 8601, `12.03.2024 10:00:00.000` and its like, or a time of day alone, which may pass
-    midnight; seconds with a point or a comma. Of `03/12/2024` either number may be the month, which
-    matters where a date changes: what gives the shorter record counts, else the day comes first.
+    midnight; seconds with a point, a comma or a colon. Of `03/12/2024` either number may be the
+    month, which matters where a date changes: what gives the shorter record counts, else the day
+    comes first.
     """
-    plain = [text.strip().strip('"').strip() for text in texts]
+    plain = [_COLON.sub(r"\1.", text.strip().strip('"').strip()) for text in texts]
     if not plain or not plain[0]:
         return None
     found = _by_iso(plain)

@@ -63,6 +63,10 @@ LAYOUTS = {
     + rows(",", BASE, clock(), P, P, P),
     "DAQExpress": "Timestamp,Disp [mm],Coil [V],Load [N]\n"
     + rows(",", BASE, clock("%m/%d/%Y %I:%M:%S.%f %p", 0), P, P, P),
+    "milliseconds behind a colon": "Time,Disp [mm],Coil [V],Load [N]\n"
+    + rows(",", BASE, clock("%H:%M:%S:%f"), P, P, P),
+    "date, milliseconds behind a colon": "Time;Disp [mm];Coil [V];Load [N]\n"
+    + rows(";", BASE, clock("%d.%m.%Y %H:%M:%S:%f"), C, C, C),
     "catman": "HBM_CATMAN_DATAFILE_40\nBegin\nT0 = 12.03.2024 10:00:00\n"
     "Time  1 - default sample rate [s]\tWeg [mm]\tSpule [V]\tKraft [kN]\n0\t1\t2\t3\n"
     + rows("\t", (T, X, U, F / 1e3), C, C, C, comma(8)),
