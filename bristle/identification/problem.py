@@ -627,11 +627,14 @@ def sizes(runs: list[Run]) -> dict[str, float]:
     """Return the typical size of a quantity on a rig by unit, from what was measured."""
     force = _spread([r.force for r in runs])
     x = _spread([r.x - r.x.mean() for r in runs])
+    # Powers of a displacement count from the zero of its sensor, which may be many strokes away.
+    far = max(x, *(abs(float(r.x.mean())) for r in runs))
     v = _spread([r.v for r in runs])
     a = _spread([r.a for r in runs])
     V = max(max(float(r.V.max()) for r in runs), 1e-9)
     return {
-        "N": force, "N/m": force / x, "N/m2": force / x**2, "N/m3": force / x**3, "m": x, "m/s": v,
+        "N": force, "N/m": force / x, "N/m2": force / far**2, "N/m3": force / far**3, "m": x,
+        "m/s": v,
         "N.s/m": force / v, "N.s2/m2": force / v**2, "kg": force / a, "J": force * x, "V": V,
         "N/V": force / V, "N/(m.V)": force / (x * V), "N.s/(m.V)": force / (v * V),
         "N/V2": force / V**2, "N/(m.V2)": force / (x * V**2), "N.s/(m.V2)": force / (v * V**2),

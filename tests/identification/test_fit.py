@@ -12,7 +12,7 @@ from bristle.data.measurement import measurements_of_frame
 from bristle.errors import RecordError
 from bristle.identification.fit import fit, fit_from_starts
 from bristle.identification.prepare import prepare
-from bristle.identification.problem import Problem
+from bristle.identification.problem import Problem, Run
 from bristle.identification.smoothing import smooth, smooth_steps
 from bristle.model.model import Model
 from bristle.physics.laws import LAWS, laws_of
@@ -32,6 +32,20 @@ def test_the_truth_comes_back_within_its_intervals(law):
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx(list(found.std.values()))
     assert np.linalg.eigvalsh(found.covariance)[0] >= 0.0
     assert found.unidentified == ()
+
+
+def test_the_zero_of_the_displacement_may_be_many_strokes_away():
+    truth = {"q": 2.4, "rho": 18e3, "sigma": 0.5, "c": 1.4, "k": 0.0, "k_3": 0.0, "f_0": 0.1}
+    t, noise = 0.005 * np.arange(2500), 0.03
+    x = -0.11 + 1.1e-4 * np.sin(2.2 * t)
+    v, a, none = 2.42e-4 * np.cos(2.2 * t), -5.32e-4 * np.sin(2.2 * t), np.zeros(len(t))
+    run = Run("run", 0.005, x, v, a, none, none, noise, np.zeros((12, len(t), 4)))
+    force = Problem([run]).predict(Model("isolator", (), truth), run)
+    force += noise * np.random.default_rng(1).standard_normal(len(t))
+    problem = Problem([replace(run, force=force)])
+    found = fit_from_starts(problem, Model("isolator"))
+    left = force - problem.predict(found.model, run)
+    assert np.std(left) == pytest.approx(noise, rel=0.05)
 
 
 @pytest.mark.parametrize("law", [law.name for law in laws_of("damper")])
