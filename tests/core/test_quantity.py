@@ -64,7 +64,13 @@ def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 
 @pytest.mark.parametrize(
-    "line", ["study check", "compare", "identify --starts 1 --no-table", "report"]
+    "line",
+    [
+        "study check",
+        "compare",
+        "identify --starts 1 --no-table",
+        pytest.param("report", marks=pytest.mark.slow),
+    ],
 )
 def test_no_command_prints_a_power_of_ten(
     line: str, rig: Path, capsys: pytest.CaptureFixture[str]

@@ -283,7 +283,11 @@ def test_the_command_line_prints_the_error(
 
 @pytest.mark.parametrize(
     ("algorithm", "low", "high"),
-    [("gauss-seidel", 1.7, 2.3), ("jacobi", 1.7, 2.3), ("midpoint", 3.3, 4.7)],
+    [
+        ("gauss-seidel", 1.7, 2.3),
+        ("midpoint", 3.3, 4.7),
+        pytest.param("jacobi", 1.7, 2.3, marks=pytest.mark.slow),
+    ],
 )
 def test_the_energy_that_the_coupling_makes_is_in_every_results_file(
     tmp_path: Path, algorithm: str, low: float, high: float

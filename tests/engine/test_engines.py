@@ -114,7 +114,10 @@ def apart(file: Path, step: float) -> pd.Series[float]:
     return difference**0.5
 
 
-@pytest.mark.parametrize("name", BUILDINGS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow) if n == "twenty floors" else n for n in BUILDINGS],
+)
 def test_any_building_runs_and_fmus_come_nearer_with_the_step(name: str, tmp_path: Path) -> None:
     (tmp_path / "building.toml").write_text(f"schema = 1\n{BUILDINGS[name]}", encoding="utf-8")
     level, floors = ("floor1", 3) if name == "fixed" else ("base", 20)

@@ -83,7 +83,9 @@ def test_what_is_held_stays_and_so_does_what_has_no_newer_value(scenario_of: Mak
     assert np.diff(integrated(scenario_of, LINEAR, "jacobi")) == pytest.approx(H * T[:-1])
 
 
-@pytest.mark.parametrize("text", [FREE, SENSORS], ids=["structure", "sensors"])
+@pytest.mark.parametrize(
+    "text", [FREE, pytest.param(SENSORS, marks=pytest.mark.slow)], ids=["structure", "sensors"]
+)
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", "midpoint"])
 def test_substeps_of_our_components_are_as_good_as_one_step(
     text: str, algorithm: str, tmp_path: Path

@@ -653,7 +653,15 @@ def alone(component: str, python: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("version", ["3.9", "3.13"])
-@pytest.mark.parametrize("component", ONE_OF_EACH)
+@pytest.mark.parametrize(
+    "component",
+    [
+        pytest.param(one, marks=())
+        if one in ("Structure", "LuGreDamper", "Sensors", "Skyhook")
+        else pytest.param(one, marks=pytest.mark.slow)
+        for one in ONE_OF_EACH
+    ],
+)
 def test_an_fmu_runs_on_other_pythons(component: str, version: str) -> None:
     python = other_python(version)
     if python is None:

@@ -28,7 +28,7 @@ OF_FMI3 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String"
 
 @pytest.mark.parametrize(("name", "kind", "value"), CASES)
 def test_both_forms_answer_and_warn(name: str, kind: str, value: Any) -> None:
-    pair = both("LuGreDamper", gas_spring__on=True)
+    pair = both("BinghamDamper", gas_spring__on=True)
     pair.set("voltage", -2.75)
     pair.begin()
     pair.said()
@@ -44,7 +44,7 @@ def test_both_forms_answer_and_warn(name: str, kind: str, value: Any) -> None:
 
 @pytest.mark.parametrize(("name", "kind", "value"), CASES)
 def test_so_does_an_fmu_of_fmi_3(name: str, kind: str, value: Any) -> None:
-    one = Three("LuGreDamper")
+    one = Three("BinghamDamper")
     one.set("gas_spring.on", True)
     one.set("voltage", -2.75)
     index = one.about.variables[name].reference
@@ -54,7 +54,7 @@ def test_so_does_an_fmu_of_fmi_3(name: str, kind: str, value: Any) -> None:
 
 
 def test_a_number_that_fits_no_integer_is_none() -> None:
-    pair = both("LuGreDamper")
+    pair = both("BinghamDamper")
     pair.set("voltage", 1e12)
     index = pair.slave._index["voltage"]
     pair.said()

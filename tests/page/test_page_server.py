@@ -169,9 +169,11 @@ def test_files_are_dropped_looked_at_and_made_a_study(client: Client, home: Path
     ("name", "content", "words"),
     [
         ("words.csv", b"a,b\nx,y\n", "words.csv"),
-        ("cut.parquet", b"PAR1nothing", "cut.parquet"),
         ("book.xlsx", b"PK\x03\x04nothing", "book.xlsx"),
-        ("packed.csv.gz", b"\x1f\x8b\x08broken", "packed.csv.gz"),
+        pytest.param("cut.parquet", b"PAR1nothing", "cut.parquet", marks=pytest.mark.slow),
+        pytest.param(
+            "packed.csv.gz", b"\x1f\x8b\x08broken", "packed.csv.gz", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_a_bad_file_gives_one_sentence(

@@ -35,6 +35,7 @@ LIBRARY = {
     "sensor": ("delay", "velocity_sensor"),
 }  # fmt: skip
 ALL = [EFFECTS[name] for name in sorted(EFFECTS)]
+USUAL = {"bingham", "lugre", "shock_absorber", "isolator"}
 
 
 def _usual(effect: type[Effect]) -> set[str]:
@@ -339,7 +340,13 @@ def spelled(effects: list[type[Effect]]) -> str:
     return ", ".join(f'"{name}" = {value}' for name, value in given.items())
 
 
-@pytest.mark.parametrize(("damper", "law"), [(component_of_law(law), law) for law in LAWS])
+@pytest.mark.parametrize(
+    ("damper", "law"),
+    [
+        pytest.param(component_of_law(law), law, marks=() if law in USUAL else pytest.mark.slow)
+        for law in LAWS
+    ],
+)
 def test_a_scenario_can_switch_every_effect_on(damper: str, law: str, tmp_path: Path) -> None:
     joined = [effect for effect in effects_of("damper", law) if effect.name != "backlash"]
     file = tmp_path / "all.toml"

@@ -152,6 +152,7 @@ def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch
     assert (study.folder / "verdict.json").read_text() == before
 
 
+@pytest.mark.slow
 def test_frames_are_diagnosed_without_a_study():
     case = make_case(1, "gas_spring", strength=0.15, duration=4.0)
     frames = {

@@ -186,7 +186,7 @@ def test_killed_process_leaves_a_readable_study(study: Study) -> None:
         "print('in', flush=True)\n"
         "while True:\n    s.add_step('step', 'x' * 20000, s.model())\n    s.undo()\n"
     )
-    for k in range(3):
+    for k in range(2):
         process = subprocess.Popen(
             [sys.executable, "-c", code, str(study.folder)], stdout=subprocess.PIPE
         )
