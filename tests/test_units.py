@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 from math import isclose, pi
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -177,17 +175,3 @@ def test_one_unit_to_itself_changes_nothing() -> None:
     assert units.convert(0.1, "g", "g") == 0.1
     assert units.convert(3.0, "mm", "m") == 0.003
     assert units.convert(0.02, "m", "mm") == 20.0
-
-
-def test_source_is_of_python_3_9_and_the_standard_library() -> None:
-    tree = ast.parse(Path(units.__file__).read_text("utf-8"), feature_version=(3, 9))
-    imported = {
-        node.module if isinstance(node, ast.ImportFrom) else alias.name
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom | ast.Import)
-        for alias in node.names
-    }
-    assert imported == {
-        *("__future__", "collections.abc", "re", "difflib", "functools", "math", "typing"),
-        "errors",
-    }

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 import bristle.component
+import bristle.physics.motion_file
+import bristle.units
 from bristle.component import control_laws
 from bristle.core.jit import compiled
 from bristle.physics.laws import law_code
@@ -250,7 +252,12 @@ def test_python_and_numba_agree() -> None:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(Path(bristle.component.__file__).parent.glob("*.py")), ids=lambda path: path.stem
+    "path",
+    [
+        *sorted(Path(bristle.component.__file__).parent.glob("*.py")),
+        *(Path(str(module.__file__)) for module in (bristle.units, bristle.physics.motion_file)),
+    ],
+    ids=lambda path: path.stem,
 )
 def test_bundled_code_is_python_3_9_and_standard_library(path: Path) -> None:
     tree = ast.parse(path.read_text(), feature_version=(3, 9))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 from collections.abc import Callable
 from itertools import pairwise
@@ -174,14 +173,3 @@ def test_gap_is_measured_against_the_median() -> None:
     times = [0.0, 1.0, 2.0, 3.6, 5.2, 6.8]  # median 1.6
     assert max(after - before for before, after in pairwise(times)) < 1.5 * 1.6
     motion_file.check_times(times, range(2, 8), "file")
-
-
-def test_source_is_of_python_3_9_and_the_standard_library() -> None:
-    tree = ast.parse(Path(motion_file.__file__).read_text("utf-8"), feature_version=(3, 9))
-    imported = {
-        node.module if isinstance(node, ast.ImportFrom) else alias.name
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom | ast.Import)
-        for alias in node.names
-    }
-    assert imported == {"__future__", "os", "stat", "collections.abc", "math", "errors"}
