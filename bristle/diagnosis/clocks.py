@@ -38,6 +38,9 @@ LOOKED, TAKEN = 3, 0.3
 """Turns after which the clocks must have taken that share of the excess: `_explain` asks for more
 than twice as much in the end."""
 
+UNFITTED = 0.2
+"""Share of `rule.clocks_promise` that clocks must take before the law is refitted to them."""
+
 SETTLED = 0.03
 """Share of a sampling step by which no run may move any more."""
 
@@ -87,12 +90,14 @@ def clock_faults(
     count = len(train.runs)
     for turn in range(TURNS):
         moved = [_set_right(run, clocks, k) for k, run in enumerate(runs)]
+        if turn == 0 and _hopeless(moved[:count], model, train, before, rule, UNFITTED):
+            return None
         model = refine(model, train.of(moved[:count]), 4)
         left = clocks_of(model, train.of(moved))
         if left is None:
             return None
         clocks = clocks.plus(left)
-        if turn == 0 and _hopeless(moved[:count], model, train, before, rule):
+        if turn == 0 and _hopeless(moved[:count], model, train, before, rule, 1.0):
             return None
         if _largest(left, runs) < SETTLED:
             break
@@ -110,9 +115,14 @@ def clock_faults(
 
 
 def _hopeless(
-    moved: list[Run], model: Model, train: Problem, before: Trial, rule: DecisionRule
+    moved: list[Run],
+    model: Model,
+    train: Problem,
+    before: Trial,
+    rule: DecisionRule,
+    share: float,
 ) -> bool:
-    """Return whether a first correction takes too little of a large excess to go on.
+    """Return whether a first correction takes less than a share of what is asked of a large excess.
 
     A small excess says nothing: one run apart hardly shows in it.
     """
@@ -121,7 +131,7 @@ def _hopeless(
     problem = train.of(moved)
     z = robust_z(problem, model)
     excess = before.train**2 - 1.0
-    return excess - max(z**2 - 1.0, 0.0) < rule.clocks_promise * excess
+    return excess - max(z**2 - 1.0, 0.0) < share * rule.clocks_promise * excess
 
 
 def _largest(clocks: Clocks, runs: list[Run]) -> float:

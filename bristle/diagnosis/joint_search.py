@@ -165,7 +165,7 @@ def _sought(
     return _Sought(chosen, tuple(pairs), ranked, by_law, equal)
 
 
-MOST_SPENT = 400e6
+MOST_SPENT = 250e6
 """Steps of dampers' forces, those of the laws alone not counted, from which on no further law is
 searched for its effects, and none for two: half a minute to a minute."""
 
