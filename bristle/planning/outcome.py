@@ -28,7 +28,7 @@ UNKNOWN = 10.0
 EXCITED = 1e-3
 """Standard deviations that an effect of its asked size changes where anything of it moves."""
 
-HEADER = ("question", "figure", "now", "with these tests")
+HEADER = ("question", "figure", "for a verdict", "now", "with these tests")
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class Outcome:
     parameter or coordinate; `what` the quantity is, in `unit`; `now` from the runs at hand, `then`
     with the tests too;
     infinite where no run shows it. `settled` whether a verdict will be able to tell; `beyond`
-    whether no test that was looked at would; `excited` whether the tests change anything of it.
+    whether no test that was looked at would; `excited` whether the tests change anything of it;
+    `needs` what a verdict needs of the quantity, "" where none is on it.
     """
 
     purpose: str
@@ -51,12 +52,14 @@ class Outcome:
     settled: bool = True
     beyond: bool = False
     excited: bool = True
+    needs: str = ""
 
     def cells(self) -> list[str]:
         """Return the row of a table."""
         site, colon, name = self.name.rpartition(": ")
-        named = f"{site}{colon}{effect_name(name)}"
-        return [named, self.what, self.shown(self.now), self.shown(self.then)]
+        named = effect_name(name).removesuffix(f" of the {site}")
+        shown = self.shown(self.now), self.shown(self.then)
+        return [f"{site}{colon}{named}", self.what, self.needs, *shown]
 
     def shown(self, value: float) -> str:
         """Return one of its numbers with the unit."""
@@ -74,6 +77,7 @@ class Outcome:
         """Return what json can hold: None where a number is not finite."""
         return {
             "purpose": self.purpose, "name": self.name, "what": self.what, "unit": self.unit,
+            "needs": self.needs,
             "now": self.now if isfinite(self.now) else None,
             "then": self.then if isfinite(self.then) else None, "settled": self.settled,
             "beyond": self.beyond,
@@ -106,8 +110,8 @@ def _separated(now: Sequence[Information], then: Sequence[Information]) -> list[
     after = {one.name: needed / one.value if one.value else inf for one in separated(then)}
     return [
         Outcome(
-            "separate", name, f"distance; a verdict needs {needed:g}", "std", before[name],
-            after[name], after[name] >= needed,
+            "separate", name, "distance", "std", before[name], after[name],
+            after[name] >= needed, needs=f"{needed:g} std",
         )
         for name in after
     ]  # fmt: skip
@@ -132,14 +136,14 @@ def _seen(purposes: Purposes, now: Information, then: Information) -> list[Outco
         ]
         # Where the model misfit_note, the runs allow sizes that they would name beside a true one.
         found = max(_named(one, before[name], after[name]), one.least, sizes[1])
-        text = f"{sized.parameter}, limit at 95 %"
+        needs = ""
         if visible[1] and not sized.ended(found):
             side = "above" if not sized.falls else "below"
-            text += f"; named {side} {quantity(sized.value(found), unit, 2, fine=True)}"
+            needs = f"{side} {quantity(sized.value(found), unit, 2, fine=True)}"
         out.append(
             Outcome(
-                "see", name, text, unit, limits[0], limits[1], visible[1],
-                excited=raw[name] > EXCITED,
+                "see", name, f"{sized.parameter} at 95 %", unit, limits[0], limits[1], visible[1],
+                excited=raw[name] > EXCITED, needs=needs,
             )
         )  # fmt: skip
     return out

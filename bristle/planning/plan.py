@@ -207,7 +207,7 @@ class Plan(Viewable):
             "## What they will show",
             "",
             f"| {' | '.join(HEADER)} |",
-            "|---|---|---|---|",
+            f"|{'---|' * len(HEADER)}",
         ]
         return lines + [f"| {' | '.join(one.cells())} |" for one in self.outcomes]
 

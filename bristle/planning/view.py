@@ -12,7 +12,7 @@ def plan_view(plan: Plan) -> View:
     """Return the view of a plan."""
     runs = plan.runs() if plan.worth else []
     rows = [[run.name, run.purpose, run.about] for run in runs]
-    told = Table(HEADER, [one.cells() for one in plan.outcomes], (2, 3))
+    told = Table(HEADER, [one.cells() for one in plan.outcomes], (3, 4))
     return View(
         f"{len(runs) or 'No'} tests planned for {plan.study or 'a new rig'}.",
         (*map(Text, plan.sentences()), *((told,) if plan.outcomes else ())),

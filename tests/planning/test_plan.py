@@ -308,7 +308,7 @@ def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Stu
     for row, one in zip(rows, purposes.effects, strict=True):
         assert one.limit is not None
         assert one.limit.named == pytest.approx(told[row.name].named, rel=1e-6)
-        assert quantity(told[row.name].named, one.sized.unit, 2, fine=True) in row.what
+        assert quantity(told[row.name].named, one.sized.unit, 2, fine=True) in row.needs
     stribeck = purposes.effects[1]
     assert stribeck.limit is not None
     assert stribeck.limit.named is not None
@@ -316,7 +316,7 @@ def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Stu
     erring = replace(stribeck, limit=replace(stribeck.limit, largest=allowed))
     others = replace(purposes, effects=(purposes.effects[0], erring, purposes.effects[2]))
     row = outcomes(others, found.asked, found.known, found.known)[1]
-    assert f"named above {quantity(allowed, '1', 2, fine=True)}" in row.what
+    assert row.needs == f"above {quantity(allowed, '1', 2, fine=True)}"
 
 
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
