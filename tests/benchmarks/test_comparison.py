@@ -166,6 +166,7 @@ def test_a_folder_that_is_a_file_is_refused(
     assert "is a file" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_design_that_fails_is_said_with_its_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

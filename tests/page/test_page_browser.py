@@ -75,6 +75,7 @@ def test_the_residual_is_drawn_without_and_with_what_was_found(tmp_path: Path) -
         assert not seen.errors
 
 
+@pytest.mark.slow
 def test_a_fit_is_shown_while_it_is_at_work_and_after_it_was_cancelled(
     browsed: Watched, monkeypatch: pytest.MonkeyPatch
 ) -> None:

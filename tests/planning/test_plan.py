@@ -338,6 +338,7 @@ def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
         found.write(tmp_path / "plan")
 
 
+@pytest.mark.slow
 def test_tests_after_those_that_are_measured_have_the_next_numbers(
     rig: bristle.Study, tmp_path: Path
 ) -> None:
@@ -398,6 +399,7 @@ def test_a_folder_that_is_there_is_refused_before_the_search(
     assert "is there already" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -> None:
     found = bristle.plan(sheet, learn=["displacement"])
     (row,) = found.outcomes

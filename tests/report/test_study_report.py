@@ -150,6 +150,7 @@ def test_the_sentences_are_those_of_the_comparison(page, folder):
         assert sentence.replace("'", "&#x27;").replace(">", "&gt;") in text
 
 
+@pytest.mark.slow
 def test_the_same_study_gives_the_same_bytes(page, folder):
     assert study_report(Study(folder)) == page
 

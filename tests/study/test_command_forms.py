@@ -87,6 +87,7 @@ def test_the_rigs_form_is_found_with_intervals_that_hold(
     assert min(table) >= 0.0
 
 
+@pytest.mark.slow
 def test_the_form_is_stored_and_everything_follows_it(
     study: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -163,6 +163,7 @@ def test_openings_are_counted_and_told(study: Study, capsys: pytest.CaptureFixtu
     assert len(uses_of_test_set(study)) == 3
 
 
+@pytest.mark.slow
 def test_the_report_opens_them_unless_they_are_to_stay_closed(
     study: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -91,6 +91,7 @@ def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFi
     assert "nan to nan" not in page
 
 
+@pytest.mark.slow
 def test_no_effect_that_lowers_the_error_is_no_proof_that_none_is_missing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
