@@ -37,7 +37,7 @@ from bristle.study.identify import FitTask
 from bristle.study.inputs import runs_of
 from bristle.study.runs import Runs
 from bristle.study.unproven import unproven
-from bristle.user_code.load import defined
+from bristle.user_code.load import define, defined
 
 from ._floor import errors_of, share_of
 
@@ -145,6 +145,8 @@ def _with_unproven(
     if opened.before.z <= opened.rule.clean:
         return opened
     found = unproven(opened, trials, laws if not opened.before.effects else (), MOST_EFFECTS)
+    for name, text in found.written.items():
+        define(name, text)  # for this job's process
     model = _identified(found.model, opened.problem)
     return replace(opened, before=judge(model, opened.problem, opened.held_out))
 

@@ -9,12 +9,10 @@ from typing import Any
 from ..core.interrupt import keeps
 from ..core.progress import tell
 from ..diagnosis import Diagnosis
-from ..diagnosis.by_label import promising
 from ..errors import StudyError
 from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
 from ..physics.effect import closures
-from ..user_code.load import defined
 from .changes import other_data
 from .forms import law_or_all
 from .history import Step
@@ -135,15 +133,12 @@ def _gained(
     """Add what improves the prediction and is not proven; return the step, None where nothing."""
     say("effects that improve the prediction")
     before, opened = study.model(), opened_at(study, "")[1]
-    texts = promising(opened.searched, opened.before.model)
-    trials = () if texts else found.trials
     laws = found.laws.rows if found.laws is not None and not before.effects else ()
-    with defined(texts):
-        best = unproven(opened, trials, laws, MOST_EFFECTS)
-        names = tuple(one for one in best.model.effects if one not in before.effects)
+    best = unproven(opened, found.trials, laws, MOST_EFFECTS)
+    names = tuple(one for one in best.model.effects if one not in before.effects)
     if not names and not best.law:
         return None
-    write_effects(study, {name: texts[name] for name in names if name in texts})
+    write_effects(study, best.written)
     say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
     step = add_unproven(study, best.law, names, best.model.values, found)
     stepped(step)
@@ -159,7 +154,7 @@ def _closed(
     if network.file is not None:
         say(f"adding {network.name}")
         why = f"verdict: {found.kind}"
-        stepped(add_effects(study, (network.name,), why=why, found=found).step)
+        stepped(add_effects(study, (network.name,), why=why).step)  # beside the present values
         study.write_verdict(verdict_of(study, found))  # on the model without it
     return network
 

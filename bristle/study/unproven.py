@@ -7,12 +7,13 @@ what lowers the error on the training runs left out of the fit; the held-out run
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..core.arrays import Array
+from ..diagnosis.by_label import promising
 from ..diagnosis.law_trials import LawTrial
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import LONG, SECONDS, Trial, missed_by, try_all
@@ -22,6 +23,7 @@ from ..identification.start_grid import refine
 from ..learning.closure import errors_of, lowers
 from ..model.model import Model
 from ..physics.effect import EFFECTS
+from ..user_code.load import defined
 
 FOLDS = 3
 """Parts of the training runs that are left out in turn: whole runs, of a single one stretches."""
@@ -39,10 +41,14 @@ standard errors over them: the rule of one, as in cross-validation, for nothing 
 
 @dataclass(frozen=True)
 class Unproven:
-    """A model that predicts better: `law` the name of another law that it has, "" for the same."""
+    """A model that predicts better: `law` the name of another law that it has, "" for the same.
+
+    `written` are the texts of its effects that change a parameter by a label, by name.
+    """
 
     model: Model
     law: str = ""
+    written: Mapping[str, str] = field(default_factory=dict)
 
 
 def unproven(
@@ -83,14 +89,16 @@ def unproven(
     taken = gaining([refine(row.trial.model, problem, LONG) for row in others])
     if taken is not None:
         law = others[taken].law
-    while len(best.effects) < most:
-        able = [one for one in trials if _joins(one, best)]
-        if not able:
-            able = try_all(best, problem, data.held_out, shown=data.shown, most=SECONDS)
-        able.sort(key=lambda one: one.train)
-        if gaining([one.model for one in able[:TRIED]]) is None:
-            break
-    return Unproven(best, law)
+    texts = promising(problem, best)
+    with defined(texts):
+        while len(best.effects) < most:
+            able = [] if texts else [one for one in trials if _joins(one, best)]
+            if not able:
+                able = try_all(best, problem, data.held_out, shown=data.shown, most=SECONDS)
+            able.sort(key=lambda one: one.train)
+            if gaining([one.model for one in able[:TRIED]]) is None:
+                break
+    return Unproven(best, law, {name: texts[name] for name in best.effects if name in texts})
 
 
 def _joins(trial: Trial, model: Model) -> bool:

@@ -79,23 +79,22 @@ def told(monkeypatch, answers):
 def test_an_unknown_error_is_lowered_by_what_is_not_proven(folder, monkeypatch):
     found = verdict("unknown", 6.0, ("stribeck", 4.0))
     told(monkeypatch, [found])
-    opened = SimpleNamespace(searched=None, before=trial(6.0))
     asked, added = [], []
 
     def chosen(*given):
         asked.append(given)
-        return SimpleNamespace(model=Model("bingham", ("stribeck", "drift")), law="")
+        return SimpleNamespace(model=Model("bingham", ("stribeck", "drift")), law="", written={})
 
     def add(_study, law, names, values, of):
         added.append((law, names, of))
         return "add stribeck, drift (not proven)"
 
-    monkeypatch.setattr(auto, "opened_at", lambda _study, _at: ("damper", opened))
-    monkeypatch.setattr(auto, "promising", lambda _problem, _model: {})
+    monkeypatch.setattr(auto, "opened_at", lambda _study, _at: ("damper", "opened"))
+    monkeypatch.setattr(auto, "write_effects", lambda _study, _texts: None)
     monkeypatch.setattr(auto, "unproven", chosen)
     monkeypatch.setattr(auto, "add_unproven", add)
     done = complete(folder, say=print)
-    assert asked == [(opened, found.trials, (), MOST_EFFECTS)]
+    assert asked == [("opened", found.trials, (), MOST_EFFECTS)]
     assert added == [("", ("stribeck", "drift"), found)]
     assert done.steps == ("add stribeck, drift (not proven)",)
 
