@@ -8,6 +8,7 @@ is run to confirm it.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -184,16 +185,18 @@ def held_out(damper: Model, model: Model, rig: Rig, measured: Sequence[Measureme
 def step_for(held: HeldOut) -> float:
     """Return the longest step [s] at which FMPy gives the error that is told.
 
-    It is that of the moments or a whole fraction of it, `FINEST` at the shortest. What FMPy shows
+    It is that of the moments that are closest, as runs may have rates of their own, or a whole
+    fraction of it, `FINEST` at the shortest. What FMPy shows
     is the force of a step before, which the damper's own functions give as well.
     """
     told, n = held.told(), 1
-    dt = held.fed[0].moments.dt
+    dt = min(fed.moments.dt for fed in held.fed)
     while dt / n >= 2.0 * FINEST:
         late = []
         for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
-            force = held.force(*_dense(fed, n))
-            force = np.concatenate([force[:1], force[:-1]])[::n]
+            steps = _steps(fed, dt / n)
+            force = held.force(*_dense(fed, steps))
+            force = np.concatenate([force[:1], force[:-1]])[::steps]
             late.append(error_on(run, held.shown(k, force)))
         if agree(pooled(late), told, 0.5):
             break
@@ -227,7 +230,7 @@ def write_inputs(held: HeldOut, step: float, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
-        per = round(fed.moments.dt / step)
+        per = _steps(fed, step)
         rows = _rows(fed.moments.V, per)
         dense = _dense_inputs(held.damper, run, fed, step)
         columns = {f"{name} [{unit}]": y[rows] for name, (unit, y) in dense.items()}
@@ -268,8 +271,10 @@ def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proo
 def _proof(held: HeldOut, fmu: Path, step: float, timeout: float, most: int) -> Proof:
     """Return the proof by an FMU that makes so many steps at the most."""
     lengths = [len(run.force) for run in held.runs]
-    per = round(held.runs[0].dt / step)
-    part = min(1.0, most / (per * sum(lengths)))
+    of_moment = [_steps(fed, step) for fed in held.fed]
+    parts = [run.finer.parts if run.finer else 1 for run in held.runs]
+    of_sample = [n * m for n, m in zip(of_moment, parts, strict=True)]
+    part = min(1.0, most / sum(n * m for n, m in zip(lengths, of_sample, strict=True)))
     samples = [max(2, int(part * n)) if part < 1.0 else n for n in lengths]
     told = held.told()
     own: list[ForceError] = []
@@ -278,6 +283,7 @@ def _proof(held: HeldOut, fmu: Path, step: float, timeout: float, most: int) -> 
         for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
             dense = _dense_inputs(held.damper, run, fed, step)
             inputs = {name: y for name, (_, y) in dense.items()}
+            per = of_sample[k]
             end = (samples[k] - 1) * per + 1
             passes = [{name: _begin(y[:end]) for name, y in inputs.items()}]
             columns = held.raw[k]
@@ -286,15 +292,14 @@ def _proof(held: HeldOut, fmu: Path, step: float, timeout: float, most: int) -> 
                     {n: _begin(_between(columns.get(n), y, per)[:end]) for n, y in inputs.items()}
                 )
             values = start_values(held.damper, fed, run)
-            names, job = tuple(inputs), (step,) * len(passes)
+            names, job = tuple(inputs), (fed.moments.dt / of_moment[k],) * len(passes)
             found = step_through(
                 SteppingJob(str(fmu.resolve()), dict(values), names, ("force",), job),
                 passes,
                 timeout,
             )
-            every = per // (run.finer.parts if run.finer else 1)
             for errors, rows in zip((own, raw), found, strict=False):
-                force = _padded(rows["force"][::every], len(fed.moments.x))
+                force = _padded(rows["force"][:: of_moment[k]], len(fed.moments.x))
                 shown = held.shown(k, force)
                 errors.append(error_on(*_first(run, shown, samples[k])))
     except FmuError as error:  # such as a library for another platform
@@ -372,8 +377,13 @@ def _inputs(damper: Model, run: Run, fed: Fed) -> dict[str, tuple[str, Array]]:
     return out
 
 
+def _steps(fed: Fed, step: float) -> int:
+    """Return in how many steps an FMU passes from one moment of a run to the next: none longer."""
+    return math.ceil(fed.moments.dt / step - 1e-6)
+
+
 def _dense_inputs(damper: Model, run: Run, fed: Fed, step: float) -> dict[str, tuple[str, Array]]:
-    moments, dense = _dense(fed, round(fed.moments.dt / step))
+    moments, dense = _dense(fed, _steps(fed, step))
     return _inputs(damper, run, dense._replace(moments=moments))
 
 

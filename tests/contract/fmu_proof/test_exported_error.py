@@ -46,20 +46,21 @@ def checked(rig: Path) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(
-    ("rate", "law", "switched"),
+    ("rates", "law", "switched"),
     [
-        (500.0, "bingham", False),
-        pytest.param(500.0, "dahl", True, marks=pytest.mark.slow),
-        (3000.0, "bingham", True),
+        ((500.0, 200.0, *[500.0] * 4), "bingham", False),
+        pytest.param((500.0,) * 3, "dahl", True, marks=pytest.mark.slow),
+        ((3000.0,) * 3, "bingham", True),
     ],
 )
 def test_the_fmu_has_the_error_that_compare_prints(
-    rate: float, law: str, switched: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    rates: tuple[float, ...], law: str, switched: bool, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
-    for k, phase in enumerate((0.3, 1.1, 2.0)):
-        record(tmp_path / f"run_{k}.csv", rate, phase, switched)
+    for k, rate in enumerate(rates):
+        record(tmp_path / f"run_{k}.csv", rate, 0.3 + 0.8 * k, switched)
     assert main(["study", "new", "rig", "--data", "run_*.csv", "--law", law]) == 0
     assert main(["identify", "rig", "--no-table"]) == 0
     capfd.readouterr()
