@@ -56,14 +56,18 @@ def even_grid(time: Array, step: float, tolerated: float) -> tuple[Array, Indice
 def _digits(time: Array) -> float:
     """Return the step on which times are written [s], 0 where none is seen."""
     widest = 1.01 * float(np.diff(time).max())
+    late = float(np.quantile(np.abs(time), 1.0 - _MOVED))
+    # With 6 significant digits it grows, 0.000333333 s, 10.0003 s: that of the last times tells.
+    last = time[np.abs(time) >= 10.0 ** np.floor(np.log10(late))] if late > 0.0 else time
     # Seconds, and parts of a day, which take all digits that a number has.
-    for size, powers, off in ((1.0, 7, 1e-4), (86400.0, 10, 5e-3)):
-        for power in range(powers):
-            unit = size * 10.0**-power
-            if unit > widest:  # of different times two are a step apart at least
-                continue
-            if np.abs(time / unit - np.round(time / unit)).max() < off:
-                return unit
+    for times in (time, last):
+        for size, powers, off in ((1.0, 7, 1e-4), (86400.0, 10, 5e-3)):
+            for power in range(powers):
+                unit = size * 10.0**-power
+                if unit > widest:  # of different times two are a step apart at least
+                    continue
+                if np.abs(times / unit - np.round(times / unit)).max() < off:
+                    return unit
     return 0.0
 
 

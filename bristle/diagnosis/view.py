@@ -115,7 +115,10 @@ def effect_text(
     drive : what commands the damper
     """
     parts = []
+    held = EFFECTS[name].assumed if name in EFFECTS else ()  # no fit moves them
     for key, (value, std, unit) in values.items():
+        if key in held:
+            continue
         text, half = with_interval(value, std)
         spread = "" if half == "-" else f" {half}"
         parts.append(f"{key} = {text}{spread}" + ("" if unit == "1" else f" {unit}"))

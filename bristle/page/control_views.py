@@ -160,7 +160,7 @@ def refused(study: Study) -> str:
     if study.settings.device:
         return (
             f"its damper is {study.settings.device}, not the one on the first level, which the "
-            "stock scenarios command. Write a design file with `device`: see docs/design.md."
+            "stock scenarios command. Write a design file with `device`: bristle design takes it."
         )
     model = study.model(to_show=True)
     if model.drive != VOLTAGE.name:

@@ -189,7 +189,10 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     study : the folder, opened
     verdict : on its present model, as verdict.json has it
     """
-    view, model = diagnosed_view(verdict, study.folder), study.model(to_show=True)
+    model = study.model(to_show=True)
+    gains = verdict.get("gains") or []
+    new = [row for row in gains if not set(row["effects"]) <= set(model.effects)]
+    view = diagnosed_view({**verdict, "gains": new}, study.folder)
     steps = history_steps(study.steps())
     judged = [one for one in steps if one.rms is not None]
     if not judged:

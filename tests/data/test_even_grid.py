@@ -31,6 +31,15 @@ def test_times_with_few_digits_have_the_rate_that_they_were_taken_at(rate, digit
     assert len(piece[0]) == count
 
 
+@pytest.mark.parametrize(("rate", "digits"), [(3000, 6), (600, 5), (7.5, 5)])
+def test_times_of_so_many_significant_digits_have_fewer_decimals_later(rate, digits):
+    true = np.arange(round(12.0 * rate)) / rate
+    time = np.array([float(f"{t:.{digits}g}") for t in true])
+    even = evenly_of(time, np.sin(2.0 * np.pi * 2.0 * true))
+    assert not even.sampling.resampled
+    assert even.pieces[0][0] == pytest.approx(true, abs=1e-4 / rate)
+
+
 def test_samples_that_were_lost_do_not_change_the_grid_of_rounded_times():
     there = np.ones(3000, dtype=bool)
     there[[400, 401, 1500]] = False
