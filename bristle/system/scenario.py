@@ -267,5 +267,5 @@ def copy_scenario(name: str, target: Path | None = None) -> Path:
         copied = file.parent / building
         content = (source.parent / building).read_text(encoding="utf-8")
         if not copied.is_file() or copied.read_text(encoding="utf-8") != content:
-            files.write_new(copied, content, ScenarioError)
+            files.write_new(copied, content, ScenarioError, folder=True)
     return file

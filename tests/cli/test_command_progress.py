@@ -161,7 +161,7 @@ def test_a_command_that_tells_nothing_is_named_after_a_while(
     monkeypatch.setattr(Study, "undo", lambda self: time.sleep(1.3) or self.steps()[0])
     with terminal(monkeypatch) as shown:
         main(["undo", str(rig)])
-        assert "bristle undo ..." in shown()
+        assert "bristle undo" in shown()
 
 
 def test_every_command_that_takes_long_tells_what_ctrl_c_keeps() -> None:
