@@ -1,6 +1,6 @@
 """Buildings as laboratories know them: what a verdict makes of files and instruments that are off.
 
-    python -m benchmarks honest buildings --clean 100 --effect 60
+    python -m benchmarks honest buildings --clean 100 --effect 60 --outside 20
 
 makes what is missing of these figures and prints them; without a number it prints what is there.
 Cases of two generators take turns: that of the blind benchmark, and that of `_shaken`. The
@@ -10,6 +10,7 @@ second case lacks an accelerometer or a displacement; every second case has no v
 
 clean      cases that hide nothing
 effect     cases that hide one effect of the library at 15 or 40 % of the force
+outside    cases that hide one that is not in it, likewise: its name is none of the library's
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from bristle.data.measurement import Measurement
 from bristle.diagnosis import diagnose_rig
 from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
-from tests.independent.effects import LIBRARY, forms
+from tests.independent.effects import LIBRARY, OUTSIDE, forms
 from tests.independent.rigs import LAWS, draw_rig
 
 from . import _shaken as shaken
@@ -45,7 +46,7 @@ NOISE, SHARES = (0.005, 0.01, 0.02), (0.15, 0.4)
 LESS = ("acceleration_absolute", "displacement")
 """What one level of every second building has no instrument for."""
 
-KINDS = ("clean", "effect")
+KINDS = ("clean", "effect", "outside")
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,8 @@ def house(kind: str, number: int, seed: int = SEED) -> House:
     seed : of all cases
     """
     rng = np.random.default_rng([seed, 33, KINDS.index(kind), number])
-    made = _second(kind, number, rng) if number // 4 % 2 else _first(kind, number, rng)
+    second = number // 4 % 2 and kind != "outside"  # its effects are the library's
+    made = _second(kind, number, rng) if second else _first(kind, number, rng)
     levels = ["base", *(f"floor{i}" for i in range(1, len(made.masses)))]
     factors = 1.0 + rng.uniform(-OFF, OFF, (2, len(levels))) * [[1.0], [float(rng.integers(2))]]
     building = from_data(
@@ -123,9 +125,10 @@ def _first(kind: str, number: int, rng: np.random.Generator) -> Made:
     law, reconstructed = LAWS[number % 2], bool(number // 2 % 2)
     rig, noise = str(rng.choice(BUILDINGS)), float(rng.choice(NOISE))
     task = Task("structure", "none", "", 0.0, noise, rig, law, int(rng.integers(2**31)))
-    if kind == "effect":
+    if kind != "clean":
         bed = draw_rig(rig, law, np.random.default_rng(0))
-        able = [name for name in _able(LIBRARY, SITES, number, reconstructed) if forms(name, bed)]
+        library = _able(LIBRARY, SITES, number, reconstructed)
+        able = [name for name in (OUTSIDE if kind == "outside" else library) if forms(name, bed)]
         name = str(rng.choice(able))
         own = [one.name for one in forms(name, bed)]
         if reconstructed and name == "base_friction":
@@ -176,7 +179,7 @@ def _able(
 
 def answered(kind: str, number: int, seed: int = SEED) -> Answer:
     """Return what the verdict says of a case; an error is wrong, a generator's is no case."""
-    about: Answer = {"kind": "error", "effects": [], "hidden": ["?"] * (kind == "effect")}
+    about: Answer = {"kind": "error", "effects": [], "hidden": ["?"] * (kind != "clean")}
     try:
         given = house(kind, number, seed)
     except ValueError:  # the specimen's equations were not solved
@@ -211,7 +214,8 @@ def rows(done: dict[str, Answer]) -> list[Row]:
     out = []
     made = [one for one in done.values() if one["kind"] != "no case"]
     clean = [one for one in made if not one.get("hidden")]
-    hiding = [one for one in made if one.get("hidden")]
+    outside = [one for one in made if {*one.get("hidden", ())} & {*OUTSIDE}]
+    hiding = [one for one in made if one.get("hidden") and one not in outside]
     if clean:
         none = score.Count(sum(one["kind"] == "none" for one in clean), len(clean))
         named = sum(bool(one["effects"]) for one in clean)
@@ -229,6 +233,10 @@ def rows(done: dict[str, Answer]) -> list[Row]:
             Row(name + "among the names", _text(among), ">= 92 %", 0.92 / max(among.share, 1e-3)),
             Row(name + "unknown", _text(unknown), "<= 4 %", unknown.share / 0.04),
         ]
+    if outside:
+        unknown = score.Count(sum(one["kind"] == "unknown" for one in outside), len(outside))
+        name = "buildings with an effect outside of the library: unknown"
+        out.append(Row(name, _text(unknown), ">= 90 %", 0.9 / max(unknown.share, 1e-3)))
     return out
 
 

@@ -13,9 +13,6 @@ from copy import copy
 from dataclasses import replace
 from typing import Protocol
 
-import numpy as np
-
-from ..comparison.names import joined
 from ..core.finding import Finding
 from ..data.channels import DRIVE
 from ..data.checks.runs import tells_a_bend
@@ -132,16 +129,6 @@ def without_faults(
         replace(one, channels={n: v for n, v in one.channels.items() if n not in late})
         for one in out
     ]
-
-
-def blurred(faults: Sequence[Finding]) -> bool:
-    """Return whether a velocity at the damper is left out."""
-    return any(map(_blurs, faults))
-
-
-def moves_measured(runs: Sequence[Measurement], building: Building) -> bool:
-    """Return whether the velocity of each end of the damper was measured, in every run."""
-    return all(run.has(f"{end}_velocity") for run in runs for end in _ends(building))
 
 
 def _blurs(fault: Finding) -> bool:
@@ -308,7 +295,6 @@ class BuildingRuns:
         right = [without_faults(list(runs), self._sensors, building) for runs in (train, holdout)]
         self._noise = median_noise([*right[0], *right[1]])
         self.lacking = lacking_in_building([*train, *holdout], right, self._sensors, self._noise)
-        self._velocities = moves_measured([*right[0], *right[1]], building)
         say("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)
         found, self._present = corrected_for_delay(found, replace(present, law=present.base_law))
@@ -467,34 +453,14 @@ class BuildingRuns:
 
     def excused(self, found: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]) -> SiteDiagnosis:
         """Return a site's diagnosis, none where instruments explain what is left; see `RigRuns`."""
-        if names := self._without_accelerometer(found.site):
-            why = f"Without the acceleration of {joined(names)} equilibrium is known less well."
-            rule = BENCH if found.site == DAMPER else SITE
-            found = excused_by_sensor(found, BENCH.no_accelerometer_z, why, rule)
         if found.site != DAMPER:
             return found
-        if blurred(self._sensors) or not self._velocities:
-            why = "Without the velocity of the base, its reversals are not located exactly."
-            found = excused_by_sensor(found, BENCH.no_velocity_z, why)
         beside = findings.get(self._beside)
         if beside is not None and late_values(beside):
             most = left_by_filter(self._present.law, *self._problems[DAMPER])
             why = "The load cell is late in a different functional form."
             found = excused_by_sensor(found, most, why)
         return found
-
-    def _without_accelerometer(self, site: str) -> list[str]:
-        """Return the levels in a site's equilibrium whose acceleration is a smoothed motion's."""
-        if site == DAMPER:
-            lowest = self._device.upper if self._problems[DAMPER][0].reconstructed else None
-        else:
-            number = int(site.removeprefix("storey")) if site.startswith("storey") else 0
-            lowest = number - (not self._building.isolated)
-        if lowest is None:
-            return []
-        there = np.all([one.accelerometer for one in [*self._train, *self._holdout]], axis=0)
-        names = self._building.levels()
-        return [names[level] for level in range(lowest, len(names)) if not there[level]]
 
     def context(self, _damper: Prepared | None) -> VerdictContext:
         """Return what the verdict tells beside the sites."""

@@ -408,19 +408,6 @@ class DecisionRule:
     Trades and found: as `stiffness_known`.
     """
 
-    no_velocity_z: float = 1.25
-    """Largest z of a true sign law if the base's velocity had to be left out.
-
-    Displacement and accelerometer alone then locate the jumps of the force. Trades: if higher,
-    missing effects are excused; if lower, an instrument's fault gives unknown. Found: blind seeds.
-    """
-
-    no_accelerometer_z: float = 1.35
-    """Largest z that is no finding where equilibrium takes a level's acceleration from its motion.
-
-    Trades and found: as `no_velocity_z`; clean buildings whose base sticks leave up to 1.30.
-    """
-
     beside: float = 1.3
     """z of a building's site up to which it is told in words alone where another site has a name.
 

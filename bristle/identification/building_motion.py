@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
@@ -26,7 +27,7 @@ from ..errors import RecordError
 from ..physics.building import GROUND, Building, Device, frequencies, with_damper
 from .kalman import Samples, kalman_smooth, room
 from .prepare import refuse_short, untold
-from .smoothing import EDGE, SmoothedMotion, posterior_draws, random_motion, smooth_steps
+from .smoothing import EDGE, MovingPart, random_motion, smooth_steps
 
 # Slow displacements of levels that have none of their own.
 #
@@ -132,10 +133,15 @@ JUMP = 6.0
 """A change of acceleration that is so many times what is usual from sample to sample is a jump."""
 
 
-def smoothed_level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
-    """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have.
+def smoothed_level(
+    m: Measurement, name: str, looser: float, forced: Array | float = 0.0
+) -> dict[str, Any]:
+    """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have, forced.
 
-    What was not measured of one channel the others tell, and the motion about it.
+    What was not measured of one channel the others tell, and the motion about it. Without an
+    accelerometer the part of the acceleration that measured forces and the ground make, `forced`
+    (n,) [m/s2], is as fast as they are: no smoother shall take that for noise. It is taken off
+    before, by its double integral, and put back.
     """
     n, dt = len(m.time), m.step
     y, r, have = np.zeros((n, 3)), np.zeros(3), np.zeros(3, dtype=np.bool_)
@@ -151,12 +157,22 @@ def smoothed_level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
         r[2] = m.noise.get(channel, 0.0) ** 2 + m.noise.get(ground, 0.0) ** 2
     # A channel without any noise still is no better than its last digits.
     r = np.maximum(r, (1e-7 * np.std(y, axis=0)) ** 2 + 1e-30)
+    path = np.zeros((n, 3))
+    if not have[2]:
+        path[:, 2] = forced - np.mean(forced)
+        path[:, 1] = cumulative_trapezoid(path[:, 2], dx=dt, initial=0.0)
+        path[:, 0] = cumulative_trapezoid(path[:, 1], dx=dt, initial=0.0)
+        y -= path * have
     added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
     jerk = looser * _likeliest(y, seen, r, have, dt, added)
     out = room(n)
     kalman_smooth(_samples(y, r, have, dt, seen), jerk + added, out)
     std = np.sqrt(np.maximum(out.cov, 0.0))
-    return {"state": out.state, "std": std, "jerk": jerk, "r": r, "have": have}
+    state = out.state + path
+    return {
+        "state": state, "std": std, "jerk": jerk, "added": added, "r": r, "have": have,
+        "forced": path,
+    }  # fmt: skip
 
 
 def _samples(y: Array, r: Array, have: Flags, dt: float, seen: Flags | None = None) -> Samples:
@@ -229,12 +245,13 @@ def level_draws(n: int, level: dict[str, Any], dt: float, draws: int, seed: int)
     jerk, r, have = level["jerk"], level["r"], level["have"]
     lead = min(200, n)
     total = n + 2 * lead
+    each = jerk + np.pad(level["added"], lead)
     out = np.zeros((draws, n, 3))
     smoothed = room(total)
     for d in range(draws):
-        path = random_motion(generator, total, dt, jerk)
+        path = random_motion(generator, total, dt, jerk, each / jerk)
         y = path + generator.standard_normal((total, 3)) * np.sqrt(r)
-        kalman_smooth(_samples(y, r, have, dt), np.full(total, jerk), smoothed)
+        kalman_smooth(_samples(y, r, have, dt), each, smoothed)
         out[d] = (path - smoothed.state)[lead : lead + n]
     return out
 
@@ -242,11 +259,12 @@ def level_draws(n: int, level: dict[str, Any], dt: float, draws: int, seed: int)
 def corrected(
     level: dict[str, Any], dt: float, draws: int, seed: int
 ) -> tuple[dict[str, Any], Array]:
-    """Return a floor that has no accelerometer without its known error, and draws of the rest.
+    """Return a level that has no accelerometer with what moves of its acceleration, and its error.
 
-    A floor's motion is smoother than white jerk: the smoother lets noise pass where nothing moves,
-    and takes some motion for noise. Most of the acceleration's error is known therefore from the
-    motion found (three quarters of it on the buildings of the tests), and taken off.
+    Draws of the error are those of the whole way: the motion that was found counts as true, the
+    channels' noise is laid on it, and it is smoothed and sought again (a parametric bootstrap:
+    Efron & Tibshirani 1993, An Introduction to the Bootstrap, ch. 6). What is off in all of them
+    alike is of a size that is known, and of no sign: half of the draws have it turned.
 
     Parameters
     ----------
@@ -256,19 +274,28 @@ def corrected(
     draws : how many draws, 0 for none
     seed : of the draws
     """
-    state, r, have, jerk = level["state"], level["r"], level["have"], level["jerk"]
+    state, r, have = level["state"] - level["forced"], level["r"], level["have"]
+    n = len(state)
     if not draws:
-        return level, np.zeros((0, len(state), 3))
-    x, v, a = state.T.copy()
-    motion = SmoothedMotion(x, v, a, level["std"], jerk, np.ones(2))
-    noise = (float(np.sqrt(r[0])), float(np.sqrt(r[1])))
-    seen = (bool(have[0]), bool(have[1]))
-    error = posterior_draws(len(state), dt, noise, jerk, seen, draws, seed, motion)
-    known = error.mean(axis=0)
-    error -= known
-    edge = min(EDGE, len(state) // 4)
-    std = np.sqrt(np.mean(error[:, edge : len(state) - edge] ** 2, axis=(0, 1)))
-    return {**level, "state": state + known, "std": std}, error
+        return level, np.zeros((0, n, 3))
+    jerk, out = np.full(n, level["jerk"]), room(n)
+
+    def smoothed(y: Array) -> Array:
+        kalman_smooth(_samples(y, r, have, dt), jerk, out)
+        return out.state.copy()
+
+    generator = np.random.default_rng(seed)
+    noise = np.sqrt(r) * generator.standard_normal((draws, n, 3))
+    passed = np.array([smoothed(one) for one in noise])
+    moving = MovingPart(passed[:, :, 2], dt)
+    state = state - moving.still(state[:, 2], (2, 1, 0))
+    seen = smoothed(state) + passed  # smoothing is linear
+    seen = np.array([one - moving.still(one[:, 2], (2, 1, 0)) for one in seen])
+    error = state - seen
+    error[1::2] -= 2.0 * error.mean(axis=0)
+    edge = min(EDGE, n // 4)
+    std = np.sqrt(np.mean(error[:, edge : n - edge] ** 2, axis=(0, 1)))
+    return {**level, "state": state + level["forced"], "std": std}, error
 
 
 # The motion of the device that is identified: of its upper level relative to the lower one.
@@ -440,6 +467,22 @@ class Response:
             return list(self.others)
         return [Load(self.device, self.force, self.noise_force), *self.others]
 
+    @property
+    def white_a(self) -> Array:
+        """Noise (levels,) of `a` that no draw has: that of accelerometers."""
+        told = self.accelerometer | (self.draws.shape[1] == 0)
+        return np.where(told, self.noise_a, 0.0)
+
+    def smoothed_inertia(self, masses: Array) -> Array:
+        """Return draws (d, n) of the error [N] of inertia from accelerations that are smoothed.
+
+        Parameters
+        ----------
+        masses : (levels,) kg, that the accelerations are multiplied by
+        """
+        smoothed = np.where(self.accelerometer, 0.0, masses)
+        return np.asarray(np.einsum("i,idn->dn", smoothed, self.draws[..., 2]))
+
     @cached_property
     def white(self) -> list[tuple[Array | None, Array]]:
         """By level draws (d, n) of its accelerometer's noise, None without one, and (d, 1) of V's.
@@ -560,14 +603,19 @@ def responses(
     for measurement in measurements:
         check_channels(measurement, building)
     smoothed = [
-        [smoothed_level(m, name, looser) for name in building.levels()] for m in measurements
+        [
+            smoothed_level(m, name, looser, forced)
+            for name, forced in zip(building.levels(), _forced(m, building, device), strict=True)
+        ]
+        for m in measurements
     ]
     across = measured_across(measurements, building, device, draws, seed + building.size, looser)
+    ends = {0}.union(*(one.levels for one in building.devices))  # where accelerations may jump
     out = []
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
         for i, one in enumerate(levels):
-            if _is_smooth(i, _instruments(one), building):
+            if not one["have"][2] and i not in ends:
                 levels[i], error = corrected(one, m.step, draws, seed + i)
                 errors.append(error)
             else:
@@ -580,6 +628,18 @@ def responses(
             known_but={why: _known(m, building, device, why) for why in reasons},
         )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
+    return out
+
+
+def _forced(m: Measurement, building: Building, device: Device) -> Array:
+    """Return the relative acceleration (levels, n) [m/s2] that ground and measured forces make."""
+    loads = list(_loads(m, building, device))
+    if m.has("force"):
+        loads.append(Load(device, m["force"], 0.0))
+    out = np.tile(-m["ground_acceleration"], (building.size, 1))
+    for load in loads:
+        shares = load.device.incidence(building.size) / np.diag(building.M)
+        out -= np.outer(shares, load.force)
     return out
 
 
@@ -630,21 +690,6 @@ def _anchored(
     return _with_motion(found, levels, errors)
 
 
-def _instruments(level: dict[str, Any]) -> tuple[bool, ...]:
-    """Return which of displacement, velocity and acceleration of a level were measured."""
-    return tuple(bool(one) for one in level["have"])
-
-
-def _is_smooth(level: int, have: tuple[bool, ...], building: Building) -> bool:
-    """Return whether a level's acceleration is smoothed, and does not jump.
-
-    Dry friction and end stops act on the first level and at the ends of devices; others have a
-    storey between.
-    """
-    ends = {0}.union(*(device.levels for device in building.devices))
-    return level not in ends and not have[2]
-
-
 def _accelerations(
     m: Measurement, building: Building, levels: list[dict[str, Any]]
 ) -> tuple[Array, Array]:
@@ -653,15 +698,12 @@ def _accelerations(
     Smoothed where a level has no accelerometer.
     """
     ground = m["ground_acceleration"]
-    noise_ground = m.noise.get("ground_acceleration", 0.0)
     a, noise = [], []
     for name, level in zip(building.levels(), levels, strict=True):
         channel = f"{name}_acceleration_absolute"
         own = m.has(channel)
         a.append(m[channel] if own else level["state"][:, 2] + ground)
-        noise.append(
-            m.noise.get(channel, 0.0) if own else float(np.hypot(level["std"][2], noise_ground))
-        )
+        noise.append(m.noise.get(channel, 0.0) if own else float(level["std"][2]))
     return np.array(a), np.array(noise)
 
 
@@ -700,8 +742,8 @@ def _response(
     )  # fmt: skip
 
 
-def shear(response: Response, building: Building, level: int) -> tuple[Array, float]:
-    """Return what must be carried below a level, and its noise per sample.
+def shear(response: Response, building: Building, level: int) -> tuple[Array, float, Array]:
+    """Return what must be carried below a level, its noise, and draws of an error besides.
 
     The inertia, damping and (for matrices that are no chain) elastic forces of this level and all
     above it, as M, C and K of the building have them, without the linear spring below the level
@@ -710,7 +752,8 @@ def shear(response: Response, building: Building, level: int) -> tuple[Array, fl
 
     Returns
     -------
-    force (n,) N; noise: standard deviation of its white part [N], from the accelerometers
+    force (n,) N; noise: standard deviation of its white part [N], from the accelerometers; (d, n)
+    draws of the error of what is smoothed for want of one [N]
     """
     M, C, K = (np.array(matrix) for matrix in (building.M, building.C, building.K))
     rows_m, rows_c, rows_k = (matrix[level:].sum(axis=0) for matrix in (M, C, K))
@@ -718,8 +761,9 @@ def shear(response: Response, building: Building, level: int) -> tuple[Array, fl
     rows_k[np.abs(rows_k) < 1e-12 * np.abs(K).max()] = 0.0
     below = response.x[level] - (response.x[level - 1] if level else 0.0)
     total = -(rows_m @ response.a + rows_c @ response.v + rows_k @ response.x)
-    noise = float(np.sqrt(np.sum((rows_m * response.noise_a) ** 2)))
+    noise = float(np.sqrt(np.sum((rows_m * response.white_a) ** 2)))
     for other in response.others:
         if other.device.crosses(level):
             total, noise = total - other.force, float(np.hypot(noise, other.noise))
-    return total + building.stiffnesses[level] * below, noise
+    force = total + building.stiffnesses[level] * below
+    return force, noise, response.smoothed_inertia(rows_m)

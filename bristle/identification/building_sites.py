@@ -203,6 +203,7 @@ def structure_run(
     untold : the channels of the force whose noise is not known
     """
     left_out = left_out or {}
+    drawn = None if drawn is None or not len(drawn) else drawn
     whole = Run(
         name, dt, *motion, force, noise, draws, left_out=left_out, force_draws=drawn, untold=untold
     )
@@ -245,7 +246,7 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
 
     Where the damper acts across that storey its force must be known.
     """
-    force, noise = shear(response, building, level)
+    force, noise, drawn = shear(response, building, level)
     lower = level - 1
     x, v = response.x[level].copy(), response.v[level].copy()
     error = _error(response, level)
@@ -254,11 +255,10 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
         v -= response.v[lower]
         error[:, :, :3] -= _error(response, lower)[:, :, :3]
     if response.force is not None and response.device.crosses(level):
-        force = force - response.force
-        noise = float(np.hypot(noise, response.noise_force))
+        force, noise = _less_damper(response, response.force, force, noise)
     motion = (x, v, response.a[level], response.V)
     made = structure_run(
-        response.name, response.dt, motion, force, noise, error,
+        response.name, response.dt, motion, force, noise, error, drawn=drawn,
         left_out=_left_out(response, level, response.device.crosses(level)),
         untold=_untold(response, building, level),
     )  # fmt: skip
@@ -291,39 +291,49 @@ def layer_run(response: Response, building: Building) -> StructureRun:
 
     Samples at which the base may be held are left out.
     """
-    force, noise = shear(response, building, 0)
+    force, noise, drawn = shear(response, building, 0)
     if response.device.crosses(0):
         if response.force is None:
             raise RecordError(
                 f"{response.name}: force was not measured, so the forces of isolation layer and "
                 "damper cannot be separated."
             )
-        force = force - response.force
-        noise = float(np.hypot(noise, response.noise_force))
+        force, noise = _less_damper(response, response.force, force, noise)
     x, v, a = response.x[0], response.v[0], response.a[0]
     made = structure_run(
         response.name, response.dt, (x, v, a, response.V), force, noise, _error(response, 0),
-        sliding(response), left_out=_left_out(response, 0, response.device.crosses(0)),
+        sliding(response), drawn, _left_out(response, 0, response.device.crosses(0)),
         untold=_untold(response, building, 0),
     )  # fmt: skip
     return _of(response, made)
 
 
+def _less_damper(response: Response, own: Array, force: Array, noise: float) -> tuple[Array, float]:
+    """Return what is carried without the damper's `own` measured force (n,) [N], and its noise.
+
+    Where no accelerometer shows its upper end, the inertia there holds its noise: they cancel.
+    """
+    shown = bool(response.accelerometer[response.device.upper])
+    return force - own, float(np.hypot(noise, response.noise_force)) if shown else noise
+
+
 def sliding(response: Response) -> Flags:
     """Return where the first level surely moves, and so do the samples beside, (n,)."""
-    return moving(response.v[0], float(response.std[0, 1]))
+    return moving(response.v[0], float(response.std[0, 1]), response.draws[0, :, :, 1])
 
 
-def moving(v: Array, std: float) -> Flags:
+def moving(v: Array, std: float, error: Array) -> Flags:
     """Return where a velocity (n,) surely is none, and so are the samples beside, (n,).
 
     Beside a stop or a start the velocity is smoothed over a bend, and less certain than elsewhere.
 
     Parameters
     ----------
-    v, std : the velocity, and its standard deviation [m/s]
+    v, std : the velocity, and its standard deviation as a rule [m/s]
+    error : (d, n) draws of its error, larger beside jumps of the acceleration
     """
-    moves = np.abs(v) > SLIDING * std
+    here = np.sqrt(np.mean(error**2, axis=0)) if len(error) else 0.0
+    moves = np.abs(v) > SLIDING * np.maximum(std, here)
     at_rest = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
     return ~at_rest
 
@@ -331,7 +341,7 @@ def moving(v: Array, std: float) -> Flags:
 def device_moves(response: Response) -> bool:
     """Return whether the ends of the damper surely move against each other anywhere in a run."""
     across = motion_across(response)
-    return bool(moving(across.v, across.std).any())
+    return bool(moving(across.v, across.std, across.error[:, :, 1]).any())
 
 
 def damper_run(
@@ -358,10 +368,10 @@ def damper_run(
     else:
         untold = _untold(response, building, response.device.upper)
         found = reconstructed(response, building, linear_storeys)
-        force, noise = found.force, found.noise
-        if len(found.error):
-            noise, drawn = found.white, found.error
-    keep = moving(v, std) if blind_at_rest(law) else None
+        force, noise, drawn = found.force, found.noise, found.error
+        if len(drawn):
+            noise = found.white
+    keep = moving(v, std, error[:, :, 1]) if blind_at_rest(law) else None
     made = structure_run(
         response.name, response.dt, motion, force, noise, error, keep, drawn,
         _left_out_across(response), untold,

@@ -417,12 +417,15 @@ def _weighted(response: Response, building: Building, weights: Array) -> Reconst
         x[upper] = x[lower] + response.across.x
         error[upper, :, :, 0] = error[lower, :, :, 0] + response.across.draws[:, :, 0]
     force = -(M @ response.a + C @ response.v + K @ x)
-    white = float(np.sum((M * response.noise_a) ** 2))
+    white = float(np.sum((M * response.white_a) ** 2))
     for other in response.others:
         share = float(weights @ np.array(other.device.incidence(building.size)))
         force, white = force - share * other.force, white + (share * other.noise) ** 2
     smooth = float(np.sum((K * response.std[:, 0]) ** 2) + np.sum((C * response.std[:, 1]) ** 2))
+    inertia = response.smoothed_inertia(M)
+    smooth += float(np.mean(inertia**2)) if len(inertia) else 0.0
     drawn = np.einsum("i,idn->dn", K, error[..., 0]) + np.einsum("i,idn->dn", C, error[..., 1])
+    drawn += inertia
     if len(drawn) > 1:  # in the mean nothing is known of it
         drawn = (drawn - drawn.mean(axis=0)) * np.sqrt(len(drawn) / (len(drawn) - 1))
     return Reconstructed(force, float(np.sqrt(white + smooth)), float(np.sqrt(white)), drawn)

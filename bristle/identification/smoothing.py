@@ -9,6 +9,7 @@ Biometrika 89(3), 603-615).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -181,31 +182,65 @@ def posterior_draws(
     return out
 
 
+class MovingPart:
+    """Which part of a smoothed acceleration is motion, by time and frequency.
+
+    White jerk is a wide guess: the smoother lets noise pass at frequencies where nothing moves.
+    Where the noise makes up the power of what is seen, that is expected to be noise, and no more
+    (Wiener's filter on the short-time spectrum, as in speech: Lim & Oppenheim 1979, Proc. IEEE 67,
+    1586-1604).
+
+    Parameters
+    ----------
+    noise : (d, n) draws of the noise that a smoother lets pass
+    dt : step [s]
+    """
+
+    def __init__(self, noise: Array, dt: float) -> None:
+        self._n, self._dt = noise.shape[1], dt
+        self._size = int(min(max(round(SPAN / dt), 64), self._n // 4))
+        self.drawn = [self.spectrum(draw) for draw in noise]
+        power = [np.mean(np.abs(Z[:, 2:-2]) ** 2, axis=1) for Z in self.drawn]
+        self._noise = np.mean(power, axis=0)[:, None]
+
+    def spectrum(self, y: Array) -> NDArray[np.complex128]:
+        """Return the short-time spectrum of a signal (n,)."""
+        seen: NDArray[np.complex128] = stft(y, nperseg=self._size, noverlap=self._size * 3 // 4)[2]
+        return seen
+
+    def signal(self, Z: NDArray[np.complex128]) -> Array:
+        """Return the signal (n,) of a short-time spectrum."""
+        made = istft(Z, nperseg=self._size, noverlap=self._size * 3 // 4)[1]
+        return np.asarray(made[: self._n], dtype=float)
+
+    def share(self, Z: NDArray[np.complex128]) -> Array:
+        """Return which share of a spectrum's power is motion."""
+        power = uniform_filter(np.abs(Z) ** 2, ALIKE)
+        noise: Array = np.clip(MASKED * self._noise / np.maximum(power, 1e-300), 0.0, 1.0)
+        return 1.0 - noise
+
+    def still(self, a: Array, integrals: Sequence[int] = (0,)) -> Array:
+        """Return what of an acceleration (n,) is noise, integrated so many times (n, k).
+
+        Nothing at the ends, where windows end.
+        """
+        Z = self.spectrum(a)
+        once = np.zeros((len(Z), 1), dtype=complex)
+        once[1:, 0] = 1.0 / (2j * np.pi * np.fft.rfftfreq(self._size, self._dt)[1:])
+        parts = [self.signal((1.0 - self.share(Z)) * Z * once**k) for k in integrals]
+        near = np.minimum(np.arange(self._n), np.arange(self._n)[::-1])
+        return np.stack(parts, axis=1) * np.minimum(near / (4.0 * EDGE), 1.0)[:, None]
+
+
 def _by_spectrum(a: Array, draws: Array, dt: float) -> Array:
     """Return draws (d, n) of the error of a smoothed acceleration (n,), known for the most part.
 
-    White jerk is a wide guess: the smoother lets noise pass at frequencies where nothing moves. A
-    parameter that multiplies the acceleration comes out too small by that noise, for it goes along
-    with the estimate. So where, in time and frequency, the noise of the `draws` makes up the power
-    of the estimate, this is expected to be wrong by itself and by no more (Wiener's filter on the
-    short-time spectrum, as in speech: Lim & Oppenheim 1979, Proc. IEEE 67, 1586-1604).
+    A parameter that multiplies the acceleration comes out too small by the noise in it, for that
+    goes along with the estimate. So what does not move is expected to be wrong by itself.
     """
-    size = int(min(max(round(SPAN / dt), 64), len(a) // 4))
-
-    def spectrum(y: Array) -> NDArray[np.complex128]:
-        seen: NDArray[np.complex128] = stft(y, nperseg=size, noverlap=size * 3 // 4)[2]
-        return seen
-
-    def signal(Z: NDArray[np.complex128]) -> Array:
-        return np.asarray(istft(Z, nperseg=size, noverlap=size * 3 // 4)[1][: len(a)], dtype=float)
-
-    seen, drawn = spectrum(a), [spectrum(draw) for draw in draws]
-    noise = np.mean([np.mean(np.abs(Z[:, 2:-2]) ** 2, axis=1) for Z in drawn], axis=0)
-    power = uniform_filter(np.abs(seen) ** 2, ALIKE)
-    moved = np.clip(1.0 - MASKED * noise[:, None] / np.maximum(power, 1e-300), 0.0, 1.0)
-    near = np.minimum(np.arange(len(a)), np.arange(len(a))[::-1])
-    known = np.minimum(near / (4.0 * EDGE), 1.0) * (signal(moved * seen) - a)
-    return np.array([signal(np.sqrt(moved) * Z) for Z in drawn]) + known
+    moving = MovingPart(draws, dt)
+    root = np.sqrt(moving.share(moving.spectrum(a)))
+    return np.array([moving.signal(root * Z) for Z in moving.drawn]) - moving.still(a)[:, 0]
 
 
 def _centre(draws: Array) -> None:
@@ -243,7 +278,9 @@ def _left_out(
     return count * left
 
 
-def random_motion(generator: np.random.Generator, n: int, dt: float, jerk: float) -> Array:
+def random_motion(
+    generator: np.random.Generator, n: int, dt: float, jerk: float, times: Array | float = 1.0
+) -> Array:
     """Return a motion (n, 3) of white jerk, from rest [m, m/s, m/s2].
 
     Parameters
@@ -251,6 +288,7 @@ def random_motion(generator: np.random.Generator, n: int, dt: float, jerk: float
     generator : source of the random numbers, moved on
     n, dt : number of samples, sampling step [s]
     jerk : intensity [m2/s5]
+    times : (n,) how many times as intense it is at each sample
     """
     Q = np.array(
         [
@@ -260,7 +298,7 @@ def random_motion(generator: np.random.Generator, n: int, dt: float, jerk: float
         ]
     ) * (jerk * dt)
     root = np.linalg.cholesky(Q + np.eye(3) * 1e-30 * max(jerk, 1.0))
-    steps = generator.standard_normal((n, 3)) @ root.T
+    steps = generator.standard_normal((n, 3)) @ root.T * np.sqrt(times).reshape(-1, 1)
     path = np.zeros((n, 3))
     x, v, a = path.T
     a[1:] = np.cumsum(steps[1:, 2])
