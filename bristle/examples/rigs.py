@@ -388,7 +388,8 @@ def perform(damper: Damper, motion: Motion, volts: Programme, scales: Scales) ->
     def rates(now: float, states: list[float]) -> list[float]:
         return damper.respond(motion.at(now), volts.value(now), states)[1]
 
-    start = [0.0] * len(damper.states)
+    # The damper was switched on long before the recorder: the coil's field is there.
+    start = [volts.value(float(t[0])) if name == "field" else 0.0 for name in damper.states]
     states = np.empty((t.size, 0))
     if start:
         sizes = damper.scales(scales.stroke, scales.speed)

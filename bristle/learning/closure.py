@@ -265,7 +265,13 @@ def lowers(
 ) -> bool:
     """Return whether errors (per run) fall by a gain, and beyond their scatter over the runs.
 
-    Of few runs it is that over stretches of them; `beyond` so many of its standard errors.
+    Of few runs it is that over stretches of them.
+
+    Parameters
+    ----------
+    before, after : of each run (n,), over its samples
+    gain : share of the error of all runs that they take at least
+    beyond : so many standard errors over the runs
     """
     total = [float(np.mean(np.concatenate([*one]) ** 2)) for one in (before, after)]
     if total[1] > (1.0 - gain) ** 2 * total[0]:
