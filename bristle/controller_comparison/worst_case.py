@@ -83,7 +83,7 @@ class Spread:
             parts.append(f"sensor noise of {percent(self.noise, 0)} of each signal")
         if self.delay:
             parts.append(f"sensor delays up to {1e3 * self.delay:g} ms")
-        return ", ".join(parts).replace("%", " %")
+        return ", ".join(parts)
 
 
 def worst_of(
