@@ -256,10 +256,12 @@ def loop_panels(page: Page, top: float, cycles: Sequence[OneCycle], name: str = 
     size = max(float(abs(each.prediction.measured[each.part]).max()) for each in cycles)
     force = scale(one.unit, size)
     draw_loops(rows, cycles, force=force)
+    shown = f"{one.quantity.replace('_', ' ')} [{force[1]}]"
+    colours = "measured (black) and model (blue)"
+    band = "Band: 95 % of a true model's samples."
     page.figure.text(
         0.65 / page.width, (page.foot + inner - top - 0.14) / page.height,
-        f"{f'{name}: ' if name else ''}{one.quantity.replace('_', ' ')} [{force[1]}] in single "
-        "cycles, measured (black) and model (blue). Band: 95 % of a true model's samples.",
+        f"{name}: {shown}, {colours}" if name else f"{shown} in single cycles, {colours}. {band}",
         fontsize=9, color=GREY, va="center",
     )  # fmt: skip
 

@@ -115,13 +115,16 @@ def effect_text(
     drive : what commands the damper
     """
     parts = []
-    held = EFFECTS[name].assumed if name in EFFECTS else ()  # no fit moves them
+    effect = EFFECTS.get(name)
+    known = effect.parameters if effect is not None and effect.changes else {}
     for key, (value, std, unit) in values.items():
-        if key in held:
+        if effect is not None and key in effect.assumed:  # no fit moves it
             continue
+        # What each psi or degree changes a parameter by is known as that alone.
+        what = f" ({known[key].text})" if key in known else ""
         text, half = with_interval(value, std)
         spread = "" if half == "-" else f" {half}"
-        parts.append(f"{key} = {text}{spread}" + ("" if unit == "1" else f" {unit}"))
+        parts.append(f"{key} = {text}{spread}" + ("" if unit == "1" else f" {unit}") + what)
     sizes = f" {', '.join(parts)} (95 %)." if parts else ""
     return about(name, drive) + sizes
 
