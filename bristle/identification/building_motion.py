@@ -142,6 +142,13 @@ def smoothed_level(
     accelerometer the part of the acceleration that measured forces and the ground make, `forced`
     (n,) [m/s2], is as fast as they are: no smoother shall take that for noise. It is taken off
     before, by its double integral, and put back.
+
+    Parameters
+    ----------
+    m : the run
+    name : of the level
+    looser : factor of the jerk's likeliest intensity [1]
+    forced : (n,) m/s2, what ground and measured forces make, or 0
     """
     n, dt = len(m.time), m.step
     y, r, have = np.zeros((n, 3)), np.zeros(3), np.zeros(3, dtype=np.bool_)
