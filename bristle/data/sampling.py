@@ -59,15 +59,19 @@ def _digits(time: Array) -> float:
     late = float(np.quantile(np.abs(time), 1.0 - _MOVED))
     # With 6 significant digits it grows, 0.000333333 s, 10.0003 s: that of the last times tells.
     last = time[np.abs(time) >= 10.0 ** np.floor(np.log10(late))] if late > 0.0 else time
+    return _unit(time, widest) or _unit(last, widest)
+
+
+def _unit(time: Array, widest: float) -> float:
+    """Return the largest decimal unit, `widest` at most, that divides times [s]; 0 for none."""
     # Seconds, and parts of a day, which take all digits that a number has.
-    for times in (time, last):
-        for size, powers, off in ((1.0, 7, 1e-4), (86400.0, 10, 5e-3)):
-            for power in range(powers):
-                unit = size * 10.0**-power
-                if unit > widest:  # of different times two are a step apart at least
-                    continue
-                if np.abs(times / unit - np.round(times / unit)).max() < off:
-                    return unit
+    for size, powers, off in ((1.0, 7, 1e-4), (86400.0, 10, 5e-3)):
+        for power in range(powers):
+            unit = size * 10.0**-power
+            if unit > widest:  # of different times two are a step apart at least
+                continue
+            if np.abs(time / unit - np.round(time / unit)).max() < off:
+                return unit
     return 0.0
 
 

@@ -84,7 +84,7 @@ MANY = 60_000
 ENOUGH, FEWEST = 30_000, 8
 """Samples, about, of that part, for a search takes as long as they are; its runs at the least."""
 
-LONG = 150.0
+LASTS = 150.0
 """Seconds, about, of that part at the most: where samples are far apart a model with a joint takes
 many steps from one to the next."""
 
@@ -197,10 +197,10 @@ def part_of(problem: Problem) -> Problem | None:
     ordered = sorted(runs, key=place)
     samples = sum(len(run.force) for run in runs)
     seconds = sum(len(run.force) * run.dt for run in runs)
-    whole = int(len(runs) * min(ENOUGH / samples, LONG / seconds))
+    whole = int(len(runs) * min(ENOUGH / samples, LASTS / seconds))
     count = min(max(FEWEST, whole), len(runs))
     chosen = np.linspace(0, len(runs) - 1, count).round().astype(int)
-    begins = [ordered[k].first(LONG / count) for k in chosen]
+    begins = [ordered[k].first(LASTS / count) for k in chosen]
     return problem.of([run.of(slice(ENOUGH // count)) for run in begins])
 
 

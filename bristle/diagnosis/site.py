@@ -229,7 +229,8 @@ class Trials:
         self._alone: dict[tuple[str, ...], list[Trial]] = {}
         self._earlier = earlier
         self._ends = ends
-        self._free = free or (vars(earlier).get("freed") if earlier else None)
+        self._begun_free = free or (earlier._freed if earlier else None)
+        self._freed: Trials | None = None
         self._weighed: dict[float, Trials] = {}
         if earlier is None:
             try_labels(prepared)
@@ -250,11 +251,13 @@ class Trials:
             self._weighed[excess] = Trials(prepared, self.say, self)
         return self._weighed[excess]
 
-    @cached_property
+    @property
     def freed(self) -> Trials:
-        """The trials with the zero of the force fitted along."""
-        self.say("the zero of the force is fitted along with every effect")
-        return Trials(self.prepared.freed, self.say, self._free)
+        """The trials with the zero of the force fitted along, made once."""
+        if self._freed is None:
+            self.say("the zero of the force is fitted along with every effect")
+            self._freed = Trials(self.prepared.freed, self.say, self._begun_free)
+        return self._freed
 
     @cached_property
     def patterns(self) -> list[ResidualPattern]:

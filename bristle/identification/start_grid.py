@@ -118,7 +118,7 @@ for an effect of speed: a fit without it inflates that part."""
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
 
-TOUGH = 30.0
+JOINT_LASTS = 30.0
 """Seconds, over all runs, that suffice for a search where the model has a joint: each is integrated
 in the same short steps, however few samples it has."""
 
@@ -313,7 +313,7 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
     """
     if kind == "joint":
         few = problem.runs[::2]
-        begins = [run.first(TOUGH / len(few)) for run in few]
+        begins = [run.first(JOINT_LASTS / len(few)) for run in few]
         if len(begins) == len(problem.runs) and all(map(is_, begins, few)):
             return problem, expected
         counts = [len(run.force) for run in begins]

@@ -194,7 +194,7 @@ def step_for(held: HeldOut) -> float:
     while dt / n >= 2.0 * FINEST:
         late = []
         for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
-            steps = _steps(fed, dt / n)
+            steps = _steps_per_moment(fed, dt / n)
             force = held.force(*_dense(fed, steps))
             force = np.concatenate([force[:1], force[:-1]])[::steps]
             late.append(error_on(run, held.shown(k, force)))
@@ -230,7 +230,7 @@ def write_inputs(held: HeldOut, step: float, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
-        per = _steps(fed, step)
+        per = _steps_per_moment(fed, step)
         rows = _rows(fed.moments.V, per)
         dense = _dense_inputs(held.damper, run, fed, step)
         columns = {f"{name} [{unit}]": y[rows] for name, (unit, y) in dense.items()}
@@ -271,7 +271,7 @@ def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proo
 def _proof(held: HeldOut, fmu: Path, step: float, timeout: float, most: int) -> Proof:
     """Return the proof by an FMU that makes so many steps at the most."""
     lengths = [len(run.force) for run in held.runs]
-    of_moment = [_steps(fed, step) for fed in held.fed]
+    of_moment = [_steps_per_moment(fed, step) for fed in held.fed]
     parts = [run.finer.parts if run.finer else 1 for run in held.runs]
     of_sample = [n * m for n, m in zip(of_moment, parts, strict=True)]
     part = min(1.0, most / sum(n * m for n, m in zip(lengths, of_sample, strict=True)))
@@ -377,13 +377,13 @@ def _inputs(damper: Model, run: Run, fed: Fed) -> dict[str, tuple[str, Array]]:
     return out
 
 
-def _steps(fed: Fed, step: float) -> int:
+def _steps_per_moment(fed: Fed, step: float) -> int:
     """Return in how many steps an FMU passes from one moment of a run to the next: none longer."""
     return math.ceil(fed.moments.dt / step - 1e-6)
 
 
 def _dense_inputs(damper: Model, run: Run, fed: Fed, step: float) -> dict[str, tuple[str, Array]]:
-    moments, dense = _dense(fed, _steps(fed, step))
+    moments, dense = _dense(fed, _steps_per_moment(fed, step))
     return _inputs(damper, run, dense._replace(moments=moments))
 
 

@@ -232,9 +232,6 @@ def add_effects(
     return Added(names, replace(identified, step=step), step, other_law)
 
 
-_ADD, _DOUBT = "add ", f" ({NOT_PROVEN})"
-
-
 def add_unproven(
     study: Study, law: str, names: Sequence[str], begin: Mapping[str, float], found: Diagnosis
 ) -> Step:
@@ -249,18 +246,20 @@ def add_unproven(
     found : the verdict at hand
     """
     identified = identify_with(study, names, begin, law)
-    parts = ([f"take {law}"] if law else []) + ([_ADD + ", ".join(names)] if names else [])
+    parts = ([f"take {law}"] if law else []) + ([f"add {', '.join(names)}"] if names else [])
     why = f"improves the prediction on training runs left out; {NOT_PROVEN}"
-    what = "; ".join(parts) + _DOUBT
+    what = f"{'; '.join(parts)} ({NOT_PROVEN})"
     step = study.add_step(what, why, identified.model, *identified.for_history())
     study.write_verdict(verdict_of(study, found))
     return step
 
 
-def unproven_of(step: Step) -> list[str]:
+def unproven_of(study: Study, step: Step) -> list[str]:
     """Return the effects that a step added and that no verdict names."""
-    _, add, names = step.what.partition(_ADD)
-    return names.removesuffix(_DOUBT).split(", ") if add and names.endswith(_DOUBT) else []
+    if not step.why.endswith(NOT_PROVEN):
+        return []
+    before, after = (study.model_of(n, to_show=True) for n in (step.number - 1, step.number))
+    return [name for name in after.effects if name not in before.effects]
 
 
 def identify_with(

@@ -198,7 +198,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     if not judged:
         return view
     began = study.model_of(steps[0].number, to_show=True)
-    doubtful = [one for step in study.steps() for one in unproven_of(step)]
+    doubtful = [one for step in study.steps() for one in unproven_of(study, step)]
     known = (*began.effects, *closures(model.effects), *doubtful)
     added = [name for name in model.effects if name not in known]
     if not added:
@@ -268,12 +268,13 @@ def _unproven(study: Study, step: Step) -> str:
     """Return the sentences about a step that improves the prediction and is not proven."""
     fall = [errors.get("error_share_holdout") for errors in (step.before, step.after)]
     falls = " to ".join(percent(one) for one in fall if isinstance(one, float))
-    back = command("study", "auto", study.folder, "--proven")
+    names = effect_names(unproven_of(study, step)) or step.what
+    back = command("undo", study.folder)
     return (
-        f"Improves the prediction, is not proven: {effect_names(unproven_of(step)) or step.what}. "
+        f"Improves the prediction, is not proven: {names}. "
         "Chosen on training runs left out of the fit; the error on held-out runs goes from "
-        f"{falls} of the force. The verdict is on the model without that. undo takes it back; "
-        f"from the begin on {back} leaves it out."
+        f"{falls} of the force. The verdict is on the model without it. {back} takes it back; "
+        "--proven keeps it out from the start."
     )
 
 
