@@ -40,6 +40,9 @@ STANDS_OUT = 3.0
 """Times the error that others show, at the most, that is asked of a run without which they would
 have none: least squares leave the one of n runs n - 1 times as much as each of the others."""
 
+OF_FEW = 0.25
+"""Share of these n - 1 times that is asked where it is less."""
+
 QUICK = 3
 """Jacobians of a first fit without a run, which shows where others are unexplained without it too.
 """
@@ -75,7 +78,7 @@ def odd_run(
     ])  # fmt: skip
     farthest = np.argsort(-np.abs(apart - np.median(apart)))
     z = _z_of_runs(model, train.of(runs), expected)
-    asked = max(1.0, min(0.25 * (len(runs) - 1), STANDS_OUT))
+    asked = max(1.0, min(OF_FEW * (len(runs) - 1), STANDS_OUT))
     for k in farthest[:SUSPECTS].tolist():
         run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
         if not is_covered([(one.v, one.V) for one in (run, *others)], 1):

@@ -53,9 +53,10 @@ _NO_COMMAND = (
     "devices are tried as well. If one acts on it, its column or --level is needed"
 )
 ENDS = (0.005, 0.995)
-"""Shares of the samples below the ends of the displacement's range: spikes are none."""
+"""Shares of the samples below the two ends of the displacement's range, so that no spike is one."""
 NEAR_ZERO = 0.45
-"""Distance of the middle of the displacement's range from its zero, by the range, that is none."""
+"""Share of the displacement's range up to which its middle may lie from zero: farther off, and
+zero is outside the range or at its very edge."""
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
 
 
