@@ -136,8 +136,11 @@ JUMP = 6.0
 def smoothed_level(
     m: Measurement, name: str, looser: float, forced: Array | float = 0.0
 ) -> dict[str, Any]:
-    """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have, forced.
+    """Return the smoothed motion of one level by name, in SI.
 
+    `state` (n, 3) displacement, velocity, acceleration and `std` (3,) their errors; `r` (3,) the
+    variances of the channels and `have` (3,) which there are; `jerk` the intensity of the motion
+    and `added` (n,) that of its jumps; `forced` (n, 3) what was taken off before and put back.
     What was not measured of one channel the others tell, and the motion about it. Without an
     accelerometer the part of the acceleration that measured forces and the ground make, `forced`
     (n,) [m/s2], is as fast as they are: no smoother shall take that for noise. It is taken off
