@@ -288,7 +288,8 @@ def decimated(even: Even, rate: float, moved: Sequence[InTime] = ()) -> Decimate
     if not pieces:
         raise RecordError(
             f"at {plain(rate)} Hz fewer than {SHORTEST} samples would be left of "
-            f"{plain(recorded, 4)} Hz: take rate out of study.toml, or measure longer."
+            f"{plain(recorded, 4)} Hz. A higher rate in study.toml is right, or a longer run; or "
+            "the times are in another unit."
         )
     step = even.sampling.step * every
     note = (

@@ -203,13 +203,15 @@ def _centred(
 class _Part:
     """A run of a new study.
 
-    Its file in data/, its number there or 0, digests, samples per s, and the tone of its motion.
+    Its file in data/, its number there or 0, digests, samples per s, length in s, and the tone of
+    its motion.
     """
 
     file: str
     piece: int
     digests: tuple[str, ...]
     rate: float
+    lasts: float
     tone: Tone | None = None
 
     @property
@@ -257,8 +259,9 @@ def _parts(
             read = measurements_of(piece, specs, estimate=False)
             digests = tuple(one.digest() for one in read)
             tone = tone_of(read[0]) if len(read) == 1 else None
-            rate = read[0].sampling.rate
-            out.append(_Part(name, number if holds_several(split) else 0, digests, rate, tone))
+            rate, lasts = read[0].sampling.rate, sum(float(np.ptp(one.time)) for one in read)
+            place = number if holds_several(split) else 0
+            out.append(_Part(name, place, digests, rate, lasts, tone))
     return out
 
 
@@ -295,6 +298,13 @@ def _rate(parts: Sequence[_Part], choices: RunChoices, notes: list[str]) -> floa
     rate = RATE if choices.rate is None else choices.rate
     if rate <= 0.0 or fastest < FAST * rate * (1.0 - 1e-6):
         return 0.0
+    longest = max(part.lasts for part in parts)
+    if longest * rate < SHORTEST:
+        raise StudyError(
+            f"the runs last {plain(longest, 3)} s at most, with {plain(fastest, 4)} samples per "
+            f"second: a fit needs {plain(SHORTEST / rate, 3)} s at least, and several cycles of "
+            "motion. If the times are in another unit, --channel time=COLUMN@UNIT gives it."
+        )
     held = plain(fastest, 4)
     if plain(slowest, 4) != held:
         held = f"{plain(slowest, 4)} to {held}"

@@ -171,7 +171,7 @@ def test_a_command_jumps_between_the_samples_where_it_did(rate: float, parts: in
 def test_too_few_samples_are_not_decimated() -> None:
     t = np.arange(100) / 2000.0
     even = Even([(t, {"x": np.sin(t)}, np.ones(100, dtype=bool))], Sampling(1 / 2000.0, 100), [])
-    with pytest.raises(RecordError, match="take rate out"):
+    with pytest.raises(RecordError, match="A higher rate"):
         decimated(even, 500.0)
 
 

@@ -51,6 +51,19 @@ def bench_run(seed: int) -> pd.DataFrame:
     return pd.DataFrame({"time [s]": t, "x [m]": x, "F [N]": force})
 
 
+def test_seconds_called_milliseconds_make_no_study(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frame = bench_run(1).rename(columns={"time [s]": "time [ms]"})
+    frame.to_csv(tmp_path / "run.csv", index=False)
+    study = tmp_path / "s"
+    assert main(["study", "new", str(study), "--data", str(tmp_path / "run.csv")]) != 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the runs last 0.00749 s at most, with 200000 samples per second" in said
+    assert "--channel time=COLUMN@UNIT" in said
+    assert not study.exists()
+
+
 def content(study: Path) -> dict[str, bytes]:
     """Return what a study's files hold, but for its lock and the picture of a check."""
     files = (one for one in study.rglob("*") if one.is_file() and one.name != ".lock")
