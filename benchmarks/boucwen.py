@@ -197,7 +197,7 @@ def bent(deflection: float, v: float, inward: float, outward: float, dt: float) 
 
     Parameters
     ----------
-    deflection : b at the begin [m]
+    deflection : b at the start [m]
     v : velocity [m/s]
     inward, outward : gamma - delta and gamma + delta [1/m]: of the way back to the middle, and out
     dt : length of the step [s]

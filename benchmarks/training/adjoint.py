@@ -38,7 +38,7 @@ def damper_slopes(plant: Any, setup: Any, u: Any, eps: Any, z: Any, course: Any)
     ----------
     plant, setup, u : as in `held_force`
     eps : (7 + q,) small changes
-    z : (k,) states at the begin
+    z : (k,) states at the start
     course : Course
     """
     table, work, active = course.table, course.work, course.active

@@ -5,7 +5,7 @@ A module per component has
     sizes(values, baked, counts)
         Fill in how many floats constants, state, outputs (hidden ones too) and work take.
     setup(values, given, baked, store, state)
-        Fill in what parameters imply, and the state at the begin.
+        Fill in what parameters imply, and the state at the start.
     constants(store)
         Return the record that the functions below take; its rows are slices of `store`, in compiled
         code views.

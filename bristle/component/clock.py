@@ -58,7 +58,7 @@ def measure(instant: float, dt: float, period: float, before: Row, now: Row, mea
 
     Parameters
     ----------
-    instant : time since the begin of the step [s]
+    instant : time since the start of the step [s]
     dt, period : length of the step and time between two samples [s]
     before, now : (m,) inputs at begin and end, each in its own unit
     measured : (m,) filled

@@ -273,7 +273,7 @@ def step(
     Parameters
     ----------
     clock : tuple
-        Time at the begin [s], dt [s], sweep (not used).
+        Time at the start [s], dt [s], sweep (not used).
     before, now : (4,) inputs at begin and end, as in `start`
     c : Constants
     state, new_state : one and the same sequence, as in `start`, moved on in place

@@ -98,7 +98,7 @@ def sizes(values: Row, baked: Row, counts: Row) -> int:
 
 
 def setup(values: Row, given: Row, baked: Row, store: Row, state: Row) -> int:
-    """Fill in what parameters imply, and the states of law and effects at the begin.
+    """Fill in what parameters imply, and the states of law and effects at the start.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ VELOCITY_AT_END, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = 
 """What the state holds behind the states of law and effects: counted from its end.
 
 `ENERGY` is that of the step, which effects know; `ENERGY_SHOWN` that at the motion shown since;
-`ENERGY_AT_BEGIN` has what the begin of the step adds to it already. Motion and force at the end are
+`ENERGY_AT_BEGIN` has what the start of the step adds to it already. Motion and force at the end are
 those shown since, at the voltage of the step.
 """
 
@@ -270,13 +270,13 @@ def step(
 ) -> int:  # fmt: skip
     """Advance law, effects and energy over one step.
 
-    A voltage that has jumped since the last step acts from the begin of this one on: the energy's
+    A voltage that has jumped since the last step acts from the start of this one on: the energy's
     trapezoid begins at the force that the damper then has.
 
     Parameters
     ----------
     clock : tuple
-        Time at the begin [s], dt [s], sweep (not used).
+        Time at the start [s], dt [s], sweep (not used).
     before, now : (5,) inputs at begin and end, as in `start`
     c : Constants
     state, new_state : states at begin (kept) and end (filled), as in `start`

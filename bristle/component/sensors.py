@@ -221,7 +221,7 @@ def step(
     Parameters
     ----------
     clock : tuple
-        Time at the begin [s], dt [s], sweep (not used).
+        Time at the start [s], dt [s], sweep (not used).
     before, now : (m,) signals at begin and end, each in its own unit
     c : Constants
     state, new_state : one and the same sequence, as `setup` lays it out, moved on in place

@@ -167,7 +167,7 @@ def step(
     Parameters
     ----------
     clock : tuple
-        Time at the begin [s], dt [s], sweep (not used).
+        Time at the start [s], dt [s], sweep (not used).
     before, now, state, new_state, work : not used: a signal has none
     c : Constants
     outputs : (1,) or (2,) as in `start`, filled

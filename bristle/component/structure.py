@@ -489,7 +489,7 @@ def step(
     Parameters
     ----------
     clock : tuple
-        Time at the begin [s], dt [s], sweep: 0 for the first of a step.
+        Time at the start [s], dt [s], sweep: 0 for the first of a step.
     before, now : (3 + d,) inputs at begin and end, as in `start`
     c : Constants
         With the matrices of a step of dt, as `discretise` returns them.

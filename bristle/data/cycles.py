@@ -44,7 +44,7 @@ def cycles(runs: Sequence[tuple[Array, Array, Array]], skip: int = 0) -> list[Cy
     Parameters
     ----------
     runs : per run displacement (n,), velocity (n,) and level (n,), evenly spaced in time
-    skip : samples at the begin of each run that do not count
+    skip : samples at the start of each run that do not count
     """
     found = []
     for number, (x, v, level) in enumerate(runs):

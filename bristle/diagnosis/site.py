@@ -206,7 +206,7 @@ class Trials:
     say : is told what is being done
     earlier : the same trials by other weights or of fewer runs, whose ends are where these begin
     free : those with the zero of the force fitted along, where they were made of fewer runs
-    ends : where trials that are made from the very begin are kept, and taken up
+    ends : where trials that are made from the very start are kept, and taken up
 
     Attributes
     ----------

@@ -90,7 +90,7 @@ def structure_record(slots: Slots = structure.SETS.library.slots) -> np.dtype[np
     `forces` are the slots of the inputs behind the first three, those of the `devices`; `friction`,
     `extra_friction` and `frictions` those of how much of the damper's force, the extra one and the
     devices' is friction.
-    smooth0 is the damper's and the extra force without friction at the begin, `smooths` that of
+    smooth0 is the damper's and the extra force without friction at the start, `smooths` that of
     each device. It is `followed` by a component that reads more than its motion.
     """
     n, most = LEVELS, MOST_DEVICES
@@ -198,7 +198,7 @@ def lay_damper(d: Any, c: Constants, state: Row, wiring: Row) -> None:
     ----------
     d : record, see `damper_record`
     c : Constants
-    state : states of law and effects at the begin, and what `component.damper` keeps behind them
+    state : states of law and effects at the start, and what `component.damper` keeps behind them
     wiring : numbers, see `DAMPER_INPUTS`
     """
     own = c.setup
@@ -229,7 +229,7 @@ def lay_structure(b: Any, c: StructureConstants, state: Row, wiring: Row) -> Non
     ----------
     b : record, see `structure_record`
     c : Constants, with the matrices of a substep
-    state : as `component.structure` lays it down, at the begin
+    state : as `component.structure` lays it down, at the start
     wiring : numbers, see `STRUCTURE_INPUTS`
     """
     lay_matrices(b, c)

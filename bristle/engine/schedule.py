@@ -12,7 +12,7 @@ schedule is worked out once, from the connections alone, and asks for no call th
   already, ahead of the newest by half its last change where it has not. Before outputs that follow
   it are read it gets the value at the step's end. What a component interpolates or samples, and
   what is discrete, gets the newest value.
-- Midpoint, iterated: the components of a loop then go back to the begin of the step and make it
+- Midpoint, iterated: the components of a loop then go back to the start of the step and make it
   again, with the middle between the values at its begin and those found at its end.
 - Jacobi: all step, all are read, all inputs are set; outputs that follow an input are read again
   for the row and not passed on.

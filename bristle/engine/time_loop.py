@@ -122,7 +122,7 @@ def integrate(
 
 
 def begin_run(sources: Any, coupled: Any, t: float, h: float, s: Any) -> None:
-    """Bring the signals to the begin of a run; the first samples are taken next.
+    """Bring the signals to the start of a run; the first samples are taken next.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def substep(
     ----------
     sources, coupled : as in `integrate`
     driven : tuple of arrays
-        Slots (d,) of the signals that are given from outside, and their values (d,) at the begin
+        Slots (d,) of the signals that are given from outside, and their values (d,) at the start
         and at the end of the communication step, between which they are linear.
     clock : tuple
         End of the substep [s], its length [s], and the share of the communication step that has
@@ -235,7 +235,7 @@ def play(sources: Any, t: float, s: Any) -> None:
 
 
 def start(dampers: Any, structures: Any, h: float, s: Any) -> None:
-    """Settle the signals at the begin: accelerations and forces may follow each other.
+    """Settle the signals at the start: accelerations and forces may follow each other.
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ def sample(sampled: Any, coupled: Any, origin: float, t: float, h: float, s: Any
     ----------
     sampled, coupled : tuples of arrays, as in `integrate`
     origin : begin of the run [s]: the time of sample 0
-    t : end of the substep [s], `origin` at the begin
+    t : end of the substep [s], `origin` at the start
     h : length of a substep [s]
     s : (n,) signals, each in its own unit, changed in place
     """

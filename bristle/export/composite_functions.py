@@ -64,7 +64,7 @@ and how many they are, where they do among the parameters, and which of the sign
 
 HEADER, GIVEN, VALUES, FIRST_STORE = range(4)
 """Rows of the store: numbers; which inputs a host has set; the values of all parts. Behind them two
-rows for each part, its own store and its state at the begin, and room to work."""
+rows for each part, its own store and its state at the start, and room to work."""
 
 H, SUBSTEPS, DT, _COUNTS, _NOTHING = 0, 1, 2, 3, 7
 HEADER_SIZE = 16
@@ -320,7 +320,7 @@ def scale_part(k: int, times: Row, samples: Row, baked: Row, store: Row) -> int:
 
 ORIGIN, BASE, COUNT, SUBSTEP, SCALE = range(5)
 NUMBERS = 8
-"""What the state begins with: the begin of the run [s]; substeps count from the time `BASE` [s] on,
+"""What the state begins with: the start of the run [s]; substeps count from the time `BASE` [s] on,
 each of so many seconds; the largest force so far [N]. Behind them the signals, the inputs at the
 last step, and the records and the memory of the time loop."""
 
@@ -570,14 +570,14 @@ def step(
 ) -> int:  # fmt: skip
     """Move all parts over a communication step, in substeps of the coupled engine.
 
-    An input is held at its newest value, or linear from that at the begin; see `HELD`. The
+    An input is held at its newest value, or linear from that at the start; see `HELD`. The
     latter is that of the last step, but where a host has set a derivative with a new value.
 
     Parameters
     ----------
     clock : tuple
-        Time at the begin [s], dt [s], sweep (not used).
-    before, now : inputs at the begin and at the end of the step, as in `start`
+        Time at the start [s], dt [s], sweep (not used).
+    before, now : inputs at the start and at the end of the step, as in `start`
     c : Constants
         As `discretise` has left them for a step of dt.
     state, new_state : one and the same sequence, as in `start`, moved on in place

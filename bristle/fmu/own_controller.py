@@ -126,7 +126,7 @@ class Functions:
 
         Parameters
         ----------
-        clock : time at the begin [s], length of the step [s], sweep (not used)
+        clock : time at the start [s], length of the step [s], sweep (not used)
         before, now : (4,) inputs at begin and end, as in `start`
         c : Constants
         state, new_state : one and the same sequence, as in `start`, moved on in place

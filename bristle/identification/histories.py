@@ -144,7 +144,7 @@ def force_history(
     setup : the damper, its parameters in SI
     motion : x, v, a, V as (n,) [m, m/s, m/s2, V] and the step dt [s]
     tracks : parameters that change over the run, set in `setup.p`
-    z : (states,) at the begin, moved on in place
+    z : (states,) at the start, moved on in place
     z1 : room for as many states
     work : room for `damper.room` floats
     out : (n,) N, filled

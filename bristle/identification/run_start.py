@@ -18,7 +18,7 @@ from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 
 SETTLING = 25
-"""Samples at the begin of a run that are not judged."""
+"""Samples at the start of a run that are not judged."""
 
 RESTS = 2e-3
 """Share of the stroke that a damper at rest moves by at most: noise."""
@@ -27,7 +27,7 @@ STANDS = 0.2
 """Time [s] for which it does: a motion that begins gently is faster."""
 
 LOADED = 0.2
-"""Share of its RMS that the force has at the begin of a rest under load."""
+"""Share of its RMS that the force has at the start of a rest under load."""
 
 STILL = 0.03
 """Share of their RMS that speed and force have at most where a run sets out from rest: noise."""
@@ -158,7 +158,7 @@ def under_load_text(loads: Mapping[str, float]) -> str:
 
     Parameters
     ----------
-    loads : force at the begin [N], by the name of the run
+    loads : force at the start [N], by the name of the run
     """
     if not loads:
         return ""

@@ -309,7 +309,7 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
     """Return less data for a search: some of the samples without memory, of the runs with a joint.
 
     Without states a law is a function of the motion at each sample. A series element costs many
-    times as much as another effect: of every other run the begin serves.
+    times as much as another effect: of every other run the start serves.
     """
     if kind == "joint":
         few = problem.runs[::2]

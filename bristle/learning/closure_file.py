@@ -161,7 +161,7 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         f"SIZE = {_n(closure.size)}",
         '"""Force [N] that it comes near at most."""',
         f"BEGIN, MOST = {_n(store.begin)}, {_n(store.most)}",
-        '"""Energy [J] that the device may give back at the begin, and at most."""',
+        '"""Energy [J] that the device may give back at the start, and at most."""',
         f"SOON, SLOW = {_n(store.soon)}, {_n(store.slow)}",
         '"""Time [s] in which it may do so; speed [m/s] below which it fades where it may not."""',
         "",

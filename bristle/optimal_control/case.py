@@ -56,7 +56,7 @@ class Case:
     ground : (N + 1,) array
         Ground acceleration [m/s2] at 0, h, ...
     states : (k,) array
-        Of the damper at the begin.
+        Of the damper at the start.
     v_max : float
         V
     command_unit : str

@@ -120,7 +120,7 @@ def improve(plant: Any, setup: Any, voltage: float, level: float, horizon: Horiz
     Parameters
     ----------
     plant, setup : Plant, Setup
-    voltage : at the begin of the horizon [V], fixed
+    voltage : at the start of the horizon [V], fixed
     level : size of the output that the cost is told by
     horizon : Horizon; instant 0 of its course and the expected ground motion are given
     u : (7,) room to work

@@ -182,7 +182,7 @@ def foreseen(
     ----------
     problem : ControlProblem
     seconds : for which the ground motion is seen ahead [s]
-    start : voltage at the begin [V]
+    start : voltage at the start [V]
     least : size of the output that counts for nothing
     statistic : "peak" or "rms"
     """

@@ -201,7 +201,7 @@ def states_of(baked: Row) -> int:
 
 
 def fill(values: Row, baked: Row, store: Row, z: Row) -> int:
-    """Fill in what values imply of a damper, and the states at the begin.
+    """Fill in what values imply of a damper, and the states at the start.
 
     Parameters
     ----------
@@ -462,7 +462,7 @@ def setup_of(
 
 
 def start_states(law: str, values: Mapping[str, float], slots: Slots) -> list[float]:
-    """Return the states at the begin; start values end in `_0`: "coil_lag.voltage_0"."""
+    """Return the states at the start; start values end in `_0`: "coil_lag.voltage_0"."""
     z = [0.0] * slots.z_size
     for name, slot in state_places(law, slots).items():
         z[slot] = values.get(name, 0.0)

@@ -128,7 +128,7 @@ class Balance(NamedTuple):
 
     `now` is what acts on the rod at its end, `now.dt` the time that goes by; `begin` the rod's
     velocity at its begin; `push` the time [s] over which forces act, the same unless the mass is to
-    come to rest at once; `deflection`, `speed` of the series element at the begin [m, m/s].
+    come to rest at once; `deflection`, `speed` of the series element at the start [m, m/s].
     """
 
     now: Inputs

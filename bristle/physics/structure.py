@@ -478,7 +478,7 @@ def state_size(n: int, slots: Slots) -> int:
 
 
 def start_states(n: int, values: dict[str, float], slots: Slots) -> list[float]:
-    """Return the states of n levels at the begin; `values` names start values, "EFFECT.STATE_0"."""
+    """Return the states of n levels at the start; `values` names start values, "EFFECT.STATE_0"."""
     return [values.get(name + "_0", 0.0) for name in slots.states] * (n + 1)
 
 

@@ -108,7 +108,7 @@ MOTIONS: dict[str, Callable[[Waveform, Array], Array]] = {
 
 
 def fade(t: Array, rise: float = RAMP) -> Array:
-    """Return a factor (n,) that rises smoothly from 0 to 1 at the begin, and falls at the end."""
+    """Return a factor (n,) that rises smoothly from 0 to 1 at the start, and falls at the end."""
     q = np.clip(np.minimum(t - t[0], t[-1] - t) / rise, 0.0, 1.0)
     return np.asarray(q**3 * (10.0 - 15.0 * q + 6.0 * q * q))
 

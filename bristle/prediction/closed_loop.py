@@ -173,7 +173,7 @@ def _trials(
 ) -> tuple[list[PredictedRun], list[str]]:
     """Return what can be simulated from rest, and why the rest is left out.
 
-    A single run that is `split` in time is simulated from the begin of its file, and judged on its
+    A single run that is `split` in time is simulated from the start of its file, and judged on its
     own part.
     """
     single = split and sum(run.role != TEST for run in study.settings.runs) == 1

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 REST = 0.1
 """Share of a response's peak up to which it counts as at rest when the run begins."""
 BEGIN = 0.02
-"""Seconds over which the begin of a run is averaged."""
+"""Seconds over which the start of a run is averaged."""
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ OF_ERROR, OF_FORCE = 0.01, 0.002
 FINEST = 2e-5
 """Shortest step [s] that is tried."""
 MOST = (120_000, 700_000)
-"""Steps of an FMU for its proof: where the runs need more, the begin of each is taken. One sample
+"""Steps of an FMU for its proof: where the runs need more, the start of each is taken. One sample
 at which the motion reverses can part the two errors there; then as many as the second number."""
 FADED = 1e-6
 """Share of its largest value below which the response of an instrument has ended."""

@@ -31,7 +31,7 @@ def test_a_clock_gains_from_the_begin_of_the_record_on():
     moved = placed(fast, [Correction("displacement", "clock", 1e-3)], begin=40.0)
     known = ~moved.lost["displacement"]
     assert np.abs(moved.channels["displacement"] - np.sin(3.0 * t))[known].max() < 1e-4
-    assert 2970 < known.sum() < 2980  # 40 ms at the begin of this part are before it
+    assert 2970 < known.sum() < 2980  # 40 ms at the start of this part are before it
 
 
 def force_of(t):

@@ -102,7 +102,7 @@ def velocity_after_a_step(begin: float, end: float, monkeypatch: pytest.MonkeyPa
 
 
 def test_an_input_goes_from_its_value_by_its_derivative(monkeypatch: pytest.MonkeyPatch) -> None:
-    # What stands at the begin is not what the last step ended with where a host sets both.
+    # What stands at the start is not what the last step ended with where a host sets both.
     from_zero, from_five = (velocity_after_a_step(begin, 6.0, monkeypatch) for begin in (0.0, 5.0))
     assert from_five / from_zero == pytest.approx(5.5 / 3.0, rel=0.05)
 

@@ -51,7 +51,7 @@ def trees() -> list[tuple[str, ast.Module]]:
 
 
 def literals(tree: ast.Module) -> Iterator[tuple[int, str]]:
-    """Yield line and name of each string that is one, or the begin of a parameter's full name."""
+    """Yield line and name of each string that is one, or the start of a parameter's full name."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             name, dot, rest = node.value.partition(".")

@@ -17,7 +17,7 @@ def yielded(bent: float, v: float, slip: float, sigma: float, dt: float) -> floa
 
     Parameters
     ----------
-    bent : deflection at the begin [m]
+    bent : deflection at the start [m]
     v : velocity [m/s]
     slip : inverse of the deflection in sliding [1/m]
     sigma : share of gamma in beta + gamma [1], 0.5 or more

@@ -16,7 +16,7 @@ def slid(bent: float, travel: float, slip: float) -> float:
 
     Parameters
     ----------
-    bent : deflection at the begin [m]
+    bent : deflection at the start [m]
     travel : how far it went, 0 or more [m]
     slip : inverse of the deflection in sliding [1/m]
     """

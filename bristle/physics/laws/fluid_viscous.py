@@ -74,7 +74,7 @@ def carried_on(y, v, give, alpha, dt):
     """Return the share of c [1] that is carried after a step at constant velocity v [m/s].
 
     The spring takes up what the dashpot does not let through at the mean share. That lies between
-    the share at the begin and that of steady motion.
+    the share at the start and that of steady motion.
     """
     goal = steady(v, alpha)
     if y == goal or dt <= 0.0:

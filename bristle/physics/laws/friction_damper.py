@@ -32,7 +32,7 @@ def carried_on(offset, v, slip, gamma, play, dt):
 
     Parameters
     ----------
-    offset : at the begin [m]: within `play` nothing is carried, beyond it the plates bend
+    offset : at the start [m]: within `play` nothing is carried, beyond it the plates bend
     v : velocity [m/s]
     slip : inverse of the deflection in sliding [1/m]
     gamma : Dahl's exponent [1]

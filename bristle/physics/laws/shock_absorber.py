@@ -46,7 +46,7 @@ def flowing(u, v, p, dt):
 
     What gives way takes up what the valves do not let through: it bends, by their force's rise
     times its compliance, as the rod moves farther than the oil, whose mean speed lies at a share
-    of its change. The speed stays between that at the begin and the rod's.
+    of its change. The speed stays between that at the start and the rod's.
     """
     if u == v or dt <= 0.0:
         return u
