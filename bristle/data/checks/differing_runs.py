@@ -32,7 +32,7 @@ from .motion import velocity_of_run
 _SAMPLES = 1500  # of a run, at most
 _WIDTHS = (0.05, 0.3)  # of a yield force's turn, in standard deviations of the velocity
 _LENGTHS = np.array([0.03, 0.12, 0.5])  # over which a force builds up, in those of the displacement
-_PARTS = 6
+_STRETCHES = 6  # of a run: the scatter over them gives its standard errors
 _MASS = 0.02  # s; so that an acceleration is about as large as the other shapes
 _TURNS = 25  # of gains and shapes
 
@@ -112,18 +112,20 @@ def fitted_forces(parts: Sequence[ForcePart], sound: Sequence[int]) -> RunForces
         float(np.std(part.force - g * p) / np.std(part.force))
         for part, g, p in zip(parts, gain, predicted, strict=True)
     ]
-    errors = np.array([_errors(p, part.force) for p, part in zip(predicted, parts, strict=True)])
+    errors = np.array(
+        [_standard_errors(p, part.force) for p, part in zip(predicted, parts, strict=True)]
+    )
     relative = errors[:, 0] / np.maximum(np.abs(gain), 1e-9)
     return RunForces(gain, zero, np.array(misfit), relative, errors[:, 1])
 
 
-def _errors(predicted: Array, force: Array) -> tuple[float, float]:
-    """Return the standard errors of gain and zero of a run, from its parts that move."""
+def _standard_errors(predicted: Array, force: Array) -> tuple[float, float]:
+    """Return the standard errors of gain and zero [N], from stretches of a run that move."""
     moving = 0.05 * float(np.std(predicted))
     parts = [
         np.polyfit(p, f, 1)
         for p, f in zip(
-            np.array_split(predicted, _PARTS), np.array_split(force, _PARTS), strict=True
+            np.array_split(predicted, _STRETCHES), np.array_split(force, _STRETCHES), strict=True
         )
         if float(np.std(p)) > moving
     ]
@@ -174,6 +176,8 @@ def _displacement(run: Measurement, velocity: Array) -> Array:
         return run["displacement"] - np.mean(run["displacement"])
     return np.cumsum(velocity - np.mean(velocity)) * run.step
 
+
+# Which run differs: by its gain, its zero or its sign.
 
 MIN_RUNS = 4
 """Runs from which on one can differ from the others."""

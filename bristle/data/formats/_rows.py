@@ -1,4 +1,4 @@
-"""Rows of a delimited text: which fields are numbers, and how rows become columns."""
+"""Rows of a delimited text: which fields are numbers or instants, how rows become columns."""
 
 from __future__ import annotations
 
@@ -381,14 +381,14 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
     month, which matters where a date changes: what gives the shorter record counts, else the day
     comes first.
     """
-    plain = [_COLON.sub(r"\1.", text.strip().strip('"').strip()) for text in texts]
-    if not plain or not plain[0]:
+    bare = [_COLON.sub(r"\1.", text.strip().strip('"').strip()) for text in texts]
+    if not bare or not bare[0]:
         return None
-    found = _by_iso(plain)
+    found = _by_iso(bare)
     if found is None:
-        plain = [_with_point(text) for text in plain]
-        able = (one for form in _FORMS if (one := _by_form(plain, form)) is not None)
-        day, last = (text.partition(" ")[0] for text in (plain[0], plain[-1]))
+        bare = [_with_point(text) for text in bare]
+        able = (one for form in _FORMS if (one := _by_form(bare, form)) is not None)
+        day, last = (text.partition(" ")[0] for text in (bare[0], bare[-1]))
         found = (
             next(able, None) if day == last or ":" in day else min(able, key=_span, default=None)
         )
@@ -418,13 +418,13 @@ def _by_iso(texts: Sequence[str]) -> tuple[list[datetime], bool] | None:
 
 def _by_form(texts: Sequence[str], form: str) -> tuple[list[datetime], bool] | None:
     try:
-        _read(texts[0], form)  # most forms fail here
-        return [_read(text, form) for text in texts], form in _CLOCKS
+        _instant(texts[0], form)  # most forms fail here
+        return [_instant(text, form) for text in texts], form in _CLOCKS
     except ValueError:
         return None
 
 
-def _read(text: str, form: str) -> datetime:
+def _instant(text: str, form: str) -> datetime:
     """Return an instant; whole seconds may be written without their fraction."""
     try:
         return datetime.strptime(text, form)
