@@ -23,6 +23,11 @@ def in_child(
     order : plain data, which stands there as JSON
     timeout : after which the process is ended [s]; None: never
     more : variables of its environment beside those of this process
+
+    Raises
+    ------
+    subprocess.TimeoutExpired
+        If it was ended.
     """
     path = os.pathsep.join([_ROOT, os.environ.get("PYTHONPATH", "")])
     return subprocess.run(

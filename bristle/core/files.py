@@ -142,8 +142,9 @@ def as_json(value: Any, of_array: Callable[[Any], Any] | None = None) -> Any:
     if isinstance(value, list | tuple):
         return [as_json(item, of_array) for item in value]
     if hasattr(value, "tolist"):
-        whole = of_array is not None and getattr(value, "ndim", 0) > 0
-        return of_array(value) if of_array and whole else as_json(value.tolist(), of_array)
+        if of_array and getattr(value, "ndim", 0) > 0:
+            return of_array(value)
+        return as_json(value.tolist(), of_array)
     if isinstance(value, float) and not isfinite(value):
         return None
     return value

@@ -134,7 +134,7 @@ def _seen(purposes: Purposes, now: Information, then: Information) -> list[Outco
             sized.value(max(size, one.least)) if shown else inf
             for size, shown in zip(sizes, visible, strict=True)
         ]
-        # Where the model misfit_note, the runs allow sizes that they would name beside a true one.
+        # Where the model misfits, the runs allow sizes that they would name beside a true one.
         found = max(_named(one, before[name], after[name]), one.least, sizes[1])
         needs = ""
         if visible[1] and not sized.ended(found):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ..core.files import json_text
 from ..core.text import plain, quantity
 from ..diagnosis.rule import BENCH
 from ..errors import StudyError
@@ -189,7 +189,7 @@ class Plan(Viewable):
         runs = enumerate(self.runs())
         pictures = {f"{run.name}.png": png(self._page(k), 110) for k, run in runs}
         told = {"header": HEADER, "rows": [one.cells() for one in self.outcomes]}
-        table = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
+        table = json_text(told) + "\n"
         return {**pictures, "plan.md": "\n".join([*self._text(), ""]), OUTCOMES: table}
 
     def _text(self) -> list[str]:

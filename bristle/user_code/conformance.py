@@ -287,7 +287,7 @@ def _forces(law: type[Law], dt: float) -> list[float]:
 
 def main() -> int:
     """Print what is asked of a file's effect or law, and whether it holds."""
-    from ..user_code.load import load_file
+    from .load import load_file
 
     word, file = sys.argv[1:3]
     made = load_file(Path(file), word)
