@@ -155,6 +155,7 @@ PATIENCE = 300.0
 SETTLE = 3.0
 """Seconds in which the scheduler sees that a worker is dead."""
 _LOOK = 2.0
+"""Seconds without a result after which the workers are looked at."""
 _PER_THREAD = 4
 """Runs under way per thread of the cluster."""
 _KILLED = "KilledWorker: "

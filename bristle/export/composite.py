@@ -229,10 +229,7 @@ class Assembly:
 
     def _inputs_of(self, part: str, port: str, initial: bool) -> Sequence[str]:
         slave = self.parts[part]
-        if initial and self.kind(part) in (
-            functions.CONTROLLER,
-            functions.SENSORS,
-        ):
+        if initial and self.kind(part) in (functions.CONTROLLER, functions.SENSORS):
             return [slave.vars[index].name for index in slave._inputs]
         follows: Sequence[str] = slave._depends[port]
         return follows

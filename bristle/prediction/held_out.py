@@ -186,8 +186,8 @@ def step_for(held: HeldOut) -> float:
     """Return the longest step [s] at which FMPy gives the error that is told.
 
     It is that of the moments that are closest, as runs may have rates of their own, or a whole
-    fraction of it, `FINEST` at the shortest. What FMPy shows
-    is the force of a step before, which the damper's own functions give as well.
+    fraction of it, `FINEST` at the shortest. What FMPy shows is the force of a step before, which
+    the damper's own functions give as well.
     """
     told, n = held.told(), 1
     dt = min(fed.moments.dt for fed in held.fed)
