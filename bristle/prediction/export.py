@@ -261,7 +261,7 @@ def _reach(study: Study, model: Model, runs: Runs) -> str:
         told = f"{texts[0]} to {texts[-1]}" if label.is_number else ", ".join(texts)
         ranges.append(f"{label_name(label.name)} {told}")
     share = history_steps(study.steps())[-1].share
-    off = "" if share is None else f" Error on {len(runs.holdout)} held-out: {percent(share)} RMS."
+    off = "" if share is None else f" Held-out error: {percent(share)} of the force (RMS)."
     counted = f"{len(train)} run{'s' * (len(train) > 1)}"
     return f"Fitted to {counted} (data {study.data[:14]}): {'; '.join(ranges)}.{off}"
 
