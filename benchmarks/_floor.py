@@ -16,11 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.identification.problem import Problem, Run
 from bristle.identification.start_grid import Search
 from bristle.model.model import Model
-
-Array = NDArray[np.float64]
 
 FOLDS = 4
 """Parts of the training runs that are left out in turn."""

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from bristle.core.arrays import Array
 from bristle.data.measurement import read_measurements
 from bristle.identification.problem import Problem, steady, without
 from bristle.identification.rig import DAMPER, ROLES, Site, bench_rig
@@ -25,8 +25,6 @@ from bristle.physics.laws import base_and_variant, law_names
 
 from . import _measured
 from ._rows import Row
-
-Array = NDArray[np.float64]
 
 STARTS = 8
 TRAINING, HELD_OUT = 1.02, 1.05

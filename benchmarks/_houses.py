@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.data.channels import ChannelSpec, channel_unit
 from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.examples import rigs
@@ -16,7 +16,6 @@ from bristle.examples.hidden import Scales
 from bristle.examples.rigs import CENTRE, ROUGH, Damper, Signals
 from bristle.physics.building import Building, from_data
 
-Array = NDArray[np.float64]
 Force = Callable[[Array, Array], Array]
 
 LAW, NOISE = "lugre", 0.01

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, read_measurement, read_measurements
 from bristle.diagnosis import Diagnosis, diagnose_rig
@@ -24,7 +24,6 @@ from bristle.identification.problem import Problem
 from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
 
-Array = NDArray[np.float64]
 Runs = tuple[list[Measurement], list[Measurement]]
 """Runs that are fitted to, and runs held out."""
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.data import read_ground_motion
 from bristle.errors import RecordError
-
-Array = NDArray[np.float64]
 
 G, KAPPA = 9.81, 0.45
 STEP = 0.00025

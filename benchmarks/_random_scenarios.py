@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import bristle.physics.effects  # noqa: F401  all of them are then registered
-from bristle.core.toml_write import toml_key, toml_value
+from bristle.core.toml_lines import toml_key, toml_value
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 

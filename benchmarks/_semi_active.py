@@ -13,17 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from bristle.component import control_laws
 from bristle.component.controller_file import read_controller
+from bristle.core.arrays import Array
 from bristle.core.jit import compiled
 from bristle.physics.building import paper_building
 from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
-
-Array = NDArray[np.float64]
 
 SAMPLE = 0.002
 """Sample period [s]."""

@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bristle.core.arrays import Array
 
 FINE = 2e-5
 """Step of the simulation [s]."""

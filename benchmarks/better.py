@@ -10,14 +10,13 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from bristle.core.arrays import Array
 
 from ._motions import REPORTED, reported, training
 from ._rows import Row
 from ._search import minimise
 from ._semi_active import CLIPPED, ESTIMATED, FEEDBACK, PASSIVE, lq_gains, peak
-
-Array = NDArray[np.float64]
 
 GOAL = 0.8
 """Peak against clipped's."""

@@ -27,6 +27,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.core.text import plain
 from bristle.data.measurement import measurements_of_frame
 from bristle.identification.fit import fit_from_starts
@@ -41,8 +42,6 @@ from bristle.physics.tuples import Inputs
 from ._answers import Answer, Answers
 from ._floor import share_of
 from ._rows import Row
-
-Array = NDArray[np.float64]
 
 MASS, DAMPING, STIFFNESS = 2.0, 10.0, 5e4  # kg, N s/m, N/m
 ALPHA, BETA, GAMMA, DELTA = 5e4, 1e3, 0.8, -1.1  # N/m, 1/m, 1, 1

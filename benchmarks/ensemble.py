@@ -11,8 +11,8 @@ import time
 from collections.abc import Callable
 
 from bristle.campaign import EnsemblePlan
+from bristle.campaign.campaign import run_local
 from bristle.campaign.ensemble_file import read_ensemble
-from bristle.campaign.pool import run_local
 from bristle.engine.coupled import Coupled
 from bristle.system.scenario import load_scenario
 

@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import bristle
+from bristle.core.arrays import Array
 from bristle.data.left_out import SETTLING
 from bristle.identification.error import ForceError, error_of, pooled, reasons_of
 from bristle.identification.prepare import prepare
@@ -31,8 +31,6 @@ from bristle.identification.prepare import prepare
 from . import _honest_buildings, _honest_fit, _honest_intervals
 from ._motions import DATA as MOTIONS
 from ._rows import Row
-
-Array = NDArray[np.float64]
 
 DATA = MOTIONS.parent
 """Measured sets, where they lie beside the checkout."""

@@ -34,8 +34,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.core.finding import Finding
 from bristle.core.text import plain
 from bristle.data.checks.differing_runs import check_differing_runs
@@ -56,8 +56,6 @@ from ._blind import cases, score
 from ._blind.plan import Task, make_plan
 from ._blind.subject import measurements
 from ._rows import Row
-
-Array = NDArray[np.float64]
 
 SEED = 23
 FAULTS = (

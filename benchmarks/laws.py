@@ -20,8 +20,8 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import DamperForces
@@ -31,8 +31,6 @@ from bristle.model.model import Model
 from bristle.physics.laws import LAWS, laws_of
 
 from ._rows import Row
-
-Array = NDArray[np.float64]
 
 STEP = 0.002
 """Sampling step [s]."""

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bristle.component.controller_file import read_controller
+from bristle.core.arrays import Array
 from bristle.core.files import scenarios_folder
 from bristle.engine.coupled import Coupled
 from bristle.errors import RecordError
@@ -28,8 +28,6 @@ from ._semi_active import PARTS
 from .training.closed_loop import Motion, Policy
 from .training.runs import Loop, Run, disturbed, plant_of, setup_of
 from .training.training import PolicyTask, Training
-
-Array = NDArray[np.float64]
 
 FMU = "TrainedPolicy"
 OUTPUT, DRIFT = "structure.floor2_acceleration_absolute", "structure.base_displacement"

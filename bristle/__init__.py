@@ -38,19 +38,19 @@ if TYPE_CHECKING:
     from .study.api import compare as compare
     from .study.api import diagnose as diagnose
     from .study.api import identify as identify
-    from .study.identified import Identified as Identified
+    from .study.identify import Identified as Identified
     from .study.study import Study as Study
     from .synthesis import design as design
-    from .synthesis.result import DesignResult as DesignResult
+    from .synthesis.analysis import DesignResult as DesignResult
 
 _LAZY = {
     "BristleError": "errors",
     "Comparison": "comparison.result",
-    "DesignResult": "synthesis.result",
+    "DesignResult": "synthesis.analysis",
     "Diagnosis": "diagnosis.verdict",
     "Effect": "physics.effect",
     "Ensemble": "campaign.ensemble",
-    "Identified": "study.identified",
+    "Identified": "study.identify",
     "Law": "physics.law",
     "Measurement": "data.measurement",
     "Parameter": "physics.parameter",

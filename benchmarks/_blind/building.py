@@ -6,9 +6,6 @@ import time
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bristle.data.measurement import Measurement
 from bristle.diagnosis import Diagnosis, diagnose_rig
 from bristle.diagnosis.site import try_effect
@@ -25,8 +22,6 @@ from bristle.physics.laws import law_of_part
 from . import cases, inseparable
 from .cases import Recorded
 from .subject import measurements, packed
-
-Array = NDArray[np.float64]
 
 
 def file_of(case: Recorded) -> Building:

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.diagnosis.trials import short_search
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.prepare import prepare
@@ -25,8 +25,6 @@ from bristle.model.model import Model
 
 from . import cases, separate, subject
 from .cases import Recorded
-
-Array = NDArray[np.float64]
 
 
 def resolution(

@@ -26,17 +26,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import butter, sosfiltfilt
 
+from bristle.core.arrays import Array
 from tests.independent.refit import BaseLaw
 from tests.independent.rigs import SIZES, Rig
 
 if TYPE_CHECKING:
     from .cases import Recorded
 
-Array = NDArray[np.float64]
 Signals = dict[str, Array]
 
 CUT = 18.0  # Hz

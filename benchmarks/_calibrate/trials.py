@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks._blind import building, cases, plan, subject
 from benchmarks._blind.plan import Task
+from bristle.core.arrays import Array
 from bristle.core.files import cache_folder
 from bristle.diagnosis.decision import decide
 from bristle.diagnosis.rig_runs import BenchRuns
@@ -32,9 +32,6 @@ from bristle.identification.rig import DAMPER
 from bristle.model.model import Model
 
 from .varied import variants
-
-Array = NDArray[np.float64]
-
 
 WEAKER = (1.0, 0.2, 0.07)
 """Factors on the strengths of the proof's plan, in turn: 40, 15 and 5 % of the force become 8, 3

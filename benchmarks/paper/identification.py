@@ -7,8 +7,8 @@ from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.identification.error_table import CUTOFF, LawError, error_table, low_pass
 from bristle.identification.problem import Problem, Run
 from bristle.model.model import Model
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.gridspec import GridSpec
 
-Array = NDArray[np.float64]
 
 SCENARIO = "identification_chirp"
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.core.progress import Count
 
 from .runs import PATIENT, Loop, Run
-
-Array = NDArray[np.float64]
 
 POWER = 5.0
 """Of the mean over motions: the larger, the more the worst motion counts."""

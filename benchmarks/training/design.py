@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from bristle.component.control_laws import weight_count
 from bristle.component.controller_file import POLICY, Controller, building_digest
+from bristle.core.arrays import Array
 from bristle.core.progress import counted, tell
 from bristle.errors import DesignError
-from bristle.synthesis.damper import coefficients
+from bristle.synthesis.analysis import DesignResult, flat, pole_list
+from bristle.synthesis.damper import Bank, coefficients
 from bristle.synthesis.kinds import design_hinf
 from bristle.synthesis.plant import StateSpace, structure
-from bristle.synthesis.result import DesignResult, flat, pole_list
-from bristle.synthesis.sampling import Bank
 from bristle.synthesis.task import Task
 
 from . import motions
@@ -25,8 +24,6 @@ from .descent import Outcome, descend, peak_ratios
 from .estimator import GROUNDS, estimator
 from .runs import Loop, Run, disturbed, plant_of, setup_of
 from .training import PolicyTask, Training
-
-Array = NDArray[np.float64]
 
 LEVEL_LASTS = 8.0
 """How long the output's level is remembered [s]."""

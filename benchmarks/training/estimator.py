@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from bristle.core.arrays import Array
 from bristle.errors import DesignError
 from bristle.synthesis.plant import StateSpace
-
-Array = NDArray[np.float64]
 
 GROUNDS = ((5.0, 0.5), (25.0, 0.5))
 """Corner [rad/s] and damping ratio of the layers whose sum the ground motion is taken for."""

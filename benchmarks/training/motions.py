@@ -5,11 +5,9 @@ from __future__ import annotations
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bristle.core.arrays import Array
 from bristle.data.ground_motion import GroundMotion
-
-Array = NDArray[np.float64]
 
 SECONDS = 10.0
 """Length of a motion of the training."""

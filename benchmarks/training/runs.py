@@ -7,10 +7,10 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from bristle.component.control_laws import BESIDES, LARGEST, weight_count
+from bristle.core.arrays import Array
 from bristle.core.jit import compiled
 from bristle.physics import damper
 from bristle.physics.building import Building
@@ -21,8 +21,6 @@ from bristle.synthesis.plant import structure
 from .adjoint import PULL_BACK, RESPOND, compute
 from .closed_loop import STATES, Course, Motion, Plant, Policy
 from .training import PolicyTask
-
-Array = NDArray[np.float64]
 
 PATIENT = 0.25
 """Constant voltage under which signals are looked at first, as a share of the largest."""

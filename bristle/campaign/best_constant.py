@@ -14,8 +14,8 @@ from math import ceil
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Progress
 from ..core.text import plain, unknown
 from ..data import read_ground_motion
@@ -26,8 +26,6 @@ from ..system.model import Component, System, plain_target
 from ..system.scenario import load_scenario
 from ..view import Viewable
 from .campaign import Campaign, Statistic, Variation
-
-Array = NDArray[np.float64]
 
 G = 9.81
 """Gravity that intensities are counted in [m/s2], as in Shirazi et al. (2012)."""

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import multiprocessing
+import os
+import queue
+import signal
+import sys
+import time
+from collections import deque
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import isfinite, nan
-from typing import NamedTuple, Protocol
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, NamedTuple, Protocol
 
+from ..core.text import install
 from ..engine import Engine
 from ..engine.results import Array, RunTable, statistic_of
-from ..errors import BristleError, ScenarioError
+from ..errors import BristleError, EnsembleError, RunError, ScenarioError
 from ..fmu.description import Value
 from ..model.draws import in_short
 from ..system.model import Signal, System
 from ..system.overrides import FILES
 from ..system.scenario import load_scenario
+from ..version import __version__
 
 STATISTICS = ("peak", "rms", "max", "min", "mean", "last")
 """What `statistic_of` knows."""
@@ -191,3 +203,273 @@ def is_read_anew(system: System, name: str) -> bool:
 def _one_line(error: Exception) -> str:
     kind = f"{type(error).__name__}: " if isinstance(error, BristleError) else ""
     return kind + " ".join(str(error).split())
+
+
+# Runs on the cores of this machine, one process each, or on a cluster.
+
+AHEAD = 2
+"""Runs that a process has been given and not yet answered: it never waits for the next."""
+TRIES = 2
+"""How often a run is begun whose process dies."""
+
+
+@dataclass
+class _Process:
+    """A process, this side of its pipe, and the runs that it has, the one it is at first."""
+
+    process: BaseProcess
+    pipe: Connection
+    given: deque[int] = field(default_factory=deque)
+
+
+def run_local(
+    campaign: Campaign, runs: Iterable[int], workers: int
+) -> Generator[RunOutcome, None, None]:
+    """Yield what becomes of runs as they end, in whatever order.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        `prepare` has been called: forked processes have what it compiled.
+    runs : iterable of int
+    workers : int
+        Number of processes.
+    """
+    waiting = deque(runs)
+    died: dict[int, int] = {}
+    processes: list[_Process] = []
+    try:
+        while waiting or any(p.given for p in processes):
+            while waiting and len(processes) < workers:
+                processes.append(_start(campaign, processes))
+            for p in processes:
+                _feed(p, waiting)
+            ready = wait([p.pipe for p in processes if p.given])
+            for p in [p for p in processes if p.pipe in ready]:
+                try:
+                    outcome: RunOutcome = p.pipe.recv()
+                except (EOFError, OSError):
+                    processes.remove(p)
+                    failed = _bury(p, waiting, died)
+                    if failed is not None:
+                        yield failed
+                else:
+                    p.given.remove(outcome.run)
+                    yield outcome
+    finally:
+        _end(processes)
+
+
+def _feed(p: _Process, waiting: deque[int]) -> None:
+    while waiting and len(p.given) < AHEAD:
+        try:
+            p.pipe.send(waiting[0])
+        except OSError:  # it has died, which is seen when its pipe is read
+            if not p.given:
+                p.given.append(waiting.popleft())
+            return
+        p.given.append(waiting.popleft())
+
+
+def _bury(p: _Process, waiting: deque[int], died: dict[int, int]) -> RunOutcome | None:
+    """Take back a dead process's runs; return the failure of one that has killed twice."""
+    p.process.join()
+    p.pipe.close()
+    at = p.given.popleft()
+    waiting.extendleft(reversed(p.given))
+    died[at] = died.get(at, 0) + 1
+    if died[at] < TRIES:
+        waiting.appendleft(at)
+        return None
+    code = p.process.exitcode or 0
+    how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
+    return RunOutcome(at, reason=f"RunError: its process ended {how}, {TRIES} times.")
+
+
+def _start(campaign: Campaign, others: list[_Process]) -> _Process:
+    # Forked processes have the compiled code and the loaded scenario at once; the library's threads
+    # (of BLAS, of a progress bar) hold no lock that a run takes.
+    forks = sys.platform == "linux"
+    context: Any = multiprocessing.get_context("fork" if forks else "spawn")
+    ours, theirs = context.Pipe()
+    inherited = [ours, *(p.pipe for p in others)] if forks else []
+    process = context.Process(target=_run_members, args=(campaign, theirs, inherited), daemon=True)
+    process.start()
+    theirs.close()
+    return _Process(process, ours)
+
+
+def _run_members(campaign: Campaign, pipe: Connection, inherited: list[Connection]) -> None:
+    """Answer run numbers with outcomes until the other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the parent decides
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for connection in inherited:  # else nobody would notice that the parent is gone
+        connection.close()
+    campaign.prepare()
+    with suppress(EOFError, OSError):
+        while True:
+            pipe.send(campaign.outcome(pipe.recv()))
+    os._exit(0)  # at once: taking down compiled code takes a second
+
+
+def _end(processes: list[_Process]) -> None:
+    for p in processes:
+        p.pipe.close()
+        if p.given:  # its runs are not wanted any more
+            p.process.terminate()
+    for p in processes:
+        p.process.join()
+
+
+# Runs on a Dask cluster; the library is needed, and imported, with --cluster only.
+#
+# A worker that is lost costs the runs that it was at: the scheduler gives them to another one. What
+# has come back is kept on this side. The scheduler cannot tell which of the runs that a lost worker
+# had been given has killed it: so runs that have lost several workers are run again at the end, one
+# alone at a time, and once more in the opposite order, for a worker is seen to be dead only a
+# moment after it has died. One that kills then as well has failed.
+
+CONNECT = 10.0
+"""Seconds in which a scheduler must answer."""
+PATIENCE = 300.0
+"""Seconds for which a cluster may be without any worker before the ensemble gives up."""
+SETTLE = 3.0
+"""Seconds in which the scheduler sees that a worker is dead."""
+_LOOK = 2.0
+"""Seconds without a result after which the workers are looked at."""
+_PER_THREAD = 4
+"""Runs under way per thread of the cluster."""
+_KILLED = "KilledWorker: "
+
+
+def run_cluster(
+    campaign: Campaign, runs: Iterable[int], address: str
+) -> Generator[RunOutcome, None, None]:
+    """Yield what becomes of runs as they end, in whatever order.
+
+    Scenario, records and components are read by the workers: they must see the same files.
+
+    Raises
+    ------
+    EnsembleError
+        If Dask is not installed, nothing answers at the address, the cluster has no worker, or one
+        has another version of bristle.
+    RunError
+        If the scheduler or all workers are lost on the way.
+    """
+    client = _connected(address)
+    try:
+        threads = _threads(client, address)
+        shared = client.scatter(campaign, broadcast=True)
+        waiting, at_once = deque(runs), _PER_THREAD * threads
+        for last in (False, False, True):
+            suspects: deque[int] = deque()
+            for outcome in _gather(client, shared, waiting, at_once):
+                killed = outcome.reason.startswith(_KILLED)
+                if killed and at_once == 1:
+                    time.sleep(SETTLE)  # else the next one goes to a worker that is dead
+                if killed and not last:
+                    suspects.appendleft(outcome.run)
+                else:
+                    yield outcome
+            waiting, at_once = suspects, 1
+            if suspects:
+                time.sleep(SETTLE)
+    finally:
+        client.close(timeout=CONNECT)
+
+
+def _connected(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise EnsembleError(
+            f"--cluster needs Dask's scheduler, which is not installed:  {install('cluster')}"
+        ) from None
+    connect: Any = Client  # only partly typed
+    try:
+        return connect(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise EnsembleError(
+            f"--cluster {address}: no Dask scheduler answers ({text}). "
+            "An address such as tcp://host:8786 is right."
+        ) from None
+
+
+def _threads(client: Any, address: str) -> int:
+    """Return the cluster's number of threads, once its workers have been looked at."""
+    try:
+        client.wait_for_workers(1, timeout=CONNECT)
+    except TimeoutError:
+        raise EnsembleError(
+            f"--cluster {address}: the cluster has no worker. Start one or more."
+        ) from None
+    workers = client.scheduler_info(n_workers=-1)["workers"]
+    try:
+        versions = client.run(_version)
+    except Exception as error:  # whatever a worker answers that cannot load this module
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise EnsembleError(
+            f"--cluster {address}: a worker cannot run bristle ({text}). Install bristle "
+            f"{__version__} there."
+        ) from error
+    for name, version in versions.items():
+        if version != __version__:
+            raise EnsembleError(
+                f"--cluster {address}: the worker {name} has bristle {version}, here is "
+                f"{__version__}. Install the same version there."
+            )
+    return sum(int(worker["nthreads"]) for worker in workers.values())
+
+
+def _version() -> str:
+    """Return the version of bristle where this is called."""
+    return __version__
+
+
+def _gather(
+    client: Any, shared: Any, waiting: deque[int], at_once: int
+) -> Generator[RunOutcome, None, None]:
+    ended: queue.Queue[Any] = queue.Queue()
+    under_way: dict[Any, int] = {}
+    alone = 0.0
+    while waiting or under_way:
+        while waiting and len(under_way) < at_once:
+            run = waiting.popleft()
+            future = client.submit(outcome_of, shared, run, pure=False)
+            under_way[future.key] = run
+            future.add_done_callback(ended.put)
+        try:
+            future = ended.get(timeout=_LOOK)
+        except queue.Empty:
+            alone = 0.0 if _alive(client) else alone + _LOOK
+            if alone >= PATIENCE:
+                raise RunError(f"the cluster has had no worker for {PATIENCE:g} s.") from None
+            continue
+        yield _outcome(under_way.pop(future.key), future)
+
+
+def outcome_of(campaign: Campaign, run: int) -> RunOutcome:
+    """Return what becomes of a run where this is called."""
+    return campaign.outcome(run)
+
+
+def _alive(client: Any) -> bool:
+    if client.status != "running":
+        raise RunError("the connection to the cluster's scheduler is lost.")
+    return bool(client.scheduler_info(n_workers=-1)["workers"])
+
+
+def _outcome(run: int, future: Any) -> RunOutcome:
+    """Return a future's outcome: what the run says of itself, or why it never could."""
+    if future.status == "finished":
+        outcome: RunOutcome = future.result()
+        return outcome
+    if future.status == "cancelled":
+        raise RunError("the connection to the cluster's scheduler is lost.")
+    error = future.exception()
+    if type(error).__name__ == "KilledWorker":
+        return RunOutcome(run, reason=f"{_KILLED}the workers that ran it have died.")
+    text = " ".join(str(error).split())
+    return RunOutcome(run, reason=f"{type(error).__name__}: {text}")

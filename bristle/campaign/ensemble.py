@@ -14,9 +14,8 @@ from ..core.progress import Progress
 from ..core.text import written
 from ..errors import EnsembleError, RunError
 from ..view import Viewable
-from .campaign import Campaign, RunOutcome
+from .campaign import Campaign, RunOutcome, run_cluster, run_local
 from .ensemble_file import EnsemblePlan, read_ensemble
-from .pool import run_cluster, run_local
 from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
 
 if TYPE_CHECKING:

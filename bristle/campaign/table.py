@@ -18,8 +18,8 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.files import replaced_by, writing
 from ..errors import EnsembleError, RunError
 from ..model.draws import POINT, reach, simulated_whole
@@ -207,7 +207,6 @@ def _read(plan: EnsemblePlan, path: Path) -> dict[int, RunOutcome]:
 
 # What an ensemble says: quantiles of each output, and failures by their reason.
 
-Array = NDArray[np.float64]
 
 VARIES = "all that varies"
 """What the ensemble draws, beside effects that are left open."""

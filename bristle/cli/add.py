@@ -23,9 +23,9 @@ def add_arguments(parser: Parser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Add, refit, print."""
     from ..core.interrupt import keeps
-    from ..study.fit_view import added_view
     from ..study.steps import add_effects
     from ..study.study import Study
+    from ..study.view import added_view
 
     study = Study(arguments.folder)
     added = add_effects(study, arguments.effects, why=arguments.why)

@@ -116,7 +116,7 @@ def _web(arguments: argparse.Namespace) -> int:
     """Write a scenario or study as a web page, or a component as a module; print the files."""
     from ..export.web import export_component, export_web
     from ..fmu.catalogue import component_names
-    from ..report.what_if import movable
+    from ..report.study_page import movable
     from ..study.study import Study
     from ..system.overrides import parse_overrides
 

@@ -50,13 +50,13 @@ def main(arguments: argparse.Namespace) -> int:
     from ..core.files import json_text
     from ..core.interrupt import keeps
     from ..core.progress import Progress, tell
-    from ..study.fit_view import identified_with_next
     from ..study.identify import STAGES, identify_study
     from ..study.study import Study
+    from ..study.view import identified_with_next
 
     study = Study(arguments.folder)
     if not arguments.dry_run:
-        import_ahead("bristle.study.budget_picture", "bristle.study.fit_view")
+        import_ahead("bristle.study.pictures", "bristle.study.view")
     with Progress("identifying", STAGES, True, even=False) as progress:
         found = identify_study(
             study,
@@ -73,8 +73,8 @@ def main(arguments: argparse.Namespace) -> int:
         keeps("The new step is kept in the study's history; its pictures were not all drawn.")
     picture = parts = None
     if not arguments.dry_run:
-        from ..study.budget_picture import draw_budget
-        from ..study.fit_view import draw_identified
+        from ..study.pictures import draw_budget
+        from ..study.view import draw_identified
         from ..view.style import png
 
         picture = study.write_report("identify.png", png(draw_identified(found), 110))

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..core.text import percent, plain, scale, short_z
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from ..core.arrays import Array
+from ..core.text import log_ticks, percent, plain, quantity, scale, short_z
 from ..data.channels import Label, label_text, varying
+from ..data.cycles import by_level, cycles, steady
+from ..identification.search import z_scale
 from ..physics.drive import DRIVES
 from ..view.blocks import Figure, Table, Text, View, view_of
-from ..view.style import BLUE, FLOOR, GREY, INK, VERMILION, Page, look
+from ..view.style import BLUE, FLOOR, GREY, INK, PALE, VERMILION, Page, look, zero_lines
 from .conditions import known_of
 from .misfit import CLOSE, RunMisfit, SiteMisfit
 from .names import name_of, site_name
-from .panels import (
-    OVERS,
-    OneCycle,
-    chosen_cycles,
-    draw_error,
-    draw_history,
-    draw_loop,
-    draw_loops,
-    draw_pattern,
-    draw_regimes,
-    draw_spectrum,
-    worst_window,
-)
 from .patterns import ResidualPattern
+from .predictions import SHOWN, RunPrediction, shown
 from .result import Comparison
 from .words import FAINT, capitalised
 
@@ -362,3 +356,439 @@ def sites_page(now: Comparison, before: Comparison | None, width: float) -> Page
         grid = page.grid(1, 1, top=0.35, bottom=0.35, left=1.2, right=2.9)
         draw_sites(page.figure.add_subplot(grid[0, 0]), now.sites, before.sites if before else ())
     return page
+
+
+# The panels that hold a prediction against a measurement, one function each.
+
+MEASURED, PREDICTED, ERROR = INK, BLUE, VERMILION
+_DOTS = 3000
+_WINDOW = 600  # samples of a history that are told apart on paper
+
+
+def worst_window(prediction: RunPrediction, samples: int = _WINDOW) -> slice:
+    """Return the stretch of a run where its normalised error is largest."""
+    count = len(prediction.measured)
+    if count <= samples:
+        return slice(0, count)
+    power = np.minimum(((prediction.measured - prediction.predicted) / prediction.sigma) ** 2, 1e4)
+    power[: prediction.skip] = 0.0
+    power[prediction.skip :][~prediction.judged] = 0.0
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    begin = int(np.argmax(total[samples:] - total[:-samples]))
+    return slice(begin, begin + samples)
+
+
+def draw_history(axes: Axes, prediction: RunPrediction, window: slice) -> None:
+    """Draw measured over predicted output in a stretch of a run."""
+    time = prediction.time[window]
+    axes.plot(time, prediction.measured[window], color=MEASURED, lw=1.6, alpha=0.85)
+    axes.plot(time, prediction.predicted[window], color=PREDICTED, lw=1.3)
+    axes.axhline(0.0, color=PALE, lw=0.8, zorder=1)
+    axes.margins(x=0.0, y=0.08)
+    axes.set_title(
+        f"{_named(prediction)} [{prediction.unit}], {prediction.name}: its worst stretch"
+    )
+    _legend(axes, ("measured", MEASURED), ("model", PREDICTED))
+
+
+def draw_error(axes: Axes, prediction: RunPrediction, window: slice) -> None:
+    """Draw the error in a stretch of a run over the band that noise explains."""
+    time, error = prediction.time[window], (prediction.measured - prediction.predicted)[window]
+    band = 2.0 * prediction.sigma[window]
+    axes.fill_between(time, -band, band, color="#dbe5ec", lw=0.0)
+    axes.plot(time, error, color=ERROR, lw=0.9)
+    axes.margins(x=0.0)
+    top = max(1.15 * float(np.quantile(np.abs(error), 0.995)), 1.5 * float(np.median(band)))
+    axes.set_ylim(-top, top)
+    axes.set_title(f"measured less model [{prediction.unit}]")
+    _legend(axes, ("twice the expected noise", "#9fb6c6"))
+    axes.set_xlabel("time [s]", loc="right", labelpad=0)
+
+
+def draw_loop(
+    axes: Axes, prediction: RunPrediction, over: str, *, window: slice | None = None
+) -> None:
+    """Draw measured and predicted output over a coordinate.
+
+    Parameters
+    ----------
+    axes : where to draw
+    prediction : the run
+    over : name of the coordinate, such as "displacement"
+    window : samples to draw; None for all that count
+    """
+    factor, unit = SHOWN.get(over, (1.0, ""))
+    part = window or slice(prediction.skip, None)
+    x = factor * prediction.coordinates[over][part]
+    zero_lines(axes)
+    axes.plot(x, prediction.measured[part], color=MEASURED, lw=1.3, alpha=0.75)
+    axes.plot(x, prediction.predicted[part], color=PREDICTED, lw=1.0)
+    axes.set_title(
+        f"{_named(prediction)} [{prediction.unit}] over {name_of(over, prediction.site)}"
+    )
+    axes.set_xlabel(f"{_axis(over, prediction.site)} [{unit}]")
+    axes.margins(0.05)
+
+
+def draw_pattern(
+    axes: Axes,
+    comparison: Comparison,
+    pattern: ResidualPattern,
+    after: ResidualPattern | None = None,
+) -> None:
+    """Draw the error over a coordinate: samples, and the mean in bins with its interval.
+
+    Parameters
+    ----------
+    axes : where to draw
+    comparison : whose error it is
+    pattern : the coordinate with its bins
+    after : a pattern whose means are taken off first; None for none
+    """
+    units, size = comparison.predictions[0].units, float(np.max(np.abs(pattern.centre)))
+    factor, unit = shown(pattern.coordinate, units, size)
+    x = np.concatenate([one.judged_along()[pattern.coordinate] for one in comparison.predictions])
+    y = np.concatenate([one.only_judged(one.residual) for one in comparison.predictions])
+    sigma = np.concatenate(
+        [one.only_judged(one.sigma[one.skip :]) for one in comparison.predictions]
+    )
+    if after:
+        y = y - _means_along(comparison, after)
+    if pattern.turned:
+        y = y * _direction(comparison)
+    axes.axhline(0.0, color=PALE, lw=0.8, zorder=1)
+    if np.min(x) <= 0.0 <= np.max(x):  # from 25 °C on, a line at zero is an empty panel
+        axes.axvline(0.0, color=PALE, lw=0.8, zorder=1)
+    band = 2.0 * float(np.median(sigma))
+    axes.axhspan(-band, band, color="#dbe5ec", lw=0.0, zorder=0)
+    every = max(1, len(x) // _DOTS)
+    axes.plot(factor * x[::every], y[::every], ".", ms=1.6, color=PALE, alpha=0.7, zorder=1.5)
+    axes.errorbar(
+        factor * pattern.centre, pattern.mean, 2.0 * pattern.std, color=ERROR, lw=1.6, marker="o",
+        ms=3.0, elinewidth=0.9, zorder=3,
+    )  # fmt: skip
+    top = max(1.25 * float(np.max(np.abs(pattern.mean))), 1.6 * band)
+    axes.set_ylim(-top, top)
+    what = "more resistance than the model" if pattern.turned else "measured less model"
+    if after:
+        what = f"remaining: {what}"
+    axes.set_title(f"{what} [{comparison.unit}]")
+    axis = _axis(pattern.coordinate, comparison.site)
+    axes.set_xlabel(axis + (f" [{unit}]" if unit else ""))
+    if pattern.coordinate == "direction":
+        axes.set_xlim(-1.8, 1.8)
+        axes.set_xticks([-1.0, 1.0], ["moving back", "moving outwards"])
+    carried = percent(pattern.share, 0) if pattern.share >= 0.01 else "below 1 %"
+    of = "the remaining error" if after else "the error's power"
+    share = f"{carried} of {of}" if pattern.significant else "no more than chance"
+    axes.text(0.98, 0.97, share, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
+              bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+              color=ERROR if pattern.significant else GREY)  # fmt: skip
+
+
+def _direction(comparison: Comparison) -> Array:
+    return np.concatenate([one.judged_along()["direction"] for one in comparison.predictions])
+
+
+def _means_along(comparison: Comparison, pattern: ResidualPattern) -> Array:
+    """Return the error's mean (n,) that a pattern gives each sample."""
+    x = np.concatenate([one.judged_along()[pattern.coordinate] for one in comparison.predictions])
+    bins = np.clip(np.searchsorted(pattern.low, x, side="right") - 1, 0, len(pattern.mean) - 1)
+    means = pattern.mean[bins]
+    return np.asarray(means * _direction(comparison) if pattern.turned else means)
+
+
+def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
+    """Draw the power spectral densities of error, expected noise and measured output."""
+    found = comparison.spectrum
+    f = found.frequency[1:]
+    for values, colour, width in (
+        (found.measured, PALE, 1.0), (found.noise, BLUE, 1.3), (found.residual, ERROR, 1.3),
+    ):  # fmt: skip
+        axes.loglog(f, values[1:], color=colour, lw=width)
+    floor = float(np.min(found.noise[1:]))
+    axes.set_ylim(0.3 * floor, 3.0 * float(np.max(found.measured[1:])))
+    axes.set_xlim(f[0], f[-1])
+    axes.set_title(f"PSD [{comparison.unit}²/Hz]")
+    for axis, ends in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        axis.set_major_formatter(_as_text(log_ticks(*ends)))
+        axis.set_minor_formatter(lambda value, _: "")
+    axes.set_xlabel("frequency [Hz]")
+    _legend(axes, ("measured", PALE), ("error", ERROR), ("expected noise", BLUE))
+
+
+def _as_text(text: Callable[[float], str]) -> Callable[[float, float], str]:
+    """Return what writes a mark, as an axis calls it: with the number of the mark."""
+    return lambda value, _: text(value)
+
+
+def draw_regimes(axes: Axes, comparison: Comparison) -> None:
+    """Draw z in classes of speed and command, 1 being what noise explains."""
+    cells = [one for one in comparison.regimes if one.speed or one.command]
+    speeds = list(dict.fromkeys(one.speed for one in cells if one.speed))
+    levels = list(dict.fromkeys(one.command for one in cells if one.command))
+    pairs = {(one.speed, one.command): one.z for one in cells}
+    columns, rows = (levels or [""]), (speeds or [""])
+    values = np.array([[pairs.get((s, V), np.nan) for V in columns] for s in rows])
+    shown = np.log10(np.maximum(values, 1.0))
+    axes.imshow(shown, cmap="OrRd", vmin=0.0, vmax=1.0, aspect="auto", origin="lower")
+    for (i, j), z in np.ndenumerate(values):
+        if np.isfinite(z):
+            colour = "white" if z > 5.0 else INK
+            axes.text(j, i, short_z(z), ha="center", va="center",
+                      color=colour, fontsize=10)  # fmt: skip
+    axes.set_xticks(range(len(columns)), [_short(name) for name in columns], fontsize=8)
+    axes.set_yticks(range(len(rows)), [_short(name) for name in rows], fontsize=8)
+    axes.grid(visible=False)
+    axes.set_title("error / noise (z)")
+
+
+def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, Array] | None:
+    """Return the mean normalised error (b, b) over displacement and velocity, after their edges.
+
+    Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
+    """
+    along = [one.judged_along() for one in comparison.predictions]
+    if not all("displacement" in one and "velocity" in one for one in along):
+        return None
+    x = np.concatenate([one["displacement"] for one in along])
+    v = np.concatenate([one["velocity"] for one in along])
+    r = np.concatenate([one.only_judged(one.normalised) for one in comparison.predictions])
+    r = np.clip(r, -30.0, 30.0)
+    edges = [_edges(y, bins) for y in (x, v)]
+    count = np.histogram2d(x, v, edges)[0]
+    total = np.histogram2d(x, v, edges, weights=r)[0]
+    with np.errstate(invalid="ignore"):
+        mean = np.where(count >= 8, total / np.maximum(count, 1), np.nan)
+    return edges[0], edges[1], mean
+
+
+def _edges(values: Array, bins: int) -> Array:
+    low, high = (float(q) for q in np.quantile(values, [0.004, 0.996]))
+    return np.linspace(low, high, bins + 1)
+
+
+def draw_map(axes: Axes, comparison: Comparison, limit: float) -> Any:
+    """Draw where over displacement and velocity the error is; return the image for a colour bar."""
+    found = residual_map(comparison)
+    if found is None:
+        axes.set_axis_off()
+        return None
+    x, v, mean = found
+    axes.set_facecolor("#dedede")  # no samples
+    image = axes.pcolormesh(1e3 * x, 1e3 * v, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
+    axes.set_xlabel(f"{_axis('displacement', comparison.site)} [mm]")
+    axes.set_ylabel(f"{_axis('velocity', comparison.site)} [mm/s]")
+    axes.grid(visible=False)
+    return image
+
+
+def _legend(axes: Axes, *names: tuple[str, str]) -> None:
+    """Write names into the title's line, from the right, each in its colour."""
+    text = "   ".join(name for name, _ in names)
+    if len(names) == 1:
+        axes.set_title(text, loc="right", fontsize=8.5, color=names[0][1])
+        return
+    handles = [axes.plot([], [], color=colour, lw=2.0)[0] for _, colour in names]
+    axes.legend(
+        handles, [name for name, _ in names], loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        ncols=len(names), labelcolor="linecolor", fontsize=8, handlelength=0.9,
+        columnspacing=0.9, handletextpad=0.4, borderaxespad=0.15,
+    )  # fmt: skip
+
+
+def _axis(coordinate: str, site: str) -> str:
+    return name_of(coordinate, site).removeprefix("the ")
+
+
+def _named(prediction: RunPrediction) -> str:
+    return capitalised(prediction.quantity.replace("_", " "))
+
+
+def _short(text: str) -> str:
+    """Return "low speed\n(below 12 mm/s)" of "at low speed (below 12 mm/s)"."""
+    return text.removeprefix("at ").replace(" (", "\n(")
+
+
+# Loops of single cycles, by the level of the command: measured against model, with its band.
+
+MOST = 4
+"""Cycles side by side."""
+OVERS = ("velocity", "displacement")
+"""What loops are drawn over."""
+BAND = "#cfe3f1"
+"""The band in which a true model's measurement would be."""
+_VARIES = 1e-2
+"""Range of a command, over its largest value, from which on it tells cycles apart."""
+_OFF = 5e-3
+"""Share of its largest value below which a command is off."""
+
+
+class OneCycle(NamedTuple):
+    """A cycle of a run to draw: which samples, its level in words, and its error over noise."""
+
+    prediction: RunPrediction
+    part: slice
+    text: str
+    z: float
+
+
+def chosen_cycles(predictions: Sequence[RunPrediction], most: int = MOST) -> list[OneCycle]:
+    """Return one cycle in each range of the command.
+
+    Where no command varies, of a number that is known of whole runs, such as their temperature or
+    frequency; where none is, of speed. Nothing where displacement and velocity are not known.
+
+    Parameters
+    ----------
+    predictions : runs of one output at one site
+    most : cycles at the most
+    """
+    if not all({*OVERS} <= {*one.coordinates} for one in predictions):
+        return []
+    name, told = _level(predictions)
+    motions = [
+        (one.coordinates["displacement"], one.coordinates["velocity"], one.coordinates[name])
+        for one in predictions
+    ]
+    skip = max(one.skip for one in predictions)
+    found = [one for one in cycles(motions, skip) if _whole(predictions[one.run], one.part)]
+    if name == "speed":  # the median of a cycle is no measure of how fast it is
+        peaks = [float(np.max(np.abs(motions[one.run][1][one.part]))) for one in found]
+        found = [one._replace(level=v, spread=0.0) for one, v in zip(found, peaks, strict=True)]
+    out = []
+    for one in by_level(found, most):
+        of = predictions[one.run]
+        text = told(one.level)
+        if name != "speed" and not steady(one, found):
+            low, high = np.quantile(motions[one.run][2][one.part], [0.05, 0.95])
+            text = f"{told(low).partition(' ')[0]} to {told(high)}"
+        out.append(OneCycle(of, one.part, text, z_of(of, one.part)))
+    return out
+
+
+def under(shown: Sequence[OneCycle], predictions: Sequence[RunPrediction]) -> list[OneCycle]:
+    """Return the same cycles as another model predicts them.
+
+    Parameters
+    ----------
+    shown : cycles
+    predictions : the same runs under the other model
+    """
+    by_name = {one.name: one for one in predictions}
+    there = [one._replace(prediction=by_name[one.prediction.name]) for one in shown]
+    return [one._replace(z=z_of(one.prediction, one.part)) for one in there]
+
+
+def z_of(of: RunPrediction, part: slice) -> float:
+    """Return error / noise of a part of a run."""
+    if not of.noise_known:
+        return float("nan")
+    return z_scale((of.measured - of.predicted)[part] / of.sigma[part])
+
+
+def _whole(of: RunPrediction, part: slice) -> bool:
+    """Return whether all samples of a part were measured, one after the other."""
+    known = of.known is None or bool(np.all(of.known[part]))
+    return known and (of.index is None or bool(np.all(np.diff(of.index[part]) == 1)))
+
+
+def _level(predictions: Sequence[RunPrediction]) -> tuple[str, Any]:
+    """Return the coordinate that tells cycles apart, and what says one of its values."""
+    drive = predictions[0].drive
+    if all(drive in one.coordinates for one in predictions):
+        values = np.concatenate([one.coordinates[drive] for one in predictions])
+        if float(np.ptp(values)) > _VARIES * float(np.max(np.abs(values))) > 0.0:
+            largest = float(np.max(np.abs(values)))
+            unit = DRIVES[drive].unit
+
+            def level(value: float) -> str:
+                off = abs(value) < _OFF * largest  # noise about zero is no command
+                return f"{plain(0.0 if off else value)} {unit}"
+
+            return drive, level
+    for name in predictions[0].labels:  # what is known of whole runs, such as a temperature
+        known = [one.labels.get(name, "") for one in predictions if name in one.coordinates]
+        numbers = [one for one in known if not isinstance(one, str)]
+        if len(numbers) == len(predictions) and max(numbers) > min(numbers):
+            return name, lambda value, name=name: f"{name} {label_text(name, value)}"
+    return "speed", lambda value: f"up to {quantity(value, 'm/s', 2)}"
+
+
+def draw_cycle(
+    axes: Axes,
+    one: OneCycle,
+    over: str,
+    *,
+    force: tuple[float, str] = (1.0, "N"),
+) -> None:
+    """Draw a cycle, measured and predicted, in the band of 95 % of a true model's samples.
+
+    Parameters
+    ----------
+    axes : where to draw
+    one : the cycle
+    over : name of the coordinate
+    force : factor from SI and unit in which the output is shown
+    """
+    of, (factor, _) = one.prediction, force
+    x = SHOWN.get(over, (1.0, ""))[0] * of.coordinates[over][one.part]
+    predicted = factor * of.predicted[one.part]
+    zero_lines(axes)
+    half = 1.96 * factor * of.sigma[one.part]
+    pieces = [*ribbon(x, predicted - half, predicted + half)]
+    axes.add_collection(PolyCollection(pieces, facecolors=BAND, lw=0.0))
+    axes.plot(x, factor * of.measured[one.part], color=INK, lw=1.5, alpha=0.85)
+    axes.plot(x, predicted, color=BLUE, lw=1.2)
+    axes.text(
+        0.03, 0.97, f"z = {short_z(one.z)}", transform=axes.transAxes, va="top", fontsize=8.0,
+        color=GREY,
+    )  # fmt: skip
+    axes.tick_params(labelsize=8)
+
+
+def ribbon(x: Array, low: Array, high: Array) -> Array:
+    """Return the corners (n - 1, 4, 2) of the pieces of a band along a curve that turns back.
+
+    Parameters
+    ----------
+    x, low, high : (n,) of the curve, and the edges of its band
+    """
+    lower, upper = np.stack([x, low], axis=1), np.stack([x, high], axis=1)
+    return np.stack([lower[:-1], lower[1:], upper[1:], upper[:-1]], axis=1)
+
+
+def draw_loops(
+    rows: Mapping[str, Sequence[Axes]], shown: Sequence[OneCycle], *, force: tuple[float, str]
+) -> None:
+    """Draw cycles side by side, one row per coordinate, all panels of a row on one scale.
+
+    Parameters
+    ----------
+    rows : coordinate to one axes per cycle
+    shown : the cycles
+    force : factor from SI and unit in which the output is shown
+    """
+    for number, (over, panels) in enumerate(rows.items()):
+        site = shown[0].prediction.site
+        axis = _axis(over, site)
+        for panel, one in zip(panels, shown, strict=False):
+            draw_cycle(panel, one, over, force=force)
+            panel.set_xlabel(f"{axis} [{SHOWN.get(over, (1.0, ''))[1]}]", fontsize=8)
+            if number == 0:
+                panel.set_title(one.text, fontsize=9.5)
+                begin = one.prediction.time[one.part.start]
+                panel.set_title(
+                    f"{one.prediction.name}, {begin:.3g} s", loc="right", fontsize=7, color=GREY
+                )
+        _alike(panels)
+
+
+def _alike(panels: Sequence[Axes]) -> None:
+    """Give panels side by side the same ranges; only the first one names its values."""
+    spans = [(panel.get_xlim(), panel.get_ylim()) for panel in panels]
+    for number, panel in enumerate(panels):
+        panel.set_xlim(min(x[0] for x, _ in spans), max(x[1] for x, _ in spans))
+        panel.set_ylim(min(y[0] for _, y in spans), max(y[1] for _, y in spans))
+        if number:
+            panel.tick_params(labelleft=False)

@@ -4,39 +4,434 @@ from __future__ import annotations
 
 import tempfile
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from math import ceil, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..campaign.campaign import Statistic
 from ..campaign.ensemble import cores
+from ..component.controller_file import (
+    COMMAND_UNITS,
+    POLICY,
+    Controller,
+    building_digest,
+    read_controller,
+)
+from ..core.config import SCHEMA, Document
 from ..core.progress import Stages, tell
-from ..core.text import unknown
-from ..errors import ScenarioError
-from .candidates import Maker
+from ..core.text import did_you_mean, unknown
+from ..errors import BuildError, DesignError, FmuError, ScenarioError
+from ..fmu import catalogue
+from ..fmu.build import build, plan
+from ..fmu.controller import MEASURED, invertible
+from ..fmu.description import Description, read_description
+from ..physics.building import frequencies, paper_building
+from ..physics.drive import VOLTAGE
+from ..synthesis import DesignDamper, LqgWeights, Task, Weight, Weights, design
+from ..synthesis.analysis import Reach, reach_of
+from ..synthesis.design_file import task_of
+from ..synthesis.task import check_sample_period
+from ..system.library import controller_in, law_of
 from .result import ControllerComparison, Setting, of_designs, of_engines
 from .runs import CaseRunner, Reached, best_level, flat, limit_of, refuse_limit
 from .setting import (
+    ABOVE,
     BEST,
+    CONSTANT,
     DAMPER,
     DEFAULT,
+    FILES,
+    LIMIT,
     OFF,
     ON,
+    STRUCTURE,
+    CommandedDamper,
     ComparedController,
     ComparedMotion,
+    ComponentTable,
+    DamperPlace,
     Folder,
     Given,
+    Selection,
+    choices_of,
     constant,
     damper_from,
     motions_of,
+    number,
+    plain_name,
+    refuse_twice,
     site_from,
 )
 from .worst_case import Spread, tied, unvaried, varied, worst_of
 
 if TYPE_CHECKING:
     import pandas as pd
+
+# Designs for a comparison's building: made anew where none was made for it.
+#
+# A stock design belongs to the library's building and damper. For others it is made again with the
+# same weights, brought to their size: a command costs as much of the acceleration that it can make,
+# drift weighs as much beside acceleration, and corners move with the first mode. So a building that
+# differs in its unit of mass alone gets the same design.
+
+
+def designed_for(kind: str, site: DamperPlace, damper: CommandedDamper) -> Controller:
+    """Return a controller of some kind, designed for a building and its damper.
+
+    Parameters
+    ----------
+    kind : of the design, "hinf", "lpv", "lqg" ...
+    site, damper : what it is for
+
+    Raises
+    ------
+    DesignError
+        If there is none, or the design needs the damper's law and nobody knows it.
+    """
+    return design(task_for(kind, site, damper)).controller
+
+
+def task_for(kind: str, site: DamperPlace, damper: CommandedDamper) -> Task:
+    """Return the stock task of a kind, brought to a building and its damper.
+
+    Parameters
+    ----------
+    kind, site, damper
+        As in `designed_for`, and what is raised too.
+    """
+    if kind == POLICY:
+        raise DesignError(
+            f"the library's {kind} was trained for its own building and damper. Train one for "
+            f"yours in a checkout: `python -m benchmarks train my_{kind}.toml`, then --controller "
+            f"my_{kind}.json."
+        )
+    known = DesignDamper() if damper.usual else damper.for_design()
+    if known is None and COMMAND_UNITS[kind] == VOLTAGE.unit:
+        raise DesignError(
+            f"a design of the kind {kind} follows the damper's law, and {damper.name} has none "
+            "that is known in closed form."
+        )
+    stock = Task(kind)
+    here = replace(
+        stock, title=f"{kind} for {site.building.name}", building=site.building,
+        device=site.device.name, damper=known or DesignDamper(),
+    )  # fmt: skip
+    return replace(here, **_weights(stock, here))
+
+
+def _weights(stock: Task, here: Task) -> dict[str, Any]:
+    """Return the weights of a stock task at the size of another plant."""
+    before, now = reach_of(stock), reach_of(here)
+    if stock.kind == "lqg":
+        return {"lqg": _lqg(stock.lqg, before, now)}
+    faster = frequencies(here.building)[0] / frequencies(stock.building)[0]
+    w = stock.weights
+    command = _moved(w.command, faster, now.command / before.command)
+    return {"weights": Weights(_moved(w.acceleration, faster, 1.0), command, w.noise)}
+
+
+def _lqg(w: LqgWeights, before: Reach, now: Reach) -> LqgWeights:
+    per_force = now.command / before.command
+    per_drift = (now.command / now.drift) / (before.command / before.drift)
+    return replace(w, force=w.force * per_force**2, drift=w.drift * per_drift**2)
+
+
+def _moved(weight: Weight, faster: float, share: float) -> Weight:
+    """Return a weight whose frequencies are `faster` times as high, and its gain times `share`."""
+
+    def scaled(polynomial: tuple[float, ...], gain: float = 1.0) -> tuple[float, ...]:
+        missing = len(weight.denominator) - len(polynomial)
+        return tuple(gain * c * faster ** (k + missing) for k, c in enumerate(polynomial))
+
+    return Weight(scaled(weight.numerator, share), scaled(weight.denominator))
+
+
+def force_share(damper: CommandedDamper) -> float:
+    """Return how strong a damper is beside the library's: force at its typical speed and most V.
+
+    1 where its law is not known in closed form.
+    """
+    return _beside(damper, lambda one: sum(one.sliding_force(one.speed, one.v_max)))
+
+
+def slope_share(damper: CommandedDamper) -> float:
+    """Return how much force a volt makes beside the library's damper, at its typical speed.
+
+    1 where its law is not known in closed form.
+    """
+
+    def per_volt(one: DesignDamper) -> float:
+        still, driven = (sum(one.sliding_force(one.speed, V)) for V in (0.0, one.v_max))
+        return (driven - still) / one.v_max
+
+    return _beside(damper, per_volt)
+
+
+def _beside(damper: CommandedDamper, measure: Callable[[DesignDamper], float]) -> float:
+    """Return what a measure tells of a damper over what it tells of the library's."""
+    known = damper.for_design()
+    if known is None or damper.usual:
+        return 1.0
+    return measure(known) / measure(DesignDamper(law_of(DEFAULT)))
+
+
+@dataclass
+class Maker:
+    """Makes the candidates of one comparison: `site` and `damper` are what they are for."""
+
+    site: DamperPlace
+    damper: CommandedDamper
+    folder: Folder
+    _designs: dict[str, str] = field(default_factory=dict)
+
+    def candidates(self, given: Given) -> list[ComparedController]:
+        """Return the controllers of a list of texts.
+
+        Parameters
+        ----------
+        given : `WHAT,NAME=VALUE,...` each: a stock name, a controller file or design file, a
+            component of one's own (.py) or an FMU, with values of its parameters
+
+        Raises
+        ------
+        ScenarioError, DesignError, BuildError, FmuError
+            If there is none, one does not fit, or a file is not right.
+        """
+        chosen = choices_of(given, "--controller")
+        if not chosen:
+            raise ScenarioError(
+                "no controllers: name some, as --controller LqgClipped my_design.json my.fmu."
+            )
+        found = [self.candidate(choice) for choice in chosen]
+        refuse_twice([one.name for one in found], "--controller", (OFF, ON, BEST, LIMIT))
+        plain = [plain_name(one.name) for one in found]
+        refuse_twice(plain, "--controller", [plain_name(name) for name in (OFF, ON, BEST, LIMIT)])
+        return found
+
+    def candidate(self, choice: Selection) -> ComparedController:
+        """Return the controller of one choice."""
+        name = choice.as_text
+        ending = Path(choice.what).suffix.lower()
+        makers = {
+            ".fmu": self._of_fmu, ".py": self._of_source, ".json": self._of_controller,
+            ".toml": self._of_design,
+        }  # fmt: skip
+        try:
+            found = makers.get(ending, self._of_stock)(choice, name)
+            if found.period is not None:
+                check_sample_period(found.period, self.site.building)
+        except (ScenarioError, DesignError, BuildError, FmuError) as error:
+            if choice.what in str(error):
+                raise
+            raise type(error)(f"--controller {choice.what}: {error}") from error
+        return found
+
+    # -- kinds of choices
+
+    def _of_stock(self, choice: Selection, name: str) -> ComparedController:
+        known = [CONSTANT, *catalogue.controllers()]
+        if choice.what not in known:
+            hint = did_you_mean(choice.what, known)
+            raise ScenarioError(
+                f'no controller is named "{choice.what}". There are: {", ".join(known)}; a file of '
+                f"`bristle design`, of a component of your own (.py) or an FMU is right too.{hint}"
+            )
+        settings = dict(choice.settings)
+        file = settings.pop("controller", None)
+        kind = design_of(choice.what)
+        if file is not None:
+            return self._designed(choice.what, name, settings, self._checked(Path(str(file)), kind))
+        if not kind:
+            return self._built_in(choice.what, name, {"fmu": choice.what}, settings)
+        building = building_digest(self.site.building) == building_digest(paper_building())
+        if building and not self.site.device.name and self.damper.usual:
+            about = f"the library's {kind} design, made for this building"
+            source = {"fmu": choice.what}
+            return self._built_in(choice.what, name, source, settings, about, carries=True)
+        return self._designed(choice.what, name, settings, self._anew(kind), redesigned=True)
+
+    def _of_controller(self, choice: Selection, name: str) -> ComparedController:
+        file = Path(choice.what)
+        kind = read_controller(file).kind
+        kept = self._checked(file, kind)
+        return self._designed(self._component(kind), name, dict(choice.settings), kept)
+
+    def _of_design(self, choice: Selection, name: str) -> ComparedController:
+        """Design what a design file asks for; building and damper are these unless it names one."""
+        file = Path(choice.what)
+        document = Document(file, DesignError)
+        document.data.setdefault("schema", SCHEMA)
+        place = self.site.building, self.site.device.name
+        task = task_of(document, file.parent, place)
+        known = self.damper.for_design()
+        if "damper" not in document.data and known is not None:
+            task = replace(task, damper=known)
+        found = design(task).controller
+        kept = self._save(found, file.stem)
+        self.site.check_design(found, str(file))
+        return self._designed(self._component(found.kind), name, dict(choice.settings), kept)
+
+    def _of_source(self, choice: Selection, name: str) -> ComparedController:
+        with tempfile.TemporaryDirectory() as scratch:
+            made = build(plan(choice.what), Path(scratch))
+            kept = self.folder.keep(made)
+        about = f"a component of your own, {Path(choice.what).name}"
+        return self._of_file(self.folder.path / FILES / Path(kept).name, kept, choice, name, about)
+
+    def _of_fmu(self, choice: Selection, name: str) -> ComparedController:
+        file = Path(choice.what)
+        read_description(file, any_platform=True)
+        return self._of_file(file, self.folder.keep(file), choice, name, f"the FMU {file.name}")
+
+    # -- what they share
+
+    def _designed(
+        self,
+        component: str,
+        name: str,
+        settings: dict[str, Any],
+        kept: str,
+        redesigned: bool = False,
+    ) -> ComparedController:
+        """Return a controller with a design of its own; `kept` is its file in the folder."""
+        file = self.folder.path / FILES / Path(kept).name
+        kind = read_controller(file).kind
+        about = f"a design of the kind {kind}, {Path(kept).name}"
+        about += ", made for this building by the comparison" if redesigned else ""
+        source = {"fmu": component, "controller": kept}
+        found = self._built_in(component, name, source, settings, about, carries=True, file=file)
+        return replace(found, redesigned=redesigned)
+
+    def _built_in(
+        self, component: str, name: str, source: dict[str, Any], settings: dict[str, Any],
+        about: str = "", *, carries: bool = False, file: Path | None = None,
+    ) -> ComparedController:  # fmt: skip
+        description = catalogue.describe(component, controller=file)
+        parameters = {**self._suited(component, description, settings), **settings}
+        period = parameters.get("sample_period", _start(description, "sample_period"))
+        return ComparedController(
+            name, ComponentTable(source, parameters), self._wires(description), "voltage", True,
+            None if period is None else number(period, "sample_period", component),
+            about or "without a design: it suits any building", carries,
+        )  # fmt: skip
+
+    def _suited(
+        self, component: str, description: Description, settings: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the parameters that follow the damper: its largest voltage, its law's inverse."""
+        there, found = description.variables, dict[str, Any]()
+        if "v_max" in there and self.damper.most != _start(description, "v_max"):
+            found["v_max"] = self.damper.most
+        inverts = "inverse" in there and settings.get("kind", "inverse") == "inverse"
+        if component == "Skyhook" and "kind" not in settings:
+            inverts = False  # it switches, and inverts nothing
+        shares = {"f_min": force_share, **({"least_slope": slope_share} if inverts else {})}
+        for name, share_of in shares.items():
+            if name in there and 0.0 < (share := share_of(self.damper)) != 1.0:
+                found[name] = float(f"{share * float(_start(description, name) or 0.0):.4g}")
+        if inverts and "inverse" not in settings:
+            if self.damper.law not in _invertible():
+                raise ScenarioError(
+                    f"the law of {self.damper.name} is none that can be inverted, "
+                    f"{', '.join(_invertible())}: ClippedOptimal takes the same designs."
+                )
+            values = {
+                f"{self.damper.law}.{key}": value for key, value in self.damper.values.items()
+            }
+            found["inverse"] = self.damper.law
+            found |= {key: value for key, value in values.items() if value != there[key].start}
+        return found
+
+    def _of_file(
+        self, file: Path, kept: str, choice: Selection, name: str, about: str
+    ) -> ComparedController:
+        """Return a controller that is an FMU."""
+        description = read_description(file, any_platform=True)
+        there = description.variables
+        outputs = [v.name for v in description.of("output")]
+        drive = self.damper.drive.name
+        output = next((one for one in (drive, "voltage", "command") if one in outputs), "")
+        if not output:
+            raise ScenarioError(
+                f"has no output voltage [V]; its outputs are {', '.join(outputs) or 'none'}. A "
+                f"controller has the output voltage and some of the inputs {', '.join(MEASURED)}."
+            )
+        wires = self._wires(description)
+        missing = [
+            v.name for v in description.of("input")
+            if v.name not in wires and v.name not in choice.settings and not v.optional
+        ]  # fmt: skip
+        if missing:
+            raise ScenarioError(
+                f"nothing in the scenario is called as its input {', '.join(missing)}; a "
+                f"controller has inputs of {', '.join(MEASURED)}, or of the outputs of the "
+                f"building, or a value: {choice.what},{missing[0]}=0."
+            )
+        parameters: dict[str, Any] = dict(choice.settings)
+        if "v_max" in there and "v_max" not in parameters:
+            parameters |= self._suited("", _only(description, "v_max"), parameters)
+        period = parameters.get("sample_period", _start(description, "sample_period"))
+        return ComparedController(
+            name, ComponentTable({"fmu": kept}, parameters), wires, output, False,
+            float(period) if isinstance(period, int | float) else None, about,
+            controller_in(file) is not None,
+        )  # fmt: skip
+
+    def _wires(self, description: Description) -> dict[str, str]:
+        """Return what feeds a controller's inputs, by their names."""
+        known = {port: f"{STRUCTURE}.{port}" for port in self.site.shown()}
+        known |= self.site.measured
+        return {v.name: known[v.name] for v in description.of("input") if v.name in known}
+
+    def _component(self, kind: str) -> str:
+        """Return the component that takes designs of a kind; one that inverts where it can."""
+        able = [name for name in catalogue.controllers() if design_of(name) == kind]
+        if not able:
+            raise DesignError(f"no controller takes a design of the kind {kind}.")
+        inverts = [one for one in able if "inverse" in catalogue.describe(one).variables]
+        if inverts and self.damper.law in _invertible():
+            return inverts[0]
+        return next((one for one in able if one not in inverts), able[0])
+
+    def _checked(self, file: Path, kind: str) -> str:
+        """Keep a controller file that was made for this building, and of the kind."""
+        found = read_controller(file)
+        if found.kind != kind:
+            raise DesignError(f"{file}: is of the kind {found.kind}; {kind or 'none'} is right.")
+        self.site.check_design(found, str(file))
+        return self.folder.keep(file)
+
+    def _anew(self, kind: str) -> str:
+        if kind not in self._designs:
+            self._designs[kind] = self._save(designed_for(kind, self.site, self.damper), kind)
+        return self._designs[kind]
+
+    def _save(self, found: Controller, name: str) -> str:
+        kept = f"{plain_name(name)}.json"
+        found.save(self.folder.path / FILES / kept)
+        return f"{ABOVE}/{FILES}/{kept}"
+
+
+def design_of(component: str) -> str:
+    """Return the kind of design that a component takes, "" of one without."""
+    return str(getattr(catalogue.component_class(catalogue.source(component)), "design", ""))
+
+
+def _start(description: Description, name: str) -> Any:
+    variable = description.variables.get(name)
+    return None if variable is None else variable.start
+
+
+def _only(description: Description, name: str) -> Description:
+    return replace(description, variables={name: description.variables[name]})
+
+
+def _invertible() -> list[str]:
+    return [law.name for law in invertible()]
+
 
 STEP = 0.002
 """Rows of a run [s] where no controller samples faster."""

@@ -20,7 +20,7 @@ from ..campaign.ensemble_file import EnsemblePlan, read_ensemble
 from ..campaign.table import RunsTable
 from ..core.files import cache_folder
 from ..core.progress import Count, listening
-from ..core.toml_write import toml_text
+from ..core.toml_lines import toml_text
 from ..engine import Engine
 from ..engine.cosimulation import Cosimulation, ignore
 from ..engine.coupled import Coupled

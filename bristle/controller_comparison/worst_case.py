@@ -11,7 +11,7 @@ import numpy as np
 
 from ..campaign.distributions import Distribution, share
 from ..core.text import percent
-from ..core.toml_write import toml_table
+from ..core.toml_lines import toml_table
 from ..errors import ScenarioError
 from ..fmu.controller import SAMPLE_PERIOD
 from ..physics.laws import LAWS

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from ..core.arrays import Array
 from ..core.files import write_whole
 from ..core.interrupt import deferred
 from ..core.progress import Count, counted, tell
@@ -275,8 +275,6 @@ rig, if anything; `bristle example reveal {name}` opens it.
 # Planned motions and commands as a rig performs them: smooth, and held before each jump.
 
 # The true rig of an example performs a plan: the same instruments, fresh noise.
-
-Array = NDArray[np.float64]
 
 
 def seconds_of(time: Array) -> float:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
+from ..core.arrays import Array
 from ..errors import RunError, StudyError
 from . import devices
 from .devices import Values
@@ -171,7 +171,6 @@ class Damper:
 
 # Motions of a bench, motions of the ground, and what the voltage does meanwhile.
 
-Array = NDArray[np.float64]
 RATE = 500.0
 """Samples per second of every recorder."""
 V_MAX = 8.0  # V

@@ -21,7 +21,7 @@ from ..model.model import Model, parameter
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of
 from ..physics.laws import LAWS, base_and_variant
-from ..user_code.compiled import shown
+from ..user_code.conformance import shown
 from .histories import DamperForces
 from .run_start import carrying_state, start_under_load
 from .search import HUBER, z_scale

@@ -22,7 +22,7 @@ from ..fmu.build import BuildPlan, built_guid, planned
 from ..fmu.catalogue import BuildingData
 from . import zig
 from .description import text_of
-from .prepare import GUID, compile_functions, prepare
+from .entrance import GUID, compile_functions, prepare
 from .zig import Platform, here
 
 SHIM = Path(__file__).resolve().parent / "shim"

@@ -13,13 +13,11 @@ import warnings
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky
 
+from ..core.arrays import Array
 from .case import Case, ControlProblem, room
 from .response import V_0, V_1, VOLTAGE_0, VOLTAGE_1, damper_end
-
-Array = NDArray[np.float64]
 
 STEPS_PER_PERIOD = 50
 """Steps of the force in a period of the first mode, about; it is constant over each."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..component import source, structure
 from ..component.damper import REMEMBERED
 from ..component.structure import Constants
+from ..core.arrays import Array
 from ..core.jit import compiled
 from ..core.text import unknown
 from ..engine.coupled import RecordLayout
@@ -26,8 +27,6 @@ from ..physics.tuples import Setup
 from ..system.model import Component, Connection, Signal, System
 from .horizon import PULL_BACK, RECEDE, RESPOND, SLOPES, START, Horizon, compute
 from .response import STATES, TRIED, VOLTAGE_0, X_0, Course, DrivenPlant, Gradient
-
-Array = NDArray[np.float64]
 
 STEPS_PER_PERIOD = 200
 """Steps in a period of the first mode, about; whole ones of the scenario's."""

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.files import writing
 from ..core.progress import Count, counted, tell
 from ..core.text import unknown
@@ -30,7 +30,6 @@ from .search import descended, foreseen, levelled
 if TYPE_CHECKING:
     from ..engine.results import Results
 
-Array = NDArray[np.float64]
 
 OUTPUT = "structure.floor2_acceleration_absolute"
 PREVIEWS = (0.0, 0.1, 0.5)

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog, minimize
 
+from ..core.arrays import Array
 from ..engine.results import statistic_of
 from .case import ControlProblem
 from .horizon import Horizon
-
-Array = NDArray[np.float64]
 
 NORMS = (4.0, 6.0, 9.0, 14.0, 20.0, 30.0, 45.0)
 """Norms that are descended in turn, for a peak."""

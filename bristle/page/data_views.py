@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.finding import grouped, sentence
 from ..core.text import scale
 from ..data.building_file import read_building
@@ -33,8 +34,6 @@ from ..study.runs import place_of_run, read_runs
 from ..study.study import Study
 from ..study.study_file import TEST, Settings, spec_text
 from ..units import same_dimension
-
-Array = NDArray[np.float64]
 
 POINTS = 2400
 """Points of a trace that are sent: more than a screen has columns to show them."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..comparison.result import Comparison
 from ..view import html
-from ..view.page_data import pack
+from ..view.html import pack
 from .study_views import linked
 
 STATIC = Path(__file__).with_name("static")

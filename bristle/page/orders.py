@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..core.text import command, unknown, written
-from ..core.toml_write import toml_text
+from ..core.toml_lines import toml_text
 from .requests import UPLOADS, RequestError, batch_name, file_name
 
 Options = Mapping[str, Any]

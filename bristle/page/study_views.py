@@ -22,16 +22,15 @@ from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, base_and_variant
 from ..planning.folder import read_plan
-from ..report.reproduce import commands
+from ..report.study_page import commands
 from ..study.changes import other_data
 from ..study.history import CLOSE, HistoryStep, Step, history_steps
-from ..study.identified import is_identified
-from ..study.identify import as_named_here, refuse_effect
+from ..study.identify import as_named_here, is_identified, refuse_effect
 from ..study.steps import before_after, compare_study, predictions
 from ..study.study import Study
 from ..study.study_file import ROLES, TEST
 from ..study.view import story_view
-from ..view.page_data import page_data
+from ..view.html import page_data
 from .data_views import thinned
 
 ANSWER = "identify.json"

@@ -41,7 +41,7 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
     arguments : what the page asks for
     """
     from ..user_code.load import unload_effects
-    from ..view.page_data import pack
+    from ..view.html import pack
 
     try:
         unload_effects()  # those of the study that was asked for before

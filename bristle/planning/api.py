@@ -11,9 +11,8 @@ from typing import Any
 from ..core.text import written
 from ..errors import StudyError
 from ..study.study import Study
-from .bench import plan_study
+from .bench import plan_new, plan_study
 from .building import plan_building
-from .data_sheet import plan_new
 from .limits import limits_given, read_rig
 from .plan import NAMED, Plan
 from .questions import PlanRequest, notes_of_change

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.config import Document, Key, Spec
 from ..core.text import plain
 from ..data.channels import DRIVE, PLAIN, ChannelSpec
@@ -25,8 +25,6 @@ from ..data.read import read_table
 from ..data.table import Table
 from ..errors import RecordError, StudyError
 from ..units import convert
-
-Array = NDArray[np.float64]
 
 FILE = "plan.toml"
 MOTION = {"bench": "displacement", "structure": "ground_acceleration"}

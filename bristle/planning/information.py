@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.corrections import jumps
 from ..identification.building_sites import StructureRun
 from ..identification.problem import Expected, Problem, Run, residuals
@@ -22,7 +22,6 @@ from .limits import RESERVE, PrescribedSignals, RigLimits, Test
 
 # Parts without a form, along a coordinate: what runs must cover for a curve to be learned.
 
-Array = NDArray[np.float64]
 
 KNOTS = 7
 """Knots of a curve along a coordinate."""

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.config import Document, Key, Spec
 from ..core.text import quantity, unknown, written
 from ..data.corrections import limited
@@ -188,8 +188,6 @@ def with_given(limits: RigLimits, given: Mapping[str, Any]) -> RigLimits:
 
 
 # A planned test: a motion and a command, as large as the rig's limits allow.
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import correlate, correlation_lags
 
+from ..core.arrays import Array
 from ..core.text import plain, scale
 from ..data.channels import channel_unit
 from ..data.measurement import Measurement, measurements_of
@@ -26,7 +26,6 @@ from .folder import PlanFolder, PlannedRun
 
 # How far a measured signal differs from the planned one at the same instants.
 
-Array = NDArray[np.float64]
 
 DIFFERS = 0.05
 """Share from which a difference is told."""

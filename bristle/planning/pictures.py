@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..core.arrays import Array
 from ..physics.drive import DRIVES
 from ..view.style import BLUE, GREEN, VERMILION, Page, look
 
@@ -14,7 +12,6 @@ if TYPE_CHECKING:
     from .folder import PlannedRun
     from .limits import PrescribedSignals
 
-Array = NDArray[np.float64]
 
 SHOWN = 4000
 """Samples per line: more are not seen."""

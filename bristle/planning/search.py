@@ -8,10 +8,10 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from ..core.arrays import Array
 from ..core.progress import Count, tell
 from ..core.text import quantity
 from ..data.noise import white_noise
@@ -21,8 +21,6 @@ from ..identification.search import in_threads
 from .information import Goal, JudgedTest, PreparedQuestion, roles_of
 from .limits import RESERVE, PrescribedSignals, RigLimits, Test
 from .waveforms import Command, Waveform
-
-Array = NDArray[np.float64]
 
 CANDIDATES = 256
 """Tests that are looked at before the best ones are picked."""

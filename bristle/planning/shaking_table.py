@@ -11,8 +11,8 @@ from threading import Lock
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.channels import channel_unit
 from ..data.measurement import Measurement
 from ..data.sampling import Sampling
@@ -22,13 +22,12 @@ from ..model.model import Model
 from ..physics.drive import VOLTAGE
 from ..prediction.model_system import BuildingWithFile, Excitation, signals_of
 from ..prediction.monte_carlo import Simulator
-from .data_sheet import NOISE
+from .bench import NOISE
 from .information import JudgedTest
 from .limits import RESERVE, PrescribedSignals, RigLimits, Test
 from .search import LEAST, Planner
 from .waveforms import Waveform
 
-Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
 
 

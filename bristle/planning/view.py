@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ..view.blocks import Figure, Table, Text, View, view_of
-from .outcome import HEADER
-from .plan import Plan
+from .plan import HEADER, Plan
 
 
 @view_of(Plan)

@@ -10,17 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, sosfiltfilt
 
+from ..core.arrays import Array
 from ..data.ground_motion import GroundMotion, baked_in, read_ground_motion
 from ..data.measurement import Measurement
 from ..errors import RecordError
-
-Array = NDArray[np.float64]
 
 RAMP = 0.5
 """Time [s] in which a motion begins from rest, and ends at it."""

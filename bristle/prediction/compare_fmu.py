@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..comparison.comparison import compare_predictions
 from ..comparison.predictions import RunPrediction, coordinates_of, rms
 from ..comparison.result import Comparison
+from ..core.arrays import Array
 from ..core.text import percent
 from ..data.channels import DRIVE, MOTION, PLAIN, ChannelSpec, channel_unit, is_channel
 from ..data.decimate import between
@@ -117,7 +118,6 @@ def _unit(port: Port, ratio: float, correlation: float) -> tuple[str, str]:
 
 # One measurement as an FMU is fed: channels and other columns, motion smoothed, errors drawn.
 
-Array = NDArray[np.float64]
 
 DRAWS = 6
 """Draws of the inputs' error."""

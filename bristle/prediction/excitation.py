@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import command
 from ..data.building_file import read_building
 from ..data.channels import Labels
@@ -18,8 +19,6 @@ from ..identification.smoothing import smooth_steps
 from ..physics.building import with_damper
 from ..study.inputs import measurements
 from .model_system import BuildingWithFile, Excitation, shaking_of
-
-Array = NDArray[np.float64]
 
 REST = 0.1
 """Share of a response's peak up to which it counts as at rest when the run begins."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -11,19 +13,32 @@ from shutil import copyfile
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.files import writing
-from ..core.text import percent, plain
+from ..core.files import write_whole, writing
+from ..core.text import percent, plain, quantity
 from ..data.channels import channel_unit, label_name, label_text
 from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.measurement import Measurement
 from ..data.run_labels import labels_of
-from ..errors import RecordError, StudyError
+from ..errors import FmuError, RecordError, StudyError
 from ..fmu.build import BuildPlan, build, plan
 from ..fmu.catalogue import component_of_law
-from ..identification.problem import following
-from ..identification.rig import DAMPER
+from ..fmu.damper import input_of
+from ..identification.error import ForceError, error_on, pooled, reasons_of, zero_on
+from ..identification.histories import before_jump
+from ..identification.problem import (
+    Fed,
+    Moments,
+    Problem,
+    Run,
+    following,
+    of_one_site,
+    sensors,
+    shown_force,
+)
+from ..identification.rig import DAMPER, Rig, at_site
 from ..model.model import Model
 from ..physics.building import GROUND
 from ..physics.drive import VOLTAGE, Drive, drive_named
@@ -36,7 +51,6 @@ from ..system.from_model import DamperTable, Parameters, source_of, values_of
 from ..system.toml import save
 from ..user_code.load import own_effects
 from ..view import Viewable
-from .held_out import FOLDER, HeldOut, Proof, held_out, prove, step_for, write_inputs, write_proof
 from .model_system import (
     BuildingWithFile,
     Excitation,
@@ -44,7 +58,9 @@ from .model_system import (
     building_system,
     loads,
     shaking_of,
+    start_values,
 )
+from .stepping import SteppingJob, step_through
 
 Build = Callable[[BuildPlan, Path], Path]
 
@@ -334,3 +350,420 @@ def _structure(
     about = "# The model's damper in the study's building."
     scenario, *files = save(system, folder / "structure.toml", about)
     return scenario, [*copied, *files, *effects]
+
+
+# An exported damper held against the runs that no fit has seen: its inputs, its step, its error.
+
+
+OF_ERROR, OF_FORCE = 0.01, 0.002
+"""By how much the error of an FMU may differ from the one that is told: of it, or of the force."""
+FINEST = 2e-5
+"""Shortest step [s] that is tried."""
+MOST = (120_000, 700_000)
+"""Steps of an FMU for its proof: where the runs need more, the start of each is taken. One sample
+at which the motion reverses can part the two errors there; then as many as the second number."""
+FADED = 1e-6
+"""Share of its largest value below which the response of an instrument has ended."""
+FOLDER, CHECK = "held_out", "check.py"
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What an exported FMU gives in FMPy on the runs that its model was not fitted to.
+
+    `told` is the error that `bristle compare` prints, `expected` the same over the part of the runs
+    that the FMU was run on, `fmu` its own over that part, `raw` its own when it is fed with the
+    measured columns as they are, None where they are not there; `step` [s] that of the FMU, `part`
+    the share of the samples that it was run on; `training` whether these are the training runs,
+    for there are no others; `why` says why the FMU was not run, "" where it was.
+    """
+
+    told: ForceError
+    step: float
+    expected: ForceError | None = None
+    fmu: ForceError | None = None
+    raw: ForceError | None = None
+    part: float = 1.0
+    training: bool = False
+    why: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the FMU confirms the error."""
+        if self.fmu is None or self.expected is None:
+            return False
+        return agree(self.fmu, self.expected)
+
+    def lines(self, folder: Path) -> list[str]:
+        """Return in words what the FMU, exported to a folder, was found to give."""
+        runs = "training runs (there are no held-out ones)" if self.training else "held-out runs"
+        step = quantity(self.step, "s", fine=True)
+        out = [
+            f"Force error on the {runs}, as bristle compare prints it: {self.told.text()}.",
+            *self.told.beside(),
+        ]
+        if self.fmu is None:
+            return [*out, f"The FMU was not run to confirm it: {self.why}"]
+        over = "" if self.part == 1.0 else f", the first {100.0 * self.part:.2g} % of each run"
+        confirmed = "confirms it" if self.agrees else "does NOT confirm it"
+        out.append(f"The FMU in FMPy {confirmed}: {self.fmu.text()} at a step of {step}{over}.")
+        if self.part < 1.0 and self.expected is not None:
+            out[-1] += f" Over the same part the model has {self.expected.text()}."
+        out.append(
+            f"Give FMPy output_interval={self.step:.10g}: by itself it takes longer steps, "
+            "1,000 per run at most."
+        )
+        out.append(f"Again:  python {folder / FOLDER / CHECK}")
+        if self.raw is None:
+            return [*out, "It was not fed with measured columns: none is the motion of the damper."]
+        there = "" if self.part == 1.0 else ", over the same part"
+        out.append(f"Fed with the measured columns as they are{there}: {self.raw.text()}.")
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the proof as JSON has it."""
+        errors = {name: getattr(self, name) for name in ("told", "expected", "fmu", "raw")}
+        return {
+            "step": self.step, "runs": "training" if self.training else "held out",
+            "part": self.part, "agrees": self.agrees, "why_not_run": self.why,
+            **{f"error_{name}": error and error.as_dict() for name, error in errors.items()},
+        }  # fmt: skip
+
+
+class HeldOut(NamedTuple):
+    """The damper of a model and the runs that it is held against.
+
+    `runs` have all their samples; `fed` is what the damper is given of each; `zero` [N] that of the
+    load cell; `raw` the measured columns that a user would feed, by input, where the fit's serve
+    for an input that was not measured; None where no motion of the damper was.
+    """
+
+    damper: Model
+    problem: Problem
+    model: Model
+    runs: Sequence[Run]
+    fed: Sequence[Fed]
+    zero: float
+    raw: Sequence[dict[str, Array] | None]
+    training: bool
+
+    def force(self, moments: Moments, fed: Fed) -> Array:
+        """Return the force (m,) [N] of the damper at the moments of a run."""
+        return self.problem.bench(self.model).force(*moments, fed.values, fed.tracks)
+
+    def shown(self, k: int, force: Array) -> Array:
+        """Return a damper's force at the moments of run k as the load cell shows it (n,) [N]."""
+        run = self.runs[k]
+        return self.problem.shown(self.model, run, self.fed[k], force) + self.zero
+
+    def told(self, samples: Sequence[int] | None = None) -> ForceError:
+        """Return the error of the model on the runs, or on the first `samples` of each."""
+        found = []
+        for k, run in enumerate(self.runs):
+            force = self.shown(k, self.force(self.fed[k].moments, self.fed[k]))
+            found.append(error_on(*_first(run, force, samples[k] if samples else len(run.force))))
+        return pooled(found)
+
+
+def held_out(damper: Model, model: Model, rig: Rig, measured: Sequence[Measurement]) -> HeldOut:
+    """Return what a study's damper is held against.
+
+    Parameters
+    ----------
+    damper : the model's law with the effects of the damper alone
+    model : with the effects of all sites
+    rig : the sites with their runs
+    measured : the held-out runs as measured, of a building with the motion across the device
+    """
+    sites = rig.sites(model)
+    site, own = sites[DAMPER], at_site(model, DAMPER, sites)
+    problem = site.problem_of("holdout")
+    training = problem is None
+    problem = site.train if problem is None else problem
+    inside = tuple(name for name in own.effects if EFFECTS[name].site != "structure")
+    runs = [run.entire() for run in problem.runs]
+    zero = zero_on(problem, own)
+    fitted = of_one_site(own, inside)
+    fed = []
+    for run in runs:
+        values = {**fitted.values, **problem.carrying(fitted, run)}
+        fed.append(problem.fed(replace(fitted, values=values), run))
+    by_name = {one.name: one for one in measured}
+    raw = [_raw(by_name.get(run.name), run) for run in runs]
+    return HeldOut(damper, problem, fitted, runs, fed, zero, raw, training)
+
+
+def step_for(held: HeldOut) -> float:
+    """Return the longest step [s] at which FMPy gives the error that is told.
+
+    It is that of the moments that are closest, as runs may have rates of their own, or a whole
+    fraction of it, `FINEST` at the shortest. What FMPy shows is the force of a step before, which
+    the damper's own functions give as well.
+    """
+    told, n = held.told(), 1
+    dt = min(fed.moments.dt for fed in held.fed)
+    while dt / n >= 2.0 * FINEST:
+        late = []
+        for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
+            steps = _steps_per_moment(fed, dt / n)
+            force = held.force(*_dense(fed, steps))
+            force = np.concatenate([force[:1], force[:-1]])[::steps]
+            late.append(error_on(run, held.shown(k, force)))
+        if agree(pooled(late), told, 0.5):
+            break
+        n *= 2
+    return dt / n
+
+
+def agree(one: ForceError, other: ForceError, share: float = 1.0) -> bool:
+    """Return whether two errors over the same samples differ by no more than may be."""
+    allowed = max(OF_ERROR * other.rms_all, OF_FORCE * other.signal_all)
+    counted = max(OF_ERROR * other.rms, OF_FORCE * other.signal) if other.samples else allowed
+    return bool(
+        abs(one.rms_all - other.rms_all) <= share * allowed
+        and not abs(one.rms - other.rms) > share * counted
+    )
+
+
+def write_inputs(held: HeldOut, step: float, folder: Path) -> list[Path]:
+    """Write of each run the inputs as the fit saw them, and the force that they are held against.
+
+    NAME_inputs.csv has a row per moment, linear in between, and two more where the command jumps;
+    NAME_force.csv the measured force at the samples, that of the model, and 1 where a sample
+    counts.
+
+    Parameters
+    ----------
+    held : the runs
+    step : s, of the FMU
+    folder : made if need be
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
+        per = _steps_per_moment(fed, step)
+        rows = _rows(fed.moments.V, per)
+        dense = _dense_inputs(held.damper, run, fed, step)
+        columns = {f"{name} [{unit}]": y[rows] for name, (unit, y) in dense.items()}
+        time = fed.moments.dt * rows / per
+        files.append(_table(folder / f"{run.name}_inputs.csv", {"time [s]": time, **columns}))
+        out = np.any([np.zeros(len(run.force), bool), *reasons_of(run).values()], axis=0)
+        predicted = held.shown(k, held.force(fed.moments, fed))
+        force = {
+            "time [s]": run.dt * np.arange(len(run.force)), "force [N]": run.force,
+            "model_force [N]": predicted, "counts": (~out).astype(float),
+        }  # fmt: skip
+        files.append(_table(folder / f"{run.name}_force.csv", force))
+    return files
+
+
+def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proof:
+    """Run an exported FMU as FMPy does, and return its error beside the one that is told.
+
+    Parameters
+    ----------
+    held : the runs
+    fmu : the exported file
+    step : s, of the FMU
+    timeout : s, for each run
+
+    Raises
+    ------
+    RunError
+        If the FMU fails on its way.
+    """
+    few, many = MOST
+    proof = _proof(held, fmu, step, timeout, few)
+    if proof.part == 1.0 or proof.agrees or proof.why:
+        return proof
+    return _proof(held, fmu, step, timeout, many)
+
+
+def _proof(held: HeldOut, fmu: Path, step: float, timeout: float, most: int) -> Proof:
+    """Return the proof by an FMU that makes so many steps at the most."""
+    lengths = [len(run.force) for run in held.runs]
+    of_moment = [_steps_per_moment(fed, step) for fed in held.fed]
+    parts = [run.finer.parts if run.finer else 1 for run in held.runs]
+    of_sample = [n * m for n, m in zip(of_moment, parts, strict=True)]
+    part = min(1.0, most / sum(n * m for n, m in zip(lengths, of_sample, strict=True)))
+    samples = [max(2, int(part * n)) if part < 1.0 else n for n in lengths]
+    told = held.told()
+    own: list[ForceError] = []
+    raw: list[ForceError] = []
+    try:
+        for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
+            dense = _dense_inputs(held.damper, run, fed, step)
+            inputs = {name: y for name, (_, y) in dense.items()}
+            per = of_sample[k]
+            end = (samples[k] - 1) * per + 1
+            passes = [{name: _begin(y[:end]) for name, y in inputs.items()}]
+            columns = held.raw[k]
+            if columns is not None:
+                passes.append(
+                    {n: _begin(_between(columns.get(n), y, per)[:end]) for n, y in inputs.items()}
+                )
+            values = start_values(held.damper, fed, run)
+            names, job = tuple(inputs), (fed.moments.dt / of_moment[k],) * len(passes)
+            found = step_through(
+                SteppingJob(str(fmu.resolve()), dict(values), names, ("force",), job),
+                passes,
+                timeout,
+            )
+            for errors, rows in zip((own, raw), found, strict=False):
+                force = _padded(rows["force"][:: of_moment[k]], len(fed.moments.x))
+                shown = held.shown(k, force)
+                errors.append(error_on(*_first(run, shown, samples[k])))
+    except FmuError as error:  # such as a library for another platform
+        return Proof(told, step, training=held.training, why=str(error))
+    return Proof(
+        told, step, held.told(samples) if part < 1.0 else told, pooled(own),
+        pooled(raw) if len(raw) == len(own) else None, part, held.training,
+    )  # fmt: skip
+
+
+def write_proof(proof: Proof, held: HeldOut, fmu: Path, folder: Path) -> list[Path]:
+    """Write what the FMU gives, what its host has to set and to apply, and a check in FMPy.
+
+    Parameters
+    ----------
+    proof : what the FMU gives
+    held : the runs
+    fmu : the exported file
+    folder : where the inputs are
+    """
+    pulses = [_pulse_response(held, fed) for fed in held.fed]
+    linear = all(one is not None for one in pulses)
+    instruments = [effect.name for effect in sensors(held.model.effects, "force")]
+    data = {
+        "fmu": fmu.name, **proof.as_dict(),
+        "load_cell_zero": held.zero,
+        "not_applied": [] if linear else instruments,
+        "pulse_response": {
+            run.name: one.tolist() if linear and one is not None else [1.0]
+            for run, one in zip(held.runs, pulses, strict=True)
+        },
+        "moments_per_sample": {
+            run.name: run.finer.parts if run.finer else 1 for run in held.runs
+        },
+        "start_values": {
+            run.name: start_values(held.damper, fed, run)
+            for run, fed in zip(held.runs, held.fed, strict=True)
+        },
+    }  # fmt: skip
+    path = folder / "proof.json"
+    write_whole(path, json.dumps(data, indent=1) + "\n")
+    return [
+        path,
+        Path(copyfile(Path(__file__).with_name("check_held_out.py"), folder / "check.py")),
+    ]
+
+
+def _pulse_response(held: HeldOut, fed: Fed) -> Array | None:
+    """Return what the instruments of the force show of a pulse of 1 N, moment by moment (k,) [N].
+
+    None where that does not tell what they show of a force, as of one that saturates.
+    """
+    effects, dt = held.model.effects, fed.moments.dt
+    pulse = np.zeros(1 + len(fed.moments.x))
+    pulse[1] = 1.0  # not at the first moment, with which some states start
+    response = shown_force(effects, fed.values, pulse, dt)[1:]
+    there = np.flatnonzero(np.abs(response) > FADED * np.max(np.abs(response), initial=0.0))
+    response = response[: 1 + int(there[-1])] if len(there) else response[:1]
+    force = held.force(fed.moments, fed)
+    begun = np.concatenate([np.full(len(response) - 1, force[0]), force])
+    off = np.convolve(begun, response, "valid") - shown_force(effects, fed.values, force, dt)
+    return response if np.max(np.abs(off)) <= OF_FORCE * np.std(force) else None
+
+
+def _inputs(damper: Model, run: Run, fed: Fed) -> dict[str, tuple[str, Array]]:
+    """Return unit and values (m,) of what an FMU is fed, by its inputs' names."""
+    x, v, a, V, _ = fed.moments
+    drive = drive_named(run.drive)
+    out = {"displacement": ("m", x), "velocity": ("m/s", v), drive.name: (drive.unit, V)}
+    if any("a" in EFFECTS[name].needs for name in damper.effects):
+        out["acceleration"] = ("m/s2", a)
+    for parameter, channel in following(damper.effects).items():
+        name = input_of(channel, damper.base_law, drive)
+        out[name] = (run.extra[channel].known_unit, fed.tracks[parameter])
+    return out
+
+
+def _steps_per_moment(fed: Fed, step: float) -> int:
+    """Return in how many steps an FMU passes from one moment of a run to the next: none longer."""
+    return math.ceil(fed.moments.dt / step - 1e-6)
+
+
+def _dense_inputs(damper: Model, run: Run, fed: Fed, step: float) -> dict[str, tuple[str, Array]]:
+    moments, dense = _dense(fed, _steps_per_moment(fed, step))
+    return _inputs(damper, run, dense._replace(moments=moments))
+
+
+def _dense(fed: Fed, n: int) -> tuple[Moments, Fed]:
+    """Return motion and command at n times as many moments, as a prediction has them between.
+
+    The motion is linear, and so is the command but where it jumps; a channel has its newest value.
+    A jump falls on the last of these moments before its sample, which then shows it in FMPy too.
+    """
+    x, v, a, V, dt = fed.moments
+    if n == 1:
+        return fed.moments, fed
+    places, known = np.arange((len(x) - 1) * n + 1) / n, np.arange(len(x))
+    x1, v1, a1, V1 = (np.interp(places, known, y) for y in (x, v, a, V))
+    for k in range(1, len(V)):
+        if V[k] != V[k - 1] and before_jump(V, k) != V[k]:
+            V1[(k - 1) * n : k * n - 1], V1[k * n - 1] = V[k - 1], V[k]
+    tracks = {name: np.append(y[0], np.repeat(y[1:], n)) for name, y in fed.tracks.items()}
+    moments = Moments(x1, v1, a1, V1, dt / n)
+    return moments, Fed(moments, fed.values, tracks)
+
+
+def _rows(V: Array, per: int) -> NDArray[np.int64]:
+    """Return which of `per` times as many moments tell all inputs, with the command's jumps."""
+    jumps = [k for k in range(1, len(V)) if V[k] != V[k - 1] and before_jump(V, k) != V[k]]
+    beside = [k * per - late for k in jumps for late in (2, 1)] if per > 2 else []
+    return np.union1d(np.arange(len(V)) * per, np.array(beside, dtype=np.int64))
+
+
+def _begin(values: Array) -> Array:
+    """Return what is set before each step where a host sets the inputs of its begin."""
+    return np.concatenate([values[:1], values[:-1]])
+
+
+def _between(column: Array | None, fitted: Array, per: int) -> Array:
+    """Return a measured column at the moments of an FMU; the fit's where it was not measured."""
+    if column is None:
+        return fitted
+    places = np.arange(len(fitted)) / per
+    return np.interp(places, np.arange(len(column)), column)
+
+
+def _padded(force: Array, length: int) -> Array:
+    """Return a force with its last value held up to a length."""
+    return np.concatenate([force, np.full(length - len(force), force[-1])])
+
+
+def _first(run: Run, force: Array, samples: int) -> tuple[Run, Array]:
+    """Return the first samples of a run and of a force."""
+    return (
+        (run, force) if samples == len(run.force) else (run.of(slice(0, samples)), force[:samples])
+    )
+
+
+def _raw(measured: Measurement | None, run: Run) -> dict[str, Array] | None:
+    """Return the columns as measured that an FMU takes: what the host of one has, without a fit."""
+    if measured is None or not (measured.has("displacement") or measured.has("velocity")):
+        return None
+    out = {name: measured[name] for name in ("displacement", "velocity") if measured.has(name)}
+    if "velocity" not in out:
+        out["velocity"] = np.gradient(out["displacement"], measured.step)
+    if measured.has(run.drive):
+        out[run.drive] = measured[run.drive]
+    return out
+
+
+def _table(path: Path, columns: Mapping[str, NDArray[np.floating[Any]]]) -> Path:
+    """Write columns as CSV at full digits."""
+    rows = [",".join(columns)]
+    rows += [",".join(f"{y:.15g}" for y in row) for row in zip(*columns.values(), strict=True)]
+    write_whole(path, "\n".join(rows) + "\n")
+    return path

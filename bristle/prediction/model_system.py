@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.channels import device_channel
 from ..data.measurement import Measurement
 from ..errors import StudyError
@@ -26,8 +27,6 @@ from ..system.from_model import DamperTable, Parameters
 from ..system.model import Signal, System
 from ..system.scenario import make_system
 from ..user_code.load import own_effects
-
-Array = NDArray[np.float64]
 
 STEP = 2e-3
 """Longest step [s] of a building's scenario."""

@@ -9,10 +9,10 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..campaign.campaign import Campaign, Variation
+from ..core.arrays import Array
 from ..core.progress import tell
 from ..engine.coupled import Coupled
 from ..engine.results import statistic_of
@@ -38,7 +38,6 @@ from .model_system import (
 
 # A model's damper in a building, simulated as it is and with draws of what is uncertain.
 
-Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
 
 

@@ -20,11 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..errors import BristleError, FmuError, RunError
 
-Array = NDArray[np.float64]
 Value = float | int | bool | str
 
 _PACKAGES = str(Path(__file__).resolve().parents[2])

@@ -6,35 +6,36 @@ import hashlib
 import json
 import platform
 import re
-from collections.abc import Sequence
+import shlex
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..comparison.names import effect_names, name_of, site_name
-from ..comparison.panels import (
+from ..comparison.view import (
+    LOOPS,
     OneCycle,
+    band_table,
     chosen_cycles,
     draw_loop,
     draw_map,
     draw_pattern,
     draw_regimes,
     draw_spectrum,
-    residual_map,
-    under,
-)
-from ..comparison.view import (
-    LOOPS,
-    band_table,
     headline,
     loop_panels,
     pattern_table,
+    residual_map,
     run_table,
     site_table,
     sites_page,
     telling_patterns,
+    under,
 )
 from ..core.progress import counted, tell
 from ..core.text import command, percent, plain, quantity, short_z
@@ -43,14 +44,15 @@ from ..data.channels import label_text
 from ..errors import BristleError
 from ..model.equations import equations
 from ..physics.drive import DRIVES
-from ..physics.forms import shown_law
+from ..physics.forms import shown_law, split_form
 from ..physics.laws import LAWS
 from ..planning.folder import FILE, PlanFolder, read_plan
-from ..planning.outcome import OUTCOMES
 from ..planning.performed import shows
-from ..study.budget_picture import budgets, draw_budget, sentence
+from ..planning.plan import OUTCOMES
+from ..prediction.export import write_editable
 from ..study.history import HistoryStep, history_steps
-from ..study.pictures import staircase_page
+from ..study.pictures import budgets, draw_budget, sentence, staircase_page
+from ..study.read_again import devices_of
 from ..study.runs import names_of_runs, place_of_run
 from ..study.study_file import TEST
 from ..study.view import or_nothing, steps_table, story_view
@@ -58,18 +60,69 @@ from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
 from ..view.style import Page, look, png
-from .reproduce import commands
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from ..comparison.comparison import RigComparer
     from ..comparison.result import Comparison
+    from ..data.channels import ChannelSpec
     from ..data.measurement import Measurement
+    from ..export.web import Shown
     from ..identification.rig_fit import SiteModel
     from ..model.model import Fact, Model
     from ..study.history import Step
     from ..study.study import Study
+
+
+class Movable(NamedTuple):
+    """A study's scenario as a page runs it: its file, what the page shows, run and notes."""
+
+    scenario: Path
+    shown: Shown
+    run: str
+    notes: tuple[str, ...]
+
+
+@contextmanager
+def movable(study: Study) -> Iterator[Movable]:
+    """Yield the scenario of a study's damper whose numbers a page can move, in a folder that goes.
+
+    Raises
+    ------
+    StudyError, RecordError
+        If the model or its run cannot be read.
+    """
+    from ..export.web import Shown
+
+    with tempfile.TemporaryDirectory() as folder:
+        found = write_editable(study, Path(folder))
+        measured = {"damper.force": "measured.value"} if found.force else {}
+        shown = Shown([f"damper.{name}" for name in found.numbers], measured)
+        yield Movable(found.scenario, shown, found.run, found.notes)
+
+
+def what_if_section(study: Study) -> str:
+    """Return the section of a report whose sliders move the numbers of the model.
+
+    Raises
+    ------
+    BuildError
+        If zig is not installed.
+    ScenarioError, StudyError, RecordError
+        If the study has no model, or its scenario cannot be compiled.
+    """
+    from ..export.web import PageNumbers, body, described, module
+
+    with movable(study) as found:
+        numbers = PageNumbers(found.scenario)
+        description = described(numbers, shown=found.shown)
+    return html.section(
+        f"What if: the model in {found.run}, with other numbers",
+        body(module(numbers.system), description),
+        html.items(found.notes),
+    )
+
 
 # The tables of the parameters and the data.
 
@@ -366,7 +419,6 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
     `what_if` adds sliders that compute the model in the page, which needs zig.
     """
     from ..study.steps import compare_study, comparer
-    from .what_if import what_if_section
 
     moved = what_if_section(study) if what_if else ""  # first: it may lack its compiler
     model, steps = study.model(to_show=True), tuple(study.steps())
@@ -770,3 +822,98 @@ def _reproduce(content: Content) -> str:
         html.table(["file", "SHA-256, first 16 digits"], [*rows, ["model.toml", model]]),
         html.paragraphs(f"Made with {versions}.", kind="soft"),
     )
+
+
+# The commands that make a study again: from its files, step by step, to its report.
+
+AGAIN = "_again"
+"""What the name of the study that is made anew ends with."""
+
+
+def commands(study: Study) -> list[str]:
+    """Return the lines of a shell that make a study again beside it, from the folder above.
+
+    What the history did by hand is copied; everything else is computed anew.
+    """
+    old = study.name
+    new = old + AGAIN
+    lines = [_new(study, old, new)]
+    read = {run.file for run in study.settings.runs}
+    # What is left out may be what no command can read.
+    for out in dict.fromkeys(run.file for run in study.settings.excluded):
+        if out not in read:
+            lines.append(_copy(f"{old}/{out}", f"{new}/{out}"))
+    lines.append(_copy(f"{old}/study.toml", f"{new}/study.toml"))
+    own_laws = sorted(study.laws_folder.glob("*.py"))
+    if own_laws:  # `study new` makes a folder for effects alone
+        lines.append(shlex.join(["mkdir", "-p", f"{new}/laws"]))
+    for file in (*own_laws, *sorted(study.effects_folder.glob("*.py"))):
+        place = f"{file.parent.name}/{file.name}"
+        lines.append(_copy(f"{old}/{place}", f"{new}/{place}"))
+    lines.append(command("study", "check", new))
+    law = ""
+    for step in study.steps():
+        present = study.model_of(step.number, to_show=True).law
+        lines += _step(step, old, new, law, present)
+        law = present
+    return [*lines, *(command(word, new) for word in ("compare", "diagnose", "report"))]
+
+
+def _new(study: Study, old: str, new: str) -> str:
+    """Return the command that makes the study; its channels are given, not guessed again."""
+    settings = study.settings
+    files = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs)
+    words = ["study", "new", new, "--data", *files]
+    test = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs if run.role == TEST)
+    words += ["--test", *test] if test else []
+    if settings.split:
+        words += ["--split", settings.split]
+    if settings.rig != "bench":
+        words += ["--rig", settings.rig]
+    if study.history.model_file(0).is_file():
+        model = study.model_of(0, to_show=True)
+        words += ["--law", split_form(model.law)[0]]
+        if model.building:
+            words += ["--building", f"{old}/{model.building}"]
+            if len(devices_of(study.folder, settings)[1]) > 1:
+                words += ["--device", settings.device]
+    for name, spec in settings.channels.items():
+        words += _channel(name, spec)
+    return command(*words)
+
+
+def _channel(name: str, spec: ChannelSpec) -> list[str]:
+    if spec.step is not None:
+        return ["--step", f"{spec.step:g}"]
+    unit = f"@{spec.unit}" if spec.unit else ""
+    return ["--channel", f"{name}={'-' if spec.sign < 0 else ''}{spec.column}{unit}"]
+
+
+def _step(step: Step, old: str, new: str, law: str, present: str) -> list[str]:
+    """Return what makes a step of the history again; nothing for the first model.
+
+    `law` is that of the model before the step, `present` that of its own.
+    """
+    verb, _, rest = step.what.partition(" ")
+    if verb == "begin":
+        return []
+    if verb == "add":
+        return [command("add", new, *rest.split(", "))]
+    if step.what == "identify the building":
+        return [command("identify", new, "--structure")]
+    if verb == "identify":
+        # Not by the step's words: they name a table without its knots.
+        options = _other_law(law, present) if present != law else []
+        return [command("identify", new, *options)]
+    return [_copy(f"{old}/history/{step.number:03d}/model.toml", f"{new}/model.toml")]
+
+
+def _other_law(law: str, other: str) -> list[str]:
+    """Return the options that lead from a law to another one, or to another form of it."""
+    (before, _, _), (after, form, _) = split_form(law), split_form(other)
+    named = ["--law", after] if after != before or not form else []
+    return named + (["--command", form] if form else [])
+
+
+def _copy(source: str, target: str) -> str:
+    return shlex.join(["cp", source, target])

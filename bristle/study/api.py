@@ -24,8 +24,7 @@ from ..model.model import Model
 from ..physics.building import Building
 from ..physics.laws import DEFAULT
 from .forms import all_laws, left_out_notes, refuse_in_building, with_law
-from .identified import Identified, is_identified
-from .identify import FitTask, identify_on_rig, identify_study
+from .identify import FitTask, Identified, identify_on_rig, identify_study, is_identified
 from .inputs import (
     Channels,
     Data,

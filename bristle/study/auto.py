@@ -16,8 +16,7 @@ from ..physics.effect import closures
 from .changes import other_data
 from .forms import law_or_all
 from .history import Step
-from .identified import is_identified
-from .identify import identify_study
+from .identify import identify_study, is_identified
 from .learn import learn_effect, learn_study_closure, opened_at
 from .steps import (
     Say,

@@ -21,8 +21,7 @@ from ..errors import StudyError
 from .changes import FILE as ADDED
 from .changes import note_addition
 from .new import refuse_other_columns, remarks_on
-from .roles import roles_added
-from .run_facts import RunChoices, facts_of
+from .run_facts import RunChoices, facts_of, roles_added
 from .runs import read_runs
 from .study import Study
 from .study_file import EXCLUDE, RunFile, read_draft, with_runs

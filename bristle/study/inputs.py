@@ -24,8 +24,7 @@ from ..model.model_file import read_model
 from ..physics.building import Building, with_damper
 from ..physics.effect import EFFECTS
 from ..physics.laws import law_names
-from .identified import Identified
-from .identify import refuse_effect
+from .identify import Identified, refuse_effect
 from .new import parse_channel
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 

@@ -27,7 +27,7 @@ from ..physics.effect import EFFECTS
 from ..trust import remember_made
 from ..user_code.load import flaw_of
 from .history import LEARNED
-from .identified import is_identified
+from .identify import is_identified
 from .rig import building_of
 from .study import Study
 

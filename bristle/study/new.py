@@ -41,8 +41,7 @@ from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
 from ..units import canonical, convert
 from .history import History, Step
-from .roles import for_test, roles_of
-from .run_facts import Facts, RunChoices, facts_of
+from .run_facts import Facts, RunChoices, facts_of, for_test, roles_of
 from .runs import names_of_runs
 from .study_file import ALL, EXCLUDE, ROLES, TEST, RunFile, Settings, write_settings
 

@@ -43,12 +43,13 @@ from ..view import Viewable
 from .changes import noted
 from .forms import LawFits, law_command, law_or_all, with_law
 from .history import Step
-from .identified import Identified, is_identified
 from .identify import (
     FitTask,
+    Identified,
     as_named_here,
     identify_model,
     identify_study,
+    is_identified,
     refuse_effect,
     refuse_left_out,
 )

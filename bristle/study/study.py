@@ -27,7 +27,7 @@ from ..view import Viewable
 from .changes import additions, behind_data, data_digest, note_undone, other_than
 from .history import History, Step, building_in
 from .new import make_folder, parse_channel
-from .roles import refuse_too_few, roles_by_place
+from .run_facts import refuse_too_few, roles_by_place
 from .runs import (
     Runs,
     joined_corrections,
@@ -201,7 +201,7 @@ class Study(Viewable):
         TrustError
             If the model has one whose code must not run yet.
         """
-        from ..user_code.compiled import usable
+        from ..user_code.conformance import usable
 
         laws, effects = load(self.laws_folder, "law"), load(self.effects_folder)
         for one in (*laws, *effects):

@@ -18,10 +18,9 @@ from ..component.controller_file import Controller, read_controller
 from ..core.config import SCHEMA
 from ..core.text import written
 from ..errors import DesignError
+from .analysis import DesignResult, implausible
 from .damper import DesignDamper
 from .design_file import damper_from_model, read_task, task_from_data
-from .plausible import implausible
-from .result import DesignResult
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
 

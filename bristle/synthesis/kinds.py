@@ -11,15 +11,14 @@ from math import log10
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import tell
 from ..errors import DesignError
-from . import analysis, lmi, sampling
-from .analysis import hinf_norm, least_gamma
-from .damper import coefficients
+from . import analysis, lmi
+from .analysis import DesignResult, hinf_norm, least_gamma, packed, pole_list
+from .damper import Bank, coefficients, reconstruct, sampled
 from .plant import Plant, States, Units, balancing, family, generalized, structure
-from .result import DesignResult, packed, pole_list
 from .task import Task
 
 # H-infinity design: the command is the damper's force, which an inverse or a switch realises.
@@ -69,13 +68,13 @@ def design_hinf(task: Task) -> DesignResult:
     still = np.zeros(1)
     tell("solving the linear matrix inequalities")
     solution = lmi.solve([balanced], still, task.tau)
-    bank = sampling.reconstruct(solution, [balanced], still, units)
+    bank = reconstruct(solution, [balanced], still, units)
     facts = analysis.check_poles(bank, still, task.sample_period)
     norms = analysis.closed_loop_norms([plant], bank, still)
     gamma = solution.gamma * units.gamma
     open_loop = hinf_norm(plant.open_loop())
     analysis.check_bound(norms, open_loop if task.reduced else gamma, still)
-    discrete = sampling.sampled(bank, task.sample_period)
+    discrete = sampled(bank, task.sample_period)
     modulus = analysis.check_sampled_loop([plant], discrete, still, task.sample_period)
     controller = packed(
         task,
@@ -93,8 +92,6 @@ def design_hinf(task: Task) -> DesignResult:
     )
     return DesignResult(task, controller, still, [plant], bank, solution)
 
-
-Array = NDArray[np.float64]
 
 _NORMS_BETWEEN = 61
 """At how many of the table's rows closed-loop norms are computed."""
@@ -185,8 +182,8 @@ def design_lpv(task: Task) -> DesignResult:
     tell("solving the linear matrix inequalities")
     solution = lmi.solve(scaled, grid, task.tau, scheduling.varies, scheduling.rate)
     scaled_rows = [units.normalised(plant).transformed(states) for plant in at_rows]
-    bank = sampling.reconstruct(solution, scaled_rows, speeds, units)
-    grid_bank = sampling.reconstruct(solution, scaled, grid, units)
+    bank = reconstruct(solution, scaled_rows, speeds, units)
+    grid_bank = reconstruct(solution, scaled, grid, units)
     facts: dict[str, Any] = {"gamma": solution.gamma * units.gamma, "solver": solution.status}
     facts |= analysis.check_poles(bank, speeds, h)
     open_loop = [hinf_norm(plant.open_loop()) for plant in at_grid]
@@ -194,21 +191,19 @@ def design_lpv(task: Task) -> DesignResult:
     bound = max(open_loop) if task.reduced else facts["gamma"]
     facts |= _norms(at_grid, grid_bank, grid, bound, "norm")
     every = np.linspace(0, len(speeds) - 1, min(_NORMS_BETWEEN, len(speeds))).round().astype(int)
-    some = sampling.Bank(*(matrices[every] for matrices in bank))
+    some = Bank(*(matrices[every] for matrices in bank))
     facts |= _norms([at_rows[k] for k in every], some, speeds[every], bound, "row_norm")
     worst, _ = lmi.eigenvalues(solution, scaled_rows, speeds, solution.gamma)
     facts["largest_eigenvalue"] = float(worst.max())
     facts["largest_eigenvalue_at"] = float(speeds[np.argmax(worst)])
     facts["share_proved"] = float(np.mean(worst <= 0.0))
-    discrete = sampling.sampled(bank, h)
+    discrete = sampled(bank, h)
     facts["sampled_loop_modulus"] = analysis.check_sampled_loop(at_rows, discrete, speeds, h)
     facts["poles"] = [pole_list(poles) for poles in grid_bank.poles]
     return DesignResult(task, packed(task, discrete, facts), speeds, at_rows, bank, solution)
 
 
-def _norms(
-    plants: list[Plant], bank: sampling.Bank, r: Array, bound: float, name: str
-) -> dict[str, Any]:
+def _norms(plants: list[Plant], bank: Bank, r: Array, bound: float, name: str) -> dict[str, Any]:
     """Return the norms with the speed held at r (k,), and the largest; refuse one above `bound`."""
     norms = analysis.closed_loop_norms(plants, bank, r)
     analysis.check_bound(norms, bound, r)
@@ -261,10 +256,10 @@ def design_lqg(task: Task) -> DesignResult:
         if np.max(np.real(poles)) >= 0.0:
             raise DesignError(f"lqg: the {name} is not stable; weights nearer to 1 would help.")
     K, L = np.atleast_2d(K), np.atleast_2d(L)
-    bank = sampling.Bank((s.A - L @ y)[None], L[None], (push - L @ direct)[None], -K[None])
+    bank = Bank((s.A - L @ y)[None], L[None], (push - L @ direct)[None], -K[None])
     still = np.zeros(1)
     facts = analysis.check_poles(bank, still, h)
-    discrete = sampling.sampled(bank, h)
+    discrete = sampled(bank, h)
     # With a damper that gives the command exactly, the second input is the command itself.
     ideal = discrete._replace(A=discrete.A + discrete.W @ discrete.C)
     empty = np.zeros((0, 0))

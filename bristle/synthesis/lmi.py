@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.text import install
 from ..errors import DesignError
 from .plant import Plant
-
-Array = NDArray[np.float64]
 
 STRICT = (1e-7, 1e-5, 1e-3)
 """How far below zero the inequalities are held, in balanced states: the next where one fails."""

@@ -12,14 +12,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from ..core.arrays import Array
 from ..errors import DesignError
 from ..physics.building import Building, Device, Matrix
 from .weights import Weights
-
-Array = NDArray[np.float64]
 
 
 class StateSpace(NamedTuple):

@@ -10,8 +10,7 @@ import numpy as np
 from ..core.text import tick
 from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import BLUE, GREY, INK, Page, look, ramp, zero_lines
-from .analysis import facts_of, grid_rows, omega_of, responses
-from .result import DesignResult
+from .analysis import DesignResult, facts_of, grid_rows, omega_of, responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

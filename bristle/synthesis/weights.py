@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..errors import DesignError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

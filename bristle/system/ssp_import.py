@@ -16,7 +16,7 @@ from typing import Any
 from ..core import files
 from ..core.finding import Finding
 from ..core.text import listed
-from ..core.toml_write import toml_value
+from ..core.toml_lines import toml_value
 from ..errors import FmuError, ScenarioError, UnitError
 from ..fmu.description import Description, Value, Variable, passes, read_description, read_root
 from ..units import Measure

@@ -11,8 +11,7 @@ from typing import Any
 from ..core.config import ANY, Document
 from ..core.files import write_whole
 from ..core.text import unknown
-from ..core.toml_lines import KeyPath
-from ..core.toml_write import toml_key, toml_table, toml_value
+from ..core.toml_lines import KeyPath, toml_key, toml_table, toml_value
 from ..errors import BristleError, PhysicsError, TrustError
 from ..physics.forms import split_form
 from .library import Library

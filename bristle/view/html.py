@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import base64
+import json
+import struct
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape as escape
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from ..core.files import as_json
 from .blocks import Block, Figure, Formula, Table, Text, View
 from .formula import formula as formula
 
@@ -179,3 +185,57 @@ def figure(png: bytes, alt: str, caption: str = "") -> str:
     below = f"\n<figcaption>{escape(caption)}</figcaption>" if caption else ""
     image = f'<img src="data:image/png;base64,{data}" alt="{escape(alt)}">'
     return f"<figure>\n{image}{below}\n</figure>"
+
+
+# Blocks for the local page, and answers with many numbers: JSON, then arrays as 32-bit floats.
+
+ALIGN = 4
+
+
+def page_data(shown: Iterable[Block]) -> list[dict[str, Any]]:
+    """Return the words and tables of blocks as JSON has them; the page draws its own figures."""
+    out: list[dict[str, Any]] = []
+    for block in shown:
+        if isinstance(block, Table):
+            out.append({**block._asdict(), "numbers": list(block.numbers)})
+        elif isinstance(block, Text) and block.text:
+            out.append(block._asdict())
+    return out
+
+
+def pack(content: Any) -> bytes:
+    """Return plain data with numpy arrays in it as bytes; what is not finite in JSON is null.
+
+    Parameters
+    ----------
+    content : dict, list, tuple, text, number, None, and arrays of any shape, which are made flat
+    """
+    arrays: list[bytes] = []
+    count = 0
+
+    def laid(value: Any) -> Any:
+        nonlocal count
+        flat = np.ascontiguousarray(value, dtype="<f4").ravel()
+        arrays.append(flat.tobytes())
+        count += len(flat)
+        return {"array": [count - len(flat), len(flat)]}
+
+    head = json.dumps(as_json(content, laid), ensure_ascii=False).encode()
+    head += b" " * (-len(head) % ALIGN)
+    return b"".join([struct.pack("<I", len(head)), head, *arrays])
+
+
+def unpack(data: bytes) -> Any:
+    """Return what `pack` was given; arrays are flat and of 32-bit floats."""
+    (length,) = struct.unpack_from("<I", data)
+    floats = np.frombuffer(data, dtype="<f4", offset=4 + length)
+
+    def whole(value: Any) -> Any:
+        if isinstance(value, dict):
+            if set(value) == {"array"}:
+                first, count = value["array"]
+                return floats[first : first + count]
+            return {key: whole(one) for key, one in value.items()}
+        return [whole(one) for one in value] if isinstance(value, list) else value
+
+    return whole(json.loads(data[4 : 4 + length]))

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle.campaign import pool, read_ensemble
+from bristle.campaign import campaign, read_ensemble
 from bristle.campaign.campaign import Campaign, RunOutcome
 from bristle.cli import main
 from bristle.errors import EnsembleError
@@ -52,7 +52,7 @@ def test_numbers_are_those_of_this_machine(write: Write, tmp_path: Path, local: 
 def test_another_version_on_a_worker_is_named(
     write: Write, local: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pool, "__version__", "99.0")
+    monkeypatch.setattr(campaign, "__version__", "99.0")
     with pytest.raises(EnsembleError, match=r"has bristle .*, here is 99.0"):
         bristle.ensemble(write(), cluster=local.scheduler_address)
 
@@ -74,7 +74,7 @@ def test_a_lost_worker_loses_no_finished_run(
 ) -> None:
     # Not by name: workers do not see this folder of tests.
     monkeypatch.setattr(_slow, "__module__", "__main__")
-    monkeypatch.setattr(pool, "outcome_of", _slow)
+    monkeypatch.setattr(campaign, "outcome_of", _slow)
     path = write(("runs = 12", "runs = 60"))
     found = bristle.ensemble(path, out=tmp_path / "out", cluster=local.scheduler_address)
     assert (tmp_path / "died_at_5").exists()
@@ -92,7 +92,7 @@ def test_a_run_that_kills_every_worker_is_a_failure(
         return RunOutcome(run, (0.0, 0.0, 0.0))
 
     monkeypatch.setattr(deadly, "__module__", "__main__")
-    monkeypatch.setattr(pool, "outcome_of", deadly)
+    monkeypatch.setattr(campaign, "outcome_of", deadly)
     found = bristle.ensemble(write(), cluster=local.scheduler_address)
     # Dask may blame a neighbour as well, while a dead worker is not yet seen to be dead.
     failed = found.runs[found.runs["status"] == "failed"]
@@ -104,7 +104,7 @@ def test_a_run_that_kills_every_worker_is_a_failure(
 def test_a_cluster_that_is_not_there_is_named(
     write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(pool, "CONNECT", 0.5)
+    monkeypatch.setattr(campaign, "CONNECT", 0.5)
     for address in ("tcp://127.0.0.1:9", "no_address", "tcp://nowhere.invalid:1"):
         command = ["ensemble", str(write()), "--out", str(tmp_path), "--cluster", address]
         assert main(command) == 2
@@ -114,7 +114,7 @@ def test_a_cluster_that_is_not_there_is_named(
 
 
 def test_a_cluster_without_workers_is_named(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pool, "CONNECT", 2.0)
+    monkeypatch.setattr(campaign, "CONNECT", 2.0)
     with (
         distributed.LocalCluster(
             n_workers=0, dashboard_address=None, host="127.0.0.1", protocol="tcp"

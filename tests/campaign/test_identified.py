@@ -12,7 +12,7 @@ import pytest
 
 import bristle
 from bristle.campaign import read_ensemble
-from bristle.campaign.identified import Places
+from bristle.campaign.ensemble_file import Places
 from bristle.campaign.table import LEVELS, VARIES, notes, quantiles
 from bristle.cli import main
 from bristle.engine.coupled import Coupled

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from predictions_made import DT, motion, predictions_with
 
 from bristle.comparison.comparison import compare_predictions
-from bristle.comparison.panels import draw_pattern, residual_map, worst_window
 from bristle.comparison.predictions import halved, run_predictions
+from bristle.comparison.view import draw_pattern, residual_map, worst_window
 from bristle.data.left_out import MISSING
 from bristle.errors import RecordError
 from bristle.identification.histories import DamperForces

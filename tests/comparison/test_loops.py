@@ -5,8 +5,8 @@ import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from bristle.comparison.panels import chosen_cycles, draw_cycle, ribbon, under
 from bristle.comparison.predictions import RunPrediction
+from bristle.comparison.view import chosen_cycles, draw_cycle, ribbon, under
 from bristle.data.cycles import by_level, cycles, largest, steady
 
 DT = 1e-3  # s

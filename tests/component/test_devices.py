@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from bristle.component import structure
-from bristle.core.toml_write import toml_table
+from bristle.core.toml_lines import toml_table
 from bristle.data.building_file import read_building
 from bristle.errors import PhysicsError
 from bristle.fmu.catalogue import describe

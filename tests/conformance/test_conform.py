@@ -19,7 +19,7 @@ import pytest
 from bristle import cli
 from bristle.conformance import conform
 from bristle.conformance.probes import PROBES
-from bristle.conformance.report import Report
+from bristle.conformance.runner import Report
 from bristle.errors import FmuError
 from bristle.fmu import build, catalogue
 from bristle.view.blocks import Table

@@ -15,7 +15,7 @@ import bristle
 from bristle.cli import main
 from bristle.component.controller_file import read_controller
 from bristle.controller_comparison import ControllerComparison, Spread, compare_controllers
-from bristle.controller_comparison.candidates import task_for
+from bristle.controller_comparison.compare import task_for
 from bristle.controller_comparison.setting import (
     BEST,
     LIMIT,

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bristle.campaign import pool
+from bristle.campaign import campaign
 from bristle.campaign.campaign import RunOutcome
 from bristle.controller_comparison import Spread, compare_controllers
 
@@ -31,7 +31,7 @@ def test_an_interrupted_comparison_makes_no_run_of_its_ensembles_twice(
 ) -> None:
     made = [0]
     most = [6]
-    own = pool.run_local
+    own = campaign.run_local
 
     def counted(*given: Any) -> Iterator[RunOutcome]:
         for outcome in own(*given):
@@ -40,7 +40,7 @@ def test_an_interrupted_comparison_makes_no_run_of_its_ensembles_twice(
             made[0] += 1
             yield outcome
 
-    monkeypatch.setattr(pool, "run_local", counted)
+    monkeypatch.setattr(campaign, "run_local", counted)
     with pytest.raises(KeyboardInterrupt):
         compared(tmp_path)
     assert made == [6]

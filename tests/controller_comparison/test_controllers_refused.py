@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bristle.cli import main
-from bristle.controller_comparison.candidates import Maker
+from bristle.controller_comparison.compare import Maker
 from bristle.controller_comparison.setting import (
     DEFAULT,
     Folder,

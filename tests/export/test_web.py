@@ -16,8 +16,15 @@ import pytest
 from bristle.cli import main
 from bristle.engine.coupled import Coupled
 from bristle.errors import BuildError, ScenarioError
-from bristle.export.web import body, chosen, described, export_component, export_web
-from bristle.export.web_module import PageNumbers, Slider
+from bristle.export.web import (
+    PageNumbers,
+    Slider,
+    body,
+    chosen,
+    described,
+    export_component,
+    export_web,
+)
 from bristle.fmu import catalogue
 from bristle.native import zig
 from bristle.system.scenario import load_scenario, stock_scenarios

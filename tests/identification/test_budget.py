@@ -9,7 +9,7 @@ from bristle.identification.error_table import force_budget
 from bristle.identification.problem import Problem, Run
 from bristle.model.model import Model
 from bristle.physics.laws import laws_of
-from bristle.study.budget_picture import draw_budget
+from bristle.study.pictures import draw_budget
 
 DT = 0.002
 T = np.arange(0.0, 3.0, DT)

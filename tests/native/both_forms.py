@@ -21,7 +21,7 @@ from bristle.fmu.description import read_description
 from bristle.fmu.library import Handle, resources_of
 from bristle.fmu.slave import Slave
 from bristle.native.build import build
-from bristle.native.prepare import component_of
+from bristle.native.entrance import component_of
 from bristle.native.zig import here
 
 KINDS = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}

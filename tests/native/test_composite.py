@@ -14,8 +14,7 @@ from bristle.errors import BuildError, ScenarioError, StudyError
 from bristle.export import composite_functions
 from bristle.export.composite import Assembly, plan_of
 from bristle.fmu.build import ensure
-from bristle.native.entrance import entrance_of
-from bristle.native.prepare import component_of, prepare
+from bristle.native.entrance import component_of, entrance_of, prepare
 from bristle.system.scenario import load_scenario, stock_scenarios
 
 PASSIVE = "el_centro_lugre_passive"

@@ -12,7 +12,7 @@ from both_forms import Both, Native, both, folder, needs_zig
 from bristle.fmu import catalogue
 from bristle.fmu.build import plan
 from bristle.native.build import build
-from bristle.native.prepare import component_of
+from bristle.native.entrance import component_of
 from bristle.native.zig import here
 from bristle.physics.effect import effects_of
 from bristle.physics.laws import LAWS, laws_of

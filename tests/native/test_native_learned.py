@@ -20,7 +20,7 @@ from bristle.learning.curve import AT_DAMPER, PARTS, Curve, CurvePlace, may_chan
 from bristle.learning.effect_file import effect_text
 from bristle.learning.signals import ALONG, RING, SLIP
 from bristle.native.build import build
-from bristle.native.prepare import component_of
+from bristle.native.entrance import component_of
 from bristle.native.zig import here
 from bristle.prediction.export import export_study
 from bristle.study.study import Study

@@ -10,7 +10,7 @@ from both_forms import Both, Native, folder, needs_zig
 from bristle.cli import main
 from bristle.fmu.build import BuildPlan, plan
 from bristle.native.build import build
-from bristle.native.prepare import component_of, prepare
+from bristle.native.entrance import component_of, prepare
 from bristle.native.zig import here
 from bristle.user_code.load import load_file
 

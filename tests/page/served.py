@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from bristle.core import progress
-from bristle.page import jobs
+from bristle.page import app
 from bristle.page.app import App, PageServer, serving
 
 
@@ -131,4 +131,4 @@ for text in ["fitting bingham: start 1 of 4 ...", *{lines!r}]:
     print(text, file=sys.stderr, flush=True)
 {then}
 """
-    monkeypatch.setattr(jobs, "program", lambda order: [sys.executable, "-c", code])
+    monkeypatch.setattr(app, "program", lambda order: [sys.executable, "-c", code])

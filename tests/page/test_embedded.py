@@ -17,7 +17,7 @@ from predictions_made import predictions_with
 from bristle.comparison.comparison import compare_predictions
 from bristle.page.embedded import linked_section, script
 from bristle.view.html import page as whole_page
-from bristle.view.page_data import unpack
+from bristle.view.html import unpack
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from bristle.page import control_views
 from bristle.page.orders import order_of
 from bristle.page.requests import RequestError
 from bristle.study import create_study
-from bristle.view.page_data import unpack
+from bristle.view.html import unpack
 
 MOTION = {"record": "el_centro_1940_ns", "peak": 0.2}
 ASKED: dict[str, Any] = {

@@ -35,7 +35,7 @@ from bristle.study import Study, create_study
 from bristle.synthesis import read_task
 from bristle.system.overrides import parse_overrides
 from bristle.system.scenario import load_scenario
-from bristle.view.page_data import unpack
+from bristle.view.html import unpack
 
 SHAKEN: dict[str, Any] = {"motions": list(MOTIONS), "peak": 0.3}
 

@@ -30,7 +30,7 @@ from bristle.page.orders import order_of
 from bristle.page.requests import RequestError, consent, waiting_texts
 from bristle.study import Study, create_study
 from bristle.user_code.templates import file_text
-from bristle.view.page_data import pack, unpack
+from bristle.view.html import pack, unpack
 
 
 @pytest.fixture(scope="module", autouse=True)

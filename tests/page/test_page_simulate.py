@@ -18,12 +18,12 @@ from bristle.data import read_ground_motion
 from bristle.engine.results import spectra
 from bristle.errors import BristleError, BuildError, RecordError, RunError, ScenarioError
 from bristle.native import zig
-from bristle.page import simulate_views, view_cache
-from bristle.page.simulate_views import LONGEST, asked_for, controls, damper_of, stock_file
+from bristle.page import control_views, view_cache
+from bristle.page.control_views import LONGEST, asked_for, controls, damper_of, stock_file
 from bristle.study import Study, create_study
 from bristle.system.overrides import parse_overrides
 from bristle.system.scenario import load_scenario, stock_scenarios
-from bristle.view.page_data import unpack
+from bristle.view.html import unpack
 
 BENCH = "bench_sine_bingham"
 PASSIVE = "el_centro_lugre_passive"
@@ -50,7 +50,7 @@ def overrides_of(command: str) -> dict[str, Any]:
 
 def test_a_slider_gives_what_the_run_gives(home: Path) -> None:
     values = {"voltage.level": 5.0}
-    shown = simulate_views.simulate_view(home, {"scenario": BENCH, "values": values, "about": True})
+    shown = control_views.simulate_view(home, {"scenario": BENCH, "values": values, "about": True})
     frame = bristle.run(BENCH, values, engine="compiled")
     for one in shown["outputs"]:
         assert one["peak"] == pytest.approx(float(frame[one["name"]].abs().max()), rel=1e-12)
@@ -61,11 +61,11 @@ def test_a_slider_gives_what_the_run_gives(home: Path) -> None:
 
 def test_the_damper_of_a_study_takes_the_place_of_the_scenarios(home: Path) -> None:
     study = Study(home / "rig")
-    assert "rig" in simulate_views.scenarios_view(home, {})["studies"]
+    assert "rig" in control_views.scenarios_view(home, {})["studies"]
     given = damper_of(home, BENCH, "rig")
     assert given["damper.fmu"] == "BinghamDamper"
     assert given["damper.f_c"] == study.model().values["f_c"]
-    shown = simulate_views.simulate_view(home, {"scenario": BENCH, "study": "rig"})
+    shown = control_views.simulate_view(home, {"scenario": BENCH, "study": "rig"})
     assert "--set damper.fmu=BinghamDamper" in shown["command"]
 
 
@@ -98,7 +98,7 @@ def test_controls_of_every_scenario_can_be_loaded(name: str) -> None:
 def test_a_dropped_record_is_the_ground_motion_of_the_run(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert RECORD in simulate_views.scenarios_view(home, {})["records"]
+    assert RECORD in control_views.scenarios_view(home, {})["records"]
     asked = asked_for(home, {"scenario": PASSIVE, "record": RECORD})
     loaded = asked.load()
     assert Path(str(loaded.components["ground"].values["record"])) == home / RECORD
@@ -121,7 +121,7 @@ def test_a_long_record_does_not_stretch_the_run_without_end(home: Path) -> None:
 
 def test_the_spectrum_is_that_of_the_rows_of_the_run(home: Path) -> None:
     wanted = {"scenario": "half_sine_pulse", "values": {}}
-    shown = simulate_views.spectrum_view(home, wanted)
+    shown = control_views.spectrum_view(home, wanted)
     frame = bristle.run("half_sine_pulse", engine="compiled")
     columns = {str(name): frame[name].to_numpy() for name in frame}
     right = spectra(columns, float(frame.index[1]))
@@ -130,13 +130,13 @@ def test_the_spectrum_is_that_of_the_rows_of_the_run(home: Path) -> None:
         assert values == pytest.approx(right[name], rel=1e-9)
     assert shown["command"] == "bristle run half_sine_pulse --engine compiled --spectrum"
     with pytest.raises(RunError, match="no output is an acceleration"):
-        simulate_views.spectrum_view(home, {"scenario": BENCH})
+        control_views.spectrum_view(home, {"scenario": BENCH})
 
 
 def test_the_page_gets_the_numbers_of_the_same_run_and_of_its_sliders(home: Path) -> None:
     wanted = {"scenario": PASSIVE, "study": "rig"}
-    shown = simulate_views.simulate_view(home, {**wanted, "about": True})
-    given = simulate_views.numbers_view(home, wanted)
+    shown = control_views.simulate_view(home, {**wanted, "about": True})
+    given = control_views.numbers_view(home, wanted)
     assert given["rows"] + 1 == len(shown["time"]) * shown["every"]
     assert [one["name"] for one in given["outputs"]] == [one["name"] for one in shown["outputs"]]
     there = {one["name"]: one for one in shown["sliders"]}
@@ -167,7 +167,7 @@ def test_a_scenario_that_cannot_run_says_why(
     home: Path, asked: dict[str, object], words: str
 ) -> None:
     with pytest.raises(BristleError, match=words) as found:
-        simulate_views.simulate_view(home, asked)
+        control_views.simulate_view(home, asked)
     if asked.get("record") == "uploads/record-1/words.csv":
         assert found.type is RecordError  # the readers' own words
     elif "record" not in asked:
@@ -184,7 +184,7 @@ def test_without_zig_the_page_is_told_and_the_server_goes_on(
     )
     try:
         with pytest.raises(BuildError, match=r"pip install 'bristle\[native\]'"):
-            simulate_views.module_view(home, {})
+            control_views.module_view(home, {})
     finally:
         zig.version.cache_clear()
 

@@ -21,7 +21,7 @@ from bristle.page.worker import VIEWS, answer, function_of
 from bristle.study import Study, create_study
 from bristle.study.data_check import check_data
 from bristle.study.steps import before_after, compare_study, predictions
-from bristle.view.page_data import pack, unpack
+from bristle.view.html import pack, unpack
 
 
 @pytest.fixture(scope="module")

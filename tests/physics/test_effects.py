@@ -19,7 +19,7 @@ from bristle.physics.damper import DamperModel, setup_of
 from bristle.physics.effect import EFFECTS, Effect, Q, effects_of
 from bristle.physics.law import LAWS as ALL_LAWS
 from bristle.physics.parameter import Parameter
-from bristle.user_code.compiled import shown
+from bristle.user_code.conformance import shown
 
 all_laws = pytest.mark.parametrize("law", LAWS)
 both_laws = pytest.mark.parametrize("law", ["bingham", "lugre"])  # whose forces are known by hand

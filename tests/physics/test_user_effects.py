@@ -20,7 +20,7 @@ from bristle.physics import damper
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import EFFECTS
 from bristle.user_code import load
-from bristle.user_code.compiled import refused, usable
+from bristle.user_code.conformance import refused, usable
 from bristle.user_code.templates import file_text
 
 

@@ -21,7 +21,7 @@ from bristle.physics.law import LAWS, Law
 from bristle.physics.laws import law_names
 from bristle.physics.parameter import Parameter, Table
 from bristle.user_code import load, trial
-from bristle.user_code.compiled import usable
+from bristle.user_code.conformance import usable
 from bristle.user_code.templates import file_text
 
 YIELDING = "return p.yield_force * tanh(q.v / p.v_s)"

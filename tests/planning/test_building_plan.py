@@ -20,14 +20,13 @@ from bristle.data.ground_motion import GroundMotion, read_ground_motion
 from bristle.data.measurement import Measurement
 from bristle.errors import RecordError, StudyError
 from bristle.examples.make import Choice, make_building, perform_plan
-from bristle.planning.added_sensors import AddedSensors
-from bristle.planning.building import ONE_FORCE, BuildingPlan, limits_of_shaking
+from bristle.planning.building import ONE_FORCE, AddedSensors, BuildingPlan, limits_of_shaking
 from bristle.planning.folder import ROLES, read_plan
 from bristle.planning.information import Goal
 from bristle.planning.limits import RESERVE, PrescribedSignals, RigLimits, Test, read_rig
-from bristle.planning.outcome import Outcome
+from bristle.planning.plan import Outcome
+from bristle.planning.questions import are_twins, default_requests, twins_of
 from bristle.planning.shaking_table import Columns, ShakingTable, TablePlanner
-from bristle.planning.site_questions import are_twins, default_requests, twins_of
 from bristle.planning.waveforms import (
     Command,
     Waveform,

@@ -33,7 +33,7 @@ from bristle.planning.information import (
     roles_of,
 )
 from bristle.planning.limits import RigLimits, Test
-from bristle.planning.outcome import Outcome, outcomes
+from bristle.planning.plan import Outcome, outcomes
 from bristle.planning.questions import (
     LEAST,
     AskedFigure,

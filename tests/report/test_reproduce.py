@@ -13,7 +13,7 @@ from made import bench_run, write
 from bristle.cli import build_parser, main
 from bristle.model.model import new_model
 from bristle.model.model_file import read_model
-from bristle.report.reproduce import AGAIN, commands
+from bristle.report.study_page import AGAIN, commands
 from bristle.study import Study, create_study
 
 

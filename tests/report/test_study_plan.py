@@ -14,7 +14,7 @@ from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of
 from bristle.data.table import from_arrays
 from bristle.planning.folder import PlanFolder, PlannedRun, read_plan, write_plan
-from bristle.planning.outcome import OUTCOMES
+from bristle.planning.plan import OUTCOMES
 from bristle.report.study_page import plan_section
 
 

@@ -15,10 +15,10 @@ from made import write_runs
 import bristle
 from bristle.cli import main
 from bristle.errors import BuildError
-from bristle.export import web_module
+from bristle.export import web
 from bristle.native import zig
 from bristle.prediction.export import export_study
-from bristle.report.what_if import movable
+from bristle.report.study_page import movable
 from bristle.study import Study, create_study
 
 VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 2.0, "v_n": 5.0, "exponent": 0.0}
@@ -47,7 +47,7 @@ def test_it_is_the_run_of_the_exported_fmu(study: Study, tmp_path: Path) -> None
 def test_the_report_has_sliders_for_the_numbers_of_the_model(
     study: Study, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(web_module, "module", lambda _system=None: b"\0asm")
+    monkeypatch.setattr(web, "module", lambda _system=None: b"\0asm")
     assert main(["report", str(study.folder), "--what-if"]) == 0
     page = (study.folder / "reports" / "report.html").read_text()
     assert "What if: the model in run_2, with other numbers" in page

@@ -186,8 +186,7 @@ def test_numbers_that_count_files_are_no_levels(tmp_path) -> None:
 
 
 def test_the_report_tells_what_is_known_of_runs_and_how_to_make_them_again(lab, tmp_path) -> None:
-    from bristle.report.reproduce import commands
-    from bristle.report.study_page import data_table
+    from bristle.report.study_page import commands, data_table
 
     study = Study.create(tmp_path / "rig", files(lab)[:4])
     header, rows = data_table(study, study.read())

@@ -14,7 +14,7 @@ from bristle.errors import PhysicsError, StudyError
 from bristle.page import data_views
 from bristle.prediction.excitation import house_of
 from bristle.prediction.model_system import others_of, shaking_of
-from bristle.report.reproduce import commands
+from bristle.report.study_page import commands
 from bristle.study.data_check import check_data
 from bristle.study.rig import building_of
 from bristle.study.steps import identify_building_alone

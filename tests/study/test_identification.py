@@ -16,10 +16,10 @@ from bristle.errors import RecordError, StudyError
 from bristle.identification.error import ForceError
 from bristle.identification.histories import DamperForces
 from bristle.study.api import identify
-from bristle.study.fit_view import identified_with_next
 from bristle.study.identify import identify_study
 from bristle.study.steps import create_study
 from bristle.study.study import Study
+from bristle.study.view import identified_with_next
 from bristle.view import terminal
 
 DT, N = 0.004, 2000

@@ -13,7 +13,6 @@ from bristle.errors import RecordError, StudyError
 from bristle.study import steps
 from bristle.study.api import diagnose
 from bristle.study.auto import complete
-from bristle.study.fit_view import added_view
 from bristle.study.steps import (
     add_effects,
     before_after,
@@ -23,6 +22,7 @@ from bristle.study.steps import (
     predictions,
 )
 from bristle.study.study import Study
+from bristle.study.view import added_view
 from bristle.view.terminal import text
 from tests.independent.generate import make_case
 

@@ -24,8 +24,8 @@ from bristle.synthesis import (
     lmi,
 )
 from bristle.synthesis.analysis import hinf_norm, responses
+from bristle.synthesis.damper import Bank, sampled
 from bristle.synthesis.plant import Plant, balancing, generalized, structure
-from bristle.synthesis.sampling import Bank, sampled
 
 STILL = np.zeros(1)
 

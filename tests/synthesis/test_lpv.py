@@ -12,9 +12,9 @@ from bristle.component.controller_file import Controller
 from bristle.errors import DesignError
 from bristle.synthesis import DesignDamper, DesignResult, Scheduling, Task, design, lmi
 from bristle.synthesis.analysis import least_gamma, responses
+from bristle.synthesis.damper import reconstruct
 from bristle.synthesis.kinds import gammas, plants_at, units_for
 from bristle.synthesis.plant import balancing
-from bristle.synthesis.sampling import reconstruct
 
 FINE = (0.0, 0.0025, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.08, 0.15, 0.3)
 

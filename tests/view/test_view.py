@@ -7,8 +7,7 @@ import pytest
 from bristle.errors import RunError
 from bristle.view import Viewable, terminal
 from bristle.view.blocks import Next, Table, Text, View, view_of
-from bristle.view.html import answer, notebook
-from bristle.view.page_data import page_data
+from bristle.view.html import answer, notebook, page_data
 
 WIDE = Table(("case", *(f"a long title {k} [m/s²]" for k in range(12))),
              [["one", *(f"{k}.25" for k in range(12))]], range(1, 13))  # fmt: skip

@@ -74,7 +74,7 @@ export function table(caption, header, rows, numbers = []) {
         k === 0 ? h("th", { scope: "row" }, cell) : h("td", { class: kind(k), "data-of": wide ? header[k] : null }, cell)))))));
 }
 
-/** Returns the words and tables of a result: blocks of view/page_data.py. */
+/** Returns the words and tables of a result: blocks of view/html.py. */
 export const blocks = (list) => list.map((one) => one.rows
   ? [table(one.title, one.header, one.rows, one.numbers), one.note ? h("p", { class: "soft small" }, one.note) : null]
   : h("p", { class: { say: "say", note: "soft small", soft: "soft small" }[one.kind] }, one.text));

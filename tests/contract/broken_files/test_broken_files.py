@@ -10,7 +10,7 @@ import pytest
 from bristle.campaign import read_ensemble
 from bristle.data.building_file import read_building
 from bristle.errors import BristleError
-from bristle.planning.data_sheet import read_new_rig
+from bristle.planning.bench import read_new_rig
 from bristle.planning.folder import read_plan
 from bristle.study import read_model
 from bristle.study.study_file import read_settings

@@ -104,7 +104,7 @@ def test_the_check_has_the_recorder_of_the_force(
 
 def test_without_a_proof_the_reason_is_told(tmp_path: Path) -> None:
     from bristle.identification.error import error_of
-    from bristle.prediction.held_out import Proof
+    from bristle.prediction.export import Proof
 
     told = error_of(np.ones(50), np.zeros(50), {})
     lines = Proof(told, 5e-4, why="no library for this platform.").lines(tmp_path)
@@ -115,7 +115,7 @@ def test_a_proof_names_the_step_that_fmpy_does_not_take_by_itself_and_what_it_is
     tmp_path: Path,
 ) -> None:
     from bristle.identification.error import error_of
-    from bristle.prediction.held_out import Proof
+    from bristle.prediction.export import Proof
 
     told = error_of(np.ones(50), np.zeros(50), {})
     said = "\n".join(Proof(told, 3.125e-05, told, told, told, 0.5).lines(tmp_path))
