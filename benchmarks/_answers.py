@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -15,7 +15,7 @@ from bristle.core.files import cache_folder
 
 from ._blind import work
 from ._blind.cases import ROOT, digest_of
-from ._rows import Row
+from ._rows import Row, show
 
 Answer = dict[str, Any]
 
@@ -23,17 +23,19 @@ TOGETHER = 4
 """Cases that share a process: machine code stays in it, some 36 MB for each curve that is tried."""
 
 
-def ask(
-    name: str,
-    text: str | None,
-    kinds: Sequence[str],
-    answer: Callable[..., Answer],
-    rows: Callable[[dict[str, Answer]], list[Row]],
-    given: Sequence[str],
-    also: Sequence[str] = (),
-    together: int = TOGETHER,
-) -> int:
-    """Make what is missing of a benchmark's figures, print them; return 0.
+Rows = Callable[[dict[str, Answer]], list[Row]]
+Commands = tuple[Callable[[], list[Row]], Callable[[Sequence[str]], int]]
+
+
+def asked(
+    name: str, text: str | None, kinds: Sequence[str], answer: Callable[..., Answer], rows: Rows,
+    also: Sequence[str] = (), together: int = TOGETHER,
+    of: Mapping[str, Sequence[str]] | None = None,
+) -> Commands:  # fmt: skip
+    """Return `run` and `main` of a benchmark whose cases take long.
+
+    `run` returns the rows of what has been made so far; `main` makes what is missing and shows
+    them.
 
     Parameters
     ----------
@@ -41,22 +43,31 @@ def ask(
     kinds : of cases; `--KIND CASES` says how many there should be
     answer : called with kind and number of a case in another process; returns what is found
     rows : returns the figures of all answers
-    given : options as typed
     also : packages of bristle that the answers rest on, beside those of a diagnosis
     together : cases that share a process
+    of : the kinds that one option stands for
     """
-    parser = argparse.ArgumentParser(prog=f"python -m benchmarks {name}", description=text)
-    for kind in kinds:
-        parser.add_argument(f"--{kind}", type=int, default=0, metavar="CASES")
-    chosen = parser.parse_args(given)
-    jobs = ((kind, k) for kind in kinds for k in range(getattr(chosen, kind)))
-    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=together) as pool:
-        found = Answers(name, also).complete(jobs, lambda *job: pool.submit(answer, *job).result())
-    for row in rows(found):
-        goal = f" (goal {row.goal})" if row.goal else ""
-        note = f"; {row.note}" if row.note else ""
-        print(f"{row.name}: {row.measured}{goal}{note}")
-    return 0
+    answers = Answers(name, also)
+
+    def run() -> list[Row]:
+        return rows(answers.kept())
+
+    def main(given: Sequence[str]) -> int:
+        parser = argparse.ArgumentParser(prog=f"python -m benchmarks {name}", description=text)
+        for kind in kinds:
+            parser.add_argument(f"--{kind}", type=int, default=0, metavar="CASES")
+        chosen = vars(parser.parse_args(given))
+        jobs = (
+            (one, k)
+            for kind in kinds
+            for k in range(chosen[kind.replace("-", "_")])
+            for one in (of or {}).get(kind, (kind,))
+        )
+        with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=together) as pool:
+            show(rows(answers.complete(jobs, lambda *job: pool.submit(answer, *job).result())))
+        return 0
+
+    return run, main
 
 
 class Answers:

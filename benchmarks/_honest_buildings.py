@@ -30,7 +30,7 @@ from tests.independent.effects import LIBRARY, OUTSIDE, forms
 from tests.independent.rigs import LAWS, draw_rig
 
 from . import _shaken as shaken
-from ._answers import Answer, Answers, ask
+from ._answers import Answer, asked
 from ._blind import cases, score
 from ._blind.plan import BUILDINGS, SITES, Task
 from ._blind.subject import measurements
@@ -72,16 +72,6 @@ class House:
     train: list[Measurement]
     holdout: list[Measurement]
     lacks: tuple[str, ...]
-
-
-def run() -> list[Row]:
-    """Return the rows of what has been made so far."""
-    return rows(Answers("buildings").kept())
-
-
-def main(given: list[str]) -> int:
-    """Make what is missing of the figures, print them."""
-    return ask("buildings", __doc__, KINDS, answered, rows, given)
 
 
 def house(kind: str, number: int, seed: int = SEED) -> House:
@@ -258,3 +248,6 @@ def _alone(one: Answer) -> bool:
 def _among(one: Answer) -> bool:
     names, hidden = _family(one["effects"]), _family(one["hidden"])
     return _alone(one) or (one["kind"] == "ambiguous" and hidden <= names)
+
+
+run, main = asked("buildings", __doc__, KINDS, answered, rows)

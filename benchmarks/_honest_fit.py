@@ -14,7 +14,6 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from bristle.core.arrays import Array
-from bristle.data.measurement import read_measurements
 from bristle.identification.problem import Problem, steady, without
 from bristle.identification.rig import DAMPER, ROLES, Site, bench_rig
 from bristle.identification.rig_fit import fit_site
@@ -33,20 +32,12 @@ MOST = 100
 """Evaluations of scipy's search, Jacobians not counted."""
 FAR = 1e9  # N, in place of a force that is not a number
 
-DYNO = ("speed6_100psi", "speed1_100psi", "speed5_150psi"), ("speed1_150psi", "speed5_50psi")
-
-
-def dyno_runs(folder: Path) -> _measured.Runs:
-    """Return runs of a shock absorber on a dynamometer: three to fit to, two held out."""
-    train, held = ([folder / f"{name}.csv" for name in names] for names in DYNO)
-    return read_measurements(train), read_measurements(held)
-
 
 SETS: dict[str, Callable[[Path], _measured.Runs]] = {
     "mr_damper_utfpr": _measured.utfpr_runs,
     "mr_damper_mathworks": _measured.velocity_force_runs,
     "friction_tribometer": _measured.friction_runs,
-    "shock_absorber_dyno": dyno_runs,
+    "shock_absorber_dyno": _measured.absorber_runs,
 }
 
 

@@ -15,11 +15,11 @@ from bristle.identification.rig import DAMPER, bench_rig
 from bristle.identification.rig_fit import fit_site
 from bristle.model.model import Model
 
-from ._answers import Answer, Answers, ask
+from ._answers import Answer, asked
 from ._blind import cases, score
 from ._blind.forms import LIMITS
 from ._blind.plan import make_plan
-from ._blind.subject import measurements
+from ._blind.subject import halves
 from ._rows import Row
 
 SEED = 4117
@@ -30,23 +30,13 @@ LOW, HIGH = 0.93, 0.97
 """Shares of the intervals between which they are right."""
 
 
-def run() -> list[Row]:
-    """Return the rows of what has been made so far."""
-    return rows(Answers("intervals").kept())
-
-
-def main(given: list[str]) -> int:
-    """Make what is missing of the figure, print it."""
-    return ask("intervals", __doc__, ("clean",), answered, rows, given, together=TOGETHER)
-
-
 def answered(_kind: str, number: int) -> Answer:
     """Return of each parameter of a case how far it is off in standard deviations, by name.
 
     Left out are those whose true value is zero or at a limit, as in the blind benchmark.
     """
     case = cases.load(make_plan(SEED, number + 1, "none")[number])
-    train, held = (measurements(case.part(role), case.channels) for role in ("train", "holdout"))
+    train, held = halves(case)
     law = Model(case.task.law)
     sites = bench_rig(train, held).sites(law)
     found = fit_site(law, sites[DAMPER], sites, 4, {})
@@ -76,3 +66,6 @@ def rows(done: dict[str, Answer]) -> list[Row]:
             ", ".join(f"{name} {held[name]} of {n}" for name, n in sorted(every.items())),
         )
     ]  # fmt: skip
+
+
+run, main = asked("intervals", __doc__, ("clean",), answered, rows, together=TOGETHER)

@@ -174,14 +174,19 @@ def c_host(folder: Path) -> Path | None:
 
 def compiled(source: Path, folder: Path) -> Path | None:
     """Return a host in C, compiled into a folder; None without a compiler, or not on Linux."""
-    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    headers = Path(fmpy.__file__).parent / "c-code"
+    return made_in_c(source, folder / source.stem, "-O1", f"-I{headers}", "-ldl", "-lm")
+
+
+def made_in_c(source: Path, target: Path, *options: str) -> Path | None:
+    """Return what a C compiler makes of a source; None without a compiler, or not on Linux."""
+    asked = (os.environ.get("CC", ""), "cc", "gcc", "clang")
+    compiler = next(filter(None, map(shutil.which, asked)), None)
     if compiler is None or sys.platform != "linux":
         return None
-    program = folder / source.stem
-    headers = Path(fmpy.__file__).parent / "c-code"
-    command = [compiler, "-O1", f"-I{headers}", source, "-o", program, "-ldl", "-lm"]
+    command = [compiler, source, "-o", target, *options]
     subprocess.run([str(part) for part in command], check=True, capture_output=True)
-    return program
+    return target
 
 
 def swung(about: Description) -> dict[str, tuple[float, float]]:

@@ -6,6 +6,7 @@ import statistics
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 
@@ -76,3 +77,46 @@ def least_times(
             job(amount)
             least[name] = min(least[name], time.process_time() - before)
     return least
+
+
+def show(rows: list[Row]) -> None:
+    """Print figures with a goal as a table, where `ratio` is measured / goal; then the others."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in ("figure", "measured", "goal"):
+        table.add_column(column, overflow="fold")
+    table.add_column("ratio", justify="right")
+    table.add_column("")
+    lines = []
+    for row in rows:
+        if row.ratio is None:
+            lines.append(f"{row.name}: {row.measured}")
+        else:
+            verdict = "reached" if row.ratio <= 1 else "missed"
+            table.add_row(row.name, row.measured, row.goal, f"{row.ratio:.3f}", verdict)
+        if row.note:
+            lines.append(f"{row.name}: {row.note}")
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = 150  # a pipe or a file has no edge to fold at
+    if table.row_count:
+        console.print(table)
+    if lines:
+        console.print("", "Reported beside:", *lines, sep="\n")
+
+
+def write_between(page: Path, begin: str, end: str, text: str) -> None:
+    """Write a text between two marks of a page.
+
+    Raises
+    ------
+    ValueError
+        If the page has no such marks.
+    """
+    whole = page.read_text(encoding="utf-8")
+    if begin not in whole or end not in whole:
+        raise ValueError(f"{page}: no {begin} and {end} are there to write between.")
+    before, after = whole.split(begin)[0], whole.split(end)[1]
+    page.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")

@@ -14,9 +14,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks._calibrate import page, replay, trials
+from benchmarks._calibrate import page, trials
 from benchmarks._calibrate.trials import Stored
-from benchmarks._rows import Row
+from benchmarks._rows import Row, write_between
 
 CASES = 240
 BUILDINGS = 40
@@ -58,10 +58,10 @@ def main(given: Sequence[str] | None = None) -> int:
     if not cases:
         print("No trials are stored: python -m benchmarks calibrate --cases 48", file=sys.stderr)
         return 1
-    block = page.text(replay.both(cases), cases, seed)
+    block = page.text(page.both(cases), cases, seed)
     print(block)
     if arguments.docs:
-        page.write(PAGE, block)
+        write_between(PAGE, page.BEGIN, page.END, block)
     return code
 
 
@@ -87,7 +87,7 @@ def run() -> list[Row]:
     if not cases:
         return [Row("decision rule", "not calibrated: python -m benchmarks calibrate --cases 48")]
     rows = []
-    for name, found in replay.both(cases).items():
+    for name, found in page.both(cases).items():
         rule = page.RULES[name]
         today = next(row for row in found if row.value == getattr(rule, row.field))
         counts = ", ".join(

@@ -13,10 +13,12 @@ steps two instances in turn, resets one and replays a state; its last outputs ar
 from __future__ import annotations
 
 import argparse
+import csv
 import importlib.metadata
+import math
 import platform
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -30,8 +32,8 @@ from bristle.fmu.description import Description, read_description
 from bristle.physics.effect import effects_of
 from bristle.physics.laws import laws_of
 
-from . import _cross_check, _hosts
-from ._rows import Row
+from . import _hosts
+from ._rows import Row, write_between
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "compatibility.md"
 BLOCKS = {False: "compatibility", True: "native"}
@@ -268,11 +270,8 @@ def main(given: list[str]) -> int:
     for row in rows(results):
         print(f"{row.name}: {row.measured}" + (f" ({row.note})" if row.note else ""))
     if chosen.docs:
-        text = PAGE.read_text(encoding="utf-8")
         begin, end = (f"<!-- {BLOCKS[chosen.native]}: {mark} -->" for mark in ("begin", "end"))
-        before, after = text.split(begin)[0], text.split(end)[1]
-        made = f"{begin}\n\n{tables(results, date.today(), chosen.native)}\n\n{end}"
-        PAGE.write_text(before + made + after, encoding="utf-8")
+        write_between(PAGE, begin, end, tables(results, date.today(), chosen.native))
     return int(not all(result.good for result in results))
 
 
@@ -291,8 +290,80 @@ def cross_check(component: str, folder: Path) -> Path:
     path = built(component, place)
     (place / ".lock").unlink(missing_ok=True)
     about = read_description(path)
-    moves = _cross_check.moves(_hosts.swung(about))
-    wanted = reference(component, [moves[0], *moves[:-1]], _cross_check.STEP)
+    moves = moves_of(_hosts.swung(about))
+    wanted = reference(component, [moves[0], *moves[:-1]], STEP)
     outputs = [v.name for v in about.of("output") if v.kind == "Real"]
-    _cross_check.write(place, component, moves, outputs, wanted)
+    write_files(place, component, moves, outputs, wanted)
     return place
+
+
+# The files of the FMI cross-check beside an FMU: input, reference rows, options, a README.
+
+CHECKED = 500
+"""Steps of the reference rows."""
+TOLERANCE = 1e-9
+
+README = """# {name}
+
+An FMU of bristle for co-simulation, FMI 2.0. It needs no license and no tool, but a Python
+interpreter (3.9 or newer) in the host's process: a host that is not Python loads a shared libpython
+first. Its binaries are for 64-bit Linux and Windows.
+
+`{name}_ref.csv` has the outputs at t = 0 and after each step of {step} s. {inputs}
+
+Open an issue in the project's repository for questions.
+"""
+INPUTS = "In the step from\nt the inputs have their values of `{name}_in.csv` at t."
+
+
+def moves_of(inputs: Mapping[str, tuple[float, float]]) -> list[dict[str, float]]:
+    """Return the inputs at each time, of centre and amplitude of each, one cycle in a second."""
+    return [
+        {
+            name: centre + amplitude * math.sin(2 * math.pi * k * STEP + 0.7 * i)
+            for i, (name, (centre, amplitude)) in enumerate(inputs.items())
+        }
+        for k in range(CHECKED + 1)
+    ]
+
+
+def write_files(
+    place: Path,
+    name: str,
+    inputs: Sequence[Mapping[str, float]],
+    outputs: Sequence[str],
+    rows: Sequence[Sequence[float]],
+) -> None:
+    """Write the files beside an FMU of this name.
+
+    Parameters
+    ----------
+    place : Path
+        The FMU's folder.
+    name : str
+    inputs : sequence of mapping
+        The inputs at each time.
+    outputs : sequence of str
+        Names of the columns of `rows`.
+    rows : sequence of sequence of float
+        The outputs at each time.
+    """
+    times = [k * STEP for k in range(CHECKED + 1)]
+    table = [[time, *row] for time, row in zip(times, rows, strict=True)]
+    _write_table(place / f"{name}_ref.csv", outputs, table)
+    if inputs[0]:
+        table = [[time, *row.values()] for time, row in zip(times, inputs, strict=True)]
+        _write_table(place / f"{name}_in.csv", list(inputs[0]), table)
+    options = {"StartTime": 0.0, "StopTime": CHECKED * STEP, "StepSize": STEP, "RelTol": TOLERANCE}
+    text = "".join(f"{key}, {value!r}\n" for key, value in options.items())
+    (place / f"{name}_ref.opt").write_text(text, encoding="utf-8")
+    said = INPUTS.format(name=name) if inputs[0] else "It has no inputs."
+    readme = README.format(name=name, step=STEP, inputs=said)
+    (place / "README.md").write_text(readme, encoding="utf-8")
+
+
+def _write_table(file: Path, names: Sequence[str], rows: Sequence[Sequence[float]]) -> None:
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        head = ",".join(f'"{name}"' for name in ("time", *names))
+        stream.write(head + "\n")
+        csv.writer(stream, lineterminator="\n").writerows([[repr(x) for x in row] for row in rows])

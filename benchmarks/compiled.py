@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import shutil
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,6 +17,7 @@ from bristle.engine.coupled import LONGEST_SUBSTEP, Coupled, RecordLayout
 from bristle.engine.time_loop import INLINE, MAX_SWEEPS, TOLERANCE, integrate
 from bristle.system.scenario import load_scenario
 
+from . import _hosts
 from ._published import DRIFT, SECOND_FLOOR, half_sine, passive, peak_errors, symbol
 from ._rows import Row, interleave, ratio_of
 
@@ -28,7 +26,6 @@ REPETITIONS = 15
 SAME = 1e-9
 """How far the results of both may lie apart, as a share of a column's peak."""
 
-COMPILERS = ("cc", "gcc", "clang")
 SOURCE = Path(__file__).with_name("peer.c")
 COLUMNS = (
     *(
@@ -51,16 +48,16 @@ def run() -> list[Row]:
 def against_c() -> list[Row]:
     """Return the time of a substep over that of the C program, and how well the two agree."""
     name = "compiled engine / same scheme in C (-O2), per substep"
-    compiler = next(filter(None, map(shutil.which, (os.environ.get("CC", ""), *COMPILERS))), None)
-    if compiler is None:
-        return [Row(name, f"skipped: no C compiler ({', '.join(COMPILERS)}) on the path")]
     scenario = load_scenario(SCENARIO)
     substeps = round(scenario.step / LONGEST_SUBSTEP)
     count = scenario.steps * substeps
     with tempfile.TemporaryDirectory() as folder:
-        peer = Peer(
-            _library(compiler, Path(folder)), RecordLayout(scenario), scenario.steps, substeps
-        )
+        options = ("-O2", "-std=c99", "-Wall", "-Wextra", "-shared", "-fPIC", "-lm")
+        made = _hosts.made_in_c(SOURCE, Path(folder, "peer.so"), *options)
+        if made is None:
+            return [Row(name, "skipped: no C compiler on the path, or not on Linux")]
+        library = ctypes.CDLL(str(made))
+        peer = Peer(library, RecordLayout(scenario), scenario.steps, substeps)
         ours = _Ours(RecordLayout(scenario), scenario.steps, substeps)
         ours.run(LONGEST_SUBSTEP)  # compiles, or reads what was compiled
         peer.run(LONGEST_SUBSTEP)
@@ -223,13 +220,6 @@ class Peer:
 
     def columns(self) -> dict[str, np.ndarray]:
         return dict(zip(COLUMNS, self._table.T, strict=True))
-
-
-def _library(compiler: str, folder: Path) -> ctypes.CDLL:
-    made = folder / "peer.so"
-    options = ("-O2", "-std=c99", "-Wall", "-Wextra", "-shared", "-fPIC")
-    subprocess.run([compiler, *options, "-o", str(made), str(SOURCE), "-lm"], check=True)
-    return ctypes.CDLL(str(made))
 
 
 def _apart(ours: dict[str, np.ndarray], peer: dict[str, np.ndarray]) -> float:

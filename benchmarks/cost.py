@@ -30,7 +30,7 @@ from bristle.examples.make import Choice, make_bench
 from bristle.identification.histories import DamperForces
 from bristle.model.model import Model
 
-from ._rows import Row
+from ._rows import Row, show
 
 STAGES = {
     "motion": ("diagnosis.runs_of_rig", "joint_search.runs_of_rig"),
@@ -153,8 +153,6 @@ def run() -> list[Row]:
 
 def main(given: Sequence[str]) -> int:
     """Print the cost of the campaign of sines; 0."""
-    from .__main__ import show
-
     if [*given] != ["sines"]:
         raise SystemExit(f"cost {' '.join(given)}: `cost sines` and `cost` are right.")
     train, held_out = sines()

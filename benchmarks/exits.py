@@ -21,7 +21,6 @@ import argparse
 import importlib.util
 import os
 import random
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -35,6 +34,7 @@ from bristle.fmu.build import ensure
 from bristle.native import zig
 from bristle.native.build import ensure as ensure_native
 
+from . import _hosts
 from ._rows import Row
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -262,13 +262,8 @@ def run_script(number: int, library: Path | None = None) -> End:
 
 def harsh_library(folder: Path) -> Path | None:
     """Return the library that finds damaged memory, compiled; None where that cannot be done."""
-    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-    if compiler is None or sys.platform != "linux":
-        return None
-    library = folder / "late.so"
     source = Path(__file__).with_name("late.c")
-    subprocess.run([compiler, "-shared", "-fPIC", "-O0", str(source), "-o", library], check=True)
-    return library
+    return _hosts.made_in_c(source, folder / "late.so", "-shared", "-fPIC", "-O0")
 
 
 def count(numbers: range, harsh: bool = False, show: bool = False) -> list[End]:

@@ -25,11 +25,9 @@ warm      runs between 15 and 35 degC, measured; the force falls by 0.5 to 1.5 %
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 import traceback
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -42,19 +40,15 @@ from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.recording import check_recording
 from bristle.data.measurement import Measurement
 from bristle.diagnosis.load_cell import low_pass_text
-from bristle.diagnosis.prepared import Prepared
-from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.site import diagnose_damper
-from bristle.identification.rig import DAMPER
-from bristle.model.model import Model
 from tests.independent.generate import Case
 from tests.independent.rigs import Rig
 from tests.independent.specimen import Specimen
 
-from ._answers import Answer, Answers
+from ._answers import Answer, asked
 from ._blind import cases, score
 from ._blind.plan import Task, make_plan
-from ._blind.subject import measurements
+from ._blind.subject import measurements, prepared
 from ._rows import Row
 
 SEED = 23
@@ -89,22 +83,6 @@ NEAR = {
 """Share by which a told value may be off."""
 
 
-def run() -> list[Row]:
-    """Return the rows of what has been made so far."""
-    return rows(Answers("lab").kept())
-
-
-def main(given: list[str]) -> int:
-    """Make what is missing, print the rows."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks lab", description=__doc__)
-    parser.add_argument("--each", type=int, default=0, metavar="CASES")
-    each = parser.parse_args(given).each
-    done = Answers("lab").complete(_jobs(each), _answered)
-    for row in rows(done):
-        print(f"{row.name}: {row.measured} (goal {row.goal})")
-    return 0
-
-
 def rows(done: dict[str, Answer]) -> list[Row]:
     """Return one row per fault that has answers, and one of the clean cases."""
     out = []
@@ -121,10 +99,6 @@ def rows(done: dict[str, Answer]) -> list[Row]:
         text = f"{right.good} of {right.of} named with channel, run and value"
         out.append(Row(f"lab: {fault}", text, f">= {GOAL:.0%}", GOAL / max(right.share, 1e-3)))
     return out
-
-
-def _jobs(each: int) -> Iterator[tuple[str, int]]:
-    yield from ((fault, k) for k in range(each) for fault in (CLEAN, *FAULTS))
 
 
 def _answered(fault: str, number: int) -> Answer:
@@ -206,7 +180,7 @@ def _by_verdict(fault: str, number: int, rng: np.random.Generator) -> Answer:
             for run, T in zip(_performed(case, specimens, number), warm, strict=True)
         ]
     train, held = ([run for run in runs if run.name.startswith(r)] for r in ("train", "holdout"))
-    found, _ = diagnose_damper(_prepared(train, held, _task(number).law))
+    found, _ = diagnose_damper(prepared(train, held, _task(number).law))
     said = [found.kind, *found.effects, low_pass_text(found)]
     told = 0.0
     if fault == "cell" and (corner := re.search(r"corner near ([\d.]+) Hz", said[-1])):
@@ -285,16 +259,7 @@ def _told_by_model(runs: list[Measurement], number: int) -> list[Finding]:
     """Return the faults that a diagnosis of the runs begins with."""
     law = _task(number).law
     train, held = ([run for run in runs if run.name.startswith(r)] for r in ("train", "holdout"))
-    return list(_prepared(train, held, law).faults)
-
-
-def _prepared(train: list[Measurement], held: list[Measurement], law: str) -> Prepared:
-    """Return what the diagnosis of the runs begins with."""
-    runs = BenchRuns(train, held, Model(law))
-    prepared = runs.prepare(DAMPER)
-    if prepared is None:
-        raise RuntimeError(str(runs.lacking))
-    return prepared
+    return list(prepared(train, held, law).faults)
 
 
 def _task(number: int) -> Task:
@@ -377,3 +342,6 @@ def _between(rng: np.random.Generator) -> float:
         found = float(rng.uniform(25.0, 200.0))
         if all(abs(found - k * mains) > 1.0 for mains in (50.0, 60.0) for k in range(1, 5)):
             return found
+
+
+run, main = asked("lab", __doc__, ("each",), _answered, rows, of={"each": (CLEAN, *FAULTS)})

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +25,7 @@ from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.user_code.load import undefine
 
-from ._rows import Row
+from ._rows import Row, show
 
 FIRST, CASES = 4000, 40
 RUNS, TRAIN = 8, 6
@@ -153,13 +154,10 @@ def run(first: int = FIRST, cases: int = CASES) -> list[Row]:
     ]  # fmt: skip
 
 
-def main(given: list[str]) -> int:
-    """Run the cases that are asked for, print their figures."""
-    from .__main__ import show
-
+def main(given: Sequence[str]) -> int:
+    """Run the cases that are asked for, show their figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks labels", description=__doc__)
     parser.add_argument("--first", type=int, default=FIRST, help="seed of the first case")
     parser.add_argument("--cases", type=int, default=CASES, help="how many")
-    arguments = parser.parse_args(given)
-    show(run(arguments.first, arguments.cases))
+    show(run(**vars(parser.parse_args(given))))
     return 0

@@ -18,33 +18,95 @@ from __future__ import annotations
 
 import json
 import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
 from time import perf_counter
 
+import numpy as np
+
+from bristle.data.measurement import Measurement
 from bristle.diagnosis.joint_search import diagnose_laws
 from bristle.diagnosis.law_choice import LawAndEffects
 from bristle.diagnosis.sensor_faults import instruments_of
+from bristle.diagnosis.trials import joinable
+from bristle.identification.prepare import prepare
+from bristle.identification.problem import Problem
+from bristle.identification.start_grid import Search, initial_guesses
 from bristle.model.model import Model
+from bristle.physics.effect import effects_of
 from bristle.physics.forms import split_form
 
-from ._answers import Answer, Answers, ask
+from ._answers import Answer, asked
 from ._blind import cases, score
 from ._blind.plan import Task, make_plan
-from ._blind.subject import measurements
-from ._other_laws import Hidden, other_law
+from ._blind.subject import halves
 from ._rows import Row
+from .laws import recorded, truth_of
+
+LAWS = ("bouc_wen", "tanh", "dahl", "modified_bouc_wen")
+
+RUNS = ("train_1", "train_2", "train_3", "train_4", "holdout_1", "holdout_2")
+
+LEAST, MOST = 0.1, 0.6
+"""Share of the force that an effect must change, beyond what the law absorbs."""
+
+DRAWN = 4100
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What made the runs of a case: law, effects, the share of the force that these change."""
+
+    law: str
+    effects: tuple[str, ...]
+    strength: float
+    train: Sequence[Measurement]
+    held_out: Sequence[Measurement]
+
+
+def other_law(number: int, with_effect: bool) -> Hidden:
+    """Return a case: laws take turns, effects are drawn.
+
+    Parameters
+    ----------
+    number : of the case
+    with_effect : whether an effect of the library is hidden
+    """
+    law = LAWS[number % len(LAWS)]
+    rng = np.random.default_rng([DRAWN, number, int(with_effect)])
+    values, effects, strength = truth_of(law, rng), tuple[str, ...](), 0.0
+    if with_effect:
+        effect, values, strength = _strong(Model(law, (), values), rng)
+        effects = (effect,)
+    runs = [recorded(law, values, rng, name, effects) for name in RUNS]
+    return Hidden(law, effects, strength, runs[:4], runs[4:])
+
+
+def _strong(model: Model, rng: np.random.Generator) -> tuple[str, dict[str, float], float]:
+    """Return an effect that changes a law's force enough, the values with it, and by how much."""
+    runs = [prepare(recorded(model.law, dict(model.values), rng, name)) for name in RUNS[:2]]
+    problem = Problem(runs)
+    expected = problem.expectation(model)
+    search = Search(problem, model, expected, model.free())
+    base = search.residuals(search.start)
+    own = search.sensitivities()
+    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
+    sigma = np.concatenate([s[r.skip :] for r, (_, s, _) in zip(runs, expected, strict=True)])
+    size = float(np.linalg.norm(np.concatenate([r.force[r.skip :] for r in runs]) / sigma))
+    instruments = {one.name for one in effects_of("sensor")}
+    able = [name for name in joinable(model) if name not in instruments]
+    for name in rng.permutation(able).tolist():
+        for guess in rng.permutation(np.array(initial_guesses(name, model, problem), dtype=object)):
+            with_it = Search(problem, guess, expected, [])
+            change = with_it.residuals(with_it.start) - base
+            share = float(np.linalg.norm(change - basis @ (basis.T @ change))) / size
+            if LEAST <= share <= MOST:
+                return name, dict(guess.values), share
+    raise ValueError(f"no effect changes the force of {model.law} by {LEAST:.0%} to {MOST:.0%}")
+
 
 SEED = 41
 GOALS = {"none": 0.95, "effect": 0.9, "law": 0.95, "pair": 0.9}
-
-
-def run() -> list[Row]:
-    """Return the rows of what has been made so far."""
-    return rows(Answers("law_free").kept())
-
-
-def main(given: list[str]) -> int:
-    """Make what is missing of the figures, print them."""
-    return ask("law_free", __doc__, tuple(GOALS), answered, rows, given)
 
 
 def rows(done: dict[str, Answer]) -> list[Row]:
@@ -82,11 +144,8 @@ def _of(kind: str, number: int) -> Hidden:
     """Return a case of the blind benchmark's generator."""
     task = _task(kind, number)
     case = cases.load(task)
-    train, held_out = (
-        measurements(case.part(role), case.channels) for role in ("train", "holdout")
-    )
     effects = () if kind == "none" else (task.effect,)
-    return Hidden(task.law, effects, task.strength, train, held_out)
+    return Hidden(task.law, effects, task.strength, *halves(case))
 
 
 def _task(kind: str, number: int) -> Task:
@@ -134,3 +193,6 @@ def _simple(
     """Return whether a pair has no more parameters than the true one, where that was searched."""
     true = [one for one in pairs if _is((one.row.law, one.finding.effects), law, effects)]
     return all(chosen.fitted <= one.fitted for one in true)
+
+
+run, main = asked("law_free", __doc__, tuple(GOALS), answered, rows)

@@ -30,7 +30,7 @@ from bristle.identification.problem import Problem
 from bristle.model.model import Model
 from bristle.physics.laws import LAWS, laws_of
 
-from ._rows import Row
+from ._rows import Row, show
 
 STEP = 0.002
 """Sampling step [s]."""
@@ -168,12 +168,13 @@ def run() -> list[Row]:
     return measure([law.name for law in laws_of("damper")], SEEDS)
 
 
-def main(given: Sequence[str]) -> list[Row]:
-    """Return the rows of some laws over some seeds, as the arguments ask."""
+def main(given: Sequence[str]) -> int:
+    """Show the rows of some laws over some seeds, as the arguments ask."""
     names = [law.name for law in laws_of("damper")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks laws", description=__doc__)
     parser.add_argument("--seeds", type=int, default=SEEDS, help="cases per law")
     parser.add_argument("--law", action="append", choices=names, help="this law; may be repeated")
     parser.add_argument("--processes", type=int, help="how many at a time")
     arguments = parser.parse_args(given)
-    return measure(arguments.law or names, arguments.seeds, arguments.processes)
+    show(measure(arguments.law or names, arguments.seeds, arguments.processes))
+    return 0

@@ -23,18 +23,16 @@ import numpy as np
 from bristle.diagnosis.effect_limits import limit_of
 from bristle.diagnosis.effect_size import Sized, SizeSearch
 from bristle.diagnosis.prepared import Prepared
-from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.trials import joinable, judge
 from bristle.identification.problem import Problem, Run
-from bristle.identification.rig import DAMPER
 from bristle.identification.start_grid import refine
 from bristle.model.model import Model
 
-from ._answers import Answer, Answers, ask
+from ._answers import Answer, asked
 from ._blind import cases
 from ._blind.plan import make_plan
-from ._blind.subject import measurements
+from ._blind.subject import halves, prepared
 from ._rows import Row
 
 SEED = 43
@@ -46,16 +44,6 @@ EACH = 2
 
 GROUPS = 4
 """Into how many cases the effects are divided that are to be named."""
-
-
-def run() -> list[Row]:
-    """Return the rows of what has been made so far."""
-    return rows(Answers("limits").kept())
-
-
-def main(given: list[str]) -> int:
-    """Make what is missing of the figures, print them."""
-    return ask("limits", __doc__, ("clean", "named"), _answered, rows, given)
 
 
 def rows(done: dict[str, Answer]) -> list[Row]:
@@ -96,14 +84,7 @@ def _opened(number: int) -> Prepared:
     """Return a clean case as a diagnosis opens it."""
     task = [one for one in make_plan(SEED, 6 * number + 12, "none") if one.noise == 0.01][number]
     case = cases.load(task)
-    train, held_out = (
-        measurements(case.part(role), case.channels) for role in ("train", "holdout")
-    )
-    runs = BenchRuns(train, held_out, Model(task.law))
-    opened = runs.prepare(DAMPER)
-    if opened is None:
-        raise RuntimeError(str(runs.lacking))
-    return opened
+    return prepared(*halves(case), task.law)
 
 
 def _clean(opened: Prepared) -> SizeSearch:
@@ -171,3 +152,6 @@ def _holds(name: str, clean: SizeSearch, size: float) -> bool:
     if found.largest is None:
         return True  # told as what these runs cannot show
     return value >= found.largest if sized.falls else value <= found.largest
+
+
+run, main = asked("limits", __doc__, ("clean", "named"), _answered, rows)

@@ -28,7 +28,7 @@ from bristle.physics.laws import laws_of
 from bristle.system.scenario import load_scenario
 
 from . import _hosts, compatibility
-from ._rows import Row, interleave, ratio_of
+from ._rows import Row, interleave, ratio_of, show, write_between
 from .build import build_afresh
 from .master import SCENARIO, STEPS, find_fmus, time_master
 
@@ -185,15 +185,10 @@ def table(today: date) -> str:
 
 def main(given: list[str]) -> int:
     """Write the table of the page, where asked, after the figures."""
-    from .__main__ import show
-
     parser = argparse.ArgumentParser(prog="python -m benchmarks native", description=__doc__)
     parser.add_argument("--docs", action="store_true", help=f"write the table of {PAGE.name}")
     chosen = parser.parse_args(given)
     show(run())
     if chosen.docs:
-        text = PAGE.read_text(encoding="utf-8")
-        before, after = text.split(BEGIN)[0], text.split(END)[1]
-        made = f"{BEGIN}\n\n{table(date.today())}\n\n{END}"
-        PAGE.write_text(before + made + after, encoding="utf-8")
+        write_between(PAGE, BEGIN, END, table(date.today()))
     return 0

@@ -22,21 +22,11 @@ from bristle.prediction.closed_loop import closed_loop
 from bristle.study.identify import identify_study
 from bristle.study.steps import add_effects
 
-from ._answers import Answer, Answers, ask
+from ._answers import Answer, asked
 from ._rows import Row
 
 FIRST = 700
 """Seed of the first building."""
-
-
-def run() -> list[Row]:
-    """Return the rows of what has been made so far."""
-    return rows(Answers("prediction").kept())
-
-
-def main(given: list[str]) -> int:
-    """Make what is missing of the figures, print them."""
-    return ask("prediction", __doc__, ("cases",), answered, rows, given)
 
 
 def rows(done: dict[str, Answer]) -> list[Row]:
@@ -77,3 +67,6 @@ def answered(_kind: str, number: int) -> Answer:
         return about | {"error": traceback.format_exc()}
     told = [(one.kind, bool(one.inside), one.error) for one in found.rows if one.inside is not None]
     return about | {"rows": told, "notes": list(found.notes)}
+
+
+run, main = asked("prediction", __doc__, ("cases",), answered, rows)

@@ -26,8 +26,7 @@ from ._motions import DATA, NEWHALL, REPORTED, G, recorded
 from ._rows import Row
 from ._semi_active import PARTS
 from .training.closed_loop import Motion, Policy
-from .training.runs import Loop, Run, disturbed, plant_of, setup_of
-from .training.training import PolicyTask, Training
+from .training.training import Loop, PolicyTask, Run, Training, disturbed, plant_of, setup_of
 
 FMU = "TrainedPolicy"
 OUTPUT, DRIFT = "structure.floor2_acceleration_absolute", "structure.base_displacement"

@@ -21,7 +21,7 @@ from bristle.physics.laws import law_of_part
 
 from . import cases, inseparable
 from .cases import Recorded
-from .subject import measurements, packed
+from .subject import halves, measurements, packed
 
 
 def file_of(case: Recorded) -> Building:
@@ -38,8 +38,7 @@ def file_of(case: Recorded) -> Building:
 
 def ask(case: Recorded) -> dict[str, Any]:
     """Return what the diagnoser says of a building's case, and whether its class can be parted."""
-    train = measurements(case.part("train"), case.channels)
-    holdout = measurements(case.part("holdout"), case.channels)
+    train, holdout = halves(case)
     building = file_of(case)
     begun, spent = time.perf_counter(), time.process_time()
     found = diagnose_rig(train, holdout, Model(case.task.law), building)

@@ -23,7 +23,7 @@ from bristle.identification.problem import Problem, Run
 from bristle.identification.start_grid import SearchContext, ranked_guesses, refine
 from bristle.model.model import Model
 
-from . import cases, separate, subject
+from . import cases, subject
 from .cases import Recorded
 
 
@@ -65,7 +65,7 @@ def follow_up(case: Recorded, answer: dict[str, Any], experiment: Any) -> dict[s
     made = cases.make(case.task)
     more: dict[str, Any] = {"resolved": resolve(case, made, answer["effects"])}
     if experiment is not None:
-        more["separated"] = separate.perform(case, made, experiment)
+        more["separated"] = subject.perform(case, made, experiment)
     return more
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,16 @@ import pandas as pd
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.diagnosis import Diagnosis, diagnose_rig
+from bristle.diagnosis.prepared import Prepared
+from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem
+from bristle.identification.rig import DAMPER
 from bristle.identification.search import z_scale
 from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
+from tests.independent.experiments import RATE, proposed
 
 from .cases import ROOT, Recorded, digest_of
 from .forms import true_values
@@ -54,6 +59,31 @@ def measurements(runs: list[dict[str, Any]], channels: tuple[str, ...]) -> list[
     return out
 
 
+def halves(
+    case: Recorded, channels: tuple[str, ...] = ()
+) -> tuple[list[Measurement], list[Measurement]]:
+    """Return the runs of a case to fit to and those held out, with these channels or all."""
+    train, held = (
+        measurements(case.part(role), channels or case.channels) for role in ("train", "holdout")
+    )
+    return train, held
+
+
+def prepared(train: list[Measurement], held: list[Measurement], law: str) -> Prepared:
+    """Return what the diagnosis of a bench's runs begins with.
+
+    Raises
+    ------
+    RuntimeError
+        If something is lacking: what.
+    """
+    runs = BenchRuns(train, held, Model(law))
+    found = runs.prepare(DAMPER)
+    if found is None:
+        raise RuntimeError(str(runs.lacking))
+    return found
+
+
 def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) -> Diagnosis:
     """Return the diagnosis that a user gets who knows the law and nothing else."""
     return diagnose_rig(train, holdout, Model(law))
@@ -61,8 +91,7 @@ def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) ->
 
 def ask(case: Recorded) -> tuple[dict[str, Any], Diagnosis]:
     """Return what the diagnoser says of a case and how the true model does on it; the diagnosis."""
-    train = measurements(case.part("train"), case.channels)
-    holdout = measurements(case.part("holdout"), case.channels)
+    train, holdout = halves(case)
     before = time.perf_counter()
     found = diagnosed(train, holdout, case.task.law)
     seconds = time.perf_counter() - before
@@ -135,3 +164,29 @@ def z_of_truth(case: Recorded, holdout: list[Measurement]) -> float | None:
         return None
     model = true_model(case.task.law, case.truth)
     return None if model is None else z_of(model, Problem([prepare(m) for m in holdout]))
+
+
+# The experiment that a class proposes, performed by the generator on the same specimen.
+
+ROLES = ("train", "holdout")
+
+
+def perform(case: Recorded, made: Any, experiment: Any) -> dict[str, Any]:
+    """Return the verdict once two further runs of the proposed kind are there.
+
+    `experiment` is a `bristle.diagnosis.experiments.Experiment`. One run joins the training runs,
+    one the held-out ones, the latter with the motion turned round. The velocity and voltage are
+    kept within what the rig can do, as a laboratory would.
+    """
+    x, _, _, volts = experiment.signals(1.0 / RATE)
+    rig = made.specimen.rig
+    x = x - x.mean()
+    x = x * min(1.0, 0.9 * rig.stroke / float(np.max(np.abs(x - x[0]))))
+    volts = np.clip(volts, 0.0, 8.0)  # a smoothed voltage strays from the range by its noise
+    parts = {role: case.part(role) for role in ROLES}
+    for sign, role in zip((1.0, -1.0), ROLES, strict=True):
+        run = proposed(rig, (sign * x, volts), role, asdict(experiment))
+        parts[role] = [*parts[role], made.perform(run, case.task.seed, f"{role}_extra")]
+    train, holdout = (measurements(parts[role], case.channels) for role in ROLES)
+    answer = packed(diagnosed(train, holdout, case.task.law).as_dict())
+    return {name: answer[name] for name in ("kind", "effects", "z_after")}

@@ -101,24 +101,15 @@ def main_rows(lines: list[Line], noise: float, group: str) -> list[Figure]:
     classes = [line for line in single if score.in_class(line) and "resolved" in score.answer(line)]
     tried = [line for line in classes if score.answer(line).get("separated")]
     pairs = of_kind(lines, "pair", noise)
-    faults = of_kind(lines, "fault", noise)
+    faults, clean = of_kind(lines, "fault", noise), of_kind(lines, "none", noise)
+    placed = count(unknown, score.coordinate_right)
     rows = [
         ("single effect right, 15 and 40 %", count(strong, score.names_effect), 95.0, False),
         ("single effect right, 5 %", count(weak, score.names_effect), 85.0, False),
         ("named and nothing else, 15 and 40 %", count(strong, score.names_it_alone), 90.0, False),
-        (
-            "false alarms on none",
-            count(of_kind(lines, "none", noise), score.false_alarm),
-            0.0,
-            True,
-        ),
+        ("false alarms on none", count(clean, score.false_alarm), 0.0, True),
         ("outside effect unknown, 15 and 40 %", count(seen, score.calls_unknown), 90.0, False),
-        (
-            "its coordinate right, of those unknown",
-            count(unknown, score.coordinate_right),
-            80.0,
-            False,
-        ),
+        ("its coordinate right, of those unknown", placed, 80.0, False),
         ("class becomes the effect by separate_by", count(tried, score.separated), 70.0, False),
         ("sensor fault reported, no effect named", count(faults, score.reports_fault), 90.0, False),
         ("library effect called unknown", count(single, score.calls_unknown), 3.0, True),
@@ -146,37 +137,17 @@ def parameter_rows(lines: list[Line], noise: float, group: str) -> list[Figure]:
     ]
     true = [z for z in (score.answer(line).get("z_true") for line in known) if z is not None]
     inside = Count(sum(0.9 <= z <= 1.1 for z in true), len(true))
-    rows: list[Figure] = [
-        number(
-            "held-out z after adding, same form, median",
-            score.quantile(same, 0.5),
-            len(same),
-            1.05,
-            group,
-        ),
-        number(
-            "held-out z after adding, same form, 95th percentile",
-            score.quantile(same, 0.95),
-            len(same),
-            1.15,
-            group,
-        ),
-        number(
-            "held-out z after adding, other form, median",
-            score.quantile(other, 0.5),
-            len(other),
-            None,
-            group,
-        ),
-        number(
-            "held-out z after adding, other form, 95th percentile",
-            score.quantile(other, 0.95),
-            len(other),
-            None,
-            group,
-        ),
-        share("z of the true model in 0.9 to 1.1", inside, 90.0, group),
-    ]
+    forms: tuple[tuple[str, list[float], tuple[float | None, ...]], ...] = (
+        ("same", same, (1.05, 1.15)), ("other", other, (None, None)),
+    )  # fmt: skip
+    rows = [
+        number(f"held-out z after adding, {form} form, {what}", score.quantile(found, share_of),
+               len(found), goal, group)
+        for form, found, goals in forms
+        for what, share_of, goal in zip(("median", "95th percentile"), (0.5, 0.95), goals,
+                                        strict=True)
+    ]  # fmt: skip
+    rows.append(share("z of the true model in 0.9 to 1.1", inside, 90.0, group))
     return rows + interval_rows([*single, *of_kind(lines, "none", noise)], group)
 
 
@@ -195,14 +166,9 @@ def interval_rows(lines: list[Line], group: str) -> list[Figure]:
     wide = 100.0 * score.quantile((w for _, _, w in strong), 0.5)
     return [
         Figure(row.name, row.value, row.counts, row.interval, "90-99 %", fair, group),
-        number(
-            "median width of the effect's intervals, 15 and 40 %, per cent of the value",
-            wide,
-            len(strong),
-            30.0,
-            group,
-        ),
-    ]
+        number("median width of the effect's intervals, 15 and 40 %, per cent of the value", wide,
+               len(strong), 30.0, group),
+    ]  # fmt: skip
 
 
 def time_rows(lines: list[Line], times: dict[str, float]) -> list[Figure]:
@@ -214,12 +180,8 @@ def time_rows(lines: list[Line], times: dict[str, float]) -> list[Figure]:
             key = f"one {name}, fresh process, {how}"
             value = times.get(key, float("nan"))
             rows.append(number(f"{key}, s", value, int(key in times), goal, "main"))
-    return [
-        *rows,
-        number(
-            "one diagnosis inside a warm process, median, s", score.quantile(warm, 0.5), len(warm)
-        ),
-    ]
+    name = "one diagnosis inside a warm process, median, s"
+    return [*rows, number(name, score.quantile(warm, 0.5), len(warm))]
 
 
 def shared_rows(lines: list[Line]) -> list[Figure]:
@@ -306,19 +268,12 @@ def building_rows(lines: list[Line]) -> list[Figure]:
 def part_rows(lines: list[Line]) -> list[Figure]:
     """Return the parts of the main rows: bins, laws, rigs, forms, effects; what was set aside."""
     single, outside = of_kind(lines, "effect", 0.01), of_kind(lines, "outside", 0.01)
+    faults, clean = of_kind(lines, "fault", 0.01), of_kind(lines, "none", 0.01)
     both = [*single, *outside]
     rows = [
-        share(
-            "share reached below 2.5 %, set aside",
-            count(both, lambda x: not score.bin_of(x)),
-            group="parts",
-        ),
-        share(
-            "strength not reachable within physical bounds",
-            count(both, score.unreachable),
-            group="parts",
-        ),
-        share("errors", count(lines, lambda x: "error" in x), group="parts"),
+        ("share reached below 2.5 %, set aside", count(both, lambda x: not score.bin_of(x))),
+        ("strength not reachable within physical bounds", count(both, score.unreachable)),
+        ("errors", count(lines, lambda x: "error" in x)),
     ]
     splits: list[tuple[str, Callable[[Line], Any]]] = [
         ("bin", score.bin_of),
@@ -331,54 +286,33 @@ def part_rows(lines: list[Line]) -> list[Figure]:
     for what, of in splits:
         for value in sorted({str(of(line)) for line in counted}):
             group = [line for line in counted if str(of(line)) == value]
-            rows.append(
-                share(f"right, {what} {value}", count(group, score.names_effect), group="parts")
-            )
+            rows.append((f"right, {what} {value}", count(group, score.names_effect)))
             if what in ("form", "bin"):
-                rows.append(
-                    share(
-                        f"unknown, {what} {value}", count(group, score.calls_unknown), group="parts"
-                    )
-                )
-    for name in sorted({line["task"]["effect"] for line in outside}):
-        group = [line for line in outside if line["task"]["effect"] == name and score.bin_of(line)]
-        rows.append(
-            share(
-                f"unknown, outside effect {name}", count(group, score.calls_unknown), group="parts"
-            )
-        )
-    for name in sorted({line["task"]["effect"] for line in of_kind(lines, "fault", 0.01)}):
-        group = [line for line in of_kind(lines, "fault", 0.01) if line["task"]["effect"] == name]
-        rows.append(share(f"reported, {name}", count(group, score.reports_fault), group="parts"))
-    clean = of_kind(lines, "none", 0.01)
-    for name in ["none", *sorted({line["task"]["effect"] for line in counted})]:
-        group = clean if name == "none" else [x for x in counted if x["task"]["effect"] == name]
-        found = [covers for line in group for _, covers, _ in score.intervals(line)]
-        covered = Count(sum(found), len(found))
-        rows.append(share(f"intervals cover, effect {name}", covered, group="parts"))
-    strong = binned(single, "15 %", "40 %")
-    rows.append(
-        share(
-            "15 and 40 %, right or in any class of at most three",
-            count(strong, score.names_effect_or_class),
-            group="parts",
-        )
-    )
+                rows.append((f"unknown, {what} {value}", count(group, score.calls_unknown)))
+    for name, own in by_effect(outside).items():
+        unknown = count([line for line in own if score.bin_of(line)], score.calls_unknown)
+        rows.append((f"unknown, outside effect {name}", unknown))
+    for name, own in by_effect(faults).items():
+        rows.append((f"reported, {name}", count(own, score.reports_fault)))
+    for name, own in {"none": clean, **by_effect(counted)}.items():
+        found = [covers for line in own for _, covers, _ in score.intervals(line)]
+        rows.append((f"intervals cover, effect {name}", Count(sum(found), len(found))))
     classes = [line for line in counted if score.answer(line)["kind"] == "ambiguous"]
-    rows.append(
-        share(
-            "verdict is a class, single effects", Count(len(classes), len(counted)), group="parts"
-        )
-    )
-    inseparable = [line for line in classes if score.in_class(line)]
-    rows.append(
-        share(
-            "of these with the effect in it, inseparable by the separate test",
-            count(inseparable, score.inseparable),
-            group="parts",
-        )
-    )
-    return rows
+    with_it = [line for line in classes if score.in_class(line)]
+    rows += [
+        ("15 and 40 %, right or in any class of at most three",
+         count(binned(single, "15 %", "40 %"), score.names_effect_or_class)),
+        ("verdict is a class, single effects", Count(len(classes), len(counted))),
+        ("of these with the effect in it, inseparable by the separate test",
+         count(with_it, score.inseparable)),
+    ]  # fmt: skip
+    return [share(name, found, group="parts") for name, found in rows]
+
+
+def by_effect(lines: list[Line]) -> dict[str, list[Line]]:
+    """Return lines by the effect that is hidden, in the order of the names."""
+    names = sorted({line["task"]["effect"] for line in lines})
+    return {name: [line for line in lines if line["task"]["effect"] == name] for name in names}
 
 
 def as_json(rows: list[Figure]) -> list[dict[str, Any]]:

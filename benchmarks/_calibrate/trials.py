@@ -118,9 +118,7 @@ def _is_of_a_site(task: Task) -> bool:
 def made(task: Task) -> list[Stored]:
     """Return the trials of a case, one per site on a building; pairs for every rule looked at."""
     case, code = cases.load(task), subject.digest()
-    train, holdout = (
-        subject.measurements(case.part(role), case.channels) for role in ("train", "holdout")
-    )
+    train, holdout = subject.halves(case)
     if task.kind == "structure":
         problems = structure_problems(train, holdout, building.file_of(case), task.law)
         lines = {s: prepare_line(s, *pair) for s, pair in problems.items() if s != "damper"}

@@ -123,7 +123,7 @@ def answer(report: Report) -> dict[str, Any]:
 def _beyond_stroke(report: Report) -> list[dict[str, Any]]:
     """Return the runs in which the base leaves the damper's stroke, with the drift [mm]."""
     from .comparison.experiment import BEYOND
-    from .comparison.tables import beyond_stroke
+    from .comparison.page import beyond_stroke
 
     names = ["motion", "intensity [g]", "law", "peak base drift [mm]", BEYOND]
     rows: Any = beyond_stroke(report.comparison)[names].to_dict(orient="records")
@@ -131,7 +131,7 @@ def _beyond_stroke(report: Report) -> list[dict[str, Any]]:
 
 
 def show(report: Report) -> None:
-    from .comparison.tables import stroke_lines, stroke_text
+    from .comparison.page import stroke_lines, stroke_text
 
     for name, table in report.tables.items():
         _print_table(name, table)
@@ -152,7 +152,7 @@ def show(report: Report) -> None:
 def _print_table(name: str, table: pd.DataFrame) -> None:
     """Print Table IV or V; drifts beyond the damper's stroke are marked."""
     from .comparison.experiment import BEYOND
-    from .comparison.tables import MARK, TABLES, columns, shown
+    from .comparison.page import MARK, TABLES, columns, shown
 
     kind, title = TABLES[name]
     window = ", over the record as published" if kind == "rms" else ""

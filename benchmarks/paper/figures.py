@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 
 from bristle.core.progress import Progress
 from bristle.errors import ScenarioError, not_usable
+from bristle.version import __version__
 from bristle.view.style import FORMATS, look
 
 from . import identification, loops, optimum, stiction
 from .runs import Drawing, Runs
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 @dataclass(frozen=True)
@@ -34,42 +35,23 @@ class PaperFigure:
 def paper_figures() -> dict[str, PaperFigure]:
     """Return the figures by name, in the order of the paper."""
     found = (
-        PaperFigure(
-            "loops-voltage",
-            "Figs 3, 4",
-            "force loops of both laws on a test bench at four voltages",
-            2 * len(loops.VOLTAGES),
-            loops.over_voltages,
-        ),
-        PaperFigure(
-            "loops-frequency",
-            "Figs 3, 4",
-            "force loops of both laws on a test bench at four frequencies",
-            2 * len(loops.FREQUENCIES),
-            loops.over_frequencies,
-        ),
-        PaperFigure(
-            "stiction",
-            "Fig. 5",
-            "peaks in the acceleration of the base where its velocity crosses zero",
-            stiction.RUNS,
-            stiction.draw,
-        ),
-        PaperFigure(
-            "identification",
-            "Figs 6-8",
-            "laws with and without the exponential, fitted to the identification experiment",
-            identification.RUNS,
-            identification.draw,
-        ),
-        PaperFigure(
-            "passive-optimum",
-            "Fig. 9",
-            "peak acceleration of the second floor over constant voltage, four intensities",
-            optimum.RUNS,
-            optimum.draw,
-        ),
-    )
+        PaperFigure("loops-voltage", "Figs 3, 4",
+                    "force loops of both laws on a test bench at four voltages",
+                    2 * len(loops.VOLTAGES), loops.over_voltages),
+        PaperFigure("loops-frequency", "Figs 3, 4",
+                    "force loops of both laws on a test bench at four frequencies",
+                    2 * len(loops.FREQUENCIES), loops.over_frequencies),
+        PaperFigure("stiction", "Fig. 5",
+                    "peaks in the acceleration of the base where its velocity crosses zero",
+                    stiction.RUNS, stiction.draw),
+        PaperFigure("identification", "Figs 6-8",
+                    "laws with and without the exponential, fitted to the identification "
+                    "experiment",
+                    identification.RUNS, identification.draw),
+        PaperFigure("passive-optimum", "Fig. 9",
+                    "peak acceleration of the second floor over constant voltage, four intensities",
+                    optimum.RUNS, optimum.draw),
+    )  # fmt: skip
     return {figure.name: figure for figure in found}
 
 
@@ -133,13 +115,12 @@ def make(
     written = [image]
     for ending, table in drawing.tables.items():
         path = folder / f"{name}{ending}.csv"
-        _write(
-            table,
-            path,
-            name,
-            f"{figure.number} of Shirazi et al. (2012), by bristle",
-            engine,
+        head = (
+            f"# {figure.number} of Shirazi et al. (2012), by bristle; bristle {__version__}, "
+            f"engine {engine}, command: python -m benchmarks paper figures {name}\n"
+            "# Damper parameters are reconstructed, not those of the paper's tables.\n"
         )
+        write(path, head + table.to_csv(index=False, float_format="%.9g"))
         written.append(path)
     return written
 
@@ -160,16 +141,9 @@ def prepare(folder: Path, format: str) -> None:
         ) from error
 
 
-def _write(table: pd.DataFrame, path: Path, name: str, what: str, engine: str) -> None:
-    """Write a table as CSV; `# ` lines in front say how it was made."""
-    from bristle.version import __version__
-
-    head = (
-        f"# {what}; bristle {__version__}, engine {engine}, "
-        f"command: python -m benchmarks paper figures {name}\n"
-        "# Damper parameters are reconstructed, not those of the paper's tables.\n"
-    )
+def write(path: Path, text: str) -> None:
+    """Write a text, or say in a line why it cannot be written."""
     try:
-        path.write_text(head + table.to_csv(index=False, float_format="%.9g"), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error

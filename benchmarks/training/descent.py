@@ -9,7 +9,7 @@ import numpy as np
 from bristle.core.arrays import Array
 from bristle.core.progress import Count
 
-from .runs import PATIENT, Loop, Run
+from .training import PATIENT, Loop, Run
 
 POWER = 5.0
 """Of the mean over motions: the larger, the more the worst motion counts."""

@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks import better
 from benchmarks._motions import recorded, synthetic
-from benchmarks._search import minimise
 from benchmarks._semi_active import CLIPPED, ESTIMATED, FEEDBACK, PASSIVE, lq_gains, peak, run
+from benchmarks.better import minimise
 
 NONE = better.NONE
 

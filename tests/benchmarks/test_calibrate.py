@@ -13,8 +13,9 @@ import pytest
 from benchmarks import blind, calibrate
 from benchmarks._blind import plan
 from benchmarks._blind.plan import Task
-from benchmarks._calibrate import page, replay, trials, varied
+from benchmarks._calibrate import page, trials, varied
 from benchmarks._calibrate.trials import NotStoredError, Stored
+from benchmarks._rows import write_between
 from bristle.diagnosis import decision, inconsistent_runs
 from bristle.diagnosis import site as damper
 from bristle.diagnosis.decision import decide
@@ -121,7 +122,7 @@ def test_stored_trials_decide_as_the_trials_themselves(
         one.instruments,
     )
     for rule in (BENCH, replace(BENCH, chance=0.1), replace(BENCH, adequate=1.005)):
-        assert replay.answer(again, rule) == replay.answer(one, rule)
+        assert page.answer(again, rule) == page.answer(one, rule)
     first = decide(one.before, one.single, one.grow)
     assert decide(again.before, again.single, again.grow).effects == first.effects
     assert again.grow(again.single[0])[0].effects == ("gas_spring", "stribeck")
@@ -132,7 +133,7 @@ def test_stored_trials_decide_as_the_trials_themselves(
 def test_a_value_trades_false_alarms_against_misses() -> None:
     weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
     chance = case("none", "none", 1.04, trial(1.02, "stribeck"))
-    rows = {row.value: row for row in replay.traded([weak, chance], BENCH) if row.field == "gain"}
+    rows = {row.value: row for row in page.traded([weak, chance], BENCH) if row.field == "gain"}
     assert (rows[0.01].alarms, rows[0.01].missed) == ((1, 1), (0, 1))
     assert (rows[0.02].alarms, rows[0.02].missed) == ((0, 1), (0, 1))
     assert (rows[0.05].alarms, rows[0.05].missed) == ((0, 1), (1, 1))
@@ -156,45 +157,45 @@ def test_a_value_trades_false_alarms_against_misses() -> None:
 def test_what_a_verdict_counts_as(
     kind: str, hidden: str, said: str, effects: tuple[str, ...], marked: list[str]
 ) -> None:
-    assert replay.marks(case(kind, hidden, 1.0), said, effects) == marked
+    assert page.marks(case(kind, hidden, 1.0), said, effects) == marked
 
 
 def test_an_effect_is_hidden_at_the_sites_where_it_acts() -> None:
     stop = case("structure", "end_stop", 3.0, trial(1.01, "end_stop"), site="layer")
-    assert replay.answer(stop, SITE) == ("effect", ("end_stop",))
-    assert replay.hidden(stop) == ("end_stop",)
-    assert replay.hidden(replace(stop, site="storey1")) == ()
-    (row,) = [r for r in replay.traded([stop], SITE) if (r.field, r.value) == ("share", 0.7)]
+    assert page.answer(stop, SITE) == ("effect", ("end_stop",))
+    assert page.hidden(stop) == ("end_stop",)
+    assert page.hidden(replace(stop, site="storey1")) == ()
+    (row,) = [r for r in page.traded([stop], SITE) if (r.field, r.value) == ("share", 0.7)]
     assert row.missed == (0, 1)
 
 
 def test_what_is_not_stored_is_left_out_and_told() -> None:
     halves = [trial(2.0, "gas_spring"), trial(2.4, "coil_lag")]
     one = case("pair", "gas_spring+coil_lag", 3.0, *halves)
-    rows = replay.traded([one], BENCH)
+    rows = page.traded([one], BENCH)
     assert all(row.left == 1 for row in rows if row.field == "close")
     assert "left out" in page.table(rows, BENCH)
 
 
 def test_the_table_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
     weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
-    block = page.text(replay.both([weak]), [weak], 0)
+    block = page.text(page.both([weak]), [weak], 0)
     assert "1 cases on the bench, 0 buildings" in block
     assert "| `gain` | 0.005/0.01/**0.02**/0.03/0.05 | 0/0/**0**/1/1 |" in block
     file = tmp_path / "page.md"
     file.write_text(f"head\n{page.BEGIN}\nold\n{page.END}\ntail\n")
-    page.write(file, block)
+    write_between(file, page.BEGIN, page.END, block)
     assert file.read_text() == f"head\n{page.BEGIN}\n\n{block}\n\n{page.END}\ntail\n"
     file.write_text("none")
     with pytest.raises(ValueError, match=r"page\.md: no"):
-        page.write(file, block)
+        write_between(file, page.BEGIN, page.END, block)
 
 
 def test_a_table_that_moves_nowhere_says_that_it_tells_nothing() -> None:
     far = case("effect", "gas_spring", 3.0, trial(1.01, "gas_spring"))
-    assert "neither support today's values" in page.sensitivity(replay.traded([far], BENCH))
+    assert "neither support today's values" in page.sensitivity(page.traded([far], BENCH))
     weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
-    said = page.sensitivity(replay.traded([weak], BENCH))
+    said = page.sensitivity(page.traded([weak], BENCH))
     assert said.startswith("Counts change with `gain`")
     assert "neither support" not in said
 

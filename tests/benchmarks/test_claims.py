@@ -9,7 +9,14 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from benchmarks.paper.comparison.claims import STATEMENTS, ledger
+from benchmarks.paper.comparison.claims import (
+    NOT,
+    REPRODUCED,
+    STATEMENTS,
+    UNDECIDABLE,
+    Numbers,
+    ledger,
+)
 from benchmarks.paper.comparison.experiment import (
     BINGHAM,
     CLIPPED,
@@ -26,7 +33,6 @@ from benchmarks.paper.comparison.experiment import (
     ZERO,
 )
 from benchmarks.paper.comparison.identification import STIFFNESS
-from benchmarks.paper.comparison.numbers import NOT, REPRODUCED, UNDECIDABLE, Numbers
 
 LAWS = (NONE, ZERO, FOUR, CLIPPED, HINF, LPV, BINGHAM, LPV_0, LPV_400)
 CASES = [(EL_CENTRO, 0.2), (EL_CENTRO, 0.6), (SYLMAR, 0.3), (SYLMAR, 0.7)]

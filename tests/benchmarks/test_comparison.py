@@ -34,7 +34,7 @@ from benchmarks.paper.comparison.experiment import (
 )
 from benchmarks.paper.comparison.identification import NOISE, gain
 from benchmarks.paper.comparison.make import Report
-from benchmarks.paper.comparison.tables import MARK, beyond_stroke
+from benchmarks.paper.comparison.page import MARK, beyond_stroke
 from benchmarks.paper.runs import Runs
 from bristle.errors import RecordError
 from bristle.view.style import look

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.training import design as policy_design
-from benchmarks.training import motions
-from benchmarks.training.estimator import estimator
-from benchmarks.training.runs import Loop, Run
+from benchmarks.training.design import estimator
 from benchmarks.training.train import main
-from benchmarks.training.training import PolicyTask, Training, same_motion
+from benchmarks.training.training import Loop, PolicyTask, Run, Training, same_motion, synthetic
 from bristle.component.control_laws import hidden_units, policy_inputs, voltage_share, weight_count
 from bristle.data.ground_motion import GroundMotion
 from bristle.errors import DesignError
@@ -61,10 +59,10 @@ def test_the_estimator_follows_the_building_through_wrong_first_states() -> None
 
 
 def test_synthetic_motions_have_their_peak_and_their_seed() -> None:
-    first, again = (motions.synthetic(np.random.default_rng(3), H) for _ in range(2))
+    first, again = (synthetic(np.random.default_rng(3), H) for _ in range(2))
     assert np.array_equal(first, again)
     assert np.abs(first).max() == pytest.approx(1.0, rel=0.02)
-    assert not np.array_equal(first, motions.synthetic(np.random.default_rng(4), H))
+    assert not np.array_equal(first, synthetic(np.random.default_rng(4), H))
 
 
 def test_a_motion_is_known_by_its_shape() -> None:

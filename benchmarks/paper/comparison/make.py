@@ -16,21 +16,18 @@ from typing import TYPE_CHECKING
 
 from bristle.component.controller_file import read_controller
 from bristle.core.progress import Progress, counted
-from bristle.errors import DesignError, not_usable
+from bristle.errors import DesignError
 from bristle.version import __version__
 from bristle.view.style import Page, look
 
 from .. import optimum, stiction
-from ..figures import prepare
+from ..figures import prepare, write
 from ..runs import Drawing, Runs
-from . import cases as published
 from . import identification, pictures
 from . import page as page_of
-from .claims import Statement, ledger
-from .experiment import Comparison, cases, compare, motions
-from .facts import facts
-from .numbers import Numbers, Verdict
-from .tables import TABLES, published_table
+from .claims import Numbers, Statement, Verdict, ledger
+from .experiment import Comparison, cases, compare, facts, motions
+from .page import TABLES, published_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,10 +36,10 @@ KINDS = ("hinf", "lpv")
 REPORT = "report.html"
 FIGURES: dict[str, tuple[str, Callable[[Comparison], Page | None]]] = {
     "fig13-anti-windup": ("Fig. 13", pictures.anti_windup),
-    "fig14-northridge-strong": ("Fig. 14", published.northridge_hinf),
-    "fig15-northridge-strong-lpv": ("Fig. 15", published.northridge_lpv),
-    "fig16-northridge-weak": ("Fig. 16", published.northridge_weak),
-    "fig17-el-centro": ("Fig. 17", published.el_centro),
+    "fig14-northridge-strong": ("Fig. 14", pictures.northridge_hinf),
+    "fig15-northridge-strong-lpv": ("Fig. 15", pictures.northridge_lpv),
+    "fig16-northridge-weak": ("Fig. 16", pictures.northridge_weak),
+    "fig17-el-centro": ("Fig. 17", pictures.el_centro),
     "summary": ("", pictures.summary),
     "accelerations-el-centro": ("", pictures.responses),
     "drift-el-centro": ("", pictures.drifts),
@@ -118,7 +115,7 @@ def make(folder: Path, newhall: Path | None = None, progress: bool = False) -> R
         comparison, numbers, claims, tables, figures, folder, [folder / REPORT, *files],
         time.perf_counter() - began,
     )  # fmt: skip
-    _write(folder / REPORT, page_of.page(report))
+    write(folder / REPORT, page_of.page(report))
     return report
 
 
@@ -185,13 +182,6 @@ def _write_tables(
             "reconstructed, not the paper's own.\n"
         )
         path = folder / f"{name}.csv"
-        _write(path, head + table.to_csv(index=False, float_format="%.6g"))
+        write(path, head + table.to_csv(index=False, float_format="%.6g"))
         written.append(path)
     return written
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error

@@ -6,18 +6,17 @@ import re
 from collections import Counter
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bristle.version import __version__
 from bristle.view import html
 
-from .claims import Statement
-from .experiment import KAPPA, LAWS
-from .numbers import NOT, REPRODUCED, UNDECIDABLE, Verdict
-from .page_tables import stroke_html, table_html
-from .tables import TABLES, stroke_text
+from .claims import NOT, REPRODUCED, UNDECIDABLE, Statement, Verdict
+from .experiment import BEYOND, CONTROLLERS, KAPPA, LAWS, NONE, QUANTITIES, Comparison
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from .make import Report
 
 CAPTIONS = {
@@ -219,3 +218,153 @@ the CSV files of this folder.</p>
 <p>F. A. Shirazi, J. Mohammadpour, K. M. Grigoriadis, G. Song: Identification and Control of an MR
 Damper With Stiction Effect and its Application in Structural Vibration Mitigation. IEEE
 Transactions on Control Systems Technology 20(5), 2012.</p>"""
+
+
+# Tables IV and V and the runs beyond the stroke, as HTML.
+
+
+def table_html(name: str, table: pd.DataFrame) -> str:
+    """Return Table IV or V, the lowest of the controllers bold, drifts beyond the stroke marked.
+
+    Parameters
+    ----------
+    name : "table4" or "table5"
+    table : as `tables.published_table` returns it
+    """
+    kind, title = TABLES[name]
+    listed = columns(kind)
+    header = ["Law", *(heading.replace("2]", "²]") for heading, _ in listed)]
+    marked = f" {MARK}: beyond the damper's stroke." if kind == "peak" else ""
+    window = "" if kind == "peak" else " RMS values are over the record as published."
+    parts = [html.paragraphs(f"Bold: the lowest of the three controllers.{marked}{window}")]
+    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
+    for (motion, g), group in groups:
+        own = group.set_index("law")
+        rows: list[list[str]] = []
+        bold: dict[tuple[int, int], str] = {}
+        for k, law in enumerate(own.index.astype(str)):
+            rows.append([law, *(_cell(own, law, column) for _, column in listed)])
+            lowest = [_is_lowest(own, law, column) for _, column in listed]
+            bold |= {(k, 1 + i): "strong" for i, one in enumerate(lowest) if one}
+        parts.append(f"<h3>{html.escape(motion)}, nominal {g:g} g</h3>")
+        parts.append(html.table(header, rows, range(1, len(header)), kinds=bold))
+    return html.section(title, *parts, name=name)
+
+
+def _cell(own: Any, law: str, column: str) -> str:
+    if law == NONE and ("force" in column or "voltage" in column):
+        return "-"
+    beyond = "base drift" in column and BEYOND in own and float(own.loc[law, BEYOND]) > 0.0
+    return shown(float(own.loc[law, column]), column) + (MARK if beyond else "")
+
+
+def _is_lowest(own: Any, law: str, column: str) -> bool:
+    """Return whether a controller has the lowest value, as the numbers are shown."""
+    value = {one: float(shown(float(own.loc[one, column]), column)) for one in CONTROLLERS}
+    return law in value and all(value[law] < value[one] for one in value if one != law)
+
+
+def stroke_html(comparison: Comparison) -> str:
+    """Return a section on the runs that leave the damper's stroke; "" if there are none."""
+    text = stroke_text(comparison)
+    if not text:
+        return ""
+    return html.section(
+        "Runs beyond the damper's stroke", html.paragraphs(text),
+        html.items(stroke_lines(comparison)), name="stroke",
+    )  # fmt: skip
+
+
+# Tables IV and V of the comparison, and the runs in which the base leaves the damper's stroke.
+
+TABLES = {
+    "table4": ("peak", "Table IV: peaks of all motions"),
+    "table5": ("rms", "Table V: RMS of all motions"),
+}
+"""File name to what is tabled of each quantity, and the title."""
+
+DIGITS = {
+    "peak": {"base drift": 1, "voltage": 1},
+    "rms": {"damper force": 2, "voltage": 2, "base drift": 2},
+}
+_USUAL = {"peak": 2, "rms": 3}
+MARK = "†"
+"""Behind a drift that is larger than the damper's stroke."""
+
+
+def published_table(comparison: Comparison, kind: str) -> pd.DataFrame:
+    """Return Table IV or V of the comparison: a row per motion, intensity and law.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    kind : {"peak", "rms"}
+        "peak" gives Table IV, with a column `BEYOND`; "rms" gives Table V, over the record as
+        published.
+
+    Returns
+    -------
+    DataFrame
+        Columns "motion", "intensity [g]", "law" and one per quantity, named as in
+        `Comparison.table`.
+    """
+    part = comparison.table[comparison.table["law"].isin(LAWS)].copy()
+    order = {law: i for i, law in enumerate(LAWS)}
+    places = {motion.name: i for i, motion in enumerate(comparison.motions)}
+    part["_place"], part["_law"] = part["motion"].map(places), part["law"].map(order)
+    part = part.sort_values(["_place", "intensity [g]", "_law"])
+    keep = [column for _, column in columns(kind)] + [BEYOND] * (kind == "peak")
+    return part[["motion", "intensity [g]", "law", *keep]].reset_index(drop=True)
+
+
+def columns(kind: str) -> list[tuple[str, str]]:
+    """Return heading and column of each quantity of a table, kind "peak" or "rms"."""
+    return [
+        (f"{quantity} [{unit}]", f"{kind} {quantity} [{unit}]")
+        for quantity, (_, unit, _) in QUANTITIES.items()
+    ]
+
+
+def shown(value: float, column: str) -> str:
+    """Return a number of a table as text, with the digits that its column has.
+
+    Parameters
+    ----------
+    value : in the unit of the column
+    column : name of the column, such as "peak base drift [mm]"
+    """
+    kind, _, rest = column.partition(" ")
+    digits = DIGITS[kind].get(rest.partition(" [")[0], _USUAL[kind])
+    return f"{value:.{digits}f}"
+
+
+def beyond_stroke(comparison: Comparison) -> pd.DataFrame:
+    """Return the rows of all runs in which the base drifts beyond the damper's stroke."""
+    return comparison.table[comparison.table[BEYOND] > 0.0]
+
+
+def stroke_text(comparison: Comparison) -> str:
+    """Return in one sentence how many runs leave the stroke, and what that means; "" if none."""
+    rows = beyond_stroke(comparison)
+    if rows.empty:
+        return ""
+    with_damper = int((comparison.table["law"] != NONE).sum())
+    drift = rows["peak base drift [mm]"]
+    stroke = float((drift - rows[BEYOND]).iloc[0])
+    return (
+        f"In {len(rows)} of {with_damper} runs with a damper the base drifts beyond the damper's "
+        f"stroke of {stroke:.0f} mm, by up to {rows[BEYOND].max():.0f} mm. The model has no end "
+        "stop there: a real damper of this stroke would hit its end, so these rows hold for a "
+        "longer one."
+    )
+
+
+def stroke_lines(comparison: Comparison) -> list[str]:
+    """Return a line per motion and intensity: the laws that leave the stroke, with the drift."""
+    groups: dict[tuple[str, float], list[str]] = {}
+    rows = beyond_stroke(comparison)[["motion", "intensity [g]", "law", "peak base drift [mm]"]]
+    for motion, g, law, drift in rows.itertuples(index=False, name=None):
+        groups.setdefault((motion, g), []).append(f"{law} {drift:.1f} mm")
+    places = [motion.name for motion in comparison.motions]
+    ordered = sorted(groups, key=lambda case: (places.index(case[0]), case[1]))
+    return [f"{motion} {g:g} g: {'; '.join(groups[motion, g])}" for motion, g in ordered]
