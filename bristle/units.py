@@ -4,7 +4,8 @@ The spelling that bristle writes is that of interfaces and FMUs: `m/s2`, `N.s/m`
 It also reads `N s/m`, `N·s/m`, `N*s/m`, `m/s^2`, `m/s**2`, `m/s²`, `m s-2`, `m/s/s`.
 
 `g` is the standard acceleration of gravity, 9.80665 m/s2 (ISO 80000-3), and never a gram: mass
-is in kg. Nominal intensities of published tables that use 9.81 m/s2 are not this `g`.
+is in kg, and `mg` is a thousandth of gravity, as accelerometers have it. Nominal intensities of
+published tables that use 9.81 m/s2 are not this `g`.
 
 Hz is 1/s. Angles keep a dimension of their own, as in the BaseUnit of FMI 2.0, so that rad/s
 is neither Hz nor 1/s.
@@ -139,15 +140,22 @@ _PLAIN: dict[str, tuple[float, Exponents]] = {
     "h": (3600.0, _dimension(s=1)),
     "day": (86400.0, _dimension(s=1)),
     "g": (STANDARD_GRAVITY, _ACCELERATION),
+    "mg": (1e-3 * STANDARD_GRAVITY, _ACCELERATION),
+    "ug": (1e-6 * STANDARD_GRAVITY, _ACCELERATION),
     # Exact by definition: the inch of 1959, the pound of 1959 under standard gravity.
     "in": (0.0254, _LENGTH),
+    "mil": (2.54e-5, _LENGTH),
     "ft": (0.3048, _LENGTH),
     "lbf": (4.4482216152605, _FORCE),
     "kip": (4448.2216152605, _FORCE),
     "kgf": (STANDARD_GRAVITY, _FORCE),
+    "tf": (1e3 * STANDARD_GRAVITY, _FORCE),
+    "dyn": (1e-5, _FORCE),
     "daN": (10.0, _FORCE),  # of many load cells; "da" is no prefix else
     "psi": (4.4482216152605 / 0.0254**2, _PRESSURE),
     "bar": (1e5, _PRESSURE),
+    "mbar": (100.0, _PRESSURE),
+    "hPa": (100.0, _PRESSURE),
 }
 _PREFIXES = {"n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9}
 _ALIASES = {"sec": "s", "ohm": "Ohm", "Ω": "Ohm", "°": "deg", "°C": "degC", "°F": "degF"}

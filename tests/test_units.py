@@ -103,7 +103,7 @@ def test_celsius_has_an_offset_and_stands_alone() -> None:
         ("degc", 'Did you mean "degC"'),
         ("foo", "Examples: m/s2"),
         ("gram", "Mass is in kg"),
-        ("mg", "Mass is in kg"),
+        ("Mg", "Mass is in kg"),
         ("N s/m V", "two ways"),
         ("m^0.5", "whole powers"),
         ("m0", "whole powers"),

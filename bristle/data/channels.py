@@ -205,15 +205,22 @@ class Meaning(NamedTuple):
 
 
 _QUANTITIES = {
-    "time": "time t zeit tempo temps tiempo timestamp elapsed zeitstempel clock micros millis",
+    "time": "time t zeit tempo temps tiempo timestamp elapsed zeitstempel clock micros millis tijd "
+    "czas tid zaman время 时间 時間",
     "displacement": "displacement disp displ displac x position pos stroke weg hub lvdt travel "
     "deslocamento posicao curso auslenkung deflection extension crosshead d y s piston desloc "
-    "deplacement course",
-    "velocity": "velocity vel v speed geschwindigkeit velocidade vitesse velo rate vp xdot xd dx",
-    "acceleration": "acceleration acc accel a beschleunigung aceleracao acel xddot xdd ddx accn",
-    "force": "force f load kraft forca fd last fuerza loadcell effort kraftaufnehmer fdamper",
-    "voltage": "voltage volt volts u spannung tensao coilvoltage vcoil uc tension voltaje",
-    "current": "current i strom corrente courant amp amps ampere amperage icoil corriente",
+    "deplacement course spostamento corsa desplazamiento verplaatsing przemieszczenie posun "
+    "forskjutning forskydning wegaufnehmer kolbenweg ход 位移 変位 перемещение",
+    "velocity": "velocity vel v speed geschwindigkeit velocidade vitesse velo rate vp xdot xd dx "
+    "velocita velocidad snelheid predkosc hastighet скорость 速度",
+    "acceleration": "acceleration acc accel a beschleunigung aceleracao acel xddot xdd ddx accn "
+    "accelerazione aceleracion versnelling przyspieszenie ускорение 加速度",
+    "force": "force f load kraft forca fd last fuerza loadcell effort kraftaufnehmer fdamper "
+    "kraftmessdose forza carga kracht siła sila kuvvet сила усилие 力 荷重",
+    "voltage": "voltage volt volts u spannung tensao coilvoltage vcoil uc tension voltaje tensione "
+    "spanning napiecie напряжение 电压 電圧",
+    "current": "current i strom corrente courant amp amps ampere amperage icoil corriente "
+    "stroom prad ток 电流 電流",
     "duty": "duty pwm dutycycle tastgrad",
     "field": "field flux magnetic fluxdensity feld flussdichte bfield",
     "drift": "drift interstory interstorey",
@@ -304,7 +311,7 @@ def _words(name: str) -> list[str]:
     plain = unicodedata.normalize("NFKD", name)
     plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])", " ", plain)
-    words = [word.lower() for word in re.split(r"[^A-Za-z0-9]+", parted) if word]
+    words = [word.lower() for word in re.split(r"[\W_]+", parted) if word]
     out: list[str] = []
     for word in words:
         parts = [word]

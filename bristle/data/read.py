@@ -1,7 +1,7 @@
 """Tables from any file that a laboratory hands over.
 
-CSV and other delimited text (also gzip-compressed), Parquet, MAT up to version 7, results of
-bristle itself: see `formats`. Nothing is converted here; see `measurement`.
+CSV and other delimited text (also gzip-compressed), Excel, Parquet, MAT, NPZ, TDMS, HDF5: see
+`formats`. Nothing is converted here; see `measurement`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LARGEST = 256 * 1024**2
 
 ENDINGS = (
     ".csv", ".txt", ".dat", ".asc", ".tsv", ".prn", ".lvm", ".mat", ".parquet", ".xlsx", ".tdms",
-    ".h5", ".hdf5",
+    ".h5", ".hdf5", ".npz",
 )  # fmt: skip
 """Endings of the files that a folder of measurements is taken to consist of."""
 

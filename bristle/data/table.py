@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-_CODES = (-9999.0, 9999.0, -99999.0, 99999.0, -999999.0, 999999.0, -7999.0)
-"""Numbers that loggers write where nothing was measured."""
+_CODE = -7999.0
+"""A number that loggers write where nothing was measured, besides nines: -9999, 99999.99."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,16 +79,20 @@ def without_codes(table: Table) -> Table:
     values, remarks = dict(table.values), list(table.remarks)
     for key, own in table.values.items():
         size = np.abs(own)
-        for code in _CODES:
-            is_code = own == code
-            others = size[~is_code & np.isfinite(own)]
-            if is_code.any() and others.size and float(others.max()) < 0.5 * abs(code):
-                values[key] = np.where(is_code, np.nan, own)
-                remarks.append(
-                    f'"{key}" is {code:g} in {is_code.sum()} places, and else within '
-                    f"{others.max():.4g}: taken as missing there"
-                )
-                break
+        nines = np.floor(size) + 1.0
+        able = (nines >= 1e3) & (10.0 ** np.round(np.log10(np.maximum(nines, 1.0))) == nines)
+        able |= own == _CODE
+        if not able.any():
+            continue
+        code = own[able][np.argmax(size[able])]
+        is_code = own == code
+        others = size[~is_code & np.isfinite(own)]
+        if others.size and float(others.max()) < 0.5 * abs(code):
+            values[key] = np.where(is_code, np.nan, own)
+            remarks.append(
+                f'"{key}" is {code:g} in {is_code.sum()} places, and else within '
+                f"{others.max():.4g}: taken as missing there"
+            )
     return replace(table, values=values, remarks=tuple(remarks))
 
 

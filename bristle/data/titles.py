@@ -12,10 +12,15 @@ from ..units import parse as parse_unit
 from .channels import meaning, of_a_sensor, quantity_of_unit
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
+_LIKE_BRACKETS = str.maketrans("{}<>\uff3b\uff3d\uff08\uff09", "[][][]()")
+_FACTOR = re.compile(r"(?<!\d)[*/÷]\s*10+\b|[\])]\s*[x\u00d7]\s*10+\b|\b10\s*\^|\b1[eE][+-]?\d")
+"""A power of ten in a title, by which values may have been multiplied or divided."""
 _A_G = "the g can be the unit or stand for ground. Write a_g [m/s2], or acc [g]."
-_PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
+_PARTED = re.compile(
+    r"(?P<name>.*[^\s,:;=/-])\s*(?P<by>\s/\s|\s-\s|[,:;=]\s*|\sin\s|\s)\s*(?P<unit>[^\s,:;=]+)\s*"
+)
 _BRACKET = re.compile(r".*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]")
-_BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
+_BARE = re.compile(r"(?:/|in )?[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
 _WHOLE = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
 _DEGREES = re.compile(r"(?:deg(?:rees?|\.)?|grad|[°º])? ?(?:[cC](?:elsius)?|[fF](?:ahrenheit)?)")
 _TEMPERATURE = re.compile(
@@ -51,14 +56,18 @@ class Column:
 def column(index: int, text: str) -> Column:
     """Return a column from its text in the header."""
     text = text.strip().strip('"').strip()
-    match = _BRACKETS.fullmatch(text)
+    plain = text.translate(_LIKE_BRACKETS)
+    if found := _FACTOR.search(plain):
+        name = re.split(r"\s*[\[(]", plain)[0]
+        return Column(index, text, name, None, f'"{found[0].strip()}" in it may be a factor')
+    match = _BRACKETS.fullmatch(plain)
     if match:
         spelled = match["square"] if match["square"] is not None else match["round"]
         try:
-            return Column(index, text, match["name"], parse_unit(spelled))
+            return Column(index, text, match["name"], parse_unit(_renamed(spelled)))
         except UnitError as error:
             return Column(index, text, match["name"], None, str(error))
-    parts = text.split("_")
+    parts = text.rstrip("_").split("_")  # MATLAB makes Force_kN_ of "Force (kN)"
     # The longest ending that is a unit: `velocity_mm_s` is in mm/s, not in s.
     for size in (2, 1):
         name, ending = "_".join(parts[:-size]), parts[-size:]
@@ -67,7 +76,7 @@ def column(index: int, text: str) -> Column:
         if len(name) == 1 and ending == ["g"]:
             return Column(index, text, text, None, _A_G)
         try:
-            return Column(index, text, name, parse_unit("/".join(ending)))
+            return Column(index, text, name, parse_unit(_renamed("/".join(ending))))
         except UnitError:
             continue
     return Column(index, text, text, None)
@@ -84,26 +93,41 @@ def title(index: int, text: str) -> Column:
         Its title in the file.
     """
     found = column(index, text)
-    if found.unit is None and (degrees := _degrees(found)) is not None:
-        return degrees
-    if found.unit is None and found.problem:
-        bracket = _BRACKET.fullmatch(found.text)
-        unit = unit_or_none(bracket["unit"]) if bracket else None  # "(amp)" is no unit, but meant
-        return found if unit is None else replace(found, unit=unit, problem="")
-    if found.unit is None:
-        parted = _PARTED.fullmatch(found.text)
-        unit = unit_or_none(parted["unit"]) if parted else None
-        if parted and unit is not None:
-            return replace(found, name=parted["name"], unit=unit)
-        return _by_slash(found)
-    return found
+    if found.unit is not None or _FACTOR.search(found.text):
+        return found
+    if (own := _by_its_name(found)) is not None:
+        return own
+    brackets = _WHOLE.finditer(found.text.translate(_LIKE_BRACKETS))
+    told = [(one, unit) for one in brackets if (unit := unit_or_none(one[0][1:-1])) is not None
+            and any(unit.dimension)]  # fmt: skip
+    if len(told) == 1:  # Force [kN] (filtered), Force [kN] CH3
+        before = found.text[: told[0][0].start()].strip()
+        return replace(found, name=before or found.name, unit=told[0][1], problem="")
+    if found.problem:
+        return found
+    parted = _PARTED.fullmatch(found.text)
+    unit = unit_or_none(parted["unit"]) if parted else None
+    if parted and unit is not None and (parted["by"].strip() or _fits(parted["name"], unit)):
+        return replace(found, name=parted["name"], unit=unit)
+    return _by_slash(found)
 
 
-def _degrees(column: Column, spelled: str = "") -> Column | None:
-    """Return a column in degrees that are written "C" or "F"; None for another quantity.
+def _fits(name: str, unit: Unit) -> bool:
+    """Return whether a name says the quantity of a unit; g may stand for ground."""
+    meant = meaning(name, None)
+    return unit.name != "g" and meant is not None and meant.quantity == quantity_of_unit(unit.name)
+
+
+def _by_its_name(column: Column, spelled: str = "") -> Column | None:
+    """Return a column in a unit that its name tells: degrees "C" or "F", gravity "G"; else None.
 
     F alone is mostly a force: it is that of Fahrenheit where the name is one of a temperature.
     """
+    bracket = _BRACKETS.fullmatch(column.text)
+    gravity = spelled or (bracket and (bracket["square"] or bracket["round"])) or ""
+    meant = meaning(column.name, None)
+    if gravity in ("G", "mG") and meant is not None and meant.quantity == "acceleration":
+        return replace(column, unit=parse_unit(gravity.lower()), problem="", written="")
     match = _TEMPERATURE.fullmatch(column.text) if not spelled else None
     if match is None and not _DEGREES.fullmatch(spelled):
         return None
@@ -161,8 +185,8 @@ def titles(
 def _in_unit(column: Column, text: str) -> Column:
     """Return a column in the unit that a row of units says; in none where its title denies it."""
     unit = row_unit(text)
-    if unit is None and (degrees := _degrees(column, text.strip("[]() "))) is not None:
-        return degrees
+    if unit is None and (own := _by_its_name(column, text.strip("[]() "))) is not None:
+        return own
     if unit is not None and _differs(column, unit):
         assert column.unit is not None
         problem = f"the title says {column.unit.name}, and the row of units {unit.name}."
@@ -297,8 +321,7 @@ def unit_or_none(text: str) -> Unit | None:
     """Return a unit, or None where the text spells none."""
     if not text.strip():
         return None
-    bare = text.strip().rstrip(".")  # "in.", "lbs.", "sec."
-    for spelled in (text, _RENAMED.get(bare.lower(), bare)):
+    for spelled in (_renamed(text), text.strip().rstrip(".")):
         try:
             return parse_unit(spelled)
         except UnitError:
@@ -306,29 +329,43 @@ def unit_or_none(text: str) -> Unit | None:
     return None
 
 
+def _renamed(text: str) -> str:
+    """Return a unit as bristle spells it where instruments spell it otherwise."""
+    return _RENAMED.get(text.strip().rstrip(".").lower(), text)  # "in.", "lbs.", "sec."
+
+
 # What instruments print and no standard knows, some in capitals.
 _SPELLINGS = {
-    "V": "volt, volts",
-    "A": "amp, amps, ampere, amperes",
+    "V": "volt, volts, в",
+    "mV": "millivolt, millivolts",
+    "A": "amp, amps, ampere, amperes, \u0430",
     "mA": "milliamp, milliamps",
     "%": "percent, per cent, pct",
     "T": "tesla",
-    "kN": "kilonewton, kn",
-    "mm": "millimeter, millimetre, millimeters, mm",
-    "mm/s": "mm/sec, mm/s",
-    "m/s": "m/sec, m/s",
+    "N": "newton, newtons, н",
+    "kN": "kilonewton, kilonewtons, kilo-newton, kn, кн",
+    "kgf": "kp, kilopond, kg-f, kg f, kg_f",
+    "lbf": "lbs, lb, lbf, lb-f, lb f, lb_f",
+    "kip": "kip, kips, klbf, klbs, klb",
+    "um": "micron, microns, micrometer, micrometre, micrometers, micrometres, µ, μ",
+    "mm": "millimeter, millimetre, millimeters, millimetres, mm, мм",
+    "cm": "centimeter, centimetre, centimeters, centimetres",
+    "m": "meter, metre, meters, metres, м",
+    "in": 'inch, inches, in, "',
+    "mil": "mils, thou",
+    "mm/s": "mm/sec, mm/s, mms-1, mms^-1",
+    "m/s": "m/sec, m/s, ms-1, ms^-1",
     "in/s": "in/sec, in/s",
-    "h": "hour",
-    "N": "newton, newtons",
-    "s": "sec, secs, second, seconds, sekunden, s",
-    "ms": "msec, msecs, millisecond, milliseconds, millisekunden, ms",
-    "us": "microseconds, usec",
-    "min": "minute, minutes, mins",
-    "m": "meter, metre",
-    "kip": "kip, kips, klbf, klbs",
-    "lbf": "lbs, lb, lbf",
-    "in": "inch, in",
-    "g": "g's",
+    "m/s2": "ms-2, ms^-2",
+    "mm/s2": "mms-2, mms^-2",
+    "g": "g's, g_n, gn",
     "Gal": "gal, gals",
+    "h": "hour, hours, hr, hrs",
+    "min": "min, minute, minutes, mins, minuten",
+    "s": "sec, secs, second, seconds, sekunden, sek, seg, s, \u0441, сек",
+    "ms": "msec, msecs, millisecond, milliseconds, millisekunden, ms, мс",
+    "us": "microseconds, usec",
+    "Hz": "hertz, hz",
+    "kHz": "khz",
 }
 _RENAMED = {text: unit for unit, texts in _SPELLINGS.items() for text in texts.split(", ")}

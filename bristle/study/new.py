@@ -404,6 +404,10 @@ def _refuse_incomplete(
     def lacks(what: str, choice: str) -> None:
         """Say what no column can be, and how one is named where one is left to name."""
         way = f"--channel {choice}" if free else "no other column of numbers is left"
+        for text in free:
+            own = table.find(text).stated
+            if own and any(_may_be(table, text, quantity) for quantity in what.split()):
+                way = f'"{text}" is in {own}, in which none is' + ", but in kgf" * (own == "kg")
         wrong.append(f"no column can be {what}: {way}")
 
     if rig == "bench":

@@ -37,22 +37,30 @@ from .study_file import EXCLUDE, ROLES, TEST, RunFile, Settings
 # measured motion, and numbers before the mark that count the runs are no part of a level. What
 # stays open is not taken.
 
-DOUBTFUL = "_- xXdD'~=;"
+_HARDLY = "kKvVcCoO"
+DOUBTFUL = f"_- xXdD'~=;#^:\u2013\u2014{_HARDLY}"
 """What may part two numbers, or be a decimal mark."""
 
 SPELLED = {
-    "pct": "%", "percent": "%", "C": "degC", "inch": "in", "PSI": "psi", "Nm": "N.m",
+    "pct": "%", "percent": "%", "C": "degC", "inch": "in", "PSI": "psi", "Nm": "N.m", "hz": "Hz",
+    "HZ": "Hz", "MM": "mm",
+    **{word: word[0].upper() for word in ("amp", "Amp", "AMP", "ampere", "Ampere", "volt", "Volt")},
 }  # fmt: skip
 """Units as names spell them."""
 
-_LETTERS = "xXdD'~=;"  # of these, which hardly part numbers
-_POINTS = ".,\u00b7\u2219\u22c5"  # and raised points: 0·5A
-_SURE = rf"(?:[{_POINTS}]|[pP][tT]?|point|dot)"  # "1p5", where a point would end a name
+_LETTERS = DOUBTFUL[3 : -len(_HARDLY)]  # of these, which hardly part numbers
+_POINTS = ".,\u00b7\u2219\u22c5\u2027\u066b\uff0e"  # and raised points: 0·5A
+# "1p5", where a point would end a name
+_SURE = rf"(?:[{_POINTS}]|[pP][tT]?|point|dot|[kK]omma|comma|[pP]unkt)"
 _NO_DECIMALS = rf"(?<![\d.])(?<!\d[{_POINTS}])"  # of 0,5_1Hz, "5_1" is no number
 _OF_LABELS = {"pressure": "psi|PSI|mbar|bar|hPa|kPa|MPa|Pa", "load": "kN|lbf", "torque": "Nm"}
 """Units that tell a label by themselves, which is then called by both: pressure_psi."""
 _UNITS_IN_NAMES = "|".join(
-    ["mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|inch|in|degC|degF|C", *_OF_LABELS.values()]
+    [
+        "mA|[aA]mperes?|[aA]mps?|AMP|A|mV|[vV]olts?|V|mT|pct|percent|%|Hz|hz|HZ|mm|MM|cm|um|inch|in",
+        "degC|degF|C",
+        *_OF_LABELS.values(),
+    ]
 )
 SIGN = r"(?:(?<![^_= ])-)?"
 """T=-10C and cold_-10C have one; in run-10C the minus parts words."""
@@ -62,6 +70,7 @@ _AFTER_UNIT = re.compile(
     rf"(?<![\d.])({SIGN}\d+)({_UNITS_IN_NAMES})(\d+)(?![A-Za-z0-9.,%])"
 )  # 0A5, as resistors are marked
 _NO_POWER = r"(?<!\d[eE])(?<!\d[eE][-+])"  # 5E-1A is half an ampere, and not 1 A: it is not read
+_SMALL = ("mA", "mV", "mT")  # their numbers are whole
 _UNIT = "unit"  # the mark of these
 _DIGITS = {"0", "5", "00", "25", "50", "75"}  # decimals that hardly count repeated runs
 
@@ -127,12 +136,12 @@ def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
         }
         found = [after.get(one[0], one) for one in found]
     for start, text, spelled, whole in found:
-        unit = SPELLED.get(spelled, spelled)
+        unit = SPELLED.get(spelled) or SPELLED.get(spelled.removesuffix("s"), spelled)
         name = quantity_of(unit)
         if name in out:
             twice.add(name)
         value = value_of(text)
-        if digits := reading.digits.get(name, 0):
+        if (digits := reading.digits.get(name, 0)) and not spelled.startswith(_SMALL):
             value /= 10.0**digits
         letter = re.search(r"[A-Za-z]*$", stem[:start])
         before = letter.group() if letter else ""
@@ -237,6 +246,8 @@ def _by_names(
     if any(len(one) != 2 for one in used) or not used:
         return 0
     heads, tails = [one[0] for one in used], [one[1] for one in used]
+    if mark in _HARDLY:  # a unit, as in 20C2A, unless the motion says otherwise
+        return 0 if "0" in heads else -1
     if mark == _UNIT:
         of_head = [sorted({int(t) for h, t in used if h == head}) for head in {*heads}]
         if all(one == list(range(1, len(one) + 1)) for one in of_head):
@@ -317,8 +328,13 @@ def _digits(
         stated = [(one[name].value, tone) for one, tone in zip(plain, tones, strict=True) if tone]
         if (power := _power([one for one in stated if one[0] > 0.0], name)) is not None:
             powers[name] = power
-    known = {wide[name]: power for name, power in powers.items()}
-    digits = {name: known[size] for name, size in wide.items() if known.get(size, 0) > 0}
+    alike = {size: {p for n, p in powers.items() if wide[n] == size} for size in wide.values()}
+    known = {
+        name: powers[name] if name in powers else next(iter(alike[size]))
+        for name, size in wide.items()
+        if name in powers or len(alike[size]) == 1
+    }
+    digits = {name: power for name, power in known.items() if power > 0}
     why = []
     if digits:
         name = next(iter(digits))
@@ -328,7 +344,7 @@ def _digits(
         )
     doubts = {}
     for name in wide:
-        if name in digits or known.get(wide[name]) == 0:
+        if name in known:
             continue
         text = next(text for text in texts[name] if int(text))
         doubts[name] = f'"{text}" may stand for {text[0]}.{text[1:]}; --runs FILE says it then'
@@ -572,9 +588,16 @@ def _offered(
     shared = [name for name in tokens[0] if all(name in one for one in tokens)] if tokens else []
     given = {pattern.partition("=")[0] for pattern in choices.labels}
     found, notes = [Facts() for _ in files], []
+    known = commanded or choices.levels or choices.table
+    drives = [] if known else [name for name in shared if name in DRIVE]
+    if len(drives) > 1:
+        ways = " or ".join(f"--level '{tokens[0][name].pattern}'" for name in drives)
+        notes.append(f"the names tell {' and '.join(drives)}: {ways} says which is the command")
+    elif not drives and not known:
+        notes += _in_some_names(files, tokens)
     for name in shared:
         drive = name in DRIVE
-        if (drive and (commanded or choices.levels or choices.table)) or name in given:
+        if (drive and (known or len(drives) > 1)) or name in given:
             continue
         if name in reading.open:
             notes.append(reading.open[name])
@@ -601,6 +624,20 @@ def _offered(
             more = Facts(levels={name: value}) if drive else Facts(labels={name: value})
             found[k] = found[k].and_(more)
     return found, [*notes, *(reading.why if notes else ())]
+
+
+def _in_some_names(files: Sequence[Path], tokens: Sequence[Mapping[str, Token]]) -> list[str]:
+    """Return that most names tell the level of a command, and one does not."""
+    for name in DRIVE:
+        own = [one[name].text for one in tokens if name in one]
+        if 2 * len(own) > len(files):
+            other = next(file for file, one in zip(files, tokens, strict=True) if name not in one)
+            return [
+                f'"{own[0]}" and the like are in {len(own)} of {len(files)} names, and not in '
+                f'"{other.name}": no {name} is taken. --runs FILE, a table with a row per file, '
+                "says it"
+            ]
+    return []
 
 
 def _counts(values: Sequence[float]) -> bool:

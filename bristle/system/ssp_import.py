@@ -149,8 +149,13 @@ class _Flattener:
                 if name not in variables:
                     text = f'has the connector "{name}", which its FMU {block.source} lacks.'
                     raise self.package.error(block.where, text)
+                own = variables[name]
+                for told, right in ((connector.kind, own.causality), (connector.type, own.kind)):
+                    if told not in ("", right) and {told, right} != {"inout", "input"}:
+                        text = f'calls the connector "{name}" {told}; in its FMU it is {right}.'
+                        self.package.note(block.where, text)
                 if connector.unit is not None:
-                    self._compare_units(block.where, name, connector.unit, variables[name].measure)
+                    self._compare_units(block.where, name, connector.unit, own.measure)
 
     def _compare_units(self, where: str, name: str, told: Measure, own: Measure | None) -> None:
         """Say where the package names another unit than the FMU: by SSP the package decides."""

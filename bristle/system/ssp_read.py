@@ -14,7 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from ..errors import FmuError, ScenarioError, UnitError
-from ..fmu.archive import MAX_TOTAL, member_names, open_archive, parse_xml, read_member
+from ..fmu.archive import DESCRIPTION, MAX_TOTAL, member_names, open_archive, parse_xml, read_member
 from ..fmu.description import KINDS, Value
 from ..units import Measure, definitions
 
@@ -305,9 +305,11 @@ def _set(binding: Element, package: Package, file: str, where: str) -> list[Boun
         for kind in children(child(found, "Enumerations"), "Enumeration")
         for item in children(kind, "Item")
     }
-    given = []
+    given: list[BoundValue] = []
     for parameter in children(child(found, "Parameters"), "Parameter"):
         inside = f'{file}: <Parameter "{parameter.get("name", "")}">'
+        if any(one.name == parameter.get("name", "") for one in given):
+            raise package.error(inside, "stands twice in its set; one value is right.")
         given += [
             BoundValue(
                 parameter.get("name", ""),
@@ -447,7 +449,10 @@ def read_structure(package: Package) -> SystemStructure:
         For what is wrong or not read, with file and element.
     """
     if STRUCTURE not in package.names:
-        raise package.error(STRUCTURE, "is not in the package, so it is no SSP.")
+        own = (one for one in sorted(package.names) if one.lower().endswith(STRUCTURE.lower()))
+        there = next(own, DESCRIPTION if DESCRIPTION in package.names else "")
+        why = f', where "{there}" is' if there else ""
+        raise package.error(STRUCTURE, f"is not at the root of the package{why}, so it is no SSP.")
     root = package.xml(STRUCTURE, "SystemStructureDescription")
     experiment = child(root, "DefaultExperiment")
     stop = None
@@ -546,6 +551,8 @@ class _Reader:
             text = f'type "{kind}" is not read; {FMU_TYPE} and {SSD_TYPE} are.'
             raise self.package.error(where, text)
         member = self.package.member(source, self.file, where)
+        if (form := entry.get("implementation", "any")) not in ("any", "CoSimulation"):
+            self.package.note(where, f'asks for "{form}", and is run as co-simulation.')
         if kind == FMU_TYPE:
             return self._block(entry, where, source=member)
         root = self.package.xml(member, "SystemStructureDescription")

@@ -340,7 +340,7 @@ GOOD = "time_s,acc_g\n0.00,0.1\n0.01,0.2\n0.02,0.3\n0.03,0.4\n"
         (GOOD.replace("acc_g", "a_g"), r'"a_g": .* Write a_g \[m/s2\]'),
         (GOOD.replace("acc_g", "acc [m/s4]"), "no column is an acceleration"),
         (GOOD.replace("acc_g", "acc [gee]"), r'"acc \[gee\]": unit "gee" is not known'),
-        (GOOD.replace("acc_g", "acc [mg]"), "grams are not read"),
+        (GOOD.replace("acc_g", "acc [cg]"), "grams are not read"),
         (GOOD.replace("time_s", "x_mm"), "no column is a time with a unit"),
         ("time_s,t_s,acc_g\n0,0,1\n1,1,1\n", '"time_s", "t_s" could all be the time'),
         ("time_s,x_g,b [g]\n0,0,1\n1,1,1\n", None),

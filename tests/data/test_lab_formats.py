@@ -172,6 +172,19 @@ def test_a_cell_that_is_shown_in_per_cent_is_read_so(
     assert np.max(run["displacement"]) == pytest.approx(1e-3 * np.max(X))
 
 
+def test_a_cell_that_is_shown_in_thousands_is_read_so(tmp_path: Path) -> None:
+    def change(sheet, book) -> None:
+        for cell in sheet["C"][4:]:
+            cell.value, cell.number_format = 1e3 * cell.value, "#,##0.000,;-#,##0.000,"
+
+    one, other = (
+        read_table(workbook(tmp_path / name, what))
+        for name, what in (("a.xlsx", lambda *_: None), ("b.xlsx", change))
+    )
+    title = one.columns[2].text
+    np.testing.assert_allclose(other.values[title], one.values[title])
+
+
 # -- titles and units
 
 

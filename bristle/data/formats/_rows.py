@@ -53,14 +53,20 @@ class Layout:
             return next(csv.reader([line], delimiter=self.delimiter), [])
         return line.split(self.delimiter)
 
-    def fits(self, fields: Sequence[str]) -> bool:
-        """Return whether fields are a row of data: numbers where there are numbers."""
+    def fits(self, fields: Sequence[str], fewest: int = 1) -> bool:
+        """Return whether fields are a row of data: numbers where there are numbers.
+
+        Parameters
+        ----------
+        fields : of the row
+        fewest : numbers that it must have at the least
+        """
         if len(fields) != len(self.numeric):
             return False
         states = [
             state_of(one, self.comma) for one, n in zip(fields, self.numeric, strict=True) if n
         ]
-        return "word" not in states and "number" in states
+        return "word" not in states and states.count("number") >= fewest
 
 
 @dataclass
@@ -171,8 +177,7 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
     Raises
     ------
     RecordError
-        If a row has more or fewer fields than `layout` has columns; a last row that is cut short is
-        left out instead.
+        If a row has more or fewer fields than `layout` has columns.
     """
     wide = len(layout.numeric)
     rows: list[list[float]] = []
@@ -187,9 +192,6 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
         while len(fields) > wide and not fields[-1].strip():
             fields.pop()
         if len(fields) != wide:
-            if k == full[-1] and len(fields) < wide:
-                notes.append(f"line {k + 1}, the last one, is cut off and left out")
-                break
             raise RecordError(
                 f'{name}, line {k + 1}: "{shortened(lines[k].strip())}" has {len(fields)} columns, '
                 f"and the rows above it {wide}. Is the line cut, or has it decimal commas?"
@@ -264,7 +266,10 @@ def read_groups(
             kinds[k] = _refused(k, body, texts(k), layout)
     of_kind = {kind: [k for k, own in kinds.items() if own == kind] for kind in kinds.values()}
     decimal, groups = of_kind.get("decimal", []), of_kind.get("groups", [])
-    out = list(columns)
+    out = [
+        replace(one, doubt=_all_grouped(texts(k), layout)) if kinds.get(k) == "" else one
+        for k, one in enumerate(columns)
+    ]
     if groups and not decimal:
         groups = groups + [k for k in (*of_kind.get("open", []), *of_kind.get("whole", []))
                            if any(mark in text for text in texts(k))]  # fmt: skip
@@ -301,6 +306,18 @@ def _refused(k: int, body: Body, texts: list[str], layout: Layout) -> str:
             )
             break
     return ""
+
+
+def _all_grouped(texts: list[str], layout: Layout) -> str:
+    """Return the doubt in a column of which every number may have a decimal mark of its own."""
+    mark = "." if layout.comma else ","
+    own = re.compile(rf"[+-]?[1-9]\d{{0,2}}\{mark}\d{{3}}")
+    if not all(own.fullmatch(text) for text in texts if text):
+        return ""
+    return (
+        f'"{texts[0]}" is read as {texts[0].replace(mark, "")}, and nothing in the column tells '
+        f'whether its "{mark}" is a decimal mark: then give a unit a thousandth as large'
+    )
 
 
 def _kind(values: Array, texts: Callable[[Flags], list[str]], mark: str) -> str:
@@ -364,11 +381,15 @@ def _open_text(texts: list[str], mark: str) -> str:
 # Dates and times of day, as recorders of several countries write them, as seconds.
 
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
+_WITHOUT_HOURS = "%M:%S.%f"
 _DATES = (
     "%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%Y/%m/%d", "%d-%m-%Y",
-    "%m-%d-%Y",
+    "%m-%d-%Y", "%d-%b-%Y", "%d %b %Y", "%b %d %Y",
 )  # fmt: skip
-_FORMS = (*(f"{date} {clock}" for date in _DATES for clock in _CLOCKS), *_CLOCKS)
+_FORMS = (
+    *(f"{date} {clock}" for date in _DATES for clock in _CLOCKS), *_CLOCKS, _WITHOUT_HOURS
+)  # fmt: skip
+_DATE_MARK = re.compile(r"(?<=\d)[-_T/](?=\d\d?:\d\d)|(?<![^\s])0 days? ")
 _COLON = re.compile(r"(\d\d?:\d\d:\d\d):(?=\d{3,6}\b)")  # 10:00:00:250, before its milliseconds
 _DAY = 86400.0
 
@@ -376,17 +397,17 @@ _DAY = 86400.0
 def seconds_of(texts: Sequence[str]) -> Array | None:
     """Return instants as seconds since the first (n,), None where they are none.
 
-    ISO 8601, `12.03.2024 10:00:00.000` and its like, or a time of day alone, which may pass
-    midnight; seconds with a point, a comma or a colon. Of `03/12/2024` either number may be the
-    month, which matters where a date changes: what gives the shorter record counts, else the day
-    comes first.
+    ISO 8601, `12.03.2024 10:00:00.000` and its like, a time of day alone, which may pass midnight,
+    or minutes and seconds with their fraction; with a point, a comma or a colon. Of `03/12/2024`
+    either number may be the month, which matters where a date changes: what gives the shorter
+    record counts, else the day comes first.
     """
     bare = [_COLON.sub(r"\1.", text.strip().strip('"').strip()) for text in texts]
     if not bare or not bare[0]:
         return None
     found = _by_iso(bare)
     if found is None:
-        bare = [_with_point(text) for text in bare]
+        bare = [_with_point(_DATE_MARK.sub(" ", text).strip()) for text in bare]
         able = (one for form in _FORMS if (one := _by_form(bare, form)) is not None)
         day, last = (text.partition(" ")[0] for text in (bare[0], bare[-1]))
         found = (
@@ -418,6 +439,8 @@ def _by_iso(texts: Sequence[str]) -> tuple[list[datetime], bool] | None:
 
 def _by_form(texts: Sequence[str], form: str) -> tuple[list[datetime], bool] | None:
     try:
+        if form == _WITHOUT_HOURS and not all("." in text for text in texts):
+            return None  # 10:30 may be hours and minutes
         _instant(texts[0], form)  # most forms fail here
         return [_instant(text, form) for text in texts], form in _CLOCKS
     except ValueError:

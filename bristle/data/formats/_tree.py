@@ -28,18 +28,19 @@ from ._one_time import Series, by_length, on_one_time
 
 AnyArray: TypeAlias = NDArray[Any]
 
-_STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step")
+_STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step", "dx")
 _RATES = (
     "fs", "rate", "samplerate", "sample_rate", "sampling_rate", "samplingrate", "fsample", "f_s",
     "samplefrequency", "sample_frequency", "samplingfrequency", "sampling_frequency", "samplefreq",
 )  # fmt: skip
 _STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
+_SECOND, _HERTZ = parse_unit("s").dimension, parse_unit("Hz").dimension
 TELL_TIME = frozenset((*_STEPS, *_RATES, *_STARTS))
 """Names, in small letters, of numbers beside a channel that tell its time."""
 _TIMES = ("t", "time", "tout", "zeit")
 _NAMES = ("name", "label", "signalname", "channelname")
 _VALUES = ("data", "values", "value", "samples", "signal", "y")
-_UNITS = ("unit", "units")
+_UNITS = ("unit", "units", "yunit", "y_unit")
 _TELLS_NAMES = re.compile(r"name|label|header|hdr|channel|column|title|signal", re.IGNORECASE)
 _TELLS_UNITS = re.compile(r"unit|einheit", re.IGNORECASE)
 TELLS_SCALE = re.compile(r"scal(?:e|ing)|factor|sensitivity|lsb", re.IGNORECASE)
@@ -286,8 +287,8 @@ def _by_steps(found: _Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
         place, short = key.rpartition(".")[0], _short(key)
         if short in _STARTS and np.isfinite(value):
             starts[place] = value
-        elif short in (*_STEPS, *_RATES) and 0.0 < value < np.inf:
-            steps.setdefault(place, value if short in _STEPS else 1.0 / value)
+        elif step := _step_in(key, value):
+            steps.setdefault(place, step)
     if len({(starts.get(place, 0.0), step) for place, step in steps.items()}) < 2:
         return []
     clocks: dict[Any, tuple[str, AnyArray, dict[str, AnyArray]]] = {}
@@ -321,13 +322,11 @@ def _without_time(found: _Found, name: str) -> Table:
     notes = []
     timed = any(_is_time_name(key) for key in data)
     for key, value in found.scalars.items():
-        short = _short(key)
-        if timed or not 0.0 < value < np.inf or short not in (*_STEPS, *_RATES):
-            continue
-        step, unit = (value, "s") if short in _STEPS else (1.0 / value, "Hz")
-        data["time_s"] = np.arange(size) * step
-        notes.append(f"the time is made from {key} = {value:g} {unit}")
-        break
+        if not timed and (step := _step_in(key, value)):
+            data["time_s"] = np.arange(size) * step
+            unit = {True: " s", False: " Hz"}[_short(key) in _STEPS] if _tells_time(key) else ""
+            notes.append(f"the time is made from {key} = {value:g}{unit}")
+            break
     return from_arrays(data, name, dict(found.units), tuple(notes), tuple(remarks))
 
 
@@ -369,7 +368,8 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     for one, array in vectors.items():
         if one in paired:
             continue
-        called = found.named(_unit_beside(fields, one), paths[one], long[one])
+        alone = [key] if key and len(vectors) == 1 and one.lower() in _VALUES else []
+        called = found.named(_unit_beside(fields, one), *alone, paths[one], long[one])
         if _is_time_name(names[one]) and len(array) not in own and _rises(array):
             own[len(array)] = {}
             found.clocks.append((called, array, own[len(array)]))
@@ -379,7 +379,7 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     for name in added:
         if (beside := own.get(len(found.loose[name]))) is not None:
             beside[name] = found.loose.pop(name)
-    timed = bool(own) or any(_short(one) in (*_STEPS, *_RATES) for one in found.scalars)
+    timed = bool(own) or any(_step_in(one, value) for one, value in found.scalars.items())
     for one, node in fields.items():
         if isinstance(node, Leaf) and one not in vectors and node.array.size > 1:
             _matrix(found, long[one], paths[one], node, fields, timed)
@@ -659,6 +659,32 @@ def _short(key: str) -> str:
     return key.rpartition(".")[2].lower()
 
 
+def _step_in(key: str, value: float) -> float:
+    """Return the step [s] that a number tells by its name, as dt, fs, dt_ms or fs_kHz; 0 if none.
+
+    Parameters
+    ----------
+    key : name of the number
+    value : the number, in the unit of its name; in s or Hz where that has none
+    """
+    name, factor, quantity = _short(key), 1.0, ""
+    if not _tells_time(key):
+        named = title(0, key.rpartition(".")[2])
+        if named.unit is None or named.unit.dimension not in (_SECOND, _HERTZ):
+            return 0.0
+        name, factor = named.name.lower(), named.unit.factor
+        quantity = "step" if named.unit.dimension == _SECOND else "rate"
+    if not 0.0 < value < np.inf:
+        return 0.0
+    if name in _STEPS and quantity != "rate":
+        return value * factor
+    return 1.0 / (value * factor) if name in _RATES and quantity != "step" else 0.0
+
+
+def _tells_time(key: str) -> bool:
+    return _short(key) in (*_STEPS, *_RATES)
+
+
 def _header(fields: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     """Return what stands beside Channel_1_Data as Channel_1_Header, as catman writes it."""
     found = fields.get(f"{key.removesuffix('_Data')}_Header")
@@ -673,6 +699,7 @@ def _unit_beside(fields: Mapping[str, Any], key: str) -> str:
         _unit_of(_header(fields, key)),
         *(one.get(key) for one in every if isinstance(one, dict)),
         *(fields.get(f"{key}{ending}") for ending in ("_unit", "_units", "Unit")),
+        _unit_of(fields) if key.lower() in _VALUES else "",
     ]
     return next((text for text in texts if isinstance(text, str) and text), "")
 

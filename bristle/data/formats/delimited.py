@@ -18,13 +18,15 @@ from ...core.text import listed
 from ...errors import RecordError
 from ...physics.motion_file import shortened, without_end_mark
 from ...units import parse as parse_unit
+from ..channels import meaning, quantity_of_unit
 from ..table import Table
-from ..titles import Column, is_unit_row, title_rows, titles
+from ..titles import Column, is_unit_row, title, title_rows, titles, unit_or_none
 from ._rows import (
     Body,
     Layout,
     is_comment,
     is_grouped,
+    plain_number,
     read_fast,
     read_groups,
     read_slow,
@@ -38,6 +40,17 @@ HEADER = 4
 
 _TOKEN = re.compile(r'"[^"]*"|\S+(?: ?[\[(][^\])]*[\])])?')  # a title and its unit in brackets
 _GROUP = re.compile(r"\d{3}(?:\.\d*)?")
+_QUOTED = 8
+"""Lines at most in which a quoted title may be written."""
+_BEHIND = 40
+"""Lines at most that may stand behind the numbers: sums, remarks, a line that is cut."""
+_SAMPLED = re.compile(
+    r"(?P<what>\b(?:fs|dt)\b"
+    r"|(?:sampl\w*|scan|acquisition)[ _-]*(?:rate|freq\w*|interval|period|time)"
+    r"|(?:abtast|mess)(?:rate|frequenz|intervall|zeit))(?P<unit>[^\d\n]*?)"
+    r"(?P<value>\d+(?:[.,]\d+)*(?:[eE][+-]?\d+)?)[;,\s]*(?P<after>[A-Za-zµ]+)?",
+    re.IGNORECASE,
+)
 _WIDE = 60
 """Values in a row of a table that is wider than long, from which on its channels are rows."""
 _RIGHT = 'Titles with units are, for example, "time [s];force [kN]".'
@@ -61,12 +74,13 @@ def read(content: bytes, name: str) -> Table:
         cannot be told from those between columns: with the line.
     """
     text, notes = decoded(content, name)
-    lines = lines_of(text)
+    lines = _with_whole_titles(lines_of(text.replace("\u2212", "-")))
     _refuse_channels_as_rows(lines, name)
     layout = _find_layout(lines, name)
     first = _first_row(lines, layout)
     columns = _header(lines[:first], layout, name, first, notes)
-    lines = _without_repeated(lines, first, layout, notes)
+    lines = _without_repeated(lines, first, layout, name, notes)
+    lines, remarks = _without_end(lines, layout, notes)
     body = read_fast(lines, first, layout) or read_slow(lines, first, layout, name)
     columns = read_groups(columns, body, lines, layout)
     columns, body = _without_empty(columns, body)
@@ -77,7 +91,106 @@ def read(content: bytes, name: str) -> Table:
     columns = _instants(columns, body, lines, layout)
     not_numeric = {columns[index].text: text for index, text in body.not_numeric.items()}
     values = {column.text: body.values[k] for k, column in enumerate(columns)}
-    return Table(name, columns, values, body.lines, "line", not_numeric, (*notes, *body.notes))
+    if made := _time_by_rate(columns, lines[:first], len(body.lines)):
+        column, values[made[0].text], remark = made
+        columns, remarks = (*columns, column), [*remarks, remark]
+    return Table(
+        name, columns, values, body.lines, "line", not_numeric, (*notes, *body.notes),
+        tuple(remarks),
+    )  # fmt: skip
+
+
+def _with_whole_titles(lines: list[str]) -> list[str]:
+    """Return the lines with quoted titles of several lines in one, and empty ones behind it."""
+    out = list(lines)
+    for k, line in enumerate(lines[:_WIDE]):
+        if not out[k] or line.count('"') % 2 == 0:
+            continue
+        for end in range(k + 2, min(k + 1 + _QUOTED, len(lines)) + 1):
+            whole = " ".join(lines[k:end])
+            if whole.count('"') % 2 == 0:
+                out[k:end] = [whole, *[""] * (end - k - 1)]
+                break
+    return out
+
+
+def _without_end(lines: list[str], layout: Layout, notes: list[str]) -> tuple[list[str], list[str]]:
+    """Return the lines without those behind the numbers, and remarks on them.
+
+    They are sums, such as a row of maxima, words, or a last line that is cut off: in a number as
+    well, where all numbers above it have more decimals.
+    """
+    full = [k for k, line in enumerate(lines) if line.strip() and not is_comment(line)]
+    last = next(k for k in reversed(full) if layout.fits(layout.split(_without_ends(lines[k])), 0))
+    behind = [k for k in full if k > last]
+    if not behind and last == len(lines) - 1 and _is_cut(lines, full, layout):
+        behind = [last]
+    if not behind or len(behind) > _BEHIND:
+        return lines, []
+    out = [*lines[: behind[0]], *[""] * (len(lines) - behind[0])]
+    shown = shortened(lines[behind[0]].strip())
+    words = any(state_of(one, layout.comma) == "word" for one in layout.split(_without_ends(shown)))
+    if len(behind) == 1 and not words:
+        notes.append(f"line {behind[0] + 1}, the last one, is cut off and left out")
+        return out, []
+    several = f"s {behind[0] + 1} to {behind[-1] + 1}" if len(behind) > 1 else f" {behind[0] + 1}"
+    return out, [f'line{several} behind the numbers, "{shown}", left out']
+
+
+def _is_cut(lines: list[str], full: list[int], layout: Layout) -> bool:
+    """Return whether the last number of a text without an end of line has lost digits."""
+    mark = "," if layout.comma else "."
+    ends = [layout.split(_without_ends(lines[k]))[-1].partition(mark)[2] for k in full[-60:]]
+    sizes = {len(one) for one in ends[:-1] if one}
+    return len(ends) == 60 and len(sizes) == 1 and len(ends[-1]) < min(sizes)
+
+
+def _time_by_rate(
+    columns: tuple[Column, ...], above: list[str], rows: int
+) -> tuple[Column, Array, str] | None:
+    """Return a time (rows,) s by the one rate that lines above the titles state.
+
+    None where a column may tell the time, or titles are missing.
+    """
+    meant = [meaning(one.name, one.stated) for one in columns]
+    times = (quantity_of_unit(one.stated) == "time" for one in columns)
+    told = any(one is not None and one.quantity == "time" for one in meant)
+    if told or any(times) or all(one.text == f"column {one.index + 1}" for one in columns):
+        return None
+    found = {
+        step: (k, line)
+        for k, line in enumerate(above)
+        if (match := _SAMPLED.search(line)) and (step := _step_of(match)) > 0.0
+    }
+    if len(found) != 1:
+        return None
+    ((step, (k, line)),) = found.items()
+    remark = f'the time is made from line {k + 1}, "{shortened(line.strip())}": {step:g} s a sample'
+    return title(len(columns), "time [s]"), np.arange(rows, dtype=np.float64) * step, remark
+
+
+def _step_of(match: re.Match[str]) -> float:
+    """Return the sampling step [s] that a line states, 0 where it is not clear."""
+    is_rate = re.search("rate|freq|fs", match["what"].lower()) is not None
+    text = match["value"]
+    if is_rate and is_grouped(text, comma=False):  # 12,800 Hz
+        text = text.replace(",", "")
+    elif is_rate and is_grouped(text, comma=True):  # 1.000 Hz may be either
+        return 0.0
+    value = plain_number(text.replace(",", "."))
+    bracket = re.search(r"[\[(]([^\])]*)", match["unit"])
+    spelled = bracket[1] if bracket else match["after"] or ""
+    unit = unit_or_none(spelled)
+    if not value > 0.0 or (bracket and unit is None):
+        return 0.0
+    if unit is None or unit.dimension not in (
+        parse_unit("Hz").dimension,
+        parse_unit("s").dimension,
+    ):
+        return 1.0 / value if is_rate else 0.0
+    if unit.dimension == parse_unit("Hz").dimension:
+        return 1.0 / (value * unit.factor)
+    return 0.0 if is_rate else value * unit.factor
 
 
 def _refuse_channels_as_rows(lines: list[str], name: str) -> None:
@@ -113,6 +226,10 @@ def decoded(content: bytes, name: str) -> tuple[str, list[str]]:
         except UnicodeDecodeError as error:
             raise RecordError(f"{name}: this is no whole UTF-16 text ({error.reason}).") from None
     content = without_end_mark(content)
+    for form, high in (("utf-16-le", content[1:4096:2]), ("utf-16-be", content[:4096:2])):
+        if len(high) > _WIDE and high.count(0) > 0.9 * len(high):
+            return content[: len(content) // 2 * 2].decode(form, "replace"), []
+    content = content.rstrip(b"\0") or content
     if b"\0" in content[:65536]:
         raise RecordError(
             f"{name}: this is binary data of a kind that is not read. "
@@ -312,13 +429,20 @@ def _goes_on(rows: list[list[str]], layout: Layout) -> bool:
     return abs((second - first) - (third - second)) <= 0.01 * abs(third - second)
 
 
-def _without_repeated(lines: list[str], first: int, layout: Layout, notes: list[str]) -> list[str]:
+def _without_repeated(
+    lines: list[str], first: int, layout: Layout, name: str, notes: list[str]
+) -> list[str]:
     """Return the lines without titles that come again, with what stands above and below them.
 
-    Test machines write their header before every block of a test.
+    Test machines write their header before every block of a test; RecordError if units differ.
     """
+
+    def tells_units(line: str) -> bool:
+        return is_unit_row(_title_fields(line, layout, len(layout.numeric)))
+
     above = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), -1)
-    while above > 0 and is_unit_row(_title_fields(lines[above], layout, len(layout.numeric))):
+    units = lines[above].strip() if above > 0 and tells_units(lines[above]) else ""
+    while above > 0 and tells_units(lines[above]):
         above -= 1
     title = lines[above].strip() if above >= 0 else ""
     if not title or is_comment(title):
@@ -329,6 +453,11 @@ def _without_repeated(lines: list[str], first: int, layout: Layout, notes: list[
         for step in (-1, 1):
             at = k
             while first <= at < len(lines) and not _is_data(lines[at], layout):
+                if units and at > k and lines[at].strip() != units and tells_units(lines[at]):
+                    raise RecordError(
+                        f'{name}, line {at + 1}: the units are "{shortened(lines[at].strip())}" '
+                        f'here, and "{shortened(units)}" above. Save each block as a file.'
+                    )
                 out[at] = ""
                 at += step
     if again:
@@ -340,9 +469,12 @@ def _title_fields(line: str, layout: Layout, wide: int) -> list[str]:
     """Return the titles in a line; there may be one less or more than numbers, left empty."""
     stripped = line.strip("\n\r ")
     fields = layout.split(stripped) if layout.delimiter else []
+    others = (stripped.split(mark) for mark in ";\t|,") if len(fields) < 2 else ()
+    fields = next((one for one in others if len(one) == wide > 1), fields)
     if len(fields) < 2:  # blanks may part titles above a table of tabs
         fields = re.split(r"\s{2,}|\t", stripped)  # titles of several words stand further apart
-        if len(fields) != wide and not re.match(r"\S+:\s", stripped):  # "Time: 1.8 s" is no title
+        said = re.match(r"[^:]*\S:\s", stripped)  # "Time: 1.8 s" is no title
+        if len(fields) != wide and not said:
             fields = _TOKEN.findall(stripped)
     if len(fields) == wide - 1 and layout.delimiter:
         fields.append("")

@@ -39,6 +39,7 @@ _CELL = re.compile(rb"<c [^>]*[^>/]>.*?</c>", re.DOTALL)
 _ANY_FORMULA = re.compile(rb"<f[ >/]")
 _VALUE = re.compile(rb"<v(?: [^>/]*)?>[^<]")
 _QUOTED = re.compile(r'"[^"]*"|\\.')  # what a number's format writes as it stands
+_THOUSANDS = re.compile(r"[0#?](,+)(?![0#?])")
 _PLACE = re.compile(rb'r="([A-Z]+\d+)"')
 
 
@@ -172,7 +173,7 @@ def _finished(book: Any, sheet: _Sheet, table: Table) -> Table:
     _refuse_merged(sheet.part, table, lines[1:first], sheet.where)
     cells = next(book[sheet.title].iter_rows(min_row=first, max_row=first))
     forms = [_QUOTED.sub("", cell.number_format or "") for cell in cells]
-    table = _in_percent(table, {k for k, form in enumerate(forms) if "%" in form})
+    table = _as_shown(table, [form.partition(";")[0] for form in forms])
     formulas = len(_formulas(sheet.part))
     told = [f"{formulas} cells hold formulas: their stored values are taken"] if formulas else []
     return replace(table, notes=(*told, *table.notes))
@@ -197,18 +198,23 @@ def _refuse_large(archive: zipfile.ZipFile, name: str) -> None:
         )
 
 
-def _in_percent(table: Table, shown: set[int]) -> Table:
-    """Return a table whose values are what cells show: 50 % is stored as 0.5.
+def _as_shown(table: Table, forms: Sequence[str]) -> Table:
+    """Return a table whose values are what cells show: 50 % is stored as 0.5, 1.9 kN as 1911.
 
     Parameters
     ----------
     table : as read from the sheet's text
-    shown : the columns whose cells are shown in per cent; what has another unit stays as it is
+    forms : the format of the numbers in each column; a comma behind the digits shows thousands, and
+        what has another unit than % is in none
     """
     values, notes, percent = dict(table.values), list(table.notes), parse_unit("%")
     columns = list(table.columns)
     for k, column in enumerate(columns):
-        if column.index not in shown or column.problem or column.unit not in (None, percent):
+        form = forms[column.index] if column.index < len(forms) else ""
+        if match := _THOUSANDS.search(form):
+            values[column.text] = values[column.text] / 1e3 ** len(match[1])
+            notes.append(f'"{column.text}" is shown by its format "{form}", and is taken so')
+        if "%" not in form or column.problem or column.unit not in (None, percent):
             continue
         values[column.text] = 100.0 * values[column.text]
         columns[k] = replace(column, unit=percent)

@@ -202,7 +202,7 @@ def _at2(lines: Sequence[str], name: str) -> _Record:
     points = number(re.sub("[,' ]", "", whole.upper()).replace("D", "E"), name, last + 1)
     spacing = number(fraction.upper().replace("D", "E"), name, last + 1)
     second = unit_or_none((spelled or "s").rstrip("."))
-    if second is None or second.dimension != parse_unit("s").dimension:
+    if second is None or second.factor > 1.0 or second.dimension != parse_unit("s").dimension:
         raise PhysicsError(
             f'{where}: DT is in "{spelled}", which is no unit of time that is known. '
             "SEC or MSEC is right."
@@ -247,10 +247,16 @@ def _esm(lines: Sequence[str], name: str) -> _Record:
         raise _not_accelerations(kind[0].lower(), f"{name}, line {kind[1]}")
     (count, said), (step, at) = of("NDATA"), of("SAMPLING_INTERVAL_S")
     unit, line = of("UNITS")
-    return _Record(
-        int(number(count, name, said)), number(step, name, at),
-        _factor(unit, f"{name}, line {line}"), len(found), said,
-    )  # fmt: skip
+    points, spacing = int(number(count, name, said)), number(step, name, at)
+    text, place = found.get("DURATION_S", ("", 0))
+    lasts = number(text, name, place) if text else points * spacing
+    whole = sum(bool(line.strip()) for line in lines[len(found) :]) == points
+    if whole and abs(lasts - points * spacing) > 2.0 * spacing + 0.01 * lasts:
+        raise PhysicsError(
+            f"{name}, line {place}: {points} values, {spacing:g} s apart, do not last {lasts:g} s. "
+            "The file is cut or has been edited; fetch it again."
+        )
+    return _Record(points, spacing, _factor(unit, f"{name}, line {line}"), len(found), said)
 
 
 def _knet(lines: Sequence[str], name: str) -> _Record:

@@ -44,13 +44,18 @@ def read(content: bytes, name: str) -> Table:
 
 def _group(group: Any, h5py: Any) -> dict[str, Node]:
     """Return what is below a group, its rate as well; what MATLAB keeps for itself is left."""
-    return {key: Leaf(np.asarray(value)) for key, value in _times(group).items()} | {
-        key: node
-        for key, item in group.items()
-        if not key.startswith("#") and item is not None
-        for node in [_node(item, group.file, h5py)]
-        if node is not None
-    }
+    told = {"unit": unit} if (unit := _unit(group)) else {}
+    return (
+        {key: Leaf(np.asarray(value)) for key, value in _times(group).items()}
+        | told
+        | {
+            key: node
+            for key, item in group.items()
+            if not key.startswith("#") and item is not None
+            for node in [_node(item, group.file, h5py)]
+            if node is not None
+        }
+    )
 
 
 def _node(item: Any, file: Any, h5py: Any) -> Node | None:

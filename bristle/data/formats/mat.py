@@ -1,4 +1,4 @@
-"""MAT files up to version 7 (7.3 is HDF5): vectors, columns of matrices, fields of structures."""
+"""MAT up to version 7 (7.3 is HDF5), and NPZ: vectors, columns of matrices, structures."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ._tree import Leaf, Node, Unread, table_of
 
 
 def recognises(content: bytes, suffix: str) -> bool:
-    """Return whether a file is MAT, by its first bytes or its ending."""
-    return content.startswith(b"MATLAB 5.0") or suffix == ".mat"
+    """Return whether a file is MAT or NPZ, by its first bytes or its ending."""
+    return content.startswith(b"MATLAB 5.0") or suffix in (".mat", ".npz")
 
 
 def read(content: bytes, name: str) -> Table:
-    """Return the table in a MAT file.
+    """Return the table in a MAT file, or an NPZ file.
 
     Vectors are columns; a matrix gives `name_1`, `name_2`, or what a list of names beside it says.
     Fields of structures are called `structure.field`, signals of Simulink by their labels. An array
@@ -34,10 +34,14 @@ def read(content: bytes, name: str) -> Table:
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
+    kind = "NPZ" if content.startswith(b"PK") else "MAT"
     try:
-        loaded = loadmat(io.BytesIO(content), squeeze_me=True, struct_as_record=False)
+        if kind == "NPZ":
+            loaded = {**np.load(io.BytesIO(content), allow_pickle=False)}
+        else:
+            loaded = loadmat(io.BytesIO(content), squeeze_me=True, struct_as_record=False)
     except (MatReadError, *DAMAGED) as error:
-        raise RecordError(f"{name}: no MAT file, or damaged ({error}).") from None
+        raise RecordError(f"{name}: no {kind} file, or damaged ({error}).") from None
     tree = {key: _node(value) for key, value in loaded.items() if not key.startswith("__")}
     return table_of(tree, name)
 

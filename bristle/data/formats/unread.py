@@ -13,12 +13,15 @@ MARKS = {
     b"PK\x03\x04": "this is a zip archive and no Excel workbook. Unpack it.",
     b"\xd0\xcf\x11\xe0": "this is an old Excel workbook. Save it as .xlsx, or the sheet as CSV.",
     b"PK\x05\x06": "this is an empty zip archive.",
-    b"\x93NUMPY": "this is an array of NumPy, which is not read. Save it as CSV with titles.",
+    b"\x93NUMPY": "this is an array of NumPy without names. Save named ones with numpy.savez.",
     b"MDF     ": "this is MDF, which is not read. Save it as CSV, Parquet or MAT (version 7).",
 }
 """The first bytes of a format, and what a user is told."""
 
 TEXTS = {
+    re.compile(
+        rb"-1\s*\n\s*(?:15|55|58b?|82|151|164|24\d\d)\b[^,;\t]*\n"
+    ): "a universal file (UFF)",
     re.compile(rb"<(\?xml|!doctype|html)", re.IGNORECASE): "XML or HTML",
     re.compile(rb'\{\s*["}]|\[\s*(?:[{"\[\]]|(?:[-\d.eE+]+|null|true|false)\s*,)'): "JSON",
 }

@@ -46,6 +46,11 @@ NOTES = {
         value("a") + value("b"), MAPPING, STEP,
         ['no parameter is called "c": left aside.', "the mapping does not name it: left aside."],
     ),
+    "a connector of another kind": (
+        "", "", STEP, ['calls the connector "u" output; in its FMU it is input.',
+                       'calls the connector "u" Integer; in its FMU it is Real.'],
+    ),
+    "another form of FMU": ("", "", STEP, ['asks for "ModelExchange", and is run as co-sim']),
     "no step": (value("gain"), "", STOP, ASSUMED),
     "no stop": ("", "", "", ["The package names no stop: 1 s", "names no step: 0.001 s is taken"]),
     "a stop that is no whole number of steps": (
@@ -70,7 +75,12 @@ def test_run_check_and_import_say_the_same(
 ) -> None:
     values, mapping, experiment, notes = NOTES[case]
     inner = bound(values, mapping) if values else ""
+    if "connector" in case:
+        one = '<d:Connector name="u" kind="output"><c:Integer/></d:Connector>'
+        inner = f"<d:Connectors>{one}</d:Connectors>"
     body = f"<d:Elements>{component('g', inner)}</d:Elements>"
+    if "form" in case:
+        body = body.replace("<d:Component ", '<d:Component implementation="ModelExchange" ')
     package = write_ssp(tmp_path / "my.ssp", body, {"g": gain}, more=experiment)
     for _ in range(2):  # what is in the cache says it as well
         out = str(tmp_path / "run")
@@ -142,6 +152,13 @@ def test_inputs_of_all_types_are_held_and_those_without_a_start_are_told(
     assert 'The input "a.bare" has neither source nor start value: 0.0 is taken.' in said
     found = load_scenario(tmp_path / "out" / "my.toml").components["a"].values
     assert found == {"x": 1.5, "n": 4, "b": True, "s": "on", "bare": 0.0}
+
+
+def test_one_parameter_twice_in_a_set_is_refused(gain: Path, tmp_path: Path, capsys) -> None:
+    body = f"<d:Elements>{component('g', bound(value('gain') + value('gain', 4.0)))}</d:Elements>"
+    package = write_ssp(tmp_path / "my.ssp", body, {"g": gain}, more=STEP)
+    assert main(["import-ssp", str(package), "-o", str(tmp_path / "out")]) == 2
+    assert '<Parameter "gain">: stands twice in its set' in capsys.readouterr().err
 
 
 def test_a_package_whose_scenario_has_a_mistake_is_written_and_told(

@@ -48,11 +48,13 @@ def esm(**changed: str) -> str:
 def test_esm(tmp_path: Path) -> None:
     same(read(tmp_path, esm(), "IT.ABC..HNE.D.20200101.C.ACC.ASC"))
     same(read(tmp_path, esm(UNITS="m/s^2")), 100.0 * A)
+    same(read(tmp_path, esm(UNITS="mg")), 0.980665 * A)
     for changed, said in [
         ({"NDATA": "900"}, "line 7: 900 values are announced, and 803 follow"),
         ({"DATA_TYPE": "VELOCITY", "UNITS": "cm/s"}, "line 14: the values are a velocity"),
         ({"UNITS": "cm/s"}, "line 10: the values are in cm/s, which is no acceleration"),
         ({"UNITS": ""}, "no UNITS in the title lines"),
+        ({"DURATION_S": "8.02"}, "line 8: 803 values, 0.005 s apart, do not last 8.02 s"),
     ]:
         with pytest.raises(RecordError, match=said):
             read(tmp_path, esm(**changed))

@@ -49,7 +49,8 @@ CAMPAIGN = {
 
 
 @pytest.mark.parametrize(
-    "mark", ["_", "-", "x", "X", "d", "p", "P", "pt", ",", ".", "·", "point", " "]
+    "mark",
+    ["_", "-", "x", "X", "d", "p", "P", "pt", ",", ".", "·", "point", " ", "komma", "k", "c", "#"],
 )
 def test_a_decimal_mark_is_settled_by_the_measured_frequency(tmp_path, mark) -> None:
     names = {f"run_{told(name, mark)}": value for name, value in CAMPAIGN.items()}
@@ -105,6 +106,8 @@ def test_a_unit_may_stand_for_the_decimal_mark(tmp_path) -> None:
         (("2A1", "2A2", "1A1"), (2.0, 2.0, 1.0)),
         (("500mA", "1000mA", "0mA"), (0.5, 1.0, 0.0)),
         (("I0_5A", "I1A", "I0_25A"), (0.5, 1.0, 0.25)),
+        (("20C2A", "40C1A", "60C0A"), (2.0, 1.0, 0.0)),
+        (("0.5Amps_a", "1Amp_b", "0Amps_c"), (0.5, 1.0, 0.0)),
         (("0.8712V_ensaio1_2_2", "0.0000V_ensaio10_1", "3.2120V_A_10"), (0.8712, 0.0, 3.212)),
     ],
 )  # fmt: skip
@@ -159,6 +162,25 @@ def test_two_names_of_one_level_that_may_be_two_are_not_taken(tmp_path, capsys) 
     assert "5 A or 0.5 A" in said[0]
     assert "--runs FILE" in said[0]
     assert {level for _, level in runs(tmp_path / "rig").values()} == {None}
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [(("1Hz_0.5A", "2Hz_1A", "3Hz_off"), 'are in 2 of 3 names, and not in "3Hz_off.csv"'),
+     (("1Hz_0.5A_2V", "2Hz_1A_4V", "3Hz_2A_8V"), "names tell current and voltage: --level '{}A'")],
+)  # fmt: skip
+def test_levels_that_names_do_not_tell_alone_are_said_and_not_taken(tmp_path, capsys, names, said):
+    data = made(tmp_path / "lab", {name: (1.0 + k, k) for k, name in enumerate(names)})
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
+    assert {level for _, level in runs(tmp_path / "rig").values()} == {None}
+
+
+def test_decimals_by_the_frequency_are_not_those_of_milliamperes(tmp_path) -> None:
+    names = {"050Hz_10mm_050mA": (0.5, 0.05), "150Hz_10mm_100mA": (1.5, 0.1)}
+    data = made(tmp_path / "lab", names)
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert runs(tmp_path / "rig") == names
 
 
 @pytest.mark.parametrize("other", ["0_50V", "0.50V_b", "1p50V"])

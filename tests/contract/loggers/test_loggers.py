@@ -98,17 +98,66 @@ LAYOUTS = {
     "date, time and ms": "Date;Time;ms;Disp [mm];Coil [V];Force [N]\n"
     + rows(";", (T, T, (2.0 * (COUNT - 1)) % 1000, X, U, F), clock("%d.%m.%Y", 0),
            clock("%H:%M:%S", 0), K, C, C, C),
+    "minutes and seconds": "Time,Disp [mm],Coil [V],Load [N]\n"
+    + rows(",", BASE, clock("%M:%S.%f"), P, P, P),
+    "dates of MATLAB": "Time,Disp [mm],Coil [V],Load [N]\n"
+    + rows(",", BASE, clock("%d-%b-%Y %H:%M:%S.%f"), P, P, P),
+    "timedelta of pandas": "Time,Disp [mm],Coil [V],Load [N]\n"
+    + rows(",", BASE, lambda t: f"0 days 00:00:{t:09.6f}", P, P, P),
+    "titles of two lines": '"Time\n[s]","Disp\n[mm]","Coil\n[V]","Load\n[N]"\n'
+    + rows(",", BASE, *(P,) * 4),
+    "commas above semicolons": "Time [s], Disp [mm], Coil [V], Load [N]\n"
+    + rows(";", BASE, *(C,) * 4),
+    "a rate above": "Abtastrate;500;Hz\n\nNr.;Weg [mm];Spannung [V];Kraft [N]\n"
+    + rows(";", (COUNT, X, U, F), K, C, C, C),
+    "a step above": "Operator: me\nSampling period [ms]: 2\nScan\tDisp [mm]\tCoil [V]\tForce [N]\n"
+    + rows("\t", (COUNT, X, U, F), K, P, P, P),
+    "sums behind": "Time [s];Disp [mm];Coil [V];Force [N]\n" + rows(";", BASE, *(P,) * 4)
+    + "\nMax;12.0;1.5;1850\nMin;-12.0;0.5;-1850\n\nEnd of test 12.03.2024\n",
+    "signs of minus": "Time [s];Disp [mm];Coil [V];Force [N]\n"
+    + rows(";", BASE, *(lambda v: f"{v:.5f}".replace("-", "\u2212"),) * 4),
+    "units behind a slash": "Time;Disp;Coil;Force\n/s;/mm;/V;/kN\n"
+    + rows(";", (T, X, U, F / 1e3), P, P, P, point(8)),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("logger", LAYOUTS)
 def test_layouts(tmp_path: Path, logger: str) -> None:
-    (tmp_path / "run.csv").write_text(LAYOUTS[logger])
+    (tmp_path / "run.csv").write_text(LAYOUTS[logger], encoding="utf-8")
     (run,) = measurements_of(read_table(tmp_path / "run.csv"), estimate=False)
     assert run.step == pytest.approx(0.002, rel=1e-6)
     np.testing.assert_allclose(run["displacement"], 1e-3 * X, atol=1e-6)
     np.testing.assert_allclose(run["force"], F, atol=0.51)
     np.testing.assert_allclose(run["voltage"], U, atol=0.001)
+
+
+BLOCK = "Time;Disp;Coil;Force\ns;mm;V;N\n"
+OWN = rows(";", BASE, P, P, P, P)
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding", "left"),
+    [(BLOCK + OWN, "utf-16-le", N), (BLOCK + OWN + "\0\0", "utf-8", N),
+     ((BLOCK + OWN)[:-4], "utf-8", N - 1), (BLOCK + OWN[:-1], "utf-8", N)],
+)  # fmt: skip
+def test_ends_and_encodings(tmp_path: Path, text: str, encoding: str, left: int) -> None:
+    (tmp_path / "run.csv").write_bytes(text.encode(encoding))
+    (run,) = measurements_of(read_table(tmp_path / "run.csv"), estimate=False)
+    np.testing.assert_allclose(run["force"], F[:left], atol=0.01)
+    cut = f"line {N + 2}, the last one, is cut off and left out" in run.notes
+    assert cut == (left < N)
+
+
+def test_a_block_in_another_unit_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text(f"{BLOCK}{OWN}\n{BLOCK.replace(';N', ';kN')}{OWN}")
+    with pytest.raises(RecordError, match='line 605: the units are "s;mm;V;kN" here'):
+        read_table(tmp_path / "run.csv")
+
+
+def test_a_universal_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / "run.unv").write_text("    -1\n    58\nDisp\n" + "  1.0  2.0\n" * 90 + "    -1\n")
+    with pytest.raises(RecordError, match=r"a universal file \(UFF\), which is not read"):
+        read_table(tmp_path / "run.unv")
 
 
 # Times ---------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.io import savemat
 
@@ -219,3 +220,41 @@ def test_counts_beside_a_scale_are_told(tmp_path: Path, capsys, ending: str) -> 
     said = " ".join(capsys.readouterr().out.split())
     assert f"run.{ending}: force_N holds int16, and scale beside it is not applied" in said
     assert "expected values in a unit, such as force_N * scale" in said
+
+
+STATED = {
+    "a step in ms": {"x_mm": X, "u_V": U, "F_N": F, "dt_ms": 2.0},
+    "a rate in kHz": {"x_mm": X, "u_V": U, "F_N": F, "fs_kHz": 0.5},
+    "value and unit": {
+        key: {"value": one, "unit": unit, "dx": 0.002}
+        for key, one, unit in (("disp", X, "mm"), ("coil", U, "V"), ("force", F, "N"))
+    },
+}
+
+
+@pytest.mark.parametrize("kind", [*STATED, "NPZ"])
+def test_steps_and_units_that_are_stated_beside_the_values(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / "run.mat"
+    if kind == "NPZ":
+        file = tmp_path / "run.npz"
+        np.savez(
+            file, data=np.column_stack([T, X, U, F]), names=["t [s]", "x [mm]", "u [V]", "F [N]"]
+        )
+    else:
+        savemat(file, STATED[kind])
+    (run,) = measurements_of(read_table(file), estimate=False)
+    assert run.step == pytest.approx(0.002)
+    np.testing.assert_allclose(run["displacement"], 1e-3 * X, atol=1e-9)
+    np.testing.assert_allclose(run["force"], F, atol=1e-9)
+    np.testing.assert_allclose(run["voltage"], U)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_frame_in_parquet_keeps_its_index_and_its_units(tmp_path: Path, named: bool) -> None:
+    index = pd.to_timedelta(T, unit="s")
+    frame = pd.DataFrame({"disp": X, "force": F}, index=index.rename("time") if named else index)
+    frame.attrs["units"] = {"disp": "mm", "force": "N"}
+    frame.to_parquet(tmp_path / "run.parquet")
+    (run,) = measurements_of(read_table(tmp_path / "run.parquet"), estimate=False)
+    assert run.step == pytest.approx(0.002)
+    np.testing.assert_allclose(run["force"], F)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.data.guess import guess_channels
 from bristle.data.measurement import measurements_of
 from bristle.data.read import read_table
 from bristle.errors import RecordError
@@ -61,6 +62,16 @@ def test_whole_numbers_alone(tmp_path, sep, group) -> None:
     table = read_table(tmp_path / "a.csv")
     np.testing.assert_allclose(table.values["t [ms]"], 1e3 * T)
     np.testing.assert_allclose(table.values["F [N]"], F + 6000.0, atol=0.51)
+
+
+def test_a_column_of_nothing_but_groups_is_doubted(tmp_path) -> None:
+    file = made(tmp_path / "a.csv", ";", number("", ",", 2), number("", ",", 4))
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join(
+        [lines[0], *(f"{1.0 + t:.3f};{one.partition(';')[2]}" for t, one in
+                     zip(T, lines[1:], strict=True))]))  # fmt: skip
+    (time, *_) = guess_channels(read_table(file))
+    assert '"1.000" is read as 1000, and nothing in the column tells' in time.doubt
 
 
 @pytest.mark.parametrize(("sep", "decimal"), [(",", "."), (";", ","), (";", ".")])
