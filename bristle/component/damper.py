@@ -25,8 +25,9 @@ from ..physics.tuples import Inputs, Setup, record
 from .control_laws import limited
 
 DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
-FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
-"""Outputs; friction, the part of the force that is, is hidden."""
+FORCE, DISSIPATED_ENERGY, STROKE_RATIO, OUTSIDE, FRICTION = range(5)
+"""Outputs; friction, the part of the force that is, is hidden, and so is how far outside of the
+data the damper is where it knows of none."""
 
 REMEMBERED = 9
 """How many numbers the state holds behind the states of law and effects."""
@@ -38,7 +39,7 @@ class Constants(NamedTuple):
     `setup` is that of law and effects. `moving_mass` [kg] is what the holding force holds, 0: the
     law slides. The acceleration is `measured`, or the difference of velocity over the step. Motion
     and voltage are `linear` over a step, or held at their newest. `tracks` are pairs of a slot in
-    `setup.p` and the input that it follows.
+    `setup.p` and the input that it follows. `range` is that of the data, in the order of `RANGE`.
     """
 
     setup: Setup
@@ -48,17 +49,28 @@ class Constants(NamedTuple):
     measured: bool
     linear: bool
     tracks: Row
+    range: Row
 
 
 LIMITS, TRACKS = BAKED_ROWS, BAKED_ROWS + 1
 """Rows of what is baked, behind those of law and effects: the index of each of `OWN` among the
 values; pairs of a slot in `p` and the input that it follows."""
 
+WIDE = 1e30
+"""An end of a range that no motion or command reaches."""
 OWN = ("v_max", "stroke", "moving_mass")
 """What a damper's values hold besides the parameters of law and effects."""
 
+RANGE = (
+    "range.displacement_low", "range.displacement_high", "range.speed", "range.command_low",
+    "range.command_high",
+)  # fmt: skip
+"""The range [m, m/s, the command's unit] of the data that a damper knows, behind `OWN`; a build
+has all of it or none."""
+
 _OWN, _FOLLOWED = STORE_ROWS, STORE_ROWS + 1
-_V_MAX, _STROKE, _MOVING_MASS, _MEASURED = range(4)
+_V_MAX, _STROKE, _MOVING_MASS = range(3)
+_LOW, _HIGH, _SPEED, _COMMAND_LOW, _COMMAND_HIGH, _MEASURED = range(3, 9)
 
 
 def bake(
@@ -73,7 +85,7 @@ def bake(
     tracks : parameters of effects that follow an input, each with the input's number
     slots : where law and effects have their places
     """
-    own = [names.index(name) for name in OWN]
+    own = [names.index(name) for name in (*OWN, *RANGE) if name in names]
     pairs = [number for name, port in tracks for number in (slots.parameters[name], port)]
     return packed(*bake_law(law, names, slots), own, pairs)
 
@@ -118,6 +130,9 @@ def setup(values: Row, given: Row, baked: Row, store: Row, state: Row) -> int:
     own, limits = open_row(store, _OWN, _MEASURED + 1), row(baked, LIMITS)
     for i in range(len(limits)):
         store[own + i] = values[int(limits[i])]
+    if len(limits) <= _LOW:
+        store[own + _LOW] = store[own + _COMMAND_LOW] = -WIDE
+        store[own + _HIGH] = store[own + _SPEED] = store[own + _COMMAND_HIGH] = WIDE
     tracks = row(baked, TRACKS)
     at = open_row(store, _FOLLOWED, len(tracks))
     for i in range(len(tracks)):
@@ -142,7 +157,7 @@ def constants(store: Row) -> Constants:
     own = row(store, _OWN)
     return Constants(
         setup_from(store), own[_V_MAX], own[_STROKE], own[_MOVING_MASS], own[_MEASURED] != 0.0,
-        False, row(store, _FOLLOWED),
+        False, row(store, _FOLLOWED), own[_LOW:_MEASURED],
     )  # fmt: skip
 
 
@@ -207,6 +222,44 @@ def present_force(
     return force_at(c.setup, now, state, work)
 
 
+def beyond(value: float, low: float, high: float, whole: float) -> float:
+    """Return how far a value is beyond a range, as a share of its larger end; 0 inside.
+
+    Parameters
+    ----------
+    value, low, high : in one unit; an end that is not known is `WIDE`
+    whole : what it is a share of where no end is known but 0
+    """
+    over = max(low - value, value - high)
+    if over <= 0.0:
+        return 0.0
+    end = 0.0
+    if low > -WIDE:
+        end = abs(low)
+    if high < WIDE:
+        end = max(end, abs(high))
+    return over / end if end > 0.0 else over / whole
+
+
+def outside(x: float, v: float, V: float, c: Constants) -> float:
+    """Return how far a motion or its command is outside of the damper's data; 0 inside.
+
+    Parameters
+    ----------
+    x, v : displacement [m], velocity [m/s]
+    V : voltage within its limits [V]
+    c : Constants
+
+    Returns
+    -------
+    float
+        What the worst of displacement, speed and command exceeds its range by: 0.3 is 30 %.
+    """
+    known = c.range
+    most = max(beyond(x, known[0], known[1], c.stroke), beyond(abs(v), 0.0, known[2], 1.0))
+    return max(most, beyond(V, known[3], known[4], c.v_max))
+
+
 def is_measured(inputs: Row, c: Constants) -> bool:
     """Return whether the acceleration among inputs was measured.
 
@@ -231,7 +284,8 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
         acceleration [m/s2]
     c : Constants
     state : (`Slots.z_size` + 9,) the states of law and effects as given; the last nine are filled
-    outputs : (4,) force [N], dissipated energy [J], stroke ratio [1], friction [N], filled
+    outputs : (5,) force [N], dissipated energy [J], stroke ratio [1], how far outside of the
+        data [1], friction [N], filled
     work : room to work, of the size that `sizes` gives
 
     Returns
@@ -255,7 +309,7 @@ def remember(inputs: Row, c: Constants, state: Row, outputs: Row) -> None:
     inputs : (5,) as in `start`
     c : Constants
     state : as in `start`, its last entries filled
-    outputs : (4,) as in `start`, those at these inputs
+    outputs : (5,) as in `start`, those at these inputs
     """
     state[DISPLACEMENT_AT_END] = inputs[DISPLACEMENT]
     state[VELOCITY_AT_END], state[FORCE_AT_END] = inputs[VELOCITY], outputs[FORCE]
@@ -280,7 +334,7 @@ def step(
     before, now : (5,) inputs at begin and end, as in `start`
     c : Constants
     state, new_state : states at begin (kept) and end (filled), as in `start`
-    outputs : (4,) as in `start`, filled
+    outputs : (5,) as in `start`, filled
     work : room to work, of the size that `sizes` gives
 
     Returns
@@ -317,6 +371,7 @@ def step(
     new_state[LAST_STEP] = dt
     outputs[FORCE], outputs[FRICTION] = force, friction
     outputs[DISSIPATED_ENERGY], outputs[STROKE_RATIO] = energy, abs(x1) / c.stroke
+    outputs[OUTSIDE] = outside(x1, v1, V1, c)
     if c.setup.active and not c.linear:  # an effect may know the energy: above, that of before
         return output(clock[0] + dt, now, c, new_state, outputs, work)
     return SATURATED if now[VOLTAGE] != V1 else 0
@@ -335,7 +390,7 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     inputs : (5,) as in `start`
     c : Constants
     state : as in `start`, kept but for energy, velocity and force at the end
-    outputs : (4,) as in `start`, filled
+    outputs : (5,) as in `start`, filled
     work : room to work, of the size that `sizes` gives
 
     Returns
@@ -357,5 +412,5 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
         state[FORCE_AT_END] = force_end
     outputs[FORCE], outputs[FRICTION] = force, friction
     outputs[DISSIPATED_ENERGY] = state[ENERGY_SHOWN]
-    outputs[STROKE_RATIO] = abs(x) / c.stroke
+    outputs[STROKE_RATIO], outputs[OUTSIDE] = abs(x) / c.stroke, outside(x, v, V, c)
     return SATURATED if inputs[VOLTAGE] != V else 0

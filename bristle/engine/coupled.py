@@ -471,7 +471,9 @@ class RecordLayout:
         """Return the slot of the friction in a force on a structure; the last one is none."""
         begin = self.source_of.get((structure, port), ("", ""))
         pushes = begin[0] in self.names["damper"] and begin[1] == "force"
-        return self.slots[begin[0], "hidden 0"] if pushes else len(self.slots)
+        if not pushes:
+            return len(self.slots)
+        return self.slots[begin[0], f"hidden {self.slaves[begin[0]].hidden - 1}"]
 
     def _followed(self, structure: str) -> bool:
         """Return whether a component reads more of a structure than displacement and velocity."""
@@ -524,6 +526,7 @@ def instantiated(component: Component, only_on: bool = False) -> Slave:
         component.controller,
         component.effects,
         offers=component.effects_on() if only_on else None,
+        ranged=component.ranged,
     )
     for name, value in component.taken_values(only_on).items():
         index = slave._index[name]

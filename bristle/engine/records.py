@@ -73,6 +73,7 @@ def damper_record(slots: Slots = damper.LIBRARY.slots) -> np.dtype[np.void]:
             *((name, _FLOAT) for name in ("v_max", "stroke", "moving_mass", "sharing", *forces)),
             *((name, _FLAG) for name in ("active", "advances", "signed", "lags")),
             *((name, _FLAG) for name in ("measured", "jumps")),
+            ("range", _FLOAT, (len(damper_component.RANGE),)),
             *_inputs(5),
             *((name, _FLOAT, (states,)) for name in ("state", "new_state")),
             ("p", _FLOAT, (slots.p_size,)),
@@ -206,6 +207,8 @@ def lay_damper(d: Any, c: Constants, state: Row, wiring: Row) -> None:
     d["active"], d["advances"] = own.active, own.advances
     d["signed"], d["lags"] = own.signed, own.lags
     d["v_max"], d["stroke"] = c.v_max, c.stroke
+    for i in range(len(c.range)):
+        d["range"][i] = c.range[i]
     for i in range(len(state)):
         d["state"][i] = d["new_state"][i] = state[i]
     for i in range(len(own.p)):

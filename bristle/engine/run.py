@@ -14,9 +14,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from ..component.damper import RANGE, beyond
 from ..core.progress import listening
-from ..core.text import written
+from ..core.text import percent, quantity, written
 from ..errors import RunError, not_usable
+from ..fmu.component import OUTSIDE
+from ..physics.drive import DRIVES
 from ..system.model import System
 from ..system.scenario import load_scenario
 from ..system.toml import scenario_text
@@ -336,6 +339,9 @@ def _kept(system: System, engine: Engine, output: Output) -> Results:
     for column in table.columns:
         if column.name.endswith(".stroke_ratio"):
             _judge_stroke(column.name, table, output)
+    for name in system.components:
+        if left := left_data(system, name, table):
+            output.warn(f"{name}: {left}")
     frame = to_frame(table, made, complete)
     output.log(
         f"{'complete' if complete else 'incomplete'}: {len(table.time)} rows up to "
@@ -363,6 +369,54 @@ def _judge_stroke(name: str, table: RunTable, output: Output) -> None:
             f"{name.rpartition('.')[0]}: the displacement leaves the stroke: stroke_ratio "
             f"is above 1 from t = {first:.9g} s on, at most {ratio.max():.4g}"
         )
+
+
+TOLD = 0.05
+"""Share of the range of a damper's data beyond which a run is said to leave it."""
+
+
+def left_data(system: System, name: str, table: RunTable) -> str:
+    """Return by how much a run leaves the data of a damper, "" where it stays within `TOLD`.
+
+    Parameters
+    ----------
+    system : what was run
+    name : of a component
+    table : its rows
+    """
+    component = system.components[name]
+    known = component.description.variables
+    if not {OUTSIDE, *RANGE} <= {*known}:
+        return ""
+    share = table[f"{name}.{OUTSIDE}"]
+    if not share.max() > TOLD:
+        return ""
+    wires = {wire.input: wire for wire in system.wires if wire.target == name}
+
+    def number(of: str) -> float:
+        return float(component.value(of) or 0.0)
+
+    low, high, speed, least, most = map(number, RANGE)
+    ends = {
+        "displacement": ("m", low, high, "stroke"), "velocity": ("m/s", -speed, speed, ""),
+        **{one.name: (one.unit, least, most, one.limit) for one in DRIVES.values()},
+    }  # fmt: skip
+    worst = 0.0, ""
+    for port, (unit, lower, upper, whole) in ends.items():
+        if port not in known:
+            continue  # another command
+        seen = [number(port)]
+        if (wire := wires.get(port)) is not None:
+            column = table[f"{wire.source}.{wire.output}"]
+            seen = [wire.given(float(column.min())), wire.given(float(column.max()))]
+        for value in seen:
+            over = beyond(value, lower, upper, number(whole) if whole else 1.0)
+            worst = max(worst, (over, f"{port} {quantity(value, unit)}"))
+    first = table.time[(share > 0.0).argmax()]
+    return (
+        f"{worst[1]}, {percent(share.max(), 0)} beyond the data that its model is from; outside "
+        f"of them from t = {first:.4g} s"
+    )
 
 
 def _listen(output: Output, message: Message, at: float) -> None:

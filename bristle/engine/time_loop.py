@@ -505,7 +505,9 @@ def damper_constants(d: Any) -> damper.Constants:
         d.lags,
     )  # fmt: skip
     none = d.p[:0]  # no parameter follows an input here
-    return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True, none)
+    return DamperConstants(
+        setup, d.v_max, d.stroke, d.moving_mass, d.measured, True, none, d.range[:]
+    )
 
 
 def structure_constants(b: Any) -> structure.Constants:

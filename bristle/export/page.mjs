@@ -239,8 +239,22 @@ class Page {
       .join(" ");
   }
 
+  /** Says where a damper leaves the data that its model is from, beyond 5 % as `bristle run`. */
+  tellOutside() {
+    const names = this.scenario.description.outputs.map((one) => one.name);
+    const left = names.filter((n) => n.endsWith(".outside") && this.now.figures(n).peak > 0.05);
+    const said = left.map((name) => {
+      const first = this.now.time[this.now.column(name).findIndex((one) => one > 0)];
+      const most = (100 * this.now.figures(name).peak).toFixed(0);
+      return `${name}: up to ${most} % beyond the data that the model is from, first at t = ${number(first)} s.`;
+    });
+    part("outside").textContent = said.join(" ");
+    part("outside").hidden = said.length === 0;
+  }
+
   tell() {
     this.tellApart();
+    this.tellOutside();
     const body = part("figures");
     body.replaceChildren();
     for (const { name, unit } of this.scenario.description.outputs) {

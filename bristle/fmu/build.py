@@ -135,6 +135,7 @@ def plan(
     step: float | None = None,
     offers: Iterable[str] | None = None,
     about: str = "",
+    ranged: bool = False,
 ) -> BuildPlan:
     """Return what to build.
 
@@ -165,6 +166,9 @@ def plan(
         component without effects takes none.
     about : str
         What is known of how far a damper's model reaches, behind its description.
+    ranged : bool
+        Whether a damper has the output that tells whether it is within the range of its data; the
+        range is among `starts`, else all is within.
 
     Raises
     ------
@@ -205,8 +209,13 @@ def plan(
         baked["step"] = step
     if about:
         baked["about"] = about
+    if ranged:
+        baked["ranged"] = True
     if starts or offers is not None:
-        known = catalogue.describe(component, building, effects=effects, drive=drive).variables
+        described = catalogue.describe(
+            component, building, effects=effects, drive=drive, ranged=ranged
+        )
+        known = described.variables
         if offers is not None:
             chosen_effects = _checked_offers(component, known, offers, effects)
             off = {key.removesuffix(SWITCH) for key in known if key.endswith(SWITCH)}
@@ -394,6 +403,7 @@ def ensure(
     building: catalogue.BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
+    ranged: bool = False,
 ) -> Path:
     """Return a built-in component's FMU, built on first use and reused while its digest holds.
 
@@ -408,13 +418,15 @@ def ensure(
         if it has one.
     effects : iterable of path
         Files with effects of the user's own.
+    ranged : bool
+        As in `plan`.
 
     Raises
     ------
     BuildError, DesignError, PhysicsError
         If a name or a file is wrong, or the FMU cannot be built.
     """
-    return build(planned(component, building, controller, effects), fmus_folder())
+    return build(planned(component, building, controller, effects, ranged), fmus_folder())
 
 
 def planned(
@@ -422,19 +434,20 @@ def planned(
     building: catalogue.BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
+    ranged: bool = False,
 ) -> BuildPlan:
     """Return the plan of what `ensure` builds.
 
     Parameters
     ----------
-    component, building, controller, effects
+    component, building, controller, effects, ranged
         As in `ensure`, and what is raised too.
     """
     effects = tuple(effects)
-    what = plan(component, building=building, controller=controller, effects=effects)
-    if building is None and controller is None and not effects and not what.laws:
+    what = plan(component, building=building, controller=controller, effects=effects, ranged=ranged)
+    if building is None and controller is None and not effects and not what.laws and not ranged:
         return what
-    named = hashlib.sha256()
+    named = hashlib.sha256(b"ranged" if ranged else b"")
     if building is not None:
         named.update(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
     if controller is not None:

@@ -172,6 +172,7 @@ def instantiate(
     effects: Iterable[Path] = (),
     drive: str = "",
     offers: Iterable[str] | None = None,
+    ranged: bool = False,
 ) -> Slave:
     """Return a component as a Python object, as an FMU's binary would make it.
 
@@ -190,6 +191,8 @@ def instantiate(
         What commands a damper; "": its voltage.
     offers : iterable of str or None
         The effects that it offers by name; None: all of its site.
+    ranged : bool
+        Whether a damper knows the range of its data.
 
     Raises
     ------
@@ -202,6 +205,8 @@ def instantiate(
     kind = component_class(source(name))
     if drive:
         baked["drive"] = drive
+    if ranged:
+        baked["ranged"] = True
     own = [load_file(path) for path in effects]
     if own:
         baked["own"] = [effect.name for effect in own]
@@ -276,6 +281,7 @@ def describe(
     controller: Path | None = None,
     effects: Iterable[Path] = (),
     drive: str = "",
+    ranged: bool = False,
 ) -> Description:
     """Return the ports and parameters of a built-in component; no FMU is needed for it.
 
@@ -291,6 +297,8 @@ def describe(
         Files with effects of a user's own that the component carries too.
     drive : str, optional
         What commands a damper; "": its voltage.
+    ranged : bool
+        Whether a damper knows the range of its data.
 
     Raises
     ------
@@ -298,7 +306,9 @@ def describe(
         If there is no such component; if the controller, the building or an effect is wrong.
     """
     effects = tuple(effects)
-    slave = instantiate(name, building, controller=controller, effects=effects, drive=drive)
+    slave = instantiate(
+        name, building, controller=controller, effects=effects, drive=drive, ranged=ranged
+    )
     if effects and not isinstance(slave, EffectSlave):
         raise BuildError(f"{name} takes no effects; a damper or a Structure does.")
     variables = {}

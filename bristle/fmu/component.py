@@ -19,6 +19,9 @@ from .slave import STEPPING, Slave
 SWITCH = ".on"
 """What the name of an effect's switch ends with."""
 
+OUTSIDE = "outside"
+"""The output of a damper that knows the range of its data: see `component.damper.outside`."""
+
 
 class EffectSlave(Slave):
     """A component that offers the effects of its site, each with a switch and its parameters."""
@@ -129,7 +132,7 @@ class ComponentSlave(EffectSlave):
 
     texts: ClassVar[dict[int, str]] = {}
     warns_first: ClassVar[dict[int, int]] = {}
-    hidden: ClassVar[int] = 0
+    hidden = 0
     in_place: ClassVar[bool] = False
     """Whether a step moves the state on where it lies, as no step is made twice."""
 

@@ -10,7 +10,7 @@ from ..physics.damper import refusals
 from ..physics.drive import Drive, declared_for, drive_named, text_for, unit_for
 from ..physics.generate import Functions
 from ..physics.laws import LAWS
-from .component import ComponentSlave
+from .component import OUTSIDE, ComponentSlave
 
 _ABOUT = {
     "voltage": "voltage of the coil",
@@ -36,9 +36,10 @@ class DamperSlave(ComponentSlave):
     icon = "damper"
     law: ClassVar[str] = ""
     functions: ClassVar[Any] = damper
-    hidden = 1  # the friction
 
     def declare(self) -> None:
+        ranged = self.baked.get("ranged", False)
+        self.hidden = 1 if ranged else 2  # the friction; and how far outside of unknown data it is
         drive = self.drive = drive_named(self.baked.get("drive", ""))
         offered = self.offered("damper", self.law)
         self.take(self.functions_of(laws.SETS, LAWS[self.law].base, *offered))
@@ -63,6 +64,13 @@ class DamperSlave(ComponentSlave):
         self.add_output("dissipated_energy", "J", text, depends=moved)
         text = "displacement over stroke: beyond 1 the piston would hit its end"
         self.add_output("stroke_ratio", "1", text, depends=["displacement"])
+        if ranged:
+            text = (
+                "0 within the range of the data that the model is from; else what the worst of "
+                f"displacement, speed and {drive.name} exceeds it by: 0.3 is 30 %"
+            )
+            moved = ["displacement", "velocity", drive.name]
+            self.add_output(OUTSIDE, "1", text, depends=moved)
         for name, parameter in LAWS[self.law].parameters.items():
             self.add_physical(name, declared_for(parameter, drive))
         self.add_parameter("stroke", 0.02, "m", "from the middle to either end", (1e-6, 1e3))
@@ -70,10 +78,25 @@ class DamperSlave(ComponentSlave):
         self.add_parameter(drive.limit, drive.largest, drive.unit, text, (0.0, 1e4))
         text = "mass that the damper moves; 0: no holding force, sliding law"
         self.add_parameter("moving_mass", 0.0, "kg", text, (0.0, 1e9))
+        if ranged:
+            self._add_range(drive)
         for name, unit in LAWS[self.law].states.items():
             text = f"start value of the {name.replace('_', ' ')}"
             self.add_parameter(f"{name}_0", 0.0, unit_for(unit, drive), text)
         self.add_effects("damper", self.law)
+
+    def _add_range(self, drive: Drive) -> None:
+        """Declare the range of the data, wide open until it is told."""
+        units = "m", "m", "m/s", drive.unit, drive.unit
+        texts = (
+            "lowest displacement of the data", "highest displacement of the data",
+            "highest speed of the data", f"lowest {drive.name} of the data",
+            f"highest {drive.name} of the data",
+        )  # fmt: skip
+        for name, unit, text in zip(damper.RANGE, units, texts):
+            start = -damper.WIDE if name.endswith("_low") else damper.WIDE
+            least = 1e-9 if name == "range.speed" else -damper.WIDE
+            self.add_parameter(name, start, unit, text, (least, damper.WIDE))
 
     def take(self, made: Functions) -> None:
         super().take(made)

@@ -310,13 +310,14 @@ def ensure(
     building: BuildingData | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
+    ranged: bool = False,
     fmi: int = 2,
 ) -> Path:
     """Return a built-in component's native FMU for this machine, built on first use.
 
     Parameters
     ----------
-    component, building, controller, effects
+    component, building, controller, effects, ranged
         As in `fmu.build.ensure`.
     fmi : int
         2 or 3: the version of FMI that it follows.
@@ -328,7 +329,7 @@ def ensure(
     """
     from filelock import FileLock
 
-    what = planned(component, building, controller, effects)
+    what = planned(component, building, controller, effects, ranged)
     folder = zig.folder() / ("fmus_fmi3" if fmi == 3 else "fmus")
     with writing(folder, BuildError):
         folder.mkdir(exist_ok=True)

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from ..core.progress import tell
 from ..core.text import command, percent, short_z
 from ..data.measurement import Measurement
@@ -29,6 +27,7 @@ from .closed_loop_result import ClosedLoop, Predicted
 from .excitation import PredictedRun, begins_in_motion, trial_of
 from .model_system import BuildingWithFile
 from .monte_carlo import DRAWS, FEWEST, figures_of
+from .reach import ranges_of, told_range
 
 
 def closed_loop(
@@ -123,18 +122,7 @@ def closed_loop_in(
     effects, more = _prepared(study, model, draws, with_limits)
     _refuse_other_command(study, trials)
     found = _predicted(study, model, (house, True), trials, draws, effects)
-    most = max(
-        (float(np.ptp(run["displacement"])) / 2.0 for run in study.runs().train
-         if run.has("displacement")), default=float("inf"),
-    )  # fmt: skip
-    reached = max(found.strokes, default=0.0)
-    notes = [*found.notes, *more]
-    if reached > 1.2 * most:
-        notes.append(
-            f"the damper moves by {1e3 * reached:.3g} mm here, and by {1e3 * most:.3g} mm in the "
-            "training runs: beyond them neither the model nor the band is known"
-        )
-    return replace(found, notes=tuple(notes))
+    return replace(found, notes=(*found.notes, *more))
 
 
 def _prepared(
@@ -212,21 +200,25 @@ def _predicted(
     before, step = _before(study)
     judged = history_steps(study.steps())
     rows: list[Predicted] = []
-    strokes, failed = [], 0
+    known = told_range(ranges_of(study, model, study.runs()), study.drive)
+    strokes, failed, outside = [], 0, []
     lost: dict[str, tuple[str, list[str]]] = {}
     for number, trial in enumerate(trials):
         tell(f"simulating {trial.shaking.name}")
-        now = figures_of(model, place, trial, draws, number, judged[-1].missed, effects)
+        missed = judged[-1].missed
+        now = figures_of(model, place, trial, draws, number, missed, effects, known)
         then = None
         if before is not None and not following(before.effects):
             drawn = draws if has_covariance(before) else 0
             then = figures_of(before, place, trial, drawn, number, judged[-2].missed)
         rows += now.rows(trial, then)
         strokes.append(now.stroke)
+        outside += [f"in {trial.shaking.name} the damper has {now.outside}"] if now.outside else []
         failed += now.failed
         for label, why in now.lost.items():
             lost.setdefault(label, (why, []))[1].append(trial.shaking.name)
     notes = [f"{failed} of the draws could not be simulated"] if failed else []
+    notes += [f"{one}: there neither the model nor the band is known" for one in outside]
     last = judged[-1]
     if draws and last.missed and last.z is not None:
         notes.append(

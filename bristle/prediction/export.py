@@ -17,11 +17,8 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.files import write_whole, writing
-from ..core.text import percent, plain, quantity
-from ..data.channels import channel_unit, label_name, label_text
-from ..data.checks.motion import ACROSS, with_motion_across
+from ..core.text import quantity
 from ..data.measurement import Measurement
-from ..data.run_labels import labels_of
 from ..errors import FmuError, RecordError, StudyError
 from ..fmu.build import BuildPlan, build, plan
 from ..fmu.catalogue import component_of_law
@@ -40,10 +37,8 @@ from ..identification.problem import (
 )
 from ..identification.rig import DAMPER, Rig, at_site
 from ..model.model import Model
-from ..physics.building import GROUND
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
-from ..study.history import history_steps
 from ..study.rig import building_of, rig_of
 from ..study.runs import Runs
 from ..study.study import Study
@@ -60,6 +55,7 @@ from .model_system import (
     shaking_of,
     start_values,
 )
+from .reach import Ranges, ranges_of, reach_in_words, told_range, with_stroke
 from .stepping import SteppingJob, step_through
 
 Build = Callable[[BuildPlan, Path], Path]
@@ -147,7 +143,7 @@ def _held_out(study: Study, model: Model, runs: Runs, notes: list[str]) -> HeldO
         notes.append("the FMU was not held against the runs: they do not tell the damper's force.")
         return None
     bare = model.at("damper", bench=not study.settings.has_building)
-    known = [_with_stroke(study, model, one) for one in runs.holdout or runs.train]
+    known = [with_stroke(study, model, one) for one in runs.holdout or runs.train]
     return held_out(bare, model, rig, known)
 
 
@@ -173,7 +169,7 @@ def write_editable(study: Study, folder: Path) -> Editable:
     notes: list[str] = []
     own = _bare(study, model, notes)
     values = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
-    found = _range(study, model, runs, notes)
+    found = _range(study, model, runs, ranges_of(study, model, runs), notes)
     limit = drive_named(measurement.drive).limit
     values |= {VOLTAGE.limit if name == limit else name: value for name, value in found.items()}
 
@@ -236,7 +232,8 @@ def _damper(
     """Plan the damper with the model's values as its defaults."""
     own = _bare(study, model, notes)
     starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
-    starts |= _range(study, model, runs, notes)
+    ranges = ranges_of(study, model, runs)
+    starts |= _range(study, model, runs, ranges, notes)
     files = own_effects()
     return plan(
         component_of_law(own.base_law),
@@ -246,66 +243,20 @@ def _damper(
         offers=own.effects,
         drive=drive_named(runs.all[0].drive).name,
         step=step,
-        about=_reach(study, model, runs),
+        about=reach_in_words(study, runs, ranges),
+        ranged=True,
     )
 
 
-_APART = 8
-"""Samples between which a displacement's difference counts as its speed: over fewer it is noise."""
-
-
-def _reach(study: Study, model: Model, runs: Runs) -> str:
-    """Return what the model was fitted to, over which range, and how far off it is elsewhere."""
-    train = [_with_stroke(study, model, run) for run in runs.train]
-    seen: dict[str, list[Array]] = {}
-    for run in train:
-        for channel in ("displacement", run.drive):
-            if channel and run.has(channel):
-                seen.setdefault(channel, []).append(run[channel])
-        if run.has("velocity"):
-            seen.setdefault("velocity", []).append(run["velocity"])
-        elif run.has("displacement"):
-            x = run["displacement"]
-            moved = (x[_APART:] - x[:-_APART]) / (_APART * run.step)
-            seen.setdefault("velocity", []).append(moved)
-    ranges = []
-    for channel, values in seen.items():
-        low, high = (plain(float(end(np.concatenate(values))), 4) for end in (np.nanmin, np.nanmax))
-        ranges.append(f"{channel} {low} to {high} {channel_unit(channel)}")
-    for label in labels_of([run.labels for run in train]):
-        texts = [label_text(label.name, one) for one in label.levels]
-        told = f"{texts[0]} to {texts[-1]}" if label.is_number else ", ".join(texts)
-        ranges.append(f"{label_name(label.name)} {told}")
-    share = history_steps(study.steps())[-1].share
-    off = "" if share is None else f" Held-out error: {percent(share)} of the force (RMS)."
-    counted = f"{len(train)} run{'s' * (len(train) > 1)}"
-    return f"Fitted to {counted} (data {study.data[:14]}): {'; '.join(ranges)}.{off}"
-
-
-def _with_stroke(study: Study, model: Model, measurement: Measurement) -> Measurement:
-    """Return a run with the displacement across the damper, where it is a building's device."""
-    building = building_of(study, model)
-    if building is None or not building.studied:
-        return measurement
-    levels = building.levels()
-    lower, upper = (
-        "" if i == GROUND else levels[i] for i in building.device(building.studied).levels
-    )
-    seen = with_motion_across(measurement, lower, upper)
-    channels = {n: v for n, v in seen.channels.items() if not n.endswith("_displacement")}
-    stroke = seen.channels.get(f"{ACROSS}_displacement")
-    return replace(
-        seen, channels=channels if stroke is None else {**channels, "displacement": stroke}
-    )
-
-
-def _range(study: Study, model: Model, runs: Runs, notes: list[str]) -> dict[str, float]:
-    """Return the command's limit and stroke [m] that hold what was measured in all runs.
+def _range(
+    study: Study, model: Model, runs: Runs, ranges: Ranges, notes: list[str]
+) -> dict[str, float]:
+    """Return the range of the data, and the command's limit and stroke [m] that hold all runs.
 
     Where the defaults do they are left out. The run that is played alone does not tell: another
     one, to which the model was fitted, may go further.
     """
-    found = {}
+    found = told_range(ranges, runs.all[0].drive)
     drive = drive_named(runs.all[0].drive)  # that of all runs
     if not runs.all[0].drive and study.settings.has_building:
         notes.append("neither voltage nor current was measured: the scenario holds 0 V.")
@@ -314,7 +265,7 @@ def _range(study: Study, model: Model, runs: Runs, notes: list[str]) -> dict[str
         found[drive.limit] = float(ceil(1.05 * max(tops)))
     moved = [
         float(np.abs(one[channel]).max())
-        for one in (_with_stroke(study, model, run) for run in runs.all)
+        for one in (with_stroke(study, model, run) for run in runs.all)
         for channel in ("displacement", "base_displacement") if one.has(channel)
     ]  # fmt: skip
     if max(moved, default=0.0) > 0.02:

@@ -15,7 +15,8 @@ from ..campaign.campaign import Campaign, Variation
 from ..core.arrays import Array
 from ..core.progress import tell
 from ..engine.coupled import Coupled
-from ..engine.results import statistic_of
+from ..engine.results import RunTable, statistic_of
+from ..engine.run import left_data
 from ..errors import PhysicsError, RunError, ScenarioError
 from ..fmu.description import Value
 from ..identification.problem import values_of_labels
@@ -54,12 +55,15 @@ class Simulator:
         Whether the model was identified on a bench.
     shaking : Excitation
         A built-in damper calls its command a voltage, whatever it is: its numbers are the same.
+    known : mapping
+        The range of the model's data, see `reach.told_range`; empty: it is not known.
     """
 
     model: Model
     house: BuildingWithFile
     bench: bool
     shaking: Excitation
+    known: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def campaign(self) -> Campaign:
@@ -72,8 +76,16 @@ class Simulator:
 
     def response(self, values: Mapping[str, Value | Signal]) -> dict[str, Array]:
         """Return every output (n,) with these values, at the samples of the ground motion, SI."""
+        return self.shown(self.rows(values))
+
+    def rows(self, values: Mapping[str, Value | Signal]) -> RunTable:
+        """Return every output at every step with these values."""
         table = self.campaign.run(Variation(values)).table
         assert table is not None
+        return table
+
+    def shown(self, table: RunTable) -> dict[str, Array]:
+        """Return what rows hold at the samples of the ground motion."""
         return {name: column[:: self.shaking.fine] for name, column in table.values.items()}
 
     def with_errors(
@@ -119,7 +131,8 @@ class Simulator:
         )
         limit = {VOLTAGE.limit: float(ceil(1.05 * most))} if most > VOLTAGE.largest else {}
         damper = self.model.at("damper", self.bench)
-        return {**source_of(damper), "parameters": {**values_of(damper), **limit, **moving}}
+        values = {**values_of(damper), **self.known, **limit, **moving}
+        return {**source_of(damper), "parameters": values}
 
 
 # Peak and RMS of the responses of a run that was simulated, as sensors would show them.
@@ -281,7 +294,8 @@ class Figures:
 
     `missed` is the share of the force that the model misses beyond noise: it is taken to miss as
     much of a response. `left` are the changes by effects that the runs do not exclude, `lost` says
-    of others of them why they cannot be simulated.
+    of others of them why they cannot be simulated; `outside` by how much the damper leaves the data
+    that the model is from, "" where it does not.
     """
 
     best: dict[Key, float]
@@ -291,6 +305,7 @@ class Figures:
     missed: float = 0.0
     left: Left = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
+    outside: str = ""
 
     def band(self, key: Key) -> tuple[float, float] | None:
         """Return the 95 % band of what would be measured, None with too few draws."""
@@ -346,6 +361,7 @@ def figures_of(
     number: int,
     missed: float = 0.0,
     effects: Sequence[OpenEffect] = (),
+    known: Mapping[str, float] | None = None,
 ) -> Figures:
     """Simulate a run with a model, and with draws of the errors of model and channels.
 
@@ -358,6 +374,7 @@ def figures_of(
     number : of the run, which tells its draws from those of others
     missed : share of the force that the model misses beyond noise
     effects : that the model's runs do not exclude, for a band that has them, too
+    known : the range of the model's data, see `reach.told_range`
 
     Raises
     ------
@@ -367,8 +384,9 @@ def figures_of(
     house, bench = place
     model = model.with_values(values_of_labels(model.effects, trial.labels), origin="measured")
     generator = np.random.default_rng([7, number])
-    simulator = Simulator(model, house, bench, trial.shaking)
-    columns = simulator.response({})
+    simulator = Simulator(model, house, bench, trial.shaking, known or {})
+    table = simulator.rows({})
+    outside, columns = left_data(simulator.campaign.system, "damper", table), simulator.shown(table)
     names = names_of(columns, trial)
     sensors = np.random.default_rng([8, number])  # the same for the models before and after
     best = {
@@ -390,4 +408,4 @@ def figures_of(
     across = studied_ports(house.building).displacement
     stroke = float(np.max(np.abs(columns[f"structure.{across}"])))
     drawn = {key: np.array(values) for key, values in collected.items()}
-    return Figures(best, drawn, stroke, failed, missed, changes, lost)
+    return Figures(best, drawn, stroke, failed, missed, changes, lost, outside)

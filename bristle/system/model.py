@@ -19,7 +19,7 @@ from ..core.toml_lines import KeyPath
 from ..data import ground_motion_file
 from ..errors import PhysicsError, ScenarioError
 from ..fmu.catalogue import BuildingData
-from ..fmu.component import SWITCH
+from ..fmu.component import OUTSIDE, SWITCH
 from ..fmu.description import Description, Value, Variable
 from ..physics.building import PAPER, from_data
 
@@ -173,6 +173,11 @@ class Component:
     def plays(self) -> str:
         """The parameter that names the file which it plays, "" where it plays none."""
         return next((name for name in FILE_PARAMETERS if name in self.description.variables), "")
+
+    @property
+    def ranged(self) -> bool:
+        """Whether it is a damper that knows the range of its data."""
+        return OUTSIDE in self.description.variables
 
     def value(self, name: str) -> Value | None:
         """Return the value of a parameter: as it is set, else where it starts."""

@@ -346,6 +346,7 @@ def _fmu(component: Component, folder: Path, name: str, build: Build) -> Path:
         samples=files.get("file"),
         starts=values,
         offers=component.effects_on(),
+        ranged=component.ranged,
     )
     return build(what, folder)
 

@@ -205,9 +205,12 @@ def _describe(
             part.description = library.describe_file(part.file)
             _check_begin(part, path, document)
         elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
-            own = (part.effects,) if part.effects else ()
             made_of = part.law.component if part.law else part.kind
-            part.description = library.describe(made_of, part.building, part.controller, *own)
+            more: dict[str, Any] = {"effects": part.effects} if part.effects else {}
+            given = settings.get("parameters")
+            if isinstance(given, dict) and any(key.partition(".")[0] == "range" for key in given):
+                more["ranged"] = True  # what knows the range of its data has an output more
+            part.description = library.describe(made_of, part.building, part.controller, **more)
     except TrustError:
         raise  # no mistake of the file, and it is asked about
     except BristleError as error:

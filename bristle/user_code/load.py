@@ -35,7 +35,7 @@ PACKAGE = "bristle_own_effects"
 
 PORTS = (
     "displacement", "velocity", "voltage", "holding_force", "acceleration", "force",
-    "dissipated_energy", "stroke_ratio", "stroke", "v_max", "moving_mass", "fault",
+    "dissipated_energy", "stroke_ratio", "outside", "stroke", "v_max", "moving_mass", "fault",
 )  # fmt: skip
 """What a damper's component has beside the parameters of its law."""
 

@@ -194,6 +194,17 @@ def test_rows_are_those_of_the_compiled_engine(name: str, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 @needs_tools
+def test_so_is_how_far_a_damper_is_outside_of_its_data(tmp_path: Path) -> None:
+    known = {"damper.range.speed": 0.08, "damper.range.command_high": 3.0}
+    export_web("bench_sine_bingham", tmp_path, {"voltage.level": (0.0, 8.0)}, known)
+    found = run_in_node(tmp_path, {})["columns"]["damper.outside"]
+    right = Coupled().run(load_scenario("bench_sine_bingham", known))["damper.outside"]
+    assert np.max(np.abs(found - right)) <= AGREE
+    assert right.min() == pytest.approx(1.0 / 3.0)  # 4 V of 3 V
+
+
+@pytest.mark.slow
+@needs_tools
 def test_a_moved_slider_gives_the_run_with_that_value(tmp_path: Path) -> None:
     files = export_web(PASSIVE, tmp_path, {"voltage.level": (0.0, 8.0)})
     found = run_in_node(tmp_path, {"voltage.level": 7.0})

@@ -50,6 +50,12 @@ def test_so_are_those_of_a_trained_policy() -> None:
     assert compared("el_centro_0p6g_clipped", given, stop=5.0) <= EQUAL
 
 
+def test_so_are_those_of_a_damper_that_knows_the_range_of_its_data() -> None:
+    known = {"damper.range.speed": 0.08, "damper.range.displacement_low": -0.005}
+    assert "damper.outside" in Coupled().run(load_scenario("half_sine_pulse", known)).values
+    assert compared("half_sine_pulse", known, stop=1.0) <= EQUAL
+
+
 def test_so_are_those_of_a_law_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["new", "law", "my_law"]) == 0

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +87,7 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def alone(fmu: Path, run: object, starts: dict[str, float]) -> np.ndarray:
+def alone(fmu: Path, run: object, starts: dict[str, float], output: str = "force") -> np.ndarray:
     """Return the FMU's force at the run's samples by fmpy's own simulator, in a fresh process."""
     code = """
 import json, sys
@@ -97,9 +98,10 @@ rows = np.array(list(zip(*job["signals"].values())))
 named = np.array([tuple(row) for row in rows], dtype=[(n, float) for n in job["signals"]])
 found = simulate_fmu(
     job["fmu"], stop_time=job["stop"], step_size=job["step"], output_interval=job["step"],
-    input=named, output=["force", "fault"], start_values=job["starts"],
+    input=named, output=["force", "outside", "fault"], start_values=job["starts"],
 )
-print(json.dumps([found["time"].tolist(), found["force"].tolist(), float(found["fault"].max())]))
+names = ("time", "force", "outside")
+print(json.dumps([*(found[name].tolist() for name in names), float(found["fault"].max())]))
 """
     time = run.dt * np.arange(len(run.x))
     job = {
@@ -113,9 +115,9 @@ print(json.dumps([found["time"].tolist(), found["force"].tolist(), float(found["
         [sys.executable, "-c", code], input=json.dumps(job), capture_output=True, text=True,
         check=True,
     )  # fmt: skip
-    t, force, fault = json.loads(child.stdout.splitlines()[-1])
+    t, force, outside, fault = json.loads(child.stdout.splitlines()[-1])
     assert fault == 0.0
-    return np.interp(time, t, force)
+    return np.interp(time, t, force if output == "force" else outside)
 
 
 @pytest.mark.slow
@@ -163,17 +165,21 @@ def test_ports_are_those_of_the_stock_damper_and_defaults_are_baked(
         assert reach in page
     from bristle.fmu import catalogue
 
-    stock = catalogue.describe("LuGreDamper")
+    stock = catalogue.describe("LuGreDamper", ranged=True)
     for causality in ("input", "output", "parameter"):
         assert [(v.name, v.unit) for v in described.of(causality)] == [
             (v.name, v.unit)
             for v in stock.of(causality)
-            if "." not in v.name or v.name.startswith("gas_spring.")
+            if "." not in v.name or v.name.startswith(("gas_spring.", "range."))
         ]
     variables = described.variables
     assert variables["gas_spring.on"].start is True
     assert variables["gas_spring.k"].start == 75.0
     assert variables["sigma_a"].start == 700.0
+    x = bench.runs().train[0]["displacement"]
+    assert variables["range.displacement_low"].start == x.min()
+    assert variables["range.displacement_high"].start == x.max()
+    assert variables["range.command_high"].start == pytest.approx(5.0, rel=1e-3)
     assert Path(told["scenario"]).parent == tmp_path / "there"
     loaded = load_scenario(Path(told["scenario"]))
     assert loaded.step == pytest.approx(5e-4)
@@ -198,6 +204,27 @@ def test_a_dampers_own_stop_and_friction_are_in_the_fmu(bench: Study) -> None:
     # fmpy holds what was a step ago, over which a stop's force changes.
     late = rms(np.gradient(expected, run.dt)) * 5e-4
     assert rms(alone(found.fmu, run, {}) - expected) < late + AGREEMENT * rms(expected)
+
+
+def test_the_fmu_and_its_scenario_tell_when_a_run_leaves_the_data(
+    bench: Study, caplog: pytest.LogCaptureFixture
+) -> None:
+    found = export_study(bench)
+    run = prepare(bench.runs().holdout[0])
+    assert alone(found.fmu, run, {}, "outside").max() < 0.02  # as far as training went
+    frame = bristle.run(found.scenario)
+    assert frame["damper.outside"].max() < 0.02
+    assert not [one for one in caplog.records if "beyond the data" in one.getMessage()]
+    run = replace(run, x=1.3 * run.x)
+    most = max(abs(bench.runs().train[0]["displacement"]))
+    over = np.maximum(np.abs(run.x) / most - 1.0, 0.0)
+    own = alone(found.fmu, run, {}, "outside")
+    assert own.max() == pytest.approx(over.max(), abs=0.01)
+    shorter = bristle.run(found.scenario, {"damper.range.displacement_high": 0.8 * most})
+    said = [one.getMessage() for one in caplog.records if "beyond the data" in one.getMessage()]
+    assert len(said) == 1
+    assert said[0].startswith("damper: displacement 9.97 mm, 20 % beyond the data")
+    assert shorter["damper.outside"].max() > 0.15
 
 
 @pytest.mark.slow
