@@ -29,8 +29,9 @@ class Library:
     names
         () -> names of the built-in components.
     describe
-        (name, building file or None, controller file or None, files of effects if any) ->
-        Description of a built-in component; raises BristleError where a file is wrong.
+        (name, building file or None, controller file or None, effects=files, ranged=whether a
+        damper knows the range of its data) -> Description of a built-in component; raises
+        BristleError where a file is wrong.
     describe_file
         (path) -> Description of an FMU file; raises FmuError.
     read_record

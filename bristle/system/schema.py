@@ -46,7 +46,7 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
     return {
         "$schema": "http://json-schema.org/draft-07/schema#", "title": "bristle scenario", **whole,
         "definitions": {
-            name: _parameters(library.describe(name, None, None)) for name in names
+            name: _parameters(library.describe(name, None, None, ranged=True)) for name in names
         },
     }  # fmt: skip
 
