@@ -21,7 +21,7 @@ from ._options import (
 )
 
 if TYPE_CHECKING:
-    from ..planning.performed import Performed
+    from ..planning.folder import Performed
     from ..study.data_check import DataCheck
     from ..study.extend import Extended
     from ..study.read_again import CorrectedChannels
@@ -137,8 +137,7 @@ def add_extend(parser: Parser) -> None:
 
 
 def _extend(arguments: argparse.Namespace) -> int:
-    from ..planning.folder import read_plan
-    from ..planning.performed import performed
+    from ..planning.folder import performed, read_plan
     from ..study.extend import extend_study
     from ..study.run_facts import RunChoices
     from ..study.study import Study
@@ -163,7 +162,7 @@ def print_added(
         _print_extended_json(extended, by_plan)
         return
     from ..core.text import capital, command
-    from ..study.changes import unknown_to_model
+    from ..study.study import unknown_to_model
 
     folder, runs = extended.study.folder, extended.runs
     print(f"{folder}: {len(runs)} run{'s' * (len(runs) != 1)} added.")
@@ -216,8 +215,7 @@ def add_roles(parser: Parser) -> None:
 def _roles(arguments: argparse.Namespace) -> int:
     """Change the roles that are named; print those of all runs."""
     from ..errors import StudyError
-    from ..study.changes import behind_data
-    from ..study.study import Study
+    from ..study.study import Study, behind_data
 
     study = Study(arguments.folder)
     roles: dict[str, str] = {}

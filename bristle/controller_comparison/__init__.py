@@ -13,6 +13,6 @@ from __future__ import annotations
 
 from .compare import compare_controllers
 from .result import ControllerComparison
-from .worst_case import Spread
+from .runs import Spread
 
 __all__ = ["ControllerComparison", "Spread", "compare_controllers"]

@@ -36,7 +36,19 @@ from ..synthesis.design_file import task_of
 from ..synthesis.task import check_sample_period
 from ..system.library import controller_in, law_of
 from .result import ControllerComparison, Setting, of_designs, of_engines
-from .runs import CaseRunner, Reached, best_level, flat, limit_of, refuse_limit
+from .runs import (
+    CaseRunner,
+    Reached,
+    Spread,
+    best_level,
+    flat,
+    limit_of,
+    refuse_limit,
+    tied,
+    unvaried,
+    varied,
+    worst_of,
+)
 from .setting import (
     ABOVE,
     BEST,
@@ -65,7 +77,6 @@ from .setting import (
     refuse_twice,
     site_from,
 )
-from .worst_case import Spread, tied, unvaried, varied, worst_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,7 +15,7 @@ from ..core.files import writing
 from ..core.text import quantity
 from ..errors import not_usable
 from ..view import Viewable
-from .runs import CaseRunner, Reached
+from .runs import CaseRunner, Reached, Spread
 from .setting import (
     BEST,
     LIMIT,
@@ -26,7 +26,6 @@ from .setting import (
     ComparedMotion,
     DamperPlace,
 )
-from .worst_case import Spread
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,7 +18,7 @@ rows = [[1.0], [-0.42, 1.0]]
 
 `command = "quadratic"`, or `command = "table"` with `command_knots = [0.0, 1.5, 3.0]` [V], beside
 the law is a form that was chosen (`physics.forms`); `Model.law` names both together.
-`correlation` is how the errors of identified parameters go together (`model.uncertainty`); files
+`correlation` is how the errors of identified parameters go together (`model.model`); files
 without it open as before. `model.model` is what is read, `model.model_file` writes the file.
 """
 
@@ -42,16 +42,18 @@ from ..physics.parameter import Parameter
 from ..units import convert
 from ..user_code.load import waiting, why_left_out
 from .model import (
+    CORRELATION,
     VALUE,
     Fact,
     Model,
     as_written,
     declared_of,
     defaults_of,
+    read_correlation,
+    set_correlation,
     table_names,
     waiting_law,
 )
-from .uncertainty import CORRELATION, read_correlation, set_correlation
 
 # The form of the command in a model.toml: the keys `command` and `command_knots`.
 

@@ -32,8 +32,7 @@ from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
 from ..physics.laws import LAWS, law_of_part, laws_of
-from ..study.changes import behind_data
-from ..study.study import Study
+from ..study.study import Study, behind_data
 from .information import (
     USUAL,
     Evidence,

@@ -17,11 +17,10 @@ from ..identification.problem import following
 from ..model.draws import OpenEffect, has_covariance, left_open
 from ..model.model import Model
 from ..model.model_file import read_model
-from ..study.changes import behind_data
 from ..study.history import history_steps
 from ..study.rig import building_of
 from ..study.steps import count_test_set_use, opened_text, runs_for_test, uses_of_test_set
-from ..study.study import Study
+from ..study.study import Study, behind_data
 from ..study.study_file import TEST
 from .closed_loop_result import ClosedLoop, Predicted
 from .excitation import PredictedRun, begins_in_motion, trial_of

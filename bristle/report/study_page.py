@@ -46,8 +46,7 @@ from ..model.equations import equations
 from ..physics.drive import DRIVES
 from ..physics.forms import shown_law, split_form
 from ..physics.laws import LAWS
-from ..planning.folder import FILE, PlanFolder, read_plan
-from ..planning.performed import shows
+from ..planning.folder import FILE, PlanFolder, read_plan, shows
 from ..planning.plan import OUTCOMES
 from ..prediction.export import write_editable
 from ..study.history import HistoryStep, history_steps

@@ -13,7 +13,6 @@ from ..errors import StudyError
 from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
 from ..physics.effect import closures
-from .changes import other_data
 from .forms import law_or_all
 from .history import Step
 from .identify import identify_study, is_identified
@@ -27,7 +26,7 @@ from .steps import (
     verdict_of,
     write_effects,
 )
-from .study import Study
+from .study import Study, other_data
 from .study_file import ALL
 from .unproven import unproven
 

@@ -18,12 +18,11 @@ from ..data.read import read_table
 from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import StudyError
-from .changes import FILE as ADDED
-from .changes import note_addition
 from .new import refuse_other_columns, remarks_on
 from .run_facts import RunChoices, facts_of, roles_added
 from .runs import read_runs
-from .study import Study
+from .study import FILE as ADDED
+from .study import Study, note_addition
 from .study_file import EXCLUDE, RunFile, read_draft, with_runs
 
 

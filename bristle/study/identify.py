@@ -37,7 +37,6 @@ from ..physics.forms import shown_law, split_form
 from ..physics.laws import LAWS, base_and_variant, law_names
 from ..user_code.load import waiting, why_left_out
 from ..view import Viewable
-from .changes import behind_data
 from .forms import (
     FormError,
     all_laws,
@@ -51,7 +50,7 @@ from .forms import (
 from .history import Step
 from .rig import rig_of
 from .runs import Runs
-from .study import Study
+from .study import Study, behind_data
 from .study_file import ALL
 
 if TYPE_CHECKING:

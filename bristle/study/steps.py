@@ -40,7 +40,6 @@ from ..physics.laws import law_names
 from ..trust import remember_made
 from ..user_code.load import undefine
 from ..view import Viewable
-from .changes import noted
 from .forms import LawFits, law_command, law_or_all, with_law
 from .history import Step
 from .identify import (
@@ -57,7 +56,7 @@ from .new import make_folder
 from .rig import building_of, rig_of
 from .run_facts import RunChoices
 from .runs import Runs, refuse_seen, usable
-from .study import Study
+from .study import Study, noted
 from .study_file import ALL, TEST
 
 Say = Callable[[str], None]

@@ -12,8 +12,7 @@ import pytest
 
 from bristle import trust
 from bristle.campaign import read_ensemble, stock_ensembles
-from bristle.campaign.distributions import Distribution, share
-from bristle.campaign.ensemble_file import resolve_ensemble
+from bristle.campaign.ensemble_file import Distribution, resolve_ensemble, share
 from bristle.errors import EnsembleError, TrustError
 from bristle.system.scenario import resolve_scenario
 

@@ -32,7 +32,7 @@ ELSEWHERE = {
     ("diagnosis/model_faults.py", "delay"): "a kind of sensor fault",
     ("diagnosis/rig_runs.py", "delay"): "a kind of sensor fault",
     ("component/sensors.py", "delay"): "a property of an instrument",
-    ("controller_comparison/worst_case.py", "delay"): "a property of an instrument",
+    ("controller_comparison/runs.py", "delay"): "a property of an instrument",
     ("cli/controllers.py", "delay"): "an option: a property of an instrument",
     ("engine/records.py", "delay"): "a field of the engine's record: a source's parameter",
 }

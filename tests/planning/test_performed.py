@@ -14,8 +14,14 @@ from bristle.cli import main
 from bristle.data.measurement import Measurement, measurements_of
 from bristle.data.table import from_arrays
 from bristle.errors import StudyError
-from bristle.planning.folder import PlanFolder, PlannedRun, write_plan
-from bristle.planning.performed import compared, performed, planned_for
+from bristle.planning.folder import (
+    PlanFolder,
+    PlannedRun,
+    compared,
+    performed,
+    planned_for,
+    write_plan,
+)
 from bristle.study.steps import create_study
 from bristle.study.study import Study
 

@@ -18,8 +18,7 @@ from bristle.errors import FmuError, RecordError, RunError
 from bristle.fmu.build import ensure
 from bristle.fmu.description import Description, Variable
 from bristle.identification.histories import DamperForces
-from bristle.prediction.compare_fmu import compare_fmu
-from bristle.prediction.fmu_ports import map_ports
+from bristle.prediction.compare_fmu import compare_fmu, map_ports
 
 DT = 0.002
 N = 1500

@@ -15,10 +15,10 @@ from bristle.cli import main
 from bristle.data.corrections import Correction
 from bristle.errors import BristleError, StudyError
 from bristle.study import Study, create_study, history, read_again
-from bristle.study.changes import FILE as ADDED
 from bristle.study.extend import extend_study
 from bristle.study.new import parse_channel
 from bristle.study.read_again import correct_channels
+from bristle.study.study import FILE as ADDED
 
 RIGHT = ("force=-F [N]@kN",)
 """The title says N, and means kN; the sensor pulls where the damper pushes."""

@@ -12,9 +12,8 @@ from made import bench_run, write, write_runs
 
 from bristle.data.corrections import Correction
 from bristle.errors import StudyError
-from bristle.study.changes import data_digest, other_data
 from bristle.study.steps import create_study
-from bristle.study.study import Study
+from bristle.study.study import Study, data_digest, other_data
 
 VERDICT = {"schema": 2, "kind": "none", "effects": []}
 

@@ -12,12 +12,11 @@ from made import bench_run, write, write_runs
 
 from bristle.cli import main
 from bristle.errors import BristleError, StudyError
-from bristle.study.changes import FILE, additions, behind_data, unknown_to_model
 from bristle.study.extend import extend_study
 from bristle.study.history import EARLIER, Step
 from bristle.study.run_facts import RunChoices
 from bristle.study.steps import create_study
-from bristle.study.study import Study
+from bristle.study.study import FILE, Study, additions, behind_data, unknown_to_model
 
 SECONDS = 2.0
 
