@@ -22,11 +22,13 @@ from ..errors import BristleError, TrustError
 VIEWS = {
     "data_views": ("channels", "check", "columns", "data", "preview"),
     "study_views": ("errors", "fit", "history", "residual", "verdict"),
-    "control_views": ("controllers", "design", "loops", "weights"),
-    "simulate_views": ("module", "numbers", "scenarios", "simulate", "spectrum"),
-}
+    "control_views": (
+        "controllers", "design", "loops", "weights", "module", "numbers", "scenarios", "simulate",
+        "spectrum",
+    ),
+}  # fmt: skip
 """The views of each module: `NAME_view(folder, arguments)` answers, with bytes or what
-`page_data.pack` takes."""
+`html.pack` takes."""
 
 Answered = tuple[dict[str, Any], bytes]
 

@@ -14,6 +14,7 @@ from bristle.data.channels import ChannelSpec
 from bristle.errors import StudyError
 from bristle.model.model import Fact
 from bristle.page import (
+    data_views,
     study_views,
 )
 from bristle.page.worker import VIEWS, answer, function_of
@@ -52,9 +53,9 @@ def test_what_is_wrong_is_told_in_the_words_of_the_commands(home: Path) -> None:
 
 
 def test_view_1_has_the_runs_and_findings_of_the_data_check(home: Path) -> None:
-    shown, found = study_views.data_view(home / "rig", {}), check_data(Study(home / "rig"))
+    shown, found = data_views.data_view(home / "rig", {}), check_data(Study(home / "rig"))
     assert {run["name"] for run in shown["runs"]} == {run.name for run in found.runs}
-    check = study_views.check_view(home / "rig", {})
+    check = data_views.check_view(home / "rig", {})
     assert check["ok"] == found.ok
     assert {one["text"] for one in check["findings"]} >= {
         f"{one.run}: {one.text}" for one in found.findings if one.kind == "clipping"
@@ -72,8 +73,8 @@ def test_a_thinned_trace_keeps_every_extreme() -> None:
     generator = np.random.default_rng(1)
     time, y = np.arange(50_000) / 500.0, generator.standard_normal(50_000)
     y[31_234] = 9.0
-    rows = study_views.thinned(time, {"y": y})
-    assert len(rows) <= study_views.POINTS + 2
+    rows = data_views.thinned(time, {"y": y})
+    assert len(rows) <= data_views.POINTS + 2
     assert y[rows].max() == y.max()
     assert y[rows].min() == y.min()
     assert np.all(np.diff(rows) > 0)
@@ -186,7 +187,7 @@ def test_view_5_has_the_steps_and_what_can_be_added(home: Path) -> None:
 def test_dropped_files_are_told_apart_with_reasons(tmp_path: Path) -> None:
     write(tmp_path / "run.csv", bench_run(1, seconds=2.0))
     (tmp_path / "words.csv").write_text("a,b\nx,y\n")
-    shown = study_views.columns_view(tmp_path, {})
+    shown = data_views.columns_view(tmp_path, {})
     wrong = [one for one in shown["files"] if one["error"]]
     assert [one["name"] for one in wrong] == ["words.csv"]
     assert str(tmp_path) not in wrong[0]["error"]
@@ -212,14 +213,14 @@ def test_view_1_has_the_columns_of_a_study_and_what_other_channels_would_change(
 ) -> None:
     folder = columns(tmp_path)
     before = (folder / "study.toml").read_bytes()
-    shown = study_views.channels_view(folder, {})
+    shown = data_views.channels_view(folder, {})
     force = next(one for one in shown["columns"] if one["channel"] == "force")
     assert (force["text"], force["guessed_unit"], force["sign"], force["reason"]) == (
         "F [N]", "N", 1, "",
     )  # fmt: skip
     units = next(one["units"] for one in shown["known"] if one["name"] == "force")
     assert {"N", "kN", "lbf"} <= set(units)
-    told = study_views.preview_view(
+    told = data_views.preview_view(
         folder, {"channels": ["force=-F [N]@kN"], "without": ["voltage"]}
     )
     changes = {one["channel"]: one for one in told["changes"]}
@@ -230,9 +231,9 @@ def test_view_1_has_the_columns_of_a_study_and_what_other_channels_would_change(
     assert changes["voltage"]["traces"][1] is None
     assert told["results"] == []
     with pytest.raises(StudyError, match="no unit of this quantity"):
-        study_views.preview_view(folder, {"channels": ["force=F [N]@V"]})
+        data_views.preview_view(folder, {"channels": ["force=F [N]@V"]})
     with pytest.raises(StudyError, match="given twice"):
-        study_views.preview_view(folder, {"channels": ["force=F [N]@N", "force=F [N]@kN"]})
+        data_views.preview_view(folder, {"channels": ["force=F [N]@N", "force=F [N]@kN"]})
     with pytest.raises(StudyError, match="list of texts"):
-        study_views.preview_view(folder, {"without": "voltage"})
+        data_views.preview_view(folder, {"without": "voltage"})
     assert (folder / "study.toml").read_bytes() == before

@@ -11,7 +11,7 @@ from studies import DEVICES, braced_tower
 
 import bristle
 from bristle.errors import PhysicsError, StudyError
-from bristle.page import study_views
+from bristle.page import data_views
 from bristle.prediction.excitation import house_of
 from bristle.prediction.model_system import others_of, shaking_of
 from bristle.report.study_page import commands
@@ -133,7 +133,7 @@ def test_the_channels_of_devices_are_corrected_by_either_name(tmp_path):
         now.with_channels({"roof_force": column})
     with pytest.raises(StudyError, match="are one channel here"):
         now.with_channels({"force": column, "brace_force": column})
-    shown = study_views.channels_view(now.folder, {})
+    shown = data_views.channels_view(now.folder, {})
     assert {"tie_force", "base_displacement"} <= {one["name"] for one in shown["known"]}
 
 
