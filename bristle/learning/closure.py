@@ -1,9 +1,11 @@
 """A closure: a small network for what a model misses and no formula serves, in parallel with it.
 
 Its inputs are the motion of the rod, the command, and exponential traces of both over time and over
-travel. Its hidden weights are drawn (random features: Rahimi & Recht 2008, NIPS 20; Huang, Zhu &
-Siew 2006, Neurocomputing 70, 489-501), its output is a ridge regression in closed form. So a choice
-of inputs, size, scale and penalty costs little, and folds of whole runs make it.
+travel. First its hidden weights are drawn (random features: Rahimi & Recht 2008, NIPS 20; Huang,
+Zhu & Siew 2006, Neurocomputing 70, 489-501) and its output is a ridge regression in closed form, so
+that a choice of inputs costs little. On those, small networks are trained with all their weights;
+the mean of several is the closure (Hansen & Salamon 1990, IEEE PAMI 12, 993-1001). Folds of whole
+runs choose, drawn ones among the rest: they stray less where few runs tell little.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from ..core.arrays import Array, Flags, Indices
@@ -56,8 +59,20 @@ STEEP = (0.3, 0.6, 1.2)
 PENALTIES = tuple(10.0**k for k in range(-6, 1))
 """Ridges, in samples."""
 
+MEMBERS, UNITS = 3, 12
+"""Networks that are trained, from other weights each, and their hidden units."""
+
+DECAYS = (1e-4, 1e-3, 1e-2)
+"""Penalties on their weights, in variances of what is missing."""
+
+DESCENTS, ENOUGH = 400, 6_000
+"""Steps of their training; samples of the training runs, about, that it uses."""
+
 FOLDS = 4
 """Parts of the training runs that are left out in turn: whole runs, of a single one stretches."""
+
+FEWEST_REVERSALS = 2 * FOLDS
+"""Reversals of a single training run from which on parts of it are folds."""
 
 MOST = 40_000
 """Samples of the training runs, about, that are used."""
@@ -75,7 +90,10 @@ STRETCHES = 8
 """Parts of the held-out runs, at least, over which a gain must not be scatter."""
 
 ROOM = 1.5
-"""Times the largest force, and energy given back, of the training runs that a closure may have."""
+"""Times the energy given back in the training runs that a closure may give back."""
+
+BOUND = 4.0
+"""Times its largest force in the training runs that a closure comes near at the most."""
 
 SOON = 0.02
 """Time in which the store of energy may run empty, in RMS displacements over RMS velocities."""
@@ -105,8 +123,9 @@ class LearnedClosure(Viewable):
     RMS of its force over RMS of the measured one, on held-out runs; `lives_on` the groups of its
     inputs with the share of its variance that goes without each; `outside` the share of held-out
     samples where it has faded by half or more; `stroke` [m] RMS displacement of the training runs
-    where all have one amplitude, else 0; `nearest` the effect of the library that is; `refused` why
-    it is not kept, "" where it is; `file` its effect's, None where none is written.
+    where all have one amplitude, else 0; `single` the name of the only one, else ""; `nearest` the
+    effect of the library that is; `refused` why it is not kept, "" where it is; `file` its
+    effect's, None where none is written.
     """
 
     name: str
@@ -118,6 +137,7 @@ class LearnedClosure(Viewable):
     lives_on: tuple[tuple[str, float], ...] = ()
     outside: float = 0.0
     stroke: float = 0.0
+    single: str = ""
     nearest: Nearest | None = None
     refused: str = ""
     file: Path | None = None
@@ -125,7 +145,7 @@ class LearnedClosure(Viewable):
     def sentences(self) -> list[str]:
         """Return what was learned, as an engineer would say it."""
         if self.refused or self.closure is None or self.after is None:
-            return [f"No closure is kept. {self.refused}", *self._one_amplitude()]
+            return [f"No closure is kept. {self.refused}", *self._narrow()]
         errors = [one.error for one in (self.before, self.after)]
         fall = " to ".join(percent(one.headline[1]) for one in errors if one is not None)
         lives = [(words, part) for words, part in self.lives_on if part >= LIVES][:TOLD]
@@ -140,7 +160,7 @@ class LearnedClosure(Viewable):
             *([self.nearest.sentence(self.closure.drive)] if self.nearest else []),
             f"It is not supported beyond {self._region()}: it fades to zero there. Of the held-out "
             f"samples {percent(self.outside)} are outside.",
-            *self._one_amplitude(),
+            *self._narrow(),
         ]
 
     def _region(self) -> str:
@@ -159,7 +179,13 @@ class LearnedClosure(Viewable):
                 out.append(f"{name} {plain(factor * low, 3)} to {plain(factor * high, 3)} {unit}")
         return ", ".join(out)
 
-    def _one_amplitude(self) -> list[str]:
+    def _narrow(self) -> list[str]:
+        if self.single:
+            return [
+                f"One run is for training ({self.single}): parts of it chose the closure, which "
+                "knows nothing that this run did not do. Add runs with other amplitudes and "
+                "commands:  bristle study extend"
+            ]
         if not self.stroke:
             return []
         return [
@@ -205,7 +231,8 @@ def learn_closure(
     rule, before, train = rule or prepared.rule, prepared.before, prepared.problem
     alike = one_amplitude(train.runs)
     stroke = float(np.mean([np.std(run.x) for run in train.runs])) if alike else 0.0
-    found = LearnedClosure(name, None, before, stroke=stroke)
+    single = train.runs[0].name if len(train.runs) == 1 else ""
+    found = LearnedClosure(name, None, before, stroke=stroke, single=single)
     if before.z <= rule.clean:
         why = f"The model leaves {before.z:.2f} times the noise (z): nothing is missing."
         return replace(found, refused=why)
@@ -252,6 +279,12 @@ def one_amplitude(runs: Sequence[Run]) -> bool:
     tops = np.array([0.5 * float(np.ptp(run.x)) for run in runs])
     steady = bool(np.all(tops < 1.6 * sizes))  # a sine has 1.41, what is random 2.5 or more
     return steady and bool(np.ptp(sizes) <= ALIKE * np.mean(sizes))
+
+
+def reversals(run: Run) -> int:
+    """Return how often the motion of a run turns, of what is faster than SLOW."""
+    ways = np.sign(run.v[np.abs(run.v) > SLOW * np.std(run.v)])
+    return int(np.count_nonzero(np.diff(ways)))
 
 
 def errors_of(model: Model, problem: Problem) -> list[Array]:
@@ -335,12 +368,16 @@ def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None
     fold = _folds(rows)
     without = float(np.mean(np.concatenate(y) ** 2))
     tried: list[tuple[float, int, Closure]] = []
+    grids: list[tuple[float, _Grid]] = []
     for position in (False, True):
         inputs = inputs_of(train.runs, position)
         seen = [_Seen(train, model, run, inputs) for run in train.runs]
         grid = _Grid(seen, rows, y, fold)
-        for few, steep in product(SEES, STEEP):
-            tried += grid.tried(few, steep)
+        drawn = [one for few, steep in product(SEES, STEEP) for one in grid.drawn(few, steep)]
+        grids.append((min(loss for loss, _, _ in drawn), grid))
+        tried += drawn
+    _, grid = min(grids, key=lambda pair: pair[0])
+    tried += [grid.trained(decay) for decay in DECAYS]
     least = min(loss for loss, _, _ in tried)
     if least > WORTH**2 * without:
         return None
@@ -492,15 +529,17 @@ class _Grid:
         self.scaled = [(one.signals - self.middle) / self.spread for one in seen]
         self.parts = [fold == k for k in range(FOLDS) if np.any(fold == k)]
         self.region = region_of((every - self.middle) / self.spread)
-        used = np.concatenate([one.at(u, row) for one, u, row in self._runs()])
-        self.windows = [region_of(used[~part]).inside(used[part]) for part in self.parts]
+        self.used = np.concatenate([one.at(u, row) for one, u, row in self._runs()])
+        self.windows = [region_of(self.used[~part]).inside(self.used[part]) for part in self.parts]
         self.powers = [float(self.y[part] @ self.y[part]) for part in self.parts]
 
     def _runs(self) -> list[tuple[_Seen, Array, Indices]]:
         return list(zip(self.seen, self.scaled, self.rows, strict=True))
 
-    def tried(self, few: int, steep: float) -> list[tuple[float, int, Closure]]:
+    def drawn(self, few: int, steep: float) -> list[tuple[float, int, Closure]]:
         """Return networks of all sizes and penalties: loss on left-out folds, hidden units, itself.
+
+        Their hidden weights are drawn.
 
         Parameters
         ----------
@@ -538,20 +577,98 @@ class _Grid:
                 theta = np.linalg.solve(gram - G[:n, :n], side - s[:n])
                 loss += power - 2.0 * float(theta @ t[:n]) + float(theta @ H[:n, :n] @ theta)
             theta = rounded(np.linalg.solve(gram, side))
-            largest = float(np.max(np.abs(A[:, :n] @ theta)))
-            closure = Closure(
-                self.seen[0].inputs, self.middle, self.spread, self.region, hidden[:size],
-                bias[:size], theta[1 + k :], theta[1 : 1 + k], float(theta[0]),
-                float(rounded(np.array([ROOM * max(largest, 1e-9)]))[0]), Store(0.0, 0.0, 0.0, 0.0),
-                self.seen[0].run.drive,
-            )  # fmt: skip
+            closure = self._closure(hidden[:size], bias[:size], theta, A[:, :n] @ theta)
             out.append((loss / len(A), size, closure))
         return out
+
+    def trained(self, decay: float) -> tuple[float, int, Closure]:
+        """Return the mean of networks that are trained with all their weights, as `drawn` does.
+
+        They see the inputs as the load cell shows the force: late and smooth as it does.
+
+        Parameters
+        ----------
+        decay : penalty on the weights
+        """
+        u = np.concatenate(
+            [
+                one.at(u, row) if one.plain else one.shown(u)[row]
+                for one, u, row in self._runs()
+            ]
+        )  # fmt: skip
+        thin, size, loss = max(1, len(u) // ENOUGH), float(np.std(self.y)) or 1.0, 0.0
+
+        def mean_of(rows: Flags) -> list[Array]:
+            """Return hidden weights and biases of all networks, and the output of their mean."""
+            own, y = u[rows][::thin], self.y[rows][::thin] / size
+            every = [_descended(own, y, decay, seed) for seed in range(MEMBERS)]
+            hidden, bias, out, rest = (np.concatenate(part) for part in zip(*every, strict=True))
+            rest = np.sum(rest.reshape(MEMBERS, -1), axis=0)
+            return [hidden, bias, size / MEMBERS * np.append(rest, out)]
+
+        for part, window in zip(self.parts, self.windows, strict=True):
+            hidden, bias, theta = mean_of(~part)
+            loss += float(
+                np.sum((self.y[part] - window * (_columns(u[part], hidden, bias) @ theta)) ** 2)
+            )
+        hidden, bias, theta = map(rounded, mean_of(np.ones(len(u), dtype=bool)))
+        closure = self._closure(hidden, bias, theta, _columns(u, hidden, bias) @ theta)
+        return loss / len(u), len(bias), closure
+
+    def _closure(self, hidden: Array, bias: Array, theta: Array, force: Array) -> Closure:
+        """Return a network of some hidden weights and output weights, with its force there."""
+        k = len(self.middle)
+        largest = max(float(np.max(np.abs(force))), 1e-9)
+        return Closure(
+            self.seen[0].inputs, self.middle, self.spread, self.region, hidden, bias,
+            theta[1 + k :], theta[1 : 1 + k], float(theta[0]),
+            float(rounded(np.array([BOUND * largest]))[0]), Store(0.0, 0.0, 0.0, 0.0),
+            self.seen[0].run.drive,
+        )  # fmt: skip
 
 
 def _columns(u: Array, hidden: Array, bias: Array) -> Array:
     """Return what a network's output is linear in (m, 1 + k + n), at scaled inputs (m, k)."""
     return np.column_stack([np.ones(len(u)), u, np.tanh(u @ hidden.T + bias)])
+
+
+def _descended(u: Array, y: Array, decay: float, seed: int) -> list[Array]:
+    """Return a network trained on scaled inputs (m, k): hidden, bias, out, constant and linear.
+
+    Parameters
+    ----------
+    u, y : inputs (m, k) and what it is to give (m,), of the order of one
+    decay : penalty on its weights
+    seed : of its first hidden weights
+    """
+    m, k = u.shape
+    draw = np.random.default_rng(seed)
+    hidden, bias = STEEP[0] * draw.standard_normal((UNITS, k)), draw.uniform(-1.5, 1.5, UNITS)
+    A = _columns(u, hidden, bias)
+    theta = np.linalg.solve(A.T @ A + 1e-3 * m * np.eye(A.shape[1]), A.T @ y)
+    ends = np.cumsum([hidden.size, UNITS, UNITS, 1 + k])
+
+    def split(weights: Array) -> list[Array]:
+        *parts, _ = np.split(weights, ends)
+        return [parts[0].reshape(UNITS, k), *parts[1:]]
+
+    held = decay * np.concatenate([np.ones(hidden.size), 0.1 * np.ones(UNITS), np.ones(UNITS),
+                                   np.append(0.0, np.ones(k))])  # fmt: skip
+
+    def loss(weights: Array) -> tuple[float, Array]:
+        hidden, bias, out, rest = split(weights)
+        H = np.tanh(u @ hidden.T + bias)
+        left = H @ out + u @ rest[1:] + rest[0] - y
+        down = 2.0 / m * left
+        back = (1.0 - H * H) * (down[:, None] * out)
+        slope = np.concatenate([(back.T @ u).ravel(), back.sum(axis=0), H.T @ down,
+                                np.append(down.sum(), u.T @ down)])  # fmt: skip
+        cost = float(left @ left) / m + float(held @ weights**2)
+        return cost, slope + 2.0 * held * weights
+
+    begin = np.concatenate([hidden.ravel(), bias, theta[1 + k :], theta[: 1 + k]])
+    options = {"maxiter": DESCENTS, "maxcor": 20}
+    return split(minimize(loss, begin, jac=True, method="L-BFGS-B", options=options).x)
 
 
 def _store(train: Problem, closure: Closure) -> Store:

@@ -16,7 +16,7 @@ from ..diagnosis.prepared import Prepared
 from ..diagnosis.rig_runs import RigRuns, runs_of_rig
 from ..errors import StudyError
 from ..learning.closed_forms import close, closed_forms
-from ..learning.closure import LearnedClosure, learn_closure
+from ..learning.closure import FEWEST_REVERSALS, LearnedClosure, learn_closure, reversals
 from ..learning.closure_file import closure_text
 from ..learning.curve import CurvePlace, refuse_elsewhere
 from ..learning.curve_picture import curve_png
@@ -99,8 +99,8 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     Raises
     ------
     StudyError
-        If the study has one run for training, or is of a building, the data carry no verdict, or
-        the name is taken.
+        If the study has one short run for training, or is of a building, the data carry no
+        verdict, or the name is taken.
     """
     for why in study.usable_effects():
         tell(f"left out: {why}")
@@ -109,17 +109,18 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
             f"{study.folder}: a closure is in parallel with a damper on a test bench; this study "
             "is of a building. Learn a curve at one of its sites:  bristle learn --at SITE."
         )
-    train = study.runs().train
-    if len({run.source for run in train}) < 2:
-        raise StudyError(
-            f"{study.folder}: one run is for training ({train[0].name}). Folds of whole runs "
-            "choose a closure, so it needs two or more, with different amplitudes or commands. "
-            "Add runs:  bristle study extend"
-        )
     given, name = name, name or _free_name(study, "closure")
     _refuse_no_word(name)
     _refuse_taken(study, name)
     _, opened = opened_at(study, "")
+    runs = opened.problem.runs
+    if len(runs) == 1 and reversals(runs[0]) < FEWEST_REVERSALS:
+        raise StudyError(
+            f"{study.folder}: one run is for training ({runs[0].name}), and its motion turns "
+            f"{reversals(runs[0])} times. Folds choose a closure: whole runs, with different "
+            f"amplitudes or commands, or parts of one that turns {FEWEST_REVERSALS} times. "
+            "Add runs:  bristle study extend"
+        )
     found = learn_closure(opened, name)
     if found.refused or found.closure is None:
         return found

@@ -14,10 +14,10 @@ from bristle.cli import main
 STEP = 0.004  # s
 
 
-def measured(path: Path, seed: int) -> None:
+def measured(path: Path, seed: int, samples: int = 1500) -> None:
     """Write a run of a damper whose friction follows motion and command late."""
     draw = np.random.default_rng(seed)
-    t = STEP * np.arange(1500)
+    t = STEP * np.arange(samples)
     w = 2.0 * np.pi * draw.uniform(0.4, 4.0, 8)
     angle = w[:, None] * t + draw.uniform(0.0, 6.0, 8)[:, None]
     size = 0.06 / w
@@ -34,11 +34,11 @@ def measured(path: Path, seed: int) -> None:
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
 
 
-def made(folder: Path, train: int) -> Path:
+def made(folder: Path, train: int, samples: int = 1500) -> Path:
     """Return an identified study with so many runs for training and one held out."""
     names = [*(f"train_{k}" for k in range(1, train + 1)), "holdout_1"]
     for seed, name in enumerate(names):
-        measured(folder / f"{name}.csv", seed)
+        measured(folder / f"{name}.csv", seed, samples)
     data = [str(folder / f"{name}.csv") for name in names]
     assert main(["study", "new", str(folder / "rig"), "--law", "bingham", "--data", *data]) == 0
     return folder / "rig"
@@ -76,10 +76,10 @@ def test_a_verdict_is_on_the_model_without_it(tmp_path: Path, capsys: Capture) -
     assert any("without network" in note for note in verdict["notes"])
 
 
-def test_a_single_run_for_training_is_refused(tmp_path: Path, capsys: Capture) -> None:
-    rig = made(tmp_path, 1)
+def test_a_single_run_that_hardly_turns_is_refused(tmp_path: Path, capsys: Capture) -> None:
+    rig = made(tmp_path, 1, samples=300)
     why = told(capsys, "learn", rig, "--closure", code=2)
-    assert "one run is for training (train_1)" in why
+    assert "one run is for training (train_1), and its motion turns" in why
     assert "Add runs" in why
     assert not (rig / "effects" / "closure_1.py").exists()
 
