@@ -33,7 +33,7 @@ _BYTECODE = "" if "PYTHONPYCACHEPREFIX" in os.environ else tempfile.mkdtemp(pref
 os.environ.setdefault("PYTHONPYCACHEPREFIX", _BYTECODE)
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# Workers of a run are as many as cores: threads of BLAS beside them wait for each other, at work.
+# Workers of a run are more than cores: threads of BLAS beside them wait for each other, at work.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
@@ -50,6 +50,12 @@ os.environ.setdefault("BRISTLE_TEST_UNPACKED", _UNPACKED)
 
 _STUDIES = "" if studies.FOLDER in os.environ else tempfile.mkdtemp(prefix="bristle-studies-")
 os.environ.setdefault(studies.FOLDER, _STUDIES)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return one more than there are cores: tests wait, for time limits and for each other."""
+    return (os.cpu_count() or 1) + 1
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:

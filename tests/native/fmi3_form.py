@@ -22,25 +22,30 @@ WARNING, ERROR = 1, 3
 
 
 @cache
-def built(component: str) -> Path:
-    """Return a built-in component's FMU of FMI 3.0 for this machine."""
-    return build(plan(component), folder() / "fmi3", [here()], fmi=3)
+def built(component: str, offers: tuple[str, ...] | None = None) -> Path:
+    """Return a built-in component's FMU of FMI 3.0 for this machine, with some effects or all."""
+    where = folder() / ("fmi3" if offers is None else "fmi3_offers")
+    return build(plan(component, offers=offers), where, [here()], fmi=3)
 
 
-@cache
-def unpacked(component: str) -> Path:
-    return extract(built(component), folder() / f"{component}_fmi3_unpacked")
+def unpacked(component: str, offers: tuple[str, ...] | None = None) -> Path:
+    path = built(component, offers)
+    where = folder() / f"{component}_{path.parent.name}_unpacked"
+    return where if where.exists() else extract(path, where)  # a library in use is not replaced
 
 
 class Three:
     """An instance of an FMU of FMI 3.0; `said` holds (status, category, text) of its messages."""
 
-    def __init__(self, component: str, kind: Any = FMU3Slave, token: str = "", **how: Any) -> None:
-        self.about = read_description(built(component))
+    def __init__(
+        self, component: str, kind: Any = FMU3Slave, token: str = "",
+        offers: tuple[str, ...] | None = None, **how: Any,
+    ) -> None:  # fmt: skip
+        self.about = read_description(built(component, offers))
         self.said: list[tuple[int, str, str]] = []
         self.slave = kind(
             guid=token or self.about.guid, modelIdentifier=self.about.identifier,
-            unzipDirectory=str(unpacked(component)), instanceName="one",
+            unzipDirectory=str(unpacked(component, offers)), instanceName="one",
         )  # fmt: skip
         self.slave.instantiate(loggingOn=True, logMessage=self._log, **how)
 
