@@ -12,6 +12,7 @@ import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ import pytest
 from toys import Maker
 
 import bristle
+from bristle.cli import main
 from bristle.engine import cosimulation
 from bristle.engine.results import load_results
 from bristle.engine.run import RunInterrupted, run
@@ -32,12 +34,30 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": str(PACKAGE)}
 COMMAND = [sys.executable, "-m", "bristle.cli", "run"]
 
 
-def command(*arguments: object, cwd: Path, **options: Any) -> subprocess.CompletedProcess[str]:
+def apart(*arguments: object, cwd: Path, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run `bristle run` in a process of its own."""
     return subprocess.run(
         [*COMMAND, *map(str, arguments)],
         cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=60, **options,
     )  # fmt: skip
+
+
+Command = Callable[..., SimpleNamespace]
+
+
+@pytest.fixture
+def command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    """Return a function that runs `bristle run` in the test's folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: object) -> SimpleNamespace:
+        code = main(["run", *map(str, arguments)])
+        said, errors = capsys.readouterr()
+        return SimpleNamespace(returncode=code, stdout=said, stderr=errors)
+
+    return call
 
 
 def rows(folder: Path) -> int:
@@ -87,8 +107,10 @@ def slow(scenario_of: Maker, how: str, at: float) -> Path:
 # -- what a run gives
 
 
-def test_folder_holds_results_figure_and_log_and_nothing_else(fine: Path, tmp_path: Path) -> None:
-    done = command(fine, "--quiet", cwd=tmp_path)
+def test_folder_holds_results_figure_and_log_and_nothing_else(
+    fine: Path, tmp_path: Path, command: Command
+) -> None:
+    done = command(fine, "--quiet")
     assert (done.returncode, done.stderr) == (0, "")
     folder = tmp_path / "results" / "toys"
     assert sorted(p.name for p in folder.iterdir()) == ["figure.png", "log", "results.csv"]
@@ -100,18 +122,20 @@ def test_folder_holds_results_figure_and_log_and_nothing_else(fine: Path, tmp_pa
     assert frame.equals(run(fine))
 
 
-def test_older_files_of_the_folder_are_replaced(fine: Path, tmp_path: Path) -> None:
-    command(fine, "--out", "out", "--no-figure", cwd=tmp_path)
-    command(fine, "--out", "out", "--no-figure", "--format", "parquet", cwd=tmp_path)
+def test_older_files_of_the_folder_are_replaced(
+    fine: Path, tmp_path: Path, command: Command
+) -> None:
+    command(fine, "--out", "out", "--no-figure")
+    command(fine, "--out", "out", "--no-figure", "--format", "parquet")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["log", "results.parquet"]
     assert load_results(tmp_path / "out").equals(run(fine))
 
 
 def test_a_run_with_another_value_has_a_title_and_a_folder_of_its_own(
-    fine: Path, tmp_path: Path
+    fine: Path, tmp_path: Path, command: Command
 ) -> None:
-    command(fine, "--no-figure", cwd=tmp_path)
-    done = command(fine, "--no-figure", "--set", "sum.gain=3", cwd=tmp_path)
+    command(fine, "--no-figure")
+    done = command(fine, "--no-figure", "--set", "sum.gain=3")
     plain, changed = (tmp_path / "results" / name for name in ("toys", "toys_sum.gain=3"))
     assert load_results(plain).equals(run(fine))
     frame = load_results(changed)
@@ -138,9 +162,11 @@ fmu = "LuGreDamper"
 """
 
 
-def test_notes_on_units_that_check_shows_are_shown_and_logged(tmp_path: Path) -> None:
+def test_notes_on_units_that_check_shows_are_shown_and_logged(
+    tmp_path: Path, command: Command
+) -> None:
     (tmp_path / "bench.toml").write_text(NOTED)
-    done = command("bench.toml", "--no-figure", cwd=tmp_path)
+    done = command("bench.toml", "--no-figure")
     note = (
         'note: bench.toml:15: "signal.value" has no unit; "damper.voltage" takes its values as [V].'
     )
@@ -150,8 +176,8 @@ def test_notes_on_units_that_check_shows_are_shown_and_logged(tmp_path: Path) ->
         assert name in done.stdout
 
 
-def test_json_gives_peaks_and_rms_with_units(fine: Path, tmp_path: Path) -> None:
-    done = command(fine, "--json", "--no-figure", "--set", "sum.gain=3", cwd=tmp_path)
+def test_json_gives_peaks_and_rms_with_units(fine: Path, tmp_path: Path, command: Command) -> None:
+    done = command(fine, "--json", "--no-figure", "--set", "sum.gain=3")
     answer = json.loads(done.stdout)
     frame = run(fine, {"sum.gain": 3})
     assert (answer["complete"], answer["rows"], answer["window"]) == (True, 11, [0.0, 1.0])
@@ -224,17 +250,6 @@ def test_overrides_of_numpy_and_paths_are_written(fine: Path, tmp_path: Path) ->
     assert load_results(tmp_path / "out").equals(frame)
 
 
-def test_package_runs_as_a_function_whatever_was_imported(fine: Path) -> None:
-    assert bristle.run(fine).equals(run(fine))
-    code = "import bristle, sys; print(len(bristle.run(sys.argv[1])))"
-    for before in ("", "import bristle.engine.run; ", "from bristle.engine.run import run; "):
-        done = subprocess.run(
-            [sys.executable, "-c", before + code, str(fine)],
-            env=ENVIRONMENT, capture_output=True, text=True, timeout=60,
-        )  # fmt: skip
-        assert done.stdout == "11\n", done.stderr
-
-
 def test_fmu_path_imports_neither_numba_nor_scipy(fine: Path) -> None:
     code = (
         "import bristle, sys; bristle.run(sys.argv[1]); print({'numba', 'scipy'} & {*sys.modules})"
@@ -257,9 +272,9 @@ def test_run_in_a_thread(fine: Path) -> None:
 # -- what is wrong before the run: exit 2, nothing left behind
 
 
-def test_bad_input_leaves_nothing_behind(fine: Path, tmp_path: Path) -> None:
+def test_bad_input_leaves_nothing_behind(fine: Path, tmp_path: Path, command: Command) -> None:
     fine.write_text(fine.read_text().replace("ramp.value", "ramp.valeu"))
-    done = command(fine, cwd=tmp_path)
+    done = command(fine)
     assert done.returncode == 2
     assert "valeu" in done.stderr
     assert "Traceback" not in done.stderr
@@ -267,9 +282,11 @@ def test_bad_input_leaves_nothing_behind(fine: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("out", ["file", "file/below"])
-def test_out_that_is_a_file_is_refused(fine: Path, tmp_path: Path, out: str) -> None:
+def test_out_that_is_a_file_is_refused(
+    fine: Path, tmp_path: Path, out: str, command: Command
+) -> None:
     (tmp_path / "file").write_text("mine")
-    done = command(fine, "--out", out, cwd=tmp_path)
+    done = command(fine, "--out", out)
     assert done.returncode == 2
     assert out in done.stderr
     assert "Traceback" not in done.stderr
@@ -278,10 +295,10 @@ def test_out_that_is_a_file_is_refused(fine: Path, tmp_path: Path, out: str) -> 
 
 @pytest.mark.parametrize(("name", "code"), [("figure.png", 2), ("results.csv", 2), ("log", 1)])
 def test_file_that_cannot_be_replaced_is_named(
-    fine: Path, tmp_path: Path, name: str, code: int
+    fine: Path, tmp_path: Path, name: str, code: int, command: Command
 ) -> None:
     (tmp_path / "out" / name / "in the way").mkdir(parents=True)
-    done = command(fine, "--out", "out", "--no-figure", cwd=tmp_path)
+    done = command(fine, "--out", "out", "--no-figure")
     assert done.returncode == code
     assert f"out/{name}: cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
@@ -290,9 +307,9 @@ def test_file_that_cannot_be_replaced_is_named(
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write")
-def test_out_without_permission_is_refused(fine: Path, tmp_path: Path) -> None:
+def test_out_without_permission_is_refused(fine: Path, tmp_path: Path, command: Command) -> None:
     (tmp_path / "locked").mkdir(mode=0o500)
-    done = command(fine, "--out", "locked", cwd=tmp_path)
+    done = command(fine, "--out", "locked")
     assert done.returncode == 2
     assert "Permission denied" in done.stderr
 
@@ -316,9 +333,9 @@ def left(tmp_path: Path) -> pd.DataFrame:
 
 
 def test_component_that_fails_costs_exit_1_and_keeps_the_rows(
-    scenario_of: Maker, tmp_path: Path
+    scenario_of: Maker, tmp_path: Path, command: Command
 ) -> None:
-    done = command(slow(scenario_of, "discard", 2.0), cwd=tmp_path)
+    done = command(slow(scenario_of, "discard", 2.0))
     assert done.returncode == 1
     assert "RunError: bad in the step from t = 1.9 s" in done.stderr
     assert "Rows up to t = 1.9 s are kept in results/toys/results.csv" in done.stderr
@@ -339,7 +356,7 @@ def test_killed_run_leaves_a_readable_file(scenario_of: Maker, tmp_path: Path) -
 def test_foreign_fmu_that_ends_the_process_leaves_a_readable_file(
     scenario_of: Maker, tmp_path: Path
 ) -> None:
-    done = command(slow(scenario_of, "abort", 20.0), cwd=tmp_path)
+    done = apart(slow(scenario_of, "abort", 20.0), cwd=tmp_path)
     assert done.returncode == -signal.SIGABRT
     assert 0 < len(left(tmp_path)) < 200
 
@@ -406,7 +423,7 @@ def test_disk_that_fills_up_leaves_whole_lines(scenario_of: Maker, tmp_path: Pat
     import resource
 
     file = scenario_of({"ramp": "Ramp"}, stop=20_000.0)
-    done = command(
+    done = apart(
         file,
         "--no-figure",
         cwd=tmp_path,

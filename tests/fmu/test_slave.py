@@ -107,9 +107,13 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 # -- what the description says
 
 
+@cache
+def description_of(component: str) -> Any:
+    return read_model_description(str(built(component)))
+
+
 def variables(component: str) -> dict[str, Any]:
-    description = read_model_description(str(built(component)))
-    return {variable.name: variable for variable in description.modelVariables}
+    return {variable.name: variable for variable in description_of(component).modelVariables}
 
 
 def test_the_components_are_those_listed() -> None:
@@ -144,7 +148,7 @@ def test_parameters_have_their_defaults(component: str) -> None:
 
 @each_component
 def test_units_are_defined_by_their_base_units(component: str) -> None:
-    description = read_model_description(str(built(component)))
+    description = description_of(component)
     defined = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
     used = {v.unit for v in description.modelVariables if v.unit}
     assert used == set(defined)
@@ -188,7 +192,7 @@ def test_parameters_of_the_law_carry_unit_and_bounds(component: str) -> None:
 
 @each_component
 def test_every_output_is_an_initial_unknown_with_its_dependencies(component: str) -> None:
-    description = read_model_description(str(built(component)))
+    description = description_of(component)
     outputs = {unknown.variable.name: unknown for unknown in description.outputs}
     unknowns = {unknown.variable.name: unknown for unknown in description.initialUnknowns}
     assert set(outputs) == set(unknowns) == {*OUTPUTS[component], "fault"}
@@ -202,7 +206,7 @@ def test_every_output_is_an_initial_unknown_with_its_dependencies(component: str
 
 @each_component
 def test_capabilities_and_guid(component: str) -> None:
-    description = read_model_description(str(built(component)))
+    description = description_of(component)
     able = description.coSimulation
     assert able.canGetAndSetFMUstate
     assert able.canSerializeFMUstate
@@ -253,7 +257,7 @@ def follow(path: str, cases: list[dict[str, Any]]) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("component", ["Structure", *DAMPERS])
 def test_dependencies_are_what_is_seen(component: str) -> None:
-    description = read_model_description(str(built(component)))
+    description = description_of(component)
     said = {(u.variable.name, v.name) for u in description.outputs for v in u.dependencies}
     cases: list[dict[str, Any]] = [{}]
     cases += [{f"{effect.name}.on": True} for effect in effects_of(*SITES[component])]
@@ -410,7 +414,8 @@ def replay(path: str, values: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("component", "effects"),
-    [(c, False) for c in ONE_OF_EACH if c not in SITES] + [(c, True) for c in SITES],
+    [(c, c in SITES) for c in ONE_OF_EACH]
+    + [pytest.param(c, True, marks=pytest.mark.slow) for c in SITES if c not in ONE_OF_EACH],
 )
 def test_the_whole_state_can_be_kept_and_set(component: str, effects: bool) -> None:
     values = {k: v for k, v in lively(component).items() if effects or not k.endswith(".on")}
