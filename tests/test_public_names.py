@@ -42,7 +42,6 @@ def python(code: str, timeout: float = 120.0) -> subprocess.CompletedProcess[str
 @pytest.mark.parametrize(
     "lines",
     [
-        "from bristle.diagnosis import Diagnosis; import bristle",
         "import bristle.engine.run; import bristle.campaign.ensemble; import bristle",
         "import bristle; bristle.run; bristle.identify; import bristle.campaign, bristle.engine",
     ],
@@ -103,7 +102,7 @@ def test_importing_and_help_are_quick(arguments: list[str]) -> None:
         return used.ru_utime + used.ru_stime
 
     times = []
-    for _ in range(7):  # the least, of processor time: the machine has other work, too
+    for _ in range(3):  # the least, of processor time: the machine has other work, too
         before = spent()
         subprocess.run([sys.executable, *arguments], capture_output=True, check=True)
         times.append(spent() - before)

@@ -126,32 +126,18 @@ def test_the_validator_finds_nothing(component: str) -> None:
 
 
 @each_component
-def test_ports_have_their_names_and_units(component: str) -> None:
+def test_ports_parameters_and_units_are_those_listed(component: str) -> None:
     found = variables(component)
     inputs = {n: v.unit for n, v in found.items() if v.causality == "input"}
     outputs = {n: v.unit for n, v in found.items() if v.causality == "output"}
     assert inputs == INPUTS[component]
     assert outputs == {**OUTPUTS[component], "fault": None}
-    assert found["fault"].type == "Integer"
-    assert found["fault"].variability == "discrete"
-
-
-@each_component
-def test_parameters_have_their_defaults(component: str) -> None:
-    found = variables(component)
+    assert (found["fault"].type, found["fault"].variability) == ("Integer", "discrete")
     for name, value in PARAMETERS[component].items():
-        start = found[name].start
-        assert type(value)(start) == value
-        assert found[name].causality == "parameter"
-        assert found[name].variability == "fixed"
-
-
-@each_component
-def test_units_are_defined_by_their_base_units(component: str) -> None:
-    description = description_of(component)
-    defined = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
-    used = {v.unit for v in description.modelVariables if v.unit}
-    assert used == set(defined)
+        assert type(value)(found[name].start) == value
+        assert (found[name].causality, found[name].variability) == ("parameter", "fixed")
+    defined = {unit.name: unit.baseUnit for unit in description_of(component).unitDefinitions}
+    assert {v.unit for v in found.values() if v.unit} == set(defined)
     for name, base in defined.items():
         unit = units.parse(name)
         assert units.canonical(name) == name
@@ -205,7 +191,9 @@ def test_every_output_is_an_initial_unknown_with_its_dependencies(component: str
 
 
 @each_component
-def test_capabilities_and_guid(component: str) -> None:
+def test_capabilities_and_guid_and_the_catalogue_that_describes_it_without_an_fmu(
+    component: str,
+) -> None:
     description = description_of(component)
     able = description.coSimulation
     assert able.canGetAndSetFMUstate
@@ -215,18 +203,14 @@ def test_capabilities_and_guid(component: str) -> None:
     assert not able.canBeInstantiatedOnlyOncePerProcess
     assert description.guid == build.plan(component).guid()
     assert description.variableNamingConvention == "structured"
-
-
-@each_component
-def test_the_description_without_an_fmu_is_the_same(component: str) -> None:
-    found = variables(component)
-    described = catalogue.describe(component).variables
+    found, described = variables(component), catalogue.describe(component).variables
     assert list(described) == list(found)
     for name, variable in described.items():
         other = found[name]
         assert (variable.kind, variable.causality) == (other.type, other.causality)
-        assert variable.unit == other.unit
-        assert variable.reference == other.valueReference
+        assert (variable.unit, variable.reference) == (other.unit, other.valueReference)
+        bounds = [None if one is None else float(one) for one in (other.min, other.max)]
+        assert [variable.minimum, variable.maximum] == bounds, name
 
 
 # -- outputs follow inputs

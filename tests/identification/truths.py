@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import pandas as pd
 
 from bristle.data.measurement import Measurement, measurements_of_frame
@@ -22,6 +24,7 @@ def measured(run) -> Measurement:
     return measurements_of_frame(frame_of(run), run["name"])[0]
 
 
+@cache
 def true_case(seed, law, rig="bench_10N", noise=0.01):
     """Return training problem, held-out problem and the true model of a case without an effect."""
     case = make_case(seed, "none", None, 0.15, noise, rig, law)
@@ -32,6 +35,7 @@ def true_case(seed, law, rig="bench_10N", noise=0.01):
     return train, held, Model(law, (), dict(case.specimen.rig.values))
 
 
+@cache
 def hidden_case(seed, effect, form, strength, rig, law):
     """Return the training problem of a case with an effect, and the model without that effect."""
     case = make_case(seed, effect, form, strength, 0.01, rig, law)

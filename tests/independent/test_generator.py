@@ -52,7 +52,12 @@ def test_every_form_gives_its_parameters_on_every_rig_that_carries_it(name, bed)
 
 @pytest.mark.parametrize(
     ("name", "form", "law"),
-    [(n, f, law) for n in (*FURTHER, *CROSSED) for f, one in FORMS[n].items() for law in one.laws],
+    [
+        pytest.param(n, f, law, marks=[] if law == one.laws[0] else pytest.mark.slow)
+        for n in (*FURTHER, *CROSSED)
+        for f, one in FORMS[n].items()
+        for law in one.laws
+    ],
 )
 def test_a_further_effect_changes_a_bench_by_what_was_asked_for_or_by_its_most(name, form, law):
     case = make_case(11, name, form, 0.05, 0.01, "bench_10N", law, duration=6.0)

@@ -109,13 +109,12 @@ def test_a_channel_besides_is_the_second_signal():
         assert not plain.tells(EFFECTS["learned_1"])
 
 
+@pytest.mark.slow  # each is examined for 3 s; curves are by default
 @pytest.mark.parametrize(
     ("part", "second"),
     [
-        ("friction", "speed"), pytest.param("force", "voltage", marks=pytest.mark.slow),
-        pytest.param("viscous", "slowing", marks=pytest.mark.slow),
-        pytest.param("fluid", "acceleration", marks=pytest.mark.slow),
-        *(pytest.param(part, "travel", marks=pytest.mark.slow) for part in PARTS_OF_SURFACE),
+        ("friction", "speed"), ("force", "voltage"), ("viscous", "slowing"),
+        ("fluid", "acceleration"), *((part, "travel") for part in PARTS_OF_SURFACE),
     ],
 )  # fmt: skip
 def test_a_surface_of_every_part_is_an_effect(part, second):

@@ -109,29 +109,17 @@ def test_the_library_has_not_lost_an_effect() -> None:
 
 
 @each_effect
-def test_it_stands_in_a_file_of_its_name(effect: type[Effect]) -> None:
+def test_its_class_data_are_whole(effect: type[Effect]) -> None:
     assert effect.__module__.rsplit(".", 1)[-1] == effect.name
     assert EFFECTS[effect.name] is effect
-
-
-@each_effect
-def test_site_and_laws_are_known(effect: type[Effect]) -> None:
     assert set(effect.sites) <= set(SITES)
     assert effect.site == effect.sites[0]
     assert set(laws_joined(effect)) <= set(LAWS)
     assert bool(laws_joined(effect)) == ("damper" in effect.sites)
     assert effect.name not in effect.excludes
-
-
-@each_effect
-def test_units_are_known_and_spelled_as_everywhere(effect: type[Effect]) -> None:
     spelled = [parameter.unit for parameter in effect.parameters.values()]
     spelled += effect.states.values()
     assert [units.canonical(unit) for unit in spelled] == spelled
-
-
-@each_effect
-def test_bounds_hold_the_default_and_are_finite(effect: type[Effect]) -> None:
     assert effect.parameters
     for name, parameter in effect.parameters.items():
         low, high = parameter.bounds
@@ -150,29 +138,17 @@ def test_it_tells_users_what_it_is(effect: type[Effect]) -> None:
     assert len(line) <= 100
     assert ":" in line, "NAME: what happens"
     assert "Leaves out" in (effect.__doc__ or ""), "every law says where to doubt it"
-
-
-@each_effect
-def test_it_says_what_a_residual_looks_like_without_it(effect: type[Effect]) -> None:
     assert len(effect.expect.split()) >= 5
     assert not effect.expect.endswith(".")
-
-
-@each_effect
-def test_its_source_has_a_year(effect: type[Effect]) -> None:
     assert re.search(r"\b(1[89]|20)\d\d\b", effect.source), effect.source
 
 
 @each_effect
-def test_needs_states_and_parameters_are_what_the_hooks_read(effect: type[Effect]) -> None:
+def test_its_hooks_are_pure_functions_in_order_that_read_what_it_says(effect: type[Effect]) -> None:
     q, z, p = names_read(effect)
     assert q == set(effect.needs)
     assert z == set(effect.states)
     assert p == set(effect.parameters)
-
-
-@each_effect
-def test_its_hooks_are_pure_functions_in_order(effect: type[Effect]) -> None:
     hooks = effect.hooks()
     assert list(hooks) == [hook for hook in HOOKS if hook in hooks]
     for hook, function in hooks.items():
