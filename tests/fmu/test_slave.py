@@ -708,6 +708,7 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("SignalSource", {"kind": "csv", "file": "none.csv"}, "none.csv: there is no such file"),
     ("SignalSource", {"duration": 0.0}, "duration = 0.0 lies outside"),
     ("PrescribedMotion", {"kind": "steps"}, "kind 'steps' jumps: no velocity fits it"),
+    ("Sensors", {"seed": -1}, "seed = -1 lies outside [0, 2147483647]"),  # a whole number
 ]
 
 

@@ -12,7 +12,7 @@ from fmi3_form import Three
 from bristle.fmu.build import BuildPlan, plan
 from bristle.fmu.library import ERROR, WARNING
 from bristle.native.build import build
-from bristle.native.prepare import component_of
+from bristle.native.entrance import component_of
 from bristle.native.zig import here
 
 pytestmark = needs_zig
