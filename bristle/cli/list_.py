@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.text import tick, typed
-from ..view.blocks import Table
+from ..view.blocks import Table, Text
 from ..view.terminal import lines
 from ._options import Parser, print_json
 
@@ -289,11 +289,13 @@ def effect_as_dict(effect: Any) -> dict[str, Any]:
 
 
 def _print_effect(found: dict[str, Any]) -> None:
-    joins = f", joins {', '.join(found['laws'])}" if found["laws"] else ""
-    print(f"{found['name']} ({', '.join(found['sites'])}{joins}): {found['about']}\n")
-    print(found["text"])
-    print(f"\nWhen it is missing: {found['expect']}.\nSource: {found['source']}.\n")
-    print("\n".join(_parameter_lines(found, f"{found['name']}.")))
+    _say(f"{found['name']} ({', '.join(found['sites'])}): {found['about']}")
+    print(f"\n{found['text']}\n")
+    _say(f"When it is missing: {found['expect']}.")
+    if found["laws"]:
+        _say(f"Laws that it joins: {', '.join(found['laws'])}.")
+    _say(f"Source: {found['source']}.")
+    _print_parameters(found, f"{found['name']}.")
     if found["site"] == "sensor":
         print("\nUsed in a model that is compared with measurements; never inside a damper.")
     else:
@@ -333,21 +335,25 @@ def law_as_dict(law: Any) -> dict[str, Any]:
 
 
 def _print_law(found: dict[str, Any]) -> None:
-    print(f"{found['about']}\n")
-    print(found["text"])
-    print(f"\nParts: {', '.join(found['parts'])}.")
+    _say(found["about"])
+    print(f"\n{found['text']}\n")
+    print(f"Parts: {', '.join(found['parts'])}.")
     if found["contains"]:
         print(f"Contains: {', '.join(found['contains'])}; no effect of that kind is offered.")
     for quantity, (form, *names) in found["command"].items():
-        print(f"Over the voltage: {quantity} is {form}, by {', '.join(names)}.")
+        _say(f"Over the voltage: {quantity} is {form}, by {', '.join(names)}.")
     if found["forms"]:
         forms = ", or ".join(f"--command {form}" for form in found["forms"])
         print(f"To be identified in another form too:  {forms}")
     print(f"Inverse for controllers: {'yes' if found['inverse'] else 'no'}.")
-    print(f"Effects that join it: {', '.join(found['effects'])}.")
-    print(f"Source: {found['source']}.\n")
-    print("\n".join(_parameter_lines(found, "")))
+    _say(f"Effects that join it: {', '.join(found['effects'])}.")
+    _say(f"Source: {found['source']}.")
+    _print_parameters(found, "")
     print(f"\nIn a study:  bristle identify STUDY --law {found['name']}")
+
+
+def _say(text: str) -> None:
+    print("\n".join(lines(Text(text))))
 
 
 def _parameters_of(one: Any) -> dict[str, Any]:
@@ -371,11 +377,12 @@ def _text_of(one: Any) -> tuple[str, str]:
     return first.strip(), textwrap.dedent(rest).strip("\n")
 
 
-def _parameter_lines(found: dict[str, Any], begin: str) -> list[str]:
-    """Return a line per parameter: value, unit, bounds, meaning."""
-    lines = []
-    for name, about in found["parameters"].items():
-        low, high = (tick(bound) for bound in about["bounds"])
-        value = f"{typed(about['value'])} {about['unit']}".removesuffix(" 1")
-        lines.append(f"  {begin}{name} = {value}  ({low} to {high}): {about['text']}")
-    return lines
+def _print_parameters(found: dict[str, Any], begin: str) -> None:
+    """Print a row per parameter: value, unit, bounds, meaning."""
+    rows = [
+        [f"{begin}{name}", typed(about["value"]), about["unit"], *map(tick, about["bounds"]),
+         about["text"]]
+        for name, about in found["parameters"].items()
+    ]  # fmt: skip
+    header = ("parameter", "value", "unit", "from", "to", "meaning")
+    print("", *lines(Table(header, rows, (1, 3, 4))), sep="\n")

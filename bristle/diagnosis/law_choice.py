@@ -424,6 +424,9 @@ def rows_of(
                 "kind": pair.finding.kind, "effects": list(pair.finding.effects),
                 "z_with_effects": round(pair.after.z, 4), "fitted_with_effects": pair.fitted,
             }  # fmt: skip
+            nearest = pair.reach()
+            if pair.finding.kind == "unknown" and nearest.z < pair.after.z:
+                shown |= {"nearest": list(nearest.effects), "z_nearest": round(nearest.z, 4)}
         out.append(shown)
     return out
 

@@ -68,9 +68,12 @@ def law_sentences(verdict: Row) -> list[str]:
     if not verdict.get("noise_known", True):
         out = [f"Of {count} laws {law_name(mine)}{with_what} has the least error on held-out runs."]
     elif verdict.get("kind") == "unknown":
+        best = ""
+        if "nearest" in mine:
+            best = f", with {effect_names(mine['nearest'])} {short_z(mine['z_nearest'])}"
         out = [
             f"{count} laws were tried, each alone and with every effect, and none explains the "
-            f"runs. {law_name(mine)} comes nearest: alone its error is {z} {NOISE}."
+            f"runs. {law_name(mine)} comes nearest: alone its error is {z} {NOISE}{best}."
         ]
     else:
         out = [

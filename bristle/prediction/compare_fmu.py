@@ -15,10 +15,19 @@ from ..comparison.predictions import RunPrediction, coordinates_of, rms
 from ..comparison.result import Comparison
 from ..core.arrays import Array
 from ..core.text import percent, unknown
-from ..data.channels import DRIVE, MOTION, PLAIN, ChannelSpec, channel_unit, is_channel, meaning
+from ..data.channels import (
+    DRIVE,
+    MOTION,
+    PLAIN,
+    ChannelSpec,
+    channel_unit,
+    in_unit,
+    is_channel,
+    meaning,
+)
 from ..data.decimate import between
 from ..data.extra_channels import as_word
-from ..data.guess import guess_channels, specs
+from ..data.guess import guess_channels, may_be_time, specs
 from ..data.left_out import MISSING, SETTLING
 from ..data.measurement import in_si, time_of
 from ..data.noise import estimate_noise
@@ -479,9 +488,9 @@ def signals_of(
     notes = [f"guessed: {one}" for one in guesses if one.channel not in channels and one.doubt]
     chosen = {**specs(table, guesses), **channels}
     if (clock := chosen.pop("time", None)) is None:
-        raise RecordError(
-            f"{table.source}: no column is the time. --channel time=COLUMN@s names one."
-        )
+        able = may_be_time(table, [text for text in table.values if text not in table.not_numeric])
+        way = f" {in_unit('time', able[0])}." if len(able) == 1 else ""
+        raise RecordError(f"{table.source}: no column is the time.{way}")
     if clock.step is None:
         clock = replace(clock, unit=clock.unit or table.find(clock.column).stated or "s")
     time, columns = time_of(table, clock), {}

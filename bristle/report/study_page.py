@@ -53,6 +53,7 @@ from ..study.history import HistoryStep, history_steps
 from ..study.pictures import budgets, draw_budget, sentence, staircase_page
 from ..study.read_again import devices_of
 from ..study.runs import names_of_runs, place_of_run
+from ..study.steps import NOT_PROVEN
 from ..study.study_file import TEST
 from ..study.view import or_nothing, steps_table, story_view
 from ..version import __version__
@@ -897,7 +898,7 @@ def _step(step: Step, old: str, new: str, law: str, present: str) -> list[str]:
     if verb == "begin":
         return []
     if verb == "add":
-        return [command("add", new, *rest.split(", "))]
+        return [command("add", new, *rest.removesuffix(f" ({NOT_PROVEN})").split(", "))]
     if step.what == "identify the building":
         return [command("identify", new, "--structure")]
     if verb == "identify":

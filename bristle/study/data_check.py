@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.finding import Finding
 from ..core.text import command, plain
+from ..data.channels import ChannelSpec
 from ..data.checks.channels import check_channels, check_sizes
 from ..data.checks.differing_runs import check_differing_runs
 from ..data.checks.motion import (
@@ -28,6 +29,8 @@ from ..data.checks.runs import (
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
+from ..data.titles import column
+from ..units import conversion, same_dimension
 from ..view import Viewable
 from .rig import Place, place_of_damper
 from .runs import read_runs
@@ -154,7 +157,8 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     findings += [one for one in together if not (doubted and stated and one.kind == "two rigs")]
     excitations += [excitation_of(run, level) for run in test_runs]
     if study.settings.has_building:
-        findings += _unmeasured(runs.all, at_damper)
+        findings += _unmeasured(study, runs.all, at_damper)
+    findings = _advised(findings, study, every, at_damper)
     findings = [_of_study(_milder(finding, runs.all), study) for finding in findings]
     ordered = [finding for level in _LEVELS for finding in findings if finding.level == level]
     return DataCheck(tuple(ordered), tuple(excitations), tuple(every), at_damper)
@@ -210,12 +214,17 @@ def _other_levels(run: Measurement, level: str) -> list[str]:
     return [name for name in names if name and name != level]
 
 
-def _unmeasured(runs: list[Measurement], at_damper: Place) -> list[Finding]:
+def _unmeasured(study: Study, runs: list[Measurement], at_damper: Place) -> list[Finding]:
     findings = []
     there = set.intersection(*(set(run.channels) for run in runs))
     if "ground_acceleration" not in there:
         text = "the ground's acceleration was not measured: the structure's response has no input."
-        do = "Name its column: bristle study channels MY_RIG --channel ground_acceleration=COLUMN"
+        extra = study.settings.extra.values()
+        able = [one.column for one in extra if one.unit and same_dimension(one.unit, "m/s2")]
+        do = "Measure it, too."
+        if able:
+            named = ("--channel", f"ground_acceleration={able[0]}")
+            do = f"If it is that one:  {command('study', 'channels', study.folder, *named)}"
         findings.append(Finding("ground", "error", text, do))
     if "force" not in there:
         text = (
@@ -232,3 +241,98 @@ def _unmeasured(runs: list[Measurement], at_damper: Place) -> list[Finding]:
             do = "Put a load cell at it."
         findings.append(Finding("force", "warning", text, do))
     return findings
+
+
+# Advice to read a column in another unit or with the other sign: tried on the runs before it is
+# given.
+
+_UNITS = {
+    "displacement": ("mm", "m", "cm", "um"), "velocity": ("mm/s", "m/s"), "force": ("N", "kN"),
+    "voltage": ("V", "mV"), "current": ("A", "mA"), "duty": ("%", "1"), "field": ("T", "mT"),
+    "time": ("s", "ms", "us"),
+}  # fmt: skip
+"""Units in which channels of a bench are recorded, the usual one first."""
+
+_TRIED = 4
+"""Runs that are in doubt, and as many that are not, on which an advice is tried."""
+
+
+def _of_reading(finding: Finding) -> bool:
+    """Return whether another unit or sign of a column may set right what was found."""
+    kinds = ("sign", "gain") if finding.level == "error" else ("size", "command sign")
+    return finding.kind in kinds
+
+
+def _advised(
+    findings: list[Finding], study: Study, runs: list[Measurement], at_damper: Place
+) -> list[Finding]:
+    """Return findings with the way to read a column that sets them right, where there is one."""
+    doubted: dict[tuple[str, str], set[str]] = {}
+    for one in filter(_of_reading, findings):
+        doubted.setdefault((one.kind, one.channel), set()).add(one.run)
+    advice = {
+        key: _advice(*key, study, _some(runs, names), at_damper) for key, names in doubted.items()
+    }
+    return [
+        replace(one, do=advice[one.kind, one.channel]) if _of_reading(one) else one
+        for one in findings
+    ]
+
+
+def _some(runs: list[Measurement], names: set[str]) -> list[Measurement]:
+    """Return runs of these names and others, a few of each."""
+    apart = ([run for run in runs if (run.name in names) is there] for there in (True, False))
+    return [run for part in apart for run in part[:_TRIED]]
+
+
+def _advice(
+    kind: str, channel: str, study: Study, runs: list[Measurement], at_damper: Place
+) -> str:
+    """Return the command that sets a finding right on all of some runs, else where to look."""
+    bench = not study.settings.has_building
+    before, options = _doubts(runs, at_damper, bench), []
+    for name in dict.fromkeys((channel, "displacement") if kind == "gain" else (channel,)):
+        spec = study.settings.channels.get(name)
+        if spec is None or spec.step is not None or name not in _UNITS:
+            continue
+        for unit, sign, factor in _readings(kind, name, spec):
+            after = _doubts([_scaled(run, name, factor) for run in runs], at_damper, bench)
+            if (kind, channel) not in after and after <= before:
+                turned = "-" if sign < 0 else ""
+                options.append(("--channel", f"{name}={turned}{spec.column}@{unit}"))
+                break
+    if not options:
+        return "No other unit or sign of a column sets all runs right: look into the test's log."
+    ways = [command("study", "channels", study.folder, *one) for one in options]
+    if len(ways) == 1:
+        return f"Read so, it is right:  {ways[0]}"
+    return f"Read so, it is right, by the one that the test's log says:  {'  or  '.join(ways)}"
+
+
+def _readings(kind: str, channel: str, spec: ChannelSpec) -> Iterator[tuple[str, int, float]]:
+    """Yield units and signs of a column, and the factors that they give its values."""
+    now = spec.unit or column(0, spec.column).stated
+    for sign in (1, -1) if kind == "gain" else (-1,) if "sign" in kind else (1,):
+        for unit in dict.fromkeys((now, *(() if "sign" in kind else _UNITS[channel]))):
+            if (unit, sign) != (now, 1):
+                yield unit, sign * spec.sign, sign * conversion(unit, now)[0]
+
+
+def _doubts(runs: list[Measurement], at_damper: Place, bench: bool) -> set[tuple[str, str]]:
+    """Return what is found in runs that the reading of a column may set right."""
+    level = "" if at_damper.ends else at_damper.level
+    found: list[Finding] = []
+    for run in runs:
+        velocity = velocity_of_run(at_damper.seen(run), at_damper.level)
+        found += [*(check_sizes(run, velocity) if bench else ()), *check_motion(run, level)]
+        if "force" in run.channels and velocity is not None:
+            found += check_force(run, velocity)
+    return {(one.kind, one.channel) for one in found if _of_reading(one)}
+
+
+def _scaled(run: Measurement, channel: str, factor: float) -> Measurement:
+    """Return a run whose channel, or time, is so many times as large."""
+    if channel == "time":
+        sampling = replace(run.sampling, step=factor * run.step)
+        return replace(run, time=factor * run.time, sampling=sampling)
+    return replace(run, channels={**run.channels, channel: factor * run[channel]})

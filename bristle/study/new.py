@@ -24,9 +24,10 @@ from ..data.channels import (
     meaning,
     no_device,
 )
+from ..data.checks.channels import SLOW
 from ..data.decimate import FAST, RATE
 from ..data.extra_channels import found_in, raw_signals
-from ..data.guess import Guess, guess_channels, left_out, too_few_rows
+from ..data.guess import Guess, guess_channels, left_out, may_be_time, too_few_rows
 from ..data.measurement import in_si, measurements_of
 from ..data.noise import SHORTEST
 from ..data.pieces import holds_several, pieces_of
@@ -39,7 +40,7 @@ from ..model.model_file import model_text
 from ..physics.building import Building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
-from ..units import canonical, convert
+from ..units import canonical, convert, same_dimension
 from .history import History, Step
 from .run_facts import Facts, RunChoices, facts_of, for_test, roles_of
 from .runs import names_of_runs
@@ -299,10 +300,12 @@ def _rate(parts: Sequence[_Part], choices: RunChoices, notes: list[str]) -> floa
         return 0.0
     longest = max(part.lasts for part in parts)
     if longest * rate < SHORTEST:
+        other = " If the times are in another unit, --channel time=COLUMN@UNIT gives it."
+        other = other if fastest >= 1e3 * SLOW else ""  # a thousand times slower is too slow
         raise StudyError(
             f"the runs last {plain(longest, 3)} s at most, with {plain(fastest, 4)} samples per "
             f"second: a fit needs {plain(SHORTEST / rate, 3)} s at least, and several cycles of "
-            "motion. If the times are in another unit, --channel time=COLUMN@UNIT gives it."
+            f"motion.{other}"
         )
     held = plain(fastest, 4)
     if plain(slowest, 4) != held:
@@ -396,14 +399,19 @@ def _refuse_incomplete(
     wrong = []
     free = _free(table, guesses)
     if "time" not in there:
-        apart = {text: np.diff(table.values[text]) for text in free}
-        rising = [text for text, d in apart.items() if (d > 0.0).all() and not (d == 1.0).all()]
+        rising = may_be_time(table, free)
         way = f"{in_unit('time', rising[0])}; or " if len(rising) == 1 else ""
         wrong.append(f"no column can be the time: {way}--step S, the sampling step in s")
 
-    def lacks(what: str, choice: str) -> None:
-        """Say what no column can be, and how one is named where one is left to name."""
-        way = f"--channel {choice}" if free else "no other column of numbers is left"
+    def lacks(what: str, *able: str) -> None:
+        """Say what no column can be, and how one is named of those whose unit allows it."""
+        way = "no other column of numbers is left"
+        for channel in able:
+            fit = [text for text in free if _has_unit(table, text, channel_unit(channel))]
+            if fit:
+                way = in_unit(channel, fit[0] if len(fit) == 1 else "COLUMN")
+                way += f", and COLUMN one of {listed(fit)}" if len(fit) > 1 else ""
+                break
         for text in free:
             own = table.find(text).stated
             if own and any(_may_be(table, text, quantity) for quantity in what.split()):
@@ -412,7 +420,7 @@ def _refuse_incomplete(
 
     if rig == "bench":
         if not there & {"displacement", "velocity"}:
-            lacks("a displacement or velocity", "velocity=COLUMN@m/s")
+            lacks("a displacement or velocity", "displacement", "velocity")
         words = next((text for text in table.not_numeric if _may_be(table, text, "force")), "")
         if "force" not in there and words:
             wrong.append(
@@ -420,9 +428,10 @@ def _refuse_incomplete(
                 f"{table.not_numeric[words]}"
             )
         elif "force" not in there:
-            lacks("the force", "force=COLUMN@N")
+            lacks("the force", "force")
     elif not any(name.startswith(("base_", "floor", "drift")) for name in there):
-        lacks("the response of a level", "base_displacement=COLUMN@m")
+        response = ("displacement", "velocity", "acceleration_absolute")
+        lacks("the response of a level", *(f"base_{one}" for one in response))
     for guess in guesses:
         if not guess.unit:
             problem = table.find(guess.column).problem.removesuffix(".")
@@ -456,6 +465,12 @@ def _free(table: Table, guesses: Iterable[Guess]) -> list[str]:
         for text, values in table.values.items()
         if text not in taken and text not in table.not_numeric and len({*values.tolist()}) > 1
     ]
+
+
+def _has_unit(table: Table, text: str, right: str) -> bool:
+    """Return whether a column may be in a unit: it states one that converts, or none."""
+    unit = table.find(text).stated
+    return not unit or same_dimension(unit, right)
 
 
 def _may_be(table: Table, text: str, quantity: str) -> bool:

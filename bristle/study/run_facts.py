@@ -493,7 +493,7 @@ def facts_of(
     if commanded and asked:
         raise StudyError(
             f"{', '.join(sorted(asked))}: a level of each run, and a channel of the command as "
-            "well. One of the two: leave the level out, or the channel with --channel."
+            "well. One of the two: leave the level out, or the channel with --without."
         )
     if len(asked) > 1:
         raise StudyError(f"{' and '.join(sorted(asked))} both as levels; one command is right.")
@@ -605,10 +605,9 @@ def _offered(
         values = [one[name].value for one in tokens]
         seen, pattern = tokens[0][name].text, tokens[0][name].pattern
         if drive and _counts(values):
-            notes.append(
-                f'"{seen}" and the like in the names may count the files; '
-                f"--level '{pattern}' takes them for the {name}"
-            )
+            takes = f"; --level '{pattern}' takes them for the {name}"
+            takes = takes if _fits(files, pattern, reading) else ""
+            notes.append(f'"{seen}" and the like in the names may count the files{takes}')
             continue
         unit = PLAIN[name] if drive else ""
         levels = ", ".join(label_text(name, value, unit) for value in sorted(set(values)))
@@ -618,7 +617,8 @@ def _offered(
             text += f". Doubtful: {reading.doubts[name]}"
         if drive:
             text += ". No column holds a command"
-            text += f". --level '{pattern}' says the same" if not reading.digits.get(name) else ""
+            same = not reading.digits.get(name) and _fits(files, pattern, reading)
+            text += f". --level '{pattern}' says the same" if same else ""
         notes.append(text)
         for k, value in enumerate(values):
             more = Facts(levels={name: value}) if drive else Facts(labels={name: value})
@@ -638,6 +638,14 @@ def _in_some_names(files: Sequence[Path], tokens: Sequence[Mapping[str, Token]])
                 "says it"
             ]
     return []
+
+
+def _fits(files: Sequence[Path], pattern: str, reading: Reading) -> bool:
+    """Return whether a pattern of a level fits all names."""
+    try:
+        return bool([_matched(file, pattern, reading, level=True) for file in files])
+    except StudyError:
+        return False
 
 
 def _counts(values: Sequence[float]) -> bool:

@@ -56,7 +56,7 @@ from .forms import law_command
 from .history import HistoryStep, Step, history_steps
 from .identify import Identified
 from .pictures import draw_run, staircase_page
-from .steps import Added, Created, IdentifiedBuilding, unproven_of
+from .steps import NOT_PROVEN, Added, Created, IdentifiedBuilding, unproven_of
 from .study import Study
 from .study_file import TEST
 
@@ -820,5 +820,5 @@ def _gaining(verdict: Mapping[str, Any], folder: Path) -> Next:
     if not gains:
         return Next(command("compare", folder), "shows where the error is")
     best = max(gains, key=lambda row: row["gain"])
-    why = f"error {100.0 * best['gain']:.0f} % lower"
+    why = f"error {100.0 * best['gain']:.0f} % lower, {NOT_PROVEN}"
     return Next(command("add", folder, *best["effects"]), why)

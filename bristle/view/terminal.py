@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import partial
+from itertools import zip_longest
 from textwrap import wrap
 
 from .blocks import Block, Formula, Next, Table, Text, View
@@ -78,8 +79,8 @@ def aligned(
 ) -> list[str]:
     """Return the lines of a table; `numbers` are the columns that are set right.
 
-    Of a table that is too wide titles are broken, then the last cells; where that is not enough,
-    the cells of a row stand below each other.
+    Of a table that is too wide titles are broken, then long first cells beside numbers, then the
+    last cells; where that is not enough, the cells of a row stand below each other.
     """
     right = set(numbers)
     last = len(header) - 1
@@ -91,7 +92,12 @@ def aligned(
     if sum(wide) + 2 * len(wide) > WIDTH and rows:
         words = [max(map(len, title.split()), default=0) for title in header]
         wide = [max(pair) for pair in zip(words, cells, strict=True)]
-    if sum(wide) + 2 * len(wide) > WIDTH and right >= set(range(1, len(header))):
+    named = rows and right >= set(range(1, len(header)))  # numbers follow the first column
+    if named:
+        longest = max(len(word) for row in rows for word in [*row[0].split(), ""])
+        room = WIDTH - sum(wide[1:]) - 2 * len(wide)
+        wide[0] = min(wide[0], max(longest, READ, room))
+    if sum(wide) + 2 * len(wide) > WIDTH and named:
         fits = max(2, sum(sum(wide[: k + 1]) + 2 * k + 2 <= WIDTH for k in range(len(wide))))
         if fits < len(wide):
             parts = (slice(1, fits), slice(fits, None))  # numbers: the first column stands again
@@ -107,8 +113,11 @@ def aligned(
     high = max(map(len, titles))
     table = [*zip(*([""] * (high - len(one)) + one for one in titles), strict=True)]
     for row in rows:
-        first, *more = _wrapped(row[last], wide[last]) or [""]
-        table += [(*row[:last], first), *((*[""] * last, line) for line in more)]
+        broken = [
+            _wrapped(cell, max(1, wide[k])) or [""] if k in (0, last) else [cell]
+            for k, cell in enumerate(row)
+        ]
+        table += zip_longest(*broken, fillvalue="")
     return [
         "  " + "  ".join(
             cell.rjust(width) if k in right else cell.ljust(width)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from made import Columns, bench_run, write, write_runs
 
 from bristle.cli import main
 from bristle.core.finding import Finding
+from bristle.data.channels import ChannelSpec
 from bristle.data.checks.runs import cycles, drive_levels
 from bristle.data.cut_off import clipped_ends
 from bristle.errors import StudyError
@@ -81,16 +83,45 @@ def late(samples: float) -> Spoil:
         ("U [V]", -1.0, "voltage goes down to -6 V and never above zero: is its sign turned?"),
     ],
 )
-def test_what_no_damper_does_is_doubted(tmp_path: Path, title, factor, said) -> None:
+def test_what_no_damper_does_is_doubted_and_the_advice_sets_it_right(
+    tmp_path: Path, title, factor, said
+) -> None:
     def spoil(data: Columns) -> None:
         del data["v [mm/s]"]
         data[title] = factor * data[title]
 
     look = look_at(tmp_path, spoil)
-    (doubt, *_) = [*found(look, "size"), *found(look, "command sign")]
-    assert doubt.level == "warning"
+    assert_advised(tmp_path / "rig", look, said)
+
+
+def test_a_force_that_is_read_with_the_wrong_sign_is_turned_by_the_advice(tmp_path: Path) -> None:
+    files = [write(tmp_path / f"run_{k}.csv", bench_run(k, 4.0)) for k in (1, 2, 3)]
+    force = {"force": ChannelSpec("F [N]", "N", -1)}
+    study = create_study(tmp_path / "rig", files, channels=force).study
+    assert_advised(tmp_path / "rig", check_data(study), "force drives the motion")
+
+
+def assert_advised(rig: Path, look: DataCheck, said: str) -> None:
+    """Assert that a doubt is told, and that nothing is found once its command has run."""
+    kinds = ("size", "command sign", "sign")
+    (doubt, *_) = [one for kind in kinds for one in found(look, kind)]
     assert said in doubt.text
-    assert f"--channel {doubt.channel}=" in doubt.do
+    _, _, advice = doubt.do.partition(":  bristle ")
+    assert main(shlex.split(advice)) == 0
+    again = check_data(Study(rig))
+    assert not [one for kind in kinds for one in found(again, kind)]
+
+
+def test_no_sign_is_advised_that_would_be_wrong_in_another_run(tmp_path: Path) -> None:
+    files = []
+    for k in range(1, 4):
+        data = bench_run(k, 4.0)
+        data["F [N]"] *= -1.0 if k == 2 else 1.0
+        files.append(write(tmp_path / f"run_{k}.csv", data))
+    look = check_data(create_study(tmp_path / "rig", files).study)
+    (doubt,) = found(look, "sign")
+    assert doubt.run == "run_2"
+    assert "--channel" not in doubt.do
 
 
 @pytest.mark.parametrize(
@@ -338,7 +369,7 @@ def test_errors_end_the_check_with_2_and_advice_names_the_study(
     create_study(rig, [write(tmp_path / "run.csv", columns)])
     for more in ([], ["--json"]):
         assert main(["study", "check", str(rig), *more]) == 2
-    assert f"bristle study channels '{rig}' --channel displacement=" in " ".join(
+    assert f"bristle study channels '{rig}' --channel 'displacement=x [mm]@m'" in " ".join(
         capsys.readouterr().out.split()
     )
 

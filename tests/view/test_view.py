@@ -66,3 +66,13 @@ def test_a_shell_shows_the_words_and_what_has_no_figure_says_so() -> None:
 def test_a_column_without_a_title_and_without_cells_takes_no_width() -> None:
     table = Table(("site", "", "z [-]"), [["damper", "", "1.03"]], (2,))
     assert terminal.lines(table) == ["  site      z [-]", "  damper     1.03"]
+
+
+def test_a_long_name_before_numbers_goes_on_below_itself() -> None:
+    name = "5 take friction_damper; add f_0_by_pressure, asymmetry, delay (not proven)"
+    table = Table(("step", "error [N]", "of force", "z", "z train"),
+                  [[name, "75.5", "11.1 %", "10.2", "9.8"]], range(1, 5))  # fmt: skip
+    *titles, first, last = terminal.lines(table)
+    assert max(map(len, [*titles, first, last])) <= terminal.WIDTH
+    assert first.split()[-5:] == ["75.5", "11.1", "%", "10.2", "9.8"]
+    assert " ".join(f"{first[:70]} {last}".split()) == name

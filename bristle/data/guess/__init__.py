@@ -8,6 +8,7 @@ the doubt is said, for either of the two columns could be wrong.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -150,6 +151,16 @@ def too_few_rows(table: Table) -> str:
     return (
         f"{rows} of numbers: no column can be recognised as the time in fewer than {MIN_TIME_ROWS}"
     )
+
+
+def may_be_time(table: Table, columns: Iterable[str]) -> list[str]:
+    """Return which columns rise in nearly even steps, and do not only count the rows."""
+    steps = {text: np.diff(table.values[text]) for text in columns}
+    return [
+        text
+        for text, step in steps.items()
+        if step.min() > 0.0 and step.max() <= 3.0 * float(np.median(step)) and (step != 1.0).any()
+    ]
 
 
 def _find_time(table: Table) -> tuple[Guess | None, float]:
