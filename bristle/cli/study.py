@@ -126,7 +126,7 @@ def add_extend(parser: Parser) -> None:
     parser.add_argument("data", nargs="+", metavar="FILES", help=text)
     text = (
         "held-out runs among them, by file name; else those of the plan, or by the usual "
-        "names, or every third run"
+        "names, or a third of the runs"
     )
     parser.option("--holdout", "GLOB", text, nargs="+", action="extend", default=[])
     parser.add_run_facts()

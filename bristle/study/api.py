@@ -71,7 +71,7 @@ def identify(
         How the command enters: "linear", "quadratic" or "table"; of several, or "all", the errors
         of each are in `forms` of the result. Else as the model has it.
     holdout : as data, optional
-        Runs to judge on. Without them every third run is held out, of one run the last 30 %. A
+        Runs to judge on. Without them a third of the runs is held out, of one run the last 30 %. A
         study says itself which are.
     channels : mapping, optional
         Where channels are, `{"force": "-Ch3@kN"}`: column, unit, a minus to turn the sign. A study

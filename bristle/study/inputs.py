@@ -26,6 +26,7 @@ from ..physics.effect import EFFECTS
 from ..physics.laws import law_names
 from .identify import Identified, refuse_effect
 from .new import parse_channel
+from .run_facts import a_third
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ Channels: TypeAlias = Mapping[str, str | ChannelSpec]
 Given: TypeAlias = str | Path | Model | Identified
 """A law by its name, a model.toml, or a model."""
 
-_FITTED_TO = 3  # of so many runs one is held out, as in a new study
 _RIGHT = (
     "a file, a pattern of files, a pandas frame, a mapping of channels to arrays, a Measurement, "
     "or a list of them"
@@ -130,7 +130,7 @@ def _others(
 def runs_of(train: list[Measurement], holdout: list[Measurement]) -> Runs:
     """Return runs to fit to and runs to judge on.
 
-    Where none is given to judge on, a single run is split in time, 70 to 30 %, and of several every
+    Where none is given to judge on, a single run is split in time, 70 to 30 %, and of several a
     third is held out, as in a new study.
 
     Raises
@@ -147,11 +147,13 @@ def runs_of(train: list[Measurement], holdout: list[Measurement]) -> Runs:
         if len(sources) == 1:
             split = split_in_time(train)
             return Runs(split.train, split.holdout, (*split.notes, *notes))
-        judged = set(sources[1::_FITTED_TO])
+        held, which = a_third(sources)
+        judged = {sources[k] for k in held}
         holdout = [one for one in train if one.source in judged]
         train = [one for one in train if one.source not in judged]
         names = listed(one.name for one in holdout)
-        notes = (f"Every third run is held out: {names}. holdout=... names others.", *notes)
+        note = f"{which} is held out: {names}. holdout=... names others."
+        notes = (note[0].upper() + note[1:], *notes)
     refuse_twins(train, holdout)
     return Runs(train, holdout, (*notes, *twins_within(train), *twins_within(holdout)))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -811,6 +812,7 @@ _WORDS = {
     "holdout": "valid validation val vali test holdout hold check verify verification",
 }
 _TRAIN, _HOLDOUT = (frozenset(words.split()) for words in _WORDS.values())
+_WITH_NUMBER = re.compile(r"[^\W\d_]*\d+(?:[.,]\d+)?[^\W\d_]*")
 
 
 def for_test(files: Sequence[Path], choices: RunChoices) -> list[bool]:
@@ -879,12 +881,12 @@ def roles_added(names: list[str]) -> tuple[list[str], list[str]]:
     elif len(names) == 1:
         return ["train"], [f"{names[0]} is for training; --holdout '{names[0]}' holds it out"]
     else:
-        roles, note = _every_third(names)
+        roles, note = _a_third(names)
     return roles, [f"{note}. {_held_out(names, roles)}"]
 
 
 def _seen_roles(names: list[str]) -> tuple[list[str], list[str]]:
-    """Return roles and why: by the names of files, else every third is held out."""
+    """Return roles and why: by the names of files, else a third is held out."""
     found = [_role_in(name) for name in names]
     if len(names) == 1:
         return ["train"], [
@@ -898,7 +900,7 @@ def _seen_roles(names: list[str]) -> tuple[list[str], list[str]]:
         roles = [role or "train" for role in found]
         note = "roles follow the names of the files"
     else:
-        roles, note = _every_third(names)
+        roles, note = _a_third(names)
     return roles, [f"{note}. {_held_out(names, roles)}"]
 
 
@@ -908,12 +910,42 @@ def _role_in(name: str) -> str:
     return "holdout" if words & _HOLDOUT else "train" if words & _TRAIN else ""
 
 
-def _every_third(names: list[str]) -> tuple[list[str], str]:
-    """Return roles of which every third is held out, and the note that says so."""
-    return (
-        ["holdout" if k % 3 == 1 else "train" for k in range(len(names))],
-        "every third run is held out; bristle study roles changes that",
-    )
+def _a_third(names: list[str]) -> tuple[list[str], str]:
+    """Return roles of which a third is held out, and the note that says so."""
+    held, which = a_third(names)
+    roles = ["holdout" if k in held else "train" for k in range(len(names))]
+    return roles, f"{which} is held out; bristle study roles changes that"
+
+
+def a_third(names: Sequence[str]) -> tuple[set[int], str]:
+    """Return the places of the runs to hold out, of three one, and the words that tell which.
+
+    It is every third run in the order of the names. Where three levels of a campaign take turns
+    (5, 20 and 40 °C), that would leave one of them without training: then those runs are taken
+    whose levels have lost the smallest share so far.
+
+    Parameters
+    ----------
+    names : of the files; words with a number that some names share are levels ("40mm", "speed3")
+    """
+    words = [set(_WITH_NUMBER.findall(Path(name).stem.lower())) for name in names]
+    runs = Counter(word for own in words for word in own)
+    levels = [{word for word in own if 1 < runs[word] < len(names)} for own in words]
+    every = set(range(1, len(names), 3))
+    held = Counter(word for k in every for word in levels[k])
+    if all(held[word] < runs[word] for word in held):
+        return every, "every third run"
+
+    def loss(k: int) -> tuple[int, float, bool]:
+        shares = [(held[word] + 1) / runs[word] for word in levels[k]]
+        return shares.count(1.0), sum(shares), k not in every
+
+    out: set[int] = set()
+    held.clear()
+    for _ in every:
+        out.add(best := min(set(range(len(names))) - out, key=lambda k: (*loss(k), k)))
+        held.update(levels[best])
+    return out, "a third of the runs, of each level as few as can be,"
 
 
 def _held_out(names: list[str], roles: list[str]) -> str:

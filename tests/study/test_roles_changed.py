@@ -16,6 +16,7 @@ from bristle.errors import StudyError
 from bristle.study import Study, create_study
 from bristle.study.history import EARLIER
 from bristle.study.identify import identify_study
+from bristle.study.run_facts import a_third
 
 
 @pytest.fixture
@@ -150,3 +151,14 @@ def test_a_study_that_was_opened_before_is_not_compared_by_its_old_roles(study: 
     Study(study.folder).with_roles({"run_3": "holdout"})
     with pytest.raises(StudyError, match="open the study again first"):
         bristle.compare(study)
+
+
+def test_no_level_of_a_campaign_is_wholly_held_out() -> None:
+    speeds, pressures = ("speed1", "speed3", "speed6"), ("050psi", "100psi", "150psi")
+    names = [f"{speed}_{pressure}.csv" for speed in speeds for pressure in pressures]
+    held, said = a_third(names)
+    assert "of each level" in said
+    for level in (*speeds, *pressures):  # every third run would be all of 150 psi
+        assert sum(level in names[k] for k in held) == 1
+    assert a_third([f"run_{k}.csv" for k in range(7)]) == ({1, 4}, "every third run")
+    assert a_third(["sine_5mm.csv", "sine_8mm.csv"])[0] == {1}
