@@ -39,14 +39,16 @@ class Completed:
     """What `complete` came to: the last diagnosis, and the steps that it made.
 
     `curves` are those learned where no effect of the library explained the error; `unproven` the
-    step that improves the prediction by what the verdict does not name; `closure` what the
-    network came to that was asked for in the end, `no_closure` why these runs carry none.
+    step that improves the prediction by what the verdict does not prove, `refuted` why the one that
+    training runs chose was not made; `closure` what the network came to that was asked for in the
+    end, `no_closure` why these runs carry none.
     """
 
     verdict: Diagnosis
     steps: tuple[Step, ...]
     curves: tuple[LearnedEffect, ...] = ()
     unproven: Step | None = None
+    refuted: str = ""
     closure: LearnedClosure | None = None
     no_closure: str = ""
 
@@ -87,7 +89,7 @@ def complete(
     law : "all" first seeks the law together with its effects; another name is taken first; None
         seeks it where nobody chose one (`laws.law_or_all`)
     proven : whether to leave out effects that only improve the prediction; else, where the verdict
-        is unknown in the end, those are added that folds of the training runs choose
+        proves none in the end, those are added that folds of the training runs choose
     curves : whether to go on where the verdict is unknown, by learning a curve
     closure : whether to end with a closure where the verdict is unknown then; the verdict stays
     say : called with a few words at each stage
@@ -113,9 +115,10 @@ def complete(
             names = (learned[-1].name,) if learned[-1].file is not None else ()
         if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
             done = Completed(found, (), tuple(learned))
-            if found.kind == "unknown" and not proven and not study.settings.has_building:
-                done = replace(done, unproven=_gained(study, found, say, stepped))
-            if found.kind == "unknown" and closure and not closures(study.model().effects):
+            if _open(found) and not proven and not study.settings.has_building:
+                step, refuted = _gained(study, found, say, stepped)
+                done = replace(done, unproven=step, refuted=refuted)
+            if _open(found) and closure and not closures(study.model().effects):
                 try:
                     done = replace(done, closure=_closed(study, found, say, stepped))
                 except StudyError as refused:  # the verdict and the steps stand without one
@@ -125,22 +128,28 @@ def complete(
         stepped(add_effects(study, names, why=f"verdict: {found.kind}", found=found).step)
 
 
+def _open(found: Diagnosis) -> bool:
+    """Return whether a verdict leaves an error that more of a model may lower, proven or not."""
+    judged = all(one.after is not None for one in found.findings.values())
+    return found.kind in ("unknown", "ambiguous") or (judged and not found.noise_known)
+
+
 def _gained(
     study: Study, found: Diagnosis, say: Say, stepped: Callable[[Step | None], None]
-) -> Step | None:
-    """Add what improves the prediction and is not proven; return the step, None where nothing."""
+) -> tuple[Step | None, str]:
+    """Add what improves the prediction and is not proven; return the step, or why there is none."""
     say("effects that improve the prediction")
     before, opened = study.model(), opened_at(study, "")[1]
     laws = found.laws.rows if found.laws is not None and not before.effects else ()
     best = unproven(opened, found.trials, laws, MOST_EFFECTS)
     names = tuple(one for one in best.model.effects if one not in before.effects)
     if not names and not best.law:
-        return None
+        return None, ""
     write_effects(study, best.written)
     say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
-    step = add_unproven(study, best.law, names, best.model.values, found)
+    step, refuted = add_unproven(study, best.law, names, best.model.values, found)
     stepped(step)
-    return step
+    return step, refuted
 
 
 def _closed(

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from ..comparison.result import Comparison
 from ..core.files import write_json, write_whole
 from ..core.interrupt import keeps
 from ..core.progress import tell, telling
-from ..core.text import command, plain, unknown
+from ..core.text import command, percent, plain, unknown
 from ..data.channels import ChannelSpec
 from ..data.guess import Guess
 from ..diagnosis import Diagnosis, diagnose_rig
@@ -234,8 +235,10 @@ def add_effects(
 
 def add_unproven(
     study: Study, law: str, names: Sequence[str], begin: Mapping[str, float], found: Diagnosis
-) -> Step:
+) -> tuple[Step | None, str]:
     """Add what improves the prediction and is not proven; the verdict stays on the model before.
+
+    Where the held-out runs err more with it no step is made: the text returned says so.
 
     Parameters
     ----------
@@ -247,11 +250,20 @@ def add_unproven(
     """
     identified = identify_with(study, names, begin, law)
     parts = ([f"take {law}"] if law else []) + ([f"add {', '.join(names)}"] if names else [])
+    errors = identified.before, identified.after
+    fall = [one.get("error_share_holdout", inf) for one in errors]
+    if fall[1] > fall[0]:
+        return None, (
+            f"Not kept: {'; '.join(parts)}. It lowers the error on training runs left out of the "
+            f"fit; on held-out runs the error rises from {' to '.join(map(percent, fall))} of the "
+            "force."
+        )
     why = f"improves the prediction on training runs left out; {NOT_PROVEN}"
     what = f"{'; '.join(parts)} ({NOT_PROVEN})"
     step = study.add_step(what, why, identified.model, *identified.for_history())
+    found = replace(found, error=identified.errors.at)  # of the model that the study now has
     study.write_verdict(verdict_of(study, found))
-    return step
+    return step, ""
 
 
 def unproven_of(study: Study, step: Step) -> list[str]:

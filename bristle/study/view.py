@@ -620,7 +620,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
         told.insert(0, Text(view.title, "say"))
     # The errors of earlier versions are low-passed: they and the others show no fall together.
     alike = [one for one in judged if one.cut_off == judged[-1].cut_off]
-    fall = Text(_fall(alike[0], alike[-1], study.settings.cut_off))
+    fall = Text(_fall(alike, study.settings.cut_off))
     # What a missing effect would gain stands in the verdict's sentence alone.
     said = Text(verdict_error(verdict)) if verdict.get("kind") != "effect" else None
     rest = [one for one in view.blocks if one != said]
@@ -669,6 +669,7 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     learned = [Text(" ".join(one.sentences())) for one in done.curves]
     if done.unproven:
         learned.append(Text(_unproven(study, done.unproven)))
+    learned += [Text(done.refuted)] if done.refuted else []
     learned += map(Text, done.closure.sentences() if done.closure else ())
     learned += [Text(f"No closure: {done.no_closure}")] if done.no_closure else []
     first, *rest = view.blocks  # the error
@@ -694,19 +695,23 @@ def _sizes(model: Model, effect: str) -> dict[str, tuple[float, float | None, st
     return {name: (f.value, f.std, f.unit) for name, f in model.written_of(effect).items()}
 
 
-def _fall(first: HistoryStep, last: HistoryStep, cut_off: float) -> str:
+def _fall(steps: Sequence[HistoryStep], cut_off: float) -> str:
     """Return the sentence that tells how the error on held-out runs fell; of one step, what it is.
 
     Parameters
     ----------
-    first, last : whose errors are of the same low-pass, which is told
+    steps : whose errors are of the same low-pass, which is told
     cut_off : Hz, of that low-pass where they do not tell it
     """
-    factor, unit = scale("N", max(first.rms or 0.0, last.rms or 0.0))
-    texts = [_error(one, factor, unit) for one in ((first, last) if first != last else (last,))]
-    low = cut_off if last.cut_off is None else last.cut_off
+    factor, unit = scale("N", max(one.rms or 0.0 for one in (steps[0], steps[-1])))
+    proven = [one for one in steps if NOT_PROVEN not in one.what] or steps
+    texts = [_error(one, factor, unit) for one in dict.fromkeys([proven[0], proven[-1]])]
+    more = ""
+    if steps[-1] is not proven[-1]:
+        more = f", with what is not proven {_error(steps[-1], factor, unit)}"
+    low = cut_off if steps[-1].cut_off is None else steps[-1].cut_off
     below = f" below {low:g} Hz" if low else ""
-    return f"Force error{below} on the held-out runs: {' -> '.join(texts)}."
+    return f"Force error{below} on the held-out runs: {' -> '.join(texts)}{more}."
 
 
 def _error(step: HistoryStep, factor: float, unit: str) -> str:
