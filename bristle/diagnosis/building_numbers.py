@@ -164,8 +164,13 @@ class _Rows(NamedTuple):
 def _rows(
     shaken: Shaken, building: Building, lines: Mapping[str, StructurePair], rule: DecisionRule
 ) -> dict[str, _Rows]:
-    """Return by site how its force follows its line (m, p), and each mass (m, n) by a deviation."""
+    """Return by site how its force follows its line (m, p), and each mass (m, n) by a deviation.
+
+    An acceleration that is smoothed for want of an accelerometer holds more noise than a mass that
+    is off: it would take that noise, and is left as the file has it.
+    """
     n = building.size
+    told = np.array([i > 0 or shaken.train[0].pulse is None for i in range(n)])
     unit = rule.mass_doubt / DEVIATIONS
     moved = [with_masses(building, unit * np.eye(n)[j]) for j in range(n)]
     rows = {}
@@ -184,7 +189,7 @@ def _rows(
         ]
         rows[site] = _Rows(
             np.concatenate(columns) * weight[:, None],
-            np.stack(slopes, axis=1) * weight[:, None],
+            np.stack(slopes, axis=1) * weight[:, None] * told,
             here * weight,
         )
     return rows

@@ -148,8 +148,7 @@ def _why_hidden(sized: Sized) -> str:
 
 
 BELOW = 0.9
-"""A z below this is no chance: the noise expected was too large, as of a base that has friction and
-no accelerometer, where room is left for jumps."""
+"""A z below this is no chance: the noise expected was too large."""
 
 
 def detectable(

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import convolve1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
@@ -131,6 +132,10 @@ def anchored(
 
 JUMP = 6.0
 """A change of acceleration that is so many times what is usual from sample to sample is a jump."""
+
+
+PULSE = 1001
+"""Samples over which a smoother's answer to a pulse has faded."""
 
 
 def smoothed_level(
@@ -267,7 +272,7 @@ def level_draws(n: int, level: dict[str, Any], dt: float, draws: int, seed: int)
 
 
 def corrected(
-    level: dict[str, Any], dt: float, draws: int, seed: int
+    level: dict[str, Any], dt: float, draws: int, seed: int, sudden: bool = False
 ) -> tuple[dict[str, Any], Array]:
     """Return a level that has no accelerometer with what moves of its acceleration, and its error.
 
@@ -276,6 +281,9 @@ def corrected(
     Efron & Tibshirani 1993, An Introduction to the Bootstrap, ch. 6). What is off in all of them
     alike is of a size that is known, and of no sign: half of the draws have it turned.
 
+    An acceleration that jumps has all frequencies, so that none is sought in noise. What smoothing
+    takes off a jump is no error where models are shown behind the same smoother, see `shown_pulse`.
+
     Parameters
     ----------
     level : the smoothed motion of one level: `state` (n, 3), `r` (3,) and `have` (3,) of its
@@ -283,6 +291,7 @@ def corrected(
     dt : step [s]
     draws : how many draws, 0 for none
     seed : of the draws
+    sudden : whether forces on the level make its acceleration jump
     """
     state, r, have = level["state"] - level["forced"], level["r"], level["have"]
     n = len(state)
@@ -297,15 +306,39 @@ def corrected(
     generator = np.random.default_rng(seed)
     noise = np.sqrt(r) * generator.standard_normal((draws, n, 3))
     passed = np.array([smoothed(one) for one in noise])
-    moving = MovingPart(passed[:, :, 2], dt)
-    state = state - moving.still(state[:, 2], (2, 1, 0))
-    seen = smoothed(state) + passed  # smoothing is linear
-    seen = np.array([one - moving.still(one[:, 2], (2, 1, 0)) for one in seen])
-    error = state - seen
+    if sudden:
+        error = state - smoothed(state) - passed  # smoothing is linear
+        error[:, :, 2] = -passed[:, :, 2]
+    else:
+        moving = MovingPart(passed[:, :, 2], dt)
+        state = state - moving.still(state[:, 2], (2, 1, 0))
+        seen = smoothed(state) + passed
+        seen = np.array([one - moving.still(one[:, 2], (2, 1, 0)) for one in seen])
+        error = state - seen
     error[1::2] -= 2.0 * error.mean(axis=0)
     edge = min(EDGE, n // 4)
     std = np.sqrt(np.mean(error[:, edge : n - edge] ** 2, axis=(0, 1)))
     return {**level, "state": state + level["forced"], "std": std}, error
+
+
+def shown_pulse(level: dict[str, Any], dt: float) -> Array:
+    """Return what a level's smoother shows of a pulse of its acceleration (2 k + 1,), its sum 1.
+
+    Parameters
+    ----------
+    level : the smoothed motion of one level, see `corrected`
+    dt : step [s]
+    """
+    n = min(PULSE, len(level["state"]))
+    after = (np.arange(n) - n // 2) * dt
+    pulse = np.column_stack([np.maximum(after, 0.0), np.heaviside(after, 0.5), np.zeros(n)])
+    out = room(n)
+    samples = _samples(pulse * level["have"], level["r"], level["have"], dt)
+    kalman_smooth(samples, np.full(n, level["jerk"]), out)
+    shown = out.state[:, 2]
+    k = int(np.max(np.abs(np.flatnonzero(np.abs(shown) > 1e-3 * shown.max()) - n // 2)))
+    shown = shown[n // 2 - k : n // 2 + k + 1]
+    return np.asarray(shown / shown.sum())
 
 
 # The motion of the device that is identified: of its upper level relative to the lower one.
@@ -436,7 +469,9 @@ class Response:
     "" where none was measured; `labels` what is known of the whole run; `extra` its channels
     besides those that bristle knows. `known` says where all that was measured, and not filled in;
     `known_but` by reason where it would be, but for that one; `finer` is that of `Run`; `untold`
-    names the channels whose noise cannot be told from their signal.
+    names the channels whose noise cannot be told from their signal. `pulse` (2 k + 1,) is what is
+    shown of a pulse of the first level's acceleration where that is smoothed, None elsewhere: so
+    equilibrium shows the forces on that level, see `shown`.
     """
 
     name: str
@@ -464,6 +499,7 @@ class Response:
     finer: Finer | None = None
     known_but: Mapping[str, KnownSamples] = field(default_factory=dict)
     untold: tuple[str, ...] = ()
+    pulse: Array | None = None
 
     @property
     def damped(self) -> bool:
@@ -476,6 +512,10 @@ class Response:
         if self.force is None:
             return list(self.others)
         return [Load(self.device, self.force, self.noise_force), *self.others]
+
+    def shown(self, force: Array) -> Array:
+        """Return what equilibrium shows of a force (n,) [N] on the first level."""
+        return force if self.pulse is None else convolve1d(force, self.pulse, mode="nearest")
 
     @property
     def white_a(self) -> Array:
@@ -593,7 +633,7 @@ def responses(
 
     The smoother's jerk is each run's own, times `looser`: likeliest is not without bias, and a
     looser smoother trades a little noise for much of that. The draws of its error are each run's
-    own too, for a weak run has other noise than a strong one; those of a floor without an
+    own too, for a weak run has other noise than a strong one; those of a level without an
     accelerometer are made from its motion.
 
     Parameters
@@ -621,12 +661,13 @@ def responses(
     ]
     across = measured_across(measurements, building, device, draws, seed + building.size, looser)
     ends = {0}.union(*(one.levels for one in building.devices))  # where accelerations may jump
+    first = ends <= {GROUND, 0}  # forces that jump act on the first level alone
     out = []
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
         for i, one in enumerate(levels):
-            if not one["have"][2] and i not in ends:
-                levels[i], error = corrected(one, m.step, draws, seed + i)
+            if not one["have"][2] and (first or i not in ends):
+                levels[i], error = corrected(one, m.step, draws, seed + i, i == 0)
                 errors.append(error)
             else:
                 errors.append(level_draws(len(m.time), one, m.step, draws, seed + i))
@@ -636,20 +677,25 @@ def responses(
             found, device=device, others=_loads(m, building, device), across=own,
             known=_known(m, building, device) if reasons else None,
             known_but={why: _known(m, building, device, why) for why in reasons},
+            pulse=shown_pulse(levels[0], m.step) if first and not levels[0]["have"][2] else None,
         )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
     return out
 
 
 def _forced(m: Measurement, building: Building, device: Device) -> Array:
-    """Return the relative acceleration (levels, n) [m/s2] that ground and measured forces make."""
+    """Return the relative acceleration (levels, n) [m/s2] that ground and measured forces make.
+
+    Not the forces on the first level alone, see `shown_pulse`.
+    """
     loads = list(_loads(m, building, device))
     if m.has("force"):
         loads.append(Load(device, m["force"], 0.0))
     out = np.tile(-m["ground_acceleration"], (building.size, 1))
     for load in loads:
-        shares = load.device.incidence(building.size) / np.diag(building.M)
-        out -= np.outer(shares, load.force)
+        if not load.device.on_first:
+            shares = load.device.incidence(building.size) / np.diag(building.M)
+            out -= np.outer(shares, load.force)
     return out
 
 

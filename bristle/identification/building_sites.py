@@ -164,7 +164,8 @@ class StructureProblem(Problem):
             EFFECTS[e].states or EFFECTS[e].site == "sensor" for e in model.effects
         )
         assert run.whole is not None
-        seen = run.whole if memory or run.whole.finer is not None else run
+        filtered = run.whole.finer is not None or run.whole.pulse is not None
+        seen = run.whole if memory or filtered else run
         x, v, a, V, dt = seen.smoothed if draw is None else seen.drawn(draw)
         stiffness = 0.0
         if law.site == "structure":
@@ -219,12 +220,16 @@ def structure_run(
     )  # fmt: skip
 
 
-def _of(response: Response, run: StructureRun) -> StructureRun:
-    """Return a run with what is known of its measurement: command, labels, extra channels."""
+def _of(response: Response, run: StructureRun, on_first: bool = False) -> StructureRun:
+    """Return a run with what is known of its measurement: command, labels, extra channels.
+
+    And how it was seen, if it is a force on the first level that follows from equilibrium.
+    """
     known: dict[str, Any] = {"drive": response.drive or VOLTAGE.name, "labels": response.labels}
     whole = None
     if run.whole is not None:
-        whole = replace(run.whole, extra=response.extra, finer=response.finer, **known)
+        pulse = response.pulse if on_first else None
+        whole = replace(run.whole, extra=response.extra, finer=response.finer, pulse=pulse, **known)
     extra = {
         name: replace(one, values=one.values[run.keep]) for name, one in response.extra.items()
     }
@@ -246,7 +251,7 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
 
     Where the damper acts across that storey its force must be known.
     """
-    force, noise, drawn = shear(response, building, level)
+    carried = Carried(*shear(response, building, level))
     lower = level - 1
     x, v = response.x[level].copy(), response.v[level].copy()
     error = _error(response, level)
@@ -255,14 +260,15 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
         v -= response.v[lower]
         error[:, :, :3] -= _error(response, lower)[:, :, :3]
     if response.force is not None and response.device.crosses(level):
-        force, noise = _less_damper(response, response.force, force, noise)
+        carried = _less_damper(response, response.force, carried)
     motion = (x, v, response.a[level], response.V)
     made = structure_run(
-        response.name, response.dt, motion, force, noise, error, drawn=drawn,
+        response.name, response.dt, motion, carried.force, carried.noise, error,
+        drawn=carried.drawn,
         left_out=_left_out(response, level, response.device.crosses(level)),
         untold=_untold(response, building, level),
     )  # fmt: skip
-    return _of(response, made)
+    return _of(response, made, level == 0)
 
 
 def _left_out(response: Response, level: int, loaded: bool) -> dict[str, Flags]:
@@ -291,30 +297,48 @@ def layer_run(response: Response, building: Building) -> StructureRun:
 
     Samples at which the base may be held are left out.
     """
-    force, noise, drawn = shear(response, building, 0)
+    carried = Carried(*shear(response, building, 0))
     if response.device.crosses(0):
         if response.force is None:
             raise RecordError(
                 f"{response.name}: force was not measured, so the forces of isolation layer and "
                 "damper cannot be separated."
             )
-        force, noise = _less_damper(response, response.force, force, noise)
+        carried = _less_damper(response, response.force, carried)
     x, v, a = response.x[0], response.v[0], response.a[0]
     made = structure_run(
-        response.name, response.dt, (x, v, a, response.V), force, noise, _error(response, 0),
-        sliding(response), drawn, _left_out(response, 0, response.device.crosses(0)),
+        response.name, response.dt, (x, v, a, response.V), carried.force, carried.noise,
+        _error(response, 0), sliding(response), carried.drawn,
+        _left_out(response, 0, response.device.crosses(0)),
         untold=_untold(response, building, 0),
     )  # fmt: skip
-    return _of(response, made)
+    return _of(response, made, True)
 
 
-def _less_damper(response: Response, own: Array, force: Array, noise: float) -> tuple[Array, float]:
-    """Return what is carried without the damper's `own` measured force (n,) [N], and its noise.
+class Carried(NamedTuple):
+    """What is carried below a level (n,) [N]; its white noise [N]; draws (d, n) of the rest."""
 
-    Where no accelerometer shows its upper end, the inertia there holds its noise: they cancel.
+    force: Array
+    noise: float
+    drawn: Array
+
+
+def _less_damper(response: Response, own: Array, carried: Carried) -> Carried:
+    """Return what is carried without the damper's `own` measured force (n,) [N].
+
+    Where the upper end has no accelerometer, the inertia there holds its noise: they cancel. Where
+    it shows the force as it is smoothed, so is that noise, and nobody knows when between two
+    samples the force jumped.
     """
-    shown = bool(response.accelerometer[response.device.upper])
-    return force - own, float(np.hypot(noise, response.noise_force)) if shown else noise
+    force, noise, drawn = carried
+    if response.accelerometer[response.device.upper]:
+        return Carried(force - own, float(np.hypot(noise, response.noise_force)), drawn)
+    if response.pulse is not None:
+        generator = np.random.default_rng(0)
+        error = response.noise_force * generator.standard_normal(drawn.shape)
+        error += np.diff(own, append=own[-1]) * generator.uniform(-0.5, 0.5, drawn.shape)
+        drawn = drawn + response.shown(error)
+    return Carried(force - response.shown(own), noise, drawn)
 
 
 def sliding(response: Response) -> Flags:
@@ -376,7 +400,7 @@ def damper_run(
         response.name, response.dt, motion, force, noise, error, keep, drawn,
         _left_out_across(response), untold,
     )  # fmt: skip
-    return _of(response, made)
+    return _of(response, made, response.force is None)
 
 
 def _left_out_across(response: Response) -> dict[str, Flags]:

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
+from scipy.ndimage import convolve1d
 
 from ..core.arrays import Array, Flags
 from ..data.channels import Label, Labels
@@ -320,7 +321,8 @@ class Run:
     was not measured and follows from the motion, beside `noise` and each with its draw of `draws`;
     `finer` how models are evaluated between the samples of a decimated run, None for others;
     `untold` names the channels of the force whose noise cannot be told from their signal: `noise`
-    is then a lower limit.
+    is then a lower limit; `pulse` (2 k + 1,) is what a force that was not measured shows of a
+    pulse, None where it shows all.
     """
 
     name: str
@@ -341,6 +343,7 @@ class Run:
     force_draws: Array | None = None
     finer: Finer | None = None
     untold: tuple[str, ...] = ()
+    pulse: Array | None = None
 
     @cached_property
     def smoothed(self) -> Moments:
@@ -360,7 +363,14 @@ class Run:
 
     def seen(self, force: Array) -> Array:
         """Return a force at these moments as the measured one is: behind its filter (n,) [N]."""
-        return force if self.finer is None else self.finer.filtered(force)
+        force = force if self.finer is None else self.finer.filtered(force)
+        return force if self.pulse is None else convolve1d(force, self.pulse, mode="nearest")
+
+    @cached_property
+    def whole_noise(self) -> float:
+        """The standard deviation of the force's noise [N], with that of its draws."""
+        drawn = 0.0 if self.force_draws is None else float(np.sqrt(np.mean(self.force_draws**2)))
+        return float(np.hypot(self.noise, drawn))
 
     @cached_property
     def measured(self) -> Flags | None:

@@ -46,7 +46,7 @@ def fit_line(problem: StructureProblem, law: str) -> Fit:
     columns = [line_columns(run, LAWS[law]) for run in problem.runs]
     A = np.concatenate(columns)
     force = np.concatenate([run.force for run in problem.runs])
-    noise = [max(run.noise, 1e-300) for run in problem.runs]
+    noise = [max(run.whole_noise, 1e-300) for run in problem.runs]
     sigma = np.repeat(noise, [len(run.force) for run in problem.runs])
     weight = np.ones(len(force))
     scale = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)

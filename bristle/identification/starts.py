@@ -110,7 +110,7 @@ class _Net:
         """
         parts = []
         for run in self.problem.runs:
-            weight = np.full(len(run.v), 1.0 / run.noise)
+            weight = np.full(len(run.v), 1.0 / run.whole_noise)
             if self.law.has("sign") and len(run.draws):
                 error = float(np.std(run.draws[:, :, 1]))
                 weight[np.abs(run.v) < _NEAR_REST * error] = 0.0

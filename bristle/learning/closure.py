@@ -450,7 +450,8 @@ class _Seen:
     @property
     def plain(self) -> bool:
         """Whether the load cell shows a force as it is."""
-        return self.run.finer is None and not sensors(self.model.effects, "force")
+        filtered = self.run.finer is not None or self.run.pulse is not None
+        return not filtered and not sensors(self.model.effects, "force")
 
     def at(self, values: Array, rows: Indices) -> Array:
         """Return values (m, ...) of the moments at samples of the run."""
