@@ -36,8 +36,6 @@ def compare_predictions(
     predictions: Sequence[RunPrediction],
     *,
     seen: bool | None = False,
-    seed: int = 0,
-    flips: int = FLIPS,
     others: Sequence[SiteMisfit] = (),
     role: str = "",
     every: Sequence[RunPrediction] = (),
@@ -48,8 +46,6 @@ def compare_predictions(
     ----------
     predictions : one per run, of the same output at the same site
     seen : whether the model was fitted to these runs; None where that is not known
-    seed : of the random signs of blocks
-    flips : how many random patterns of signs say what chance would give
     others : the errors at the other sites of a building
     role : the role of the runs in a study, if that is known
     every : these and the runs that are too short for z: the error is over all of them
@@ -59,7 +55,7 @@ def compare_predictions(
     RecordError
         If there is no run, or one is too short, not finite or without noise.
     """
-    finder, normalised, along = _searched(predictions, flips, seed)
+    finder, normalised, along = _searched(predictions, FLIPS)
     runs = tuple(run_error(one.name, [one]) for one in predictions)
     found = finder.ranked(finder.normalised)
     second = None
@@ -87,7 +83,7 @@ def compare_predictions(
 
 
 def _searched(
-    predictions: Sequence[RunPrediction], flips: int, seed: int
+    predictions: Sequence[RunPrediction], flips: int
 ) -> tuple[Finder, list[Array], list[dict[str, Array]]]:
     """Return the search for patterns, the normalised residuals (n,) of runs, their coordinates.
 
@@ -97,7 +93,7 @@ def _searched(
     normalised = [one.only_judged(one.normalised) for one in predictions]
     residuals = [one.only_judged(one.residual) for one in predictions]
     along = [one.judged_along() for one in predictions]
-    return Finder(normalised, residuals, along, flips, seed), normalised, along
+    return Finder(normalised, residuals, along, flips), normalised, along
 
 
 def _without_z(comparison: Comparison) -> Comparison:
@@ -122,7 +118,6 @@ def compare_sites(
     site: str = "",
     *,
     seen: bool | None = False,
-    seed: int = 0,
     role: str = "",
 ) -> Comparison:
     """Compare a building's sites: one at length, the worst by default, and how the others stand.
@@ -133,7 +128,7 @@ def compare_sites(
         Site to its runs.
     site : str
         The one to compare at length; "" for that of the largest z.
-    seen, seed, role
+    seen, role
         As `compare_predictions` takes them.
 
     Raises
@@ -141,20 +136,20 @@ def compare_sites(
     RecordError
         As `compare_predictions`.
     """
-    errors = site_errors(predictions, seed)
+    errors = site_errors(predictions)
     site = site or errors[0].site
     others = [one for one in errors if one.site != site]
     return compare_predictions(
-        usable(predictions[site]), seen=seen, seed=seed, others=others, role=role,
+        usable(predictions[site]), seen=seen, others=others, role=role,
         every=predictions[site],
     )  # fmt: skip
 
 
 def site_errors(
-    predictions: Mapping[str, Sequence[RunPrediction]], seed: int = 0
+    predictions: Mapping[str, Sequence[RunPrediction]],
 ) -> tuple[SiteMisfit, ...]:
     """Return how wrong a model is at every site, the worst one first."""
-    return with_failures([site_error(runs, seed) for runs in predictions.values()])
+    return with_failures([*map(site_error, predictions.values())])
 
 
 def usable(predictions: Sequence[RunPrediction]) -> list[RunPrediction]:
@@ -162,13 +157,13 @@ def usable(predictions: Sequence[RunPrediction]) -> list[RunPrediction]:
     return [one for one in predictions if len(one.measured) > one.skip + MIN_SAMPLES]
 
 
-def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteMisfit:
+def site_error(predictions: Sequence[RunPrediction]) -> SiteMisfit:
     """Return how wrong a model is at a site, and along what, without the rest of a comparison."""
     first, every, predictions = predictions[0], predictions, usable(predictions)
     total, nothing = total_error(predictions, every), float("nan")
     if not predictions:
         return SiteMisfit(first.site, first.quantity, first.unit, (), total, (nothing,) * 2, None)
-    finder, normalised, _ = _searched(predictions, FEWER_FLIPS, seed)
+    finder, normalised, _ = _searched(predictions, FEWER_FLIPS)
     runs = tuple(run_error(one.name, [one]) for one in predictions)
     found = finder.ranked(finder.normalised)
     pattern = found[0] if found and found[0].significant else None

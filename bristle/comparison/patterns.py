@@ -162,7 +162,6 @@ def residual_patterns(
     coordinates: Sequence[Mapping[str, Array]],
     *,
     flips: int = FLIPS,
-    seed: int = 0,
 ) -> list[ResidualPattern]:
     """Return every coordinate with its share of the residual; the most telling one first.
 
@@ -174,10 +173,10 @@ def residual_patterns(
         The same in its unit, for the means in bins.
     coordinates : list of mapping
         Name to (n,); a coordinate must be there in all runs to count.
-    flips, seed : int
-        How many random signs of blocks say what chance would give, and their seed.
+    flips : int
+        How many random signs of blocks say what chance would give.
     """
-    finder = Finder(residuals, raw, coordinates, flips, seed)
+    finder = Finder(residuals, raw, coordinates, flips)
     return finder.ranked(finder.normalised)
 
 

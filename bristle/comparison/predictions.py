@@ -23,6 +23,8 @@ from ..physics.drive import DRIVES, VOLTAGE
 
 # The coordinates along which a residual may be organised, and the bins of each.
 
+DRAWS = 12
+"""Draws of the measured inputs' error that are carried through a model."""
 RECENT = 0.05
 """Time over which a change of the voltage counts as its rate [s]."""
 RESTED = 0.3
@@ -105,13 +107,13 @@ def shown(name: str, units: Mapping[str, str], size: float) -> tuple[float, str]
     return SHOWN.get(name, (1.0, ""))
 
 
-def late_speed(v: Array, dt: float, over: float = RESTED) -> Array:
+def late_speed(v: Array, dt: float) -> Array:
     """Return the mean speed (n,) of late of a velocity (n,), with the sign of the motion now [m/s].
 
     What builds up at rest and is worn down by motion has a memory of this kind, where the speed of
     the moment has none.
     """
-    fade = np.exp(-dt / over)
+    fade = np.exp(-dt / RESTED)
     size = np.abs(v)
     mean = lfilter([1.0 - fade], [1.0, -fade], size, zi=[fade * size[0]])[0]
     return np.asarray(np.where(v < 0.0, -mean, mean), dtype=float)
@@ -124,16 +126,16 @@ def since_reversal(v: Array, dt: float) -> Array:
     return np.asarray((index - np.maximum.accumulate(np.where(turned, index, 0))) * dt, dtype=float)
 
 
-def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
+def recent_rate(V: Array, dt: float) -> Array:
     """Return how fast a drive signal (n,) has changed of late, per second.
 
-    The change since its own first-order lag: a step shows for some `over` seconds, where a
+    The change since its own first-order lag: a step shows for some `RECENT` seconds, where a
     difference from sample to sample shows it once.
     """
-    keep = float(np.exp(-dt / over))
+    keep = float(np.exp(-dt / RECENT))
     rest, _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
     lagged = np.concatenate([V[:1], np.asarray(rest, dtype=float)])
-    return np.asarray((V - lagged) / over, dtype=float)
+    return np.asarray((V - lagged) / RECENT, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -295,20 +297,18 @@ class RunPrediction:
         return {name: self.only_judged(values) for name, values in self.along().items()}
 
 
-def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[RunPrediction]:
+def run_predictions(problem: Problem, model: Model) -> list[RunPrediction]:
     """Return the runs of a problem held against a model's force.
 
     Parameters
     ----------
     problem : Problem
         Runs that the model was not fitted to, if it is to be judged.
-    draws : int
-        How many draws of the measured inputs' error to carry through the model.
     """
     out = []
     problem = problem.with_excess(0.0)
     for run, (bias, sigma, spread), held in zip(
-        problem.runs, problem.expectation(model, draws), errors_by_run(problem, model), strict=True
+        problem.runs, problem.expectation(model, DRAWS), errors_by_run(problem, model), strict=True
     ):
         predicted = problem.predict(model, run)
         finer = at_half_the_step(problem, model, run)

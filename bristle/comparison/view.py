@@ -405,9 +405,7 @@ def draw_error(axes: Axes, prediction: RunPrediction, window: slice) -> None:
     axes.set_xlabel("time [s]", loc="right", labelpad=0)
 
 
-def draw_loop(
-    axes: Axes, prediction: RunPrediction, over: str, *, window: slice | None = None
-) -> None:
+def draw_loop(axes: Axes, prediction: RunPrediction, over: str) -> None:
     """Draw measured and predicted output over a coordinate.
 
     Parameters
@@ -415,10 +413,9 @@ def draw_loop(
     axes : where to draw
     prediction : the run
     over : name of the coordinate, such as "displacement"
-    window : samples to draw; None for all that count
     """
     factor, unit = SHOWN.get(over, (1.0, ""))
-    part = window or slice(prediction.skip, None)
+    part = slice(prediction.skip, None)
     x = factor * prediction.coordinates[over][part]
     zero_lines(axes)
     axes.plot(x, prediction.measured[part], color=MEASURED, lw=1.3, alpha=0.75)
@@ -543,7 +540,11 @@ def draw_regimes(axes: Axes, comparison: Comparison) -> None:
     axes.set_title("error / noise (z)")
 
 
-def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, Array] | None:
+_MAP = 13
+"""Cells of a map along each coordinate."""
+
+
+def residual_map(comparison: Comparison) -> tuple[Array, Array, Array] | None:
     """Return the mean normalised error (b, b) over displacement and velocity, after their edges.
 
     Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
@@ -555,7 +556,7 @@ def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, 
     v = np.concatenate([one["velocity"] for one in along])
     r = np.concatenate([one.only_judged(one.normalised) for one in comparison.predictions])
     r = np.clip(r, -30.0, 30.0)
-    edges = [_edges(y, bins) for y in (x, v)]
+    edges = [_edges(y, _MAP) for y in (x, v)]
     count = np.histogram2d(x, v, edges)[0]
     total = np.histogram2d(x, v, edges, weights=r)[0]
     with np.errstate(invalid="ignore"):

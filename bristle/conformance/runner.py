@@ -288,7 +288,6 @@ def conform(
     *,
     only: Collection[str] | None = None,
     beside: Path | str | None = None,
-    progress: Callable[[str], None] | None = None,
 ) -> Report:
     """Try a co-simulation FMU of FMI 2.0 or 3.0 against the standard; return what was seen.
 
@@ -302,8 +301,6 @@ def conform(
         Names of the probes to try; all of them otherwise.
     beside : Path or str, optional
         Another FMU to load into the same process; a trivial one of our own otherwise.
-    progress : callable, optional
-        Called with the name of each probe before it starts.
 
     Returns
     -------
@@ -337,7 +334,7 @@ def conform(
         elif only is None or any(name.startswith("another FMU") for name in only):
             plan.beside = _companion(plan, Path(folder))
         with Subprocesses(Path(plan.work)) as subprocesses:
-            return Report(str(path), _Session(plan, subprocesses, only, progress).rows())
+            return Report(str(path), _Session(plan, subprocesses, only).rows())
 
 
 def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: float) -> ProbePlan:
@@ -428,12 +425,10 @@ class _Session:
         plan: ProbePlan,
         subprocesses: Subprocesses,
         only: Collection[str] | None,
-        progress: Callable[[str], None] | None,
     ) -> None:
         self.plan = plan
         self.subprocesses = subprocesses
         self.only = only
-        self.progress = progress or (lambda name: None)
         self.reached: set[str] = set()
         self.stuck = False
         self.pace: dict[str, float] = {}
@@ -445,7 +440,6 @@ class _Session:
         chosen = [p for p in PROBES.values() if self._wanted(p) or p.name in self.first]
         count = Count("probe", len(chosen))
         for probe in chosen:
-            self.progress(probe.name)
             count.begins(probe.name)
             finding = self.find(probe)
             if self._wanted(probe) or finding.level == "error":

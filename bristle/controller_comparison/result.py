@@ -253,8 +253,8 @@ def beside(share: float, other: str) -> str:
     return f"{abs(100.0 * (1.0 - share)):.0f} % {'below' if share < 1.0 else 'above'} {other}"
 
 
-def _mean(found: ControllerComparison, name: str, reference: str = BEST) -> float:
-    return fmean(found.value(m, name) / found.value(m, reference) for m in found.motions)
+def _mean(found: ControllerComparison, name: str) -> float:
+    return fmean(found.value(m, name) / found.value(m, BEST) for m in found.motions)
 
 
 def _lowest(found: ControllerComparison, first: str) -> str:

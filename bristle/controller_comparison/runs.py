@@ -336,8 +336,12 @@ def refuse_limit(bench: CaseRunner, motion: ComparedMotion, judged: Statistic) -
     case_of(load_scenario(bench.write(motion, candidate)), judged.column)
 
 
+STARTS = 3
+"""Of a search for a limit."""
+
+
 def limit_of(
-    bench: CaseRunner, motion: ComparedMotion, judged: Statistic, starts: int = 3
+    bench: CaseRunner, motion: ComparedMotion, judged: Statistic
 ) -> tuple[ComparedController, Reached]:
     """Return the voltage that reaches a motion's limit as a controller, and what is known of it.
 
@@ -345,7 +349,6 @@ def limit_of(
     ----------
     bench, motion : the case
     judged : the output that is to be lowest, and its statistic
-    starts : of the search
 
     Raises
     ------
@@ -355,7 +358,7 @@ def limit_of(
         If a run fails.
     """
     text = bench.text(motion, constant(ON, bench.damper.most, ""))
-    file = cache_folder() / LIMITS / f"{_limit_digest(bench, text, judged, starts)}.json"
+    file = cache_folder() / LIMITS / f"{_limit_digest(bench, text, judged)}.json"
     found, kept = _read_limit(file), True
     if found is None:
         kept = False
@@ -363,7 +366,7 @@ def limit_of(
         with quiet():
             one = limit(
                 scenario, output=judged.column, statistic=judged.statistic, previews=(),
-                starts=starts,
+                starts=STARTS,
             )  # fmt: skip
         found = {
             "value": one.value, "bound": one.bound, "agreeing": one.agreeing,
@@ -383,9 +386,9 @@ def limit_of(
     return ComparedController(LIMIT, part, {}, "value", True, None, about), reached
 
 
-def _limit_digest(bench: CaseRunner, text: str, judged: Statistic, starts: int) -> str:
+def _limit_digest(bench: CaseRunner, text: str, judged: Statistic) -> str:
     """Return what stands for all that decides a limit: scenario, files that it reads, goal."""
-    content = hashlib.sha256(f"{__version__}/{judged.name}/{starts}/".encode())
+    content = hashlib.sha256(f"{__version__}/{judged.name}/{STARTS}/".encode())
     content.update(re.sub(r"^title = .*$", "", text, flags=re.MULTILINE).encode())
     for name in re.findall(rf'{re.escape(ABOVE)}/{FILES}/([^"]+)', text):
         content.update((bench.folder.path / FILES / name).read_bytes())

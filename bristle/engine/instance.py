@@ -178,7 +178,6 @@ class Message:
 
     component: str
     status: str
-    category: str
     text: str
 
     @property
@@ -358,12 +357,12 @@ class Instance:
                 self.say("Warning", str(error))
         _LISTENERS.pop(self._key, None)
 
-    def say(self, status: str, text: str, category: str = "") -> None:
+    def say(self, status: str, text: str) -> None:
         """Pass on a message, as if the FMU had sent it."""
         self._last.append(text)
         if status in STATUS[DISCARD:] and not self._initialised:
             self._refused.append(text)
-        self._listen(Message(self.name, status, category, text))
+        self._listen(Message(self.name, status, text))
 
     def said(self) -> str:
         """Return the FMU's last messages as lines for an error's text."""
@@ -455,14 +454,14 @@ def _on_message(
     environment: int | None,
     name: bytes | None,
     status: int,
-    category: bytes | None,
+    _category: bytes | None,
     text: bytes | None,
 ) -> None:
     said_by = (name or b"").decode("utf-8", "replace")
     named = [one for one in _LISTENERS.values() if one.name == said_by]  # many pass no environment
     instance = _LISTENERS.get(environment or 0, named[-1] if named else None)
-    text_, category_ = ((part or b"").decode("utf-8", "replace") for part in (text, category))
+    line = (text or b"").decode("utf-8", "replace")
     if instance is None:  # an FMU that another part of this process has loaded through fmpy
-        print(f"[{answer_of(status)}] {text_}")
+        print(f"[{answer_of(status)}] {line}")
     else:
-        instance.say(answer_of(status), text_, category_)
+        instance.say(answer_of(status), line)

@@ -52,7 +52,9 @@ _values = {
     for verb in ("Get", "Set")
     for kind in TYPES
 }
-OPTIONAL = {
+UNCALLED = ("fmi2CancelStep", "fmi2GetRealStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus")
+"""Optional functions that nothing here calls: a library is only asked whether it has them."""
+OPTIONAL: dict[str, tuple[Any, ...]] = {
     "fmi2GetFMUstate": (c_void_p, POINTER(_state)),
     "fmi2SetFMUstate": (c_void_p, _state),
     "fmi2FreeFMUstate": (c_void_p, POINTER(_state)),
@@ -66,12 +68,9 @@ OPTIONAL = {
     "fmi2GetRealOutputDerivatives": (
         (c_void_p, _refs, c_size_t, POINTER(c_int), POINTER(c_double))
     ),
-    "fmi2CancelStep": (c_void_p,),
     "fmi2GetStatus": (c_void_p, c_int, POINTER(c_int)),
-    "fmi2GetRealStatus": (c_void_p, c_int, POINTER(c_double)),
-    "fmi2GetIntegerStatus": (c_void_p, c_int, POINTER(c_int)),
     "fmi2GetBooleanStatus": (c_void_p, c_int, POINTER(c_int)),
-    "fmi2GetStringStatus": (c_void_p, c_int, POINTER(c_char_p)),
+    **dict.fromkeys(UNCALLED, ()),
 }
 REQUIRED = {
     "fmi2GetTypesPlatform": (),
@@ -95,8 +94,7 @@ RESULTS: dict[str, Any] = {
 }
 
 _sizes = POINTER(c_size_t)
-_flag, _numbers, _qualifiers = POINTER(c_bool), POINTER(c_double), POINTER(c_int)
-_counters = POINTER(ctypes.c_uint64)
+_flag, _numbers = POINTER(c_bool), POINTER(c_double)
 TYPES_FMI3: dict[str, Any] = {
     "Float64": c_double, "Float32": ctypes.c_float, "Boolean": c_bool, "String": c_char_p,
     "Int8": ctypes.c_int8, "UInt8": ctypes.c_uint8, "Int16": ctypes.c_int16,
@@ -129,7 +127,15 @@ REQUIRED_FMI3 = {
     "fmi3DoStep": (c_void_p, c_double, c_double, c_bool, _flag, _flag, _flag, _numbers),
     **_values_fmi3,
 }
-OPTIONAL_FMI3 = {
+UNCALLED_FMI3 = (
+    "GetAdjointDerivative", "GetBinary", "SetBinary", "GetClock", "SetClock", "GetIntervalDecimal",
+    "GetIntervalFraction", "GetShiftDecimal", "GetShiftFraction", "SetIntervalDecimal",
+    "SetIntervalFraction", "SetShiftDecimal", "SetShiftFraction", "GetNumberOfVariableDependencies",
+    "GetVariableDependencies", "EnterEventMode", "EnterStepMode", "UpdateDiscreteStates",
+    "EvaluateDiscreteStates", "EnterConfigurationMode", "ExitConfigurationMode",
+)  # fmt: skip
+"""As `UNCALLED`, without the prefix."""
+OPTIONAL_FMI3: dict[str, tuple[Any, ...]] = {
     "fmi3GetFMUState": (c_void_p, POINTER(_state)),
     "fmi3SetFMUState": (c_void_p, _state),
     "fmi3FreeFMUState": (c_void_p, POINTER(_state)),
@@ -139,32 +145,8 @@ OPTIONAL_FMI3 = {
     "fmi3GetDirectionalDerivative": (
         (c_void_p, _refs, c_size_t, _refs, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
     ),
-    "fmi3GetAdjointDerivative": (
-        (c_void_p, _refs, c_size_t, _refs, c_size_t, _numbers, c_size_t, _numbers, c_size_t)
-    ),
     "fmi3GetOutputDerivatives": (c_void_p, _refs, c_size_t, POINTER(c_int), _numbers, c_size_t),
-    "fmi3GetBinary": (c_void_p, _refs, c_size_t, _sizes, c_void_p, c_size_t),
-    "fmi3SetBinary": (c_void_p, _refs, c_size_t, _sizes, c_void_p, c_size_t),
-    "fmi3GetClock": (c_void_p, _refs, c_size_t, _flag),
-    "fmi3SetClock": (c_void_p, _refs, c_size_t, _flag),
-    "fmi3GetIntervalDecimal": (c_void_p, _refs, c_size_t, _numbers, _qualifiers),
-    "fmi3GetIntervalFraction": (c_void_p, _refs, c_size_t, _counters, _counters, _qualifiers),
-    "fmi3GetShiftDecimal": (c_void_p, _refs, c_size_t, _numbers),
-    "fmi3GetShiftFraction": (c_void_p, _refs, c_size_t, _counters, _counters),
-    "fmi3SetIntervalDecimal": (c_void_p, _refs, c_size_t, _numbers),
-    "fmi3SetIntervalFraction": (c_void_p, _refs, c_size_t, _counters, _counters),
-    "fmi3SetShiftDecimal": (c_void_p, _refs, c_size_t, _numbers),
-    "fmi3SetShiftFraction": (c_void_p, _refs, c_size_t, _counters, _counters),
-    "fmi3GetNumberOfVariableDependencies": (c_void_p, c_uint, _sizes),
-    "fmi3GetVariableDependencies": (
-        (c_void_p, c_uint, _sizes, _refs, _sizes, _qualifiers, c_size_t)
-    ),
-    "fmi3EnterEventMode": (c_void_p,),
-    "fmi3EnterStepMode": (c_void_p,),
-    "fmi3UpdateDiscreteStates": (c_void_p, _flag, _flag, _flag, _flag, _flag, _numbers),
-    "fmi3EvaluateDiscreteStates": (c_void_p,),
-    "fmi3EnterConfigurationMode": (c_void_p,),
-    "fmi3ExitConfigurationMode": (c_void_p,),
+    **{f"fmi3{name}": () for name in UNCALLED_FMI3},
 }
 RESULTS_FMI3: dict[str, Any] = {
     "fmi3GetVersion": c_char_p,

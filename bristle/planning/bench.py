@@ -244,7 +244,6 @@ def plan_study(
     request: PlanRequest | None = None,
     *,
     limits: Mapping[str, Any] | None = None,
-    record: Waveform | None = None,
     seed: int = 1,
 ) -> Plan:
     """Return the next tests of a study of a damper on a bench.
@@ -254,7 +253,6 @@ def plan_study(
     study : Study
     request : what they shall be for; None for what the verdict leaves open, or else all
     limits : of the rig, as arguments of `RigLimits`; what is not given is what the runs have done
-    record : a recorded motion that may be scaled
     seed : of what is drawn
 
     Raises
@@ -274,7 +272,7 @@ def plan_study(
     tell("looking at tests")
     planner = Planner(
         found.goal, rig, float(np.median([run.noise for run in runs])), _errors(runs[0]),
-        1.0 / runs[0].dt, record, seed, runs[0].drive,
+        1.0 / runs[0].dt, seed=seed, drive=runs[0].drive,
     )  # fmt: skip
     made = planned(study.name, found, planner, study.drive)
     return replace(made, notes=_notes(study, opened))

@@ -466,7 +466,7 @@ class FedSignals:
 
 
 def signals_of(
-    table: Table, channels: Mapping[str, ChannelSpec], rig: str, seed: int = 0
+    table: Table, channels: Mapping[str, ChannelSpec], rig: str
 ) -> tuple[list[FedSignals], list[str]]:
     """Return the pieces of a table as an FMU is fed, and what was guessed and done.
 
@@ -477,7 +477,6 @@ def signals_of(
     table : the measurement, not converted yet
     channels : channels that are known, by name; the others are guessed
     rig : {"bench", "structure"}, which decides the channels that are looked for
-    seed : of the draws of the inputs' error; piece k takes seed + k
 
     Raises
     ------
@@ -520,7 +519,7 @@ def signals_of(
         replace(
             _signals(
                 f"{stem} ({k})" if many else stem, even.sampling.step, piece, units, channels,
-                seed + k,
+                k,
             ),
             measured=measured,
         )

@@ -313,6 +313,8 @@ FINEST = 2e-5
 MOST = (120_000, 700_000)
 """Steps of an FMU for its proof: where the runs need more, the start of each is taken. One sample
 at which the motion reverses can part the two errors there; then as many as the second number."""
+TIMEOUT = 600.0
+"""Seconds that a run of it may take."""
 FADED = 1e-6
 """Share of its largest value below which the response of an instrument has ended."""
 FOLDER, CHECK = "held_out", "check.py"
@@ -508,7 +510,7 @@ def write_inputs(held: HeldOut, step: float, folder: Path) -> list[Path]:
     return files
 
 
-def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proof:
+def prove(held: HeldOut, fmu: Path, step: float) -> Proof:
     """Run an exported FMU as FMPy does, and return its error beside the one that is told.
 
     Parameters
@@ -516,7 +518,6 @@ def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proo
     held : the runs
     fmu : the exported file
     step : s, of the FMU
-    timeout : s, for each run
 
     Raises
     ------
@@ -524,13 +525,13 @@ def prove(held: HeldOut, fmu: Path, step: float, timeout: float = 600.0) -> Proo
         If the FMU fails on its way.
     """
     few, many = MOST
-    proof = _proof(held, fmu, step, timeout, few)
+    proof = _proof(held, fmu, step, few)
     if proof.part == 1.0 or proof.agrees or proof.why:
         return proof
-    return _proof(held, fmu, step, timeout, many)
+    return _proof(held, fmu, step, many)
 
 
-def _proof(held: HeldOut, fmu: Path, step: float, timeout: float, most: int) -> Proof:
+def _proof(held: HeldOut, fmu: Path, step: float, most: int) -> Proof:
     """Return the proof by an FMU that makes so many steps at the most."""
     lengths = [len(run.force) for run in held.runs]
     of_moment = [_steps_per_moment(fed, step) for fed in held.fed]
@@ -558,7 +559,7 @@ def _proof(held: HeldOut, fmu: Path, step: float, timeout: float, most: int) -> 
             found = step_through(
                 SteppingJob(str(fmu.resolve()), dict(values), names, ("force",), job),
                 passes,
-                timeout,
+                TIMEOUT,
             )
             for errors, rows in zip((own, raw), found, strict=False):
                 force = _padded(rows["force"][:: of_moment[k]], len(fed.moments.x))

@@ -216,7 +216,7 @@ SMALL = 0.1
 """Change of z below which a riser of the staircase carries no label."""
 
 
-def staircase_page(history_steps: Sequence[HistoryStep], unit: str = "N") -> Page:
+def staircase_page(history_steps: Sequence[HistoryStep]) -> Page:
     """Return the staircase: z of each model on training and held-out runs over the noise floor."""
     steps = [one for one in history_steps if one.z is not None]
     with look():
@@ -230,7 +230,7 @@ def staircase_page(history_steps: Sequence[HistoryStep], unit: str = "N") -> Pag
         _stairs(axes, [one.z for one in steps], BLUE, 2.6)
         for i, one in enumerate(steps):
             assert one.z is not None
-            _step_marks(axes, i, one, steps[i - 1].z if i else None, unit)
+            _step_marks(axes, i, one, steps[i - 1].z if i else None)
         axes.set_xlim(-0.5, len(steps) - 0.5)
         axes.set_ylim(0.75, 2.2 * top)
         names = [textwrap.fill(f"{one.number}  {one.what}", 20) for one in steps]
@@ -272,13 +272,13 @@ def _stairs(axes: Axes, heights: Sequence[float | None], colour: str, width: flo
     axes.plot(x, y, color=colour, lw=width, solid_joinstyle="miter")
 
 
-def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None, unit: str) -> None:
+def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None) -> None:
     """Write z and error over a step, and at its riser by how much the error fell."""
     assert one.z is not None
     told = [f"z = {short_z(one.z)}"]
     if one.rms is not None and one.cut_off == 0.0:  # else it is of low-passed forces
         share = "" if one.share is None else f" ({percent(one.share)})"
-        told.insert(0, f"{quantity(one.rms, unit)}{share}")
+        told.insert(0, f"{quantity(one.rms, 'N')}{share}")
     # Above the higher of both lines, so that neither strikes it through.
     height = max(one.z, one.z_train or 0.0)
     label(axes, ",  ".join(told), i, height, BLUE, xytext=(0, 7), ha="center", va="bottom")

@@ -12,7 +12,7 @@ from typing import Any
 from ..core.config import SCHEMA, json_schema
 from ..fmu.description import Description, Variable
 from .connections import FACTOR, FROM, OFFSET
-from .library import Library, installed
+from .library import installed
 from .model import choices
 from .overrides import COMPONENT, SCENARIO
 
@@ -25,9 +25,9 @@ def schema_text() -> str:
     return json.dumps(build_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
-def build_schema(library: Library | None = None) -> dict[str, Any]:
+def build_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 7) of a scenario file."""
-    library = library or installed()
+    library = installed()
     names = list(library.names())
     whole = json_schema(SCENARIO)
     whole["required"] = ["schema", "run", "components"]

@@ -21,7 +21,7 @@ def test_time_since_reversal_counts_from_each_change_of_sign():
 
 def test_a_step_of_the_voltage_shows_for_a_while_and_is_forgotten():
     V = np.concatenate([np.zeros(500), np.full(500, 4.0)])
-    rate = recent_rate(V, 0.002, over=0.05)
+    rate = recent_rate(V, 0.002)
     assert rate[:500] == pytest.approx(0.0, abs=1e-12)
     assert rate[500] == pytest.approx(4.0 / 0.05, rel=0.05)
     # A first-order lag has lost 63 % after its time constant, 25 samples here.
@@ -79,7 +79,7 @@ def test_only_what_was_measured_is_a_coordinate():
 def test_late_speed_forgets_and_takes_the_sign_of_now():
     dt = 0.002
     v = np.concatenate([np.full(1000, 0.2), np.full(1000, -0.1)])
-    late = late_speed(v, dt, 0.3)
+    late = late_speed(v, dt)
     np.testing.assert_allclose(late[:1000], 0.2)
     t = dt * np.arange(1, 1001)
     np.testing.assert_allclose(late[1000:], -(0.1 + 0.1 * np.exp(-t / 0.3)), rtol=1e-12)

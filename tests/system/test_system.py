@@ -146,7 +146,7 @@ def test_what_an_fmu_says_at_every_step_is_shown_once_a_run(
     def talks(self: Instance) -> None:
         finished(self)
         for _ in range(3):
-            self._listen(Message(self.name, "Warning", "", "the oil is hot"))
+            self._listen(Message(self.name, "Warning", "the oil is hot"))
 
     finished = Instance.finish_initialisation
     monkeypatch.setattr(Instance, "finish_initialisation", talks)
