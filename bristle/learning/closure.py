@@ -114,6 +114,10 @@ ALIKE = 0.1
 """Spread of the runs' RMS displacements, by their mean, below which they have one amplitude."""
 
 
+_Tried = tuple[float, int, Closure]
+"""A network that is tried: its loss on left-out folds, its hidden units, itself."""
+
+
 @dataclass(frozen=True, repr=False)
 class LearnedClosure(Viewable):
     """What `learn_closure` came to.
@@ -356,8 +360,31 @@ def _refitted(train: Problem, model: Model, closure: Closure) -> Model:
     return refine(model, train.of(runs), SWEEPS)
 
 
-def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None:
-    """Return the best network beside a model, its loss on left-out folds, and that without one."""
+def promised(train: Problem, model: Model) -> float:
+    """Return the error that a closure may leave on left-out folds, by that without one [1].
+
+    Networks whose hidden weights are drawn tell it, at little cost: one that is trained leaves
+    less, or as much.
+
+    Parameters
+    ----------
+    train : the training runs; they alone are looked at
+    model : fitted to them
+    """
+    if len(train.runs) == 1 and reversals(train.runs[0]) < FEWEST_REVERSALS:
+        return 1.0
+    grids, without = _grids(train, model)
+    least = min(loss for _, drawn in grids for loss, _, _ in drawn)
+    return min(1.0, float(np.sqrt(least / without)))
+
+
+def _grids(train: Problem, model: Model) -> tuple[list[tuple[_Grid, list[_Tried]]], float]:
+    """Return the networks without and with the displacement that are drawn, and the loss without.
+
+    Parameters
+    ----------
+    train, model : the training runs, and the model that networks are beside
+    """
     zero = zero_of(train, model)[0] if train.free_zero and not has_offset(model) else 0.0
     total = sum(int(np.count_nonzero(_counts(run))) for run in train.runs)
     rows = [np.flatnonzero(_counts(run))[:: max(1, total // MOST)] for run in train.runs]
@@ -365,19 +392,20 @@ def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None
         (run.force - train.predict(model, run) - zero)[row]
         for run, row in zip(train.runs, rows, strict=True)
     ]
-    fold = _folds(rows)
-    without = float(np.mean(np.concatenate(y) ** 2))
-    tried: list[tuple[float, int, Closure]] = []
-    grids: list[tuple[float, _Grid]] = []
+    fold, out = _folds(rows), []
     for position in (False, True):
         inputs = inputs_of(train.runs, position)
-        seen = [_Seen(train, model, run, inputs) for run in train.runs]
-        grid = _Grid(seen, rows, y, fold)
+        grid = _Grid([_Seen(train, model, run, inputs) for run in train.runs], rows, y, fold)
         drawn = [one for few, steep in product(SEES, STEEP) for one in grid.drawn(few, steep)]
-        grids.append((min(loss for loss, _, _ in drawn), grid))
-        tried += drawn
-    _, grid = min(grids, key=lambda pair: pair[0])
-    tried += [grid.trained(decay) for decay in DECAYS]
+        out.append((grid, drawn))
+    return out, float(np.mean(np.concatenate(y) ** 2))
+
+
+def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None:
+    """Return the best network beside a model, its loss on left-out folds, and that without one."""
+    grids, without = _grids(train, model)
+    grid, _ = min(grids, key=lambda pair: min(loss for loss, _, _ in pair[1]))
+    tried = [*(one for _, drawn in grids for one in drawn), *map(grid.trained, DECAYS)]
     least = min(loss for loss, _, _ in tried)
     if least > WORTH**2 * without:
         return None
@@ -537,7 +565,7 @@ class _Grid:
     def _runs(self) -> list[tuple[_Seen, Array, Indices]]:
         return list(zip(self.seen, self.scaled, self.rows, strict=True))
 
-    def drawn(self, few: int, steep: float) -> list[tuple[float, int, Closure]]:
+    def drawn(self, few: int, steep: float) -> list[_Tried]:
         """Return networks of all sizes and penalties: loss on left-out folds, hidden units, itself.
 
         Their hidden weights are drawn.
@@ -582,7 +610,7 @@ class _Grid:
             out.append((loss / len(A), size, closure))
         return out
 
-    def trained(self, decay: float) -> tuple[float, int, Closure]:
+    def trained(self, decay: float) -> _Tried:
         """Return the mean of networks that are trained with all their weights, as `drawn` does.
 
         They see the inputs as the load cell shows the force: late and smooth as it does.

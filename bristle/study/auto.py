@@ -16,7 +16,7 @@ from ..physics.effect import closures
 from .forms import law_or_all
 from .history import Step
 from .identify import identify_study, is_identified
-from .learn import learn_effect, learn_study_closure, opened_at
+from .learn import learn_effect, learn_study_closure, opened_at, promise_of
 from .steps import (
     Say,
     add_effects,
@@ -41,7 +41,8 @@ class Completed:
     `curves` are those learned where no effect of the library explained the error; `unproven` the
     step that improves the prediction by what the verdict does not prove, `refuted` why the one that
     training runs chose was not made; `closure` what the network came to that was asked for in the
-    end, `no_closure` why these runs carry none.
+    end, `no_closure` why these runs carry none; `promise` what one that was not asked for may leave
+    of the error, on left-out parts of the training runs.
     """
 
     verdict: Diagnosis
@@ -51,6 +52,7 @@ class Completed:
     refuted: str = ""
     closure: LearnedClosure | None = None
     no_closure: str = ""
+    promise: float = 1.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
@@ -59,6 +61,7 @@ class Completed:
             **({"learned": [one.as_dict() for one in self.curves]} if self.curves else {}),
             **({"unproven": self.unproven.what} if self.unproven else {}),
             **({"closure": self.closure.as_dict()} if self.closure else {}),
+            **({"closure_may_leave": self.promise} if self.promise < 1.0 else {}),
             "steps": [
                 {
                     "number": step.number, "what": step.what, "why": step.why,
@@ -118,11 +121,14 @@ def complete(
             if _open(found) and not proven and not study.settings.has_building:
                 step, refuted = _gained(study, found, say, stepped)
                 done = replace(done, unproven=step, refuted=refuted)
-            if _open(found) and closure and not closures(study.model().effects):
+            lacks_one = _open(found) and not closures(study.model().effects)
+            if lacks_one and closure:
                 try:
                     done = replace(done, closure=_closed(study, found, say, stepped))
                 except StudyError as refused:  # the verdict and the steps stand without one
                     done = replace(done, no_closure=str(refused))
+            elif lacks_one and found.noise_known and not study.settings.has_building:
+                done = replace(done, promise=promise_of(study))
             return replace(done, steps=tuple(steps))
         say("adding " + " and ".join(names))
         stepped(add_effects(study, names, why=f"verdict: {found.kind}", found=found).step)

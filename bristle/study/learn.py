@@ -16,7 +16,13 @@ from ..diagnosis.prepared import Prepared
 from ..diagnosis.rig_runs import RigRuns, runs_of_rig
 from ..errors import StudyError
 from ..learning.closed_forms import close, closed_forms
-from ..learning.closure import FEWEST_REVERSALS, LearnedClosure, learn_closure, reversals
+from ..learning.closure import (
+    FEWEST_REVERSALS,
+    LearnedClosure,
+    learn_closure,
+    promised,
+    reversals,
+)
 from ..learning.closure_file import closure_text
 from ..learning.curve import CurvePlace, refuse_elsewhere
 from ..learning.curve_picture import curve_png
@@ -141,6 +147,12 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     told = json.dumps(found.as_dict(), indent=2, ensure_ascii=False)
     study.write_report(f"{name}.json", told)
     return found
+
+
+def promise_of(study: Study) -> float:
+    """Return the error that a closure may leave, by the model's, as training folds tell it [1]."""
+    opened = opened_at(study, "")[1]
+    return promised(opened.problem, opened.before.model)
 
 
 def _text(study: Study, learned: LearnedEffect, name: str) -> str:

@@ -14,7 +14,7 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import judge
 from bristle.identification.histories import DamperForces, force_history
 from bristle.identification.problem import Problem
-from bristle.learning.closure import LearnedClosure, learn_closure, lowers, one_amplitude
+from bristle.learning.closure import LearnedClosure, learn_closure, lowers, one_amplitude, promised
 from bristle.learning.closure_file import Closure, closure_text
 from bristle.learning.closure_names import nearest_effect
 from bristle.model.model import Model
@@ -87,6 +87,13 @@ def test_it_lowers_the_error_on_runs_that_it_has_not_seen() -> None:
     assert "It is no effect of physics, and the verdict stays unknown." in text
     assert "It is not supported beyond velocity" in text
     assert found.as_dict()["lives_on"]
+
+
+def test_what_it_may_win_is_told_before_it_is_trained() -> None:
+    told = opened(runs(late))
+    base, train = told.before.model, told.problem
+    assert learned().folds <= promised(train, base) < 0.8
+    assert promised(train.of([train.runs[0].of(slice(0, 60))]), base) == 1.0
 
 
 @pytest.mark.slow

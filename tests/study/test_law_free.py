@@ -70,6 +70,7 @@ def folder(monkeypatch):
         return SimpleNamespace(step=f"add {names[0]}")
 
     monkeypatch.setattr(auto, "add_effects", add)
+    monkeypatch.setattr(auto, "promise_of", lambda _study: 0.6)
     return made
 
 
@@ -101,6 +102,7 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypa
     assert asked == [("opened", found.trials, (), MOST_EFFECTS)]
     assert added == [("", ("stribeck", "drift"), found)]
     assert done.steps == ("add stribeck, drift (not proven)",)
+    assert done.promise == 0.6
 
 
 def test_what_the_held_out_runs_refute_is_not_kept(bench_study, monkeypatch):
@@ -124,7 +126,9 @@ def test_only_what_is_proven_is_added_where_that_is_asked_for(folder, monkeypatc
 
 def test_what_is_explained_gets_no_further_effect(folder, monkeypatch):
     told(monkeypatch, [verdict("none", 1.0)])
-    assert complete(folder, say=print).unproven is None
+    done = complete(folder, say=print)
+    assert done.unproven is None
+    assert done.promise == 1.0
     assert folder.names == []
 
 
