@@ -10,6 +10,8 @@ from benchmarks._motions import recorded, synthetic
 from benchmarks._semi_active import CLIPPED, ESTIMATED, FEEDBACK, PASSIVE, lq_gains, peak, run
 from benchmarks.better import minimise
 
+pytestmark = pytest.mark.slow  # a benchmark's own loop is compiled for 5 s
+
 NONE = better.NONE
 
 

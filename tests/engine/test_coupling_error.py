@@ -266,7 +266,7 @@ def test_the_command_line_prints_the_error(
         "run",
         "half_sine_pulse",
         "--set",
-        "run.stop=0.5",
+        "run.stop=0.3",
         "--no-figure",
         "--out",
         str(tmp_path),
@@ -275,10 +275,10 @@ def test_the_command_line_prints_the_error(
     shown = capsys.readouterr().out
     assert "Coupling error at 2 ms, by coupled engine, in %" in shown
     assert "order" in shown
-    assert main([*given, "--tolerance", "0.2%", "--json"]) == 0
+    assert main([*given, "--tolerance", "0.5%", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
-    assert answer["coupling_error"]["damper.force"]["along"] <= 0.002
-    assert main([*given, "--tolerance", "0.2%", "--engine", "compiled"]) == 2
+    assert answer["coupling_error"]["damper.force"]["along"] <= 0.005
+    assert main([*given, "--tolerance", "0.5%", "--engine", "compiled"]) == 2
 
 
 @pytest.mark.parametrize(

@@ -167,6 +167,7 @@ def test_the_values_of_a_table_are_parameters_of_their_own(effect: type[Effect])
     assert with_it - bare == pytest.approx(2.0 * 0.5 * (0.3 + 2.0), rel=1e-14)
 
 
+@pytest.mark.slow  # 4 s: a learned curve is a table too, and is examined by default
 def test_the_effect_conforms(effect: type[Effect]) -> None:
     failed = [check for check in examine(effect) if not check.holds]
     assert failed == []
