@@ -8,7 +8,6 @@ import random
 import re
 import zipfile
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +20,13 @@ from fmpy.validation import validate_fmu
 
 import bristle
 from bristle.cli import main
-from bristle.engine.run import run
 from bristle.fmu import catalogue
 from bristle.fmu.archive import library_member
 from bristle.fmu.build import built_guid, plan
 from bristle.fmu.description import read_description
-from bristle.native import build as native_build
-from bristle.native.build import build, ensure
+from bristle.native.build import build
 from bristle.native.description import TYPES
 from bristle.native.zig import PLATFORMS, here
-from bristle.system.scenario import stock_scenarios
 
 pytestmark = needs_zig
 
@@ -216,21 +212,6 @@ def test_every_component_has_this_form(component: str) -> None:
 @pytest.mark.slow
 def test_booleans_switch_effects() -> None:
     assert largest_difference("BinghamDamper", **{"stribeck.on": True}) == 0.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("stem", ["el_centro_lugre_passive", "el_centro_0p6g_clipped"])
-def test_closed_loops_give_the_same_rows(stem: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = next(path for path in stock_scenarios() if path.stem == stem)
-    rows = []
-    for fmi in (2, 3):
-        monkeypatch.setattr(native_build, "ensure", partial(ensure, fmi=fmi))
-        rows.append(run(file, {"run.stop": 2.0}, fmus="native"))
-    assert list(rows[0].columns) == list(rows[1].columns)
-    # Only FMI 2.0 has input derivatives, which the master uses where they save a call: its rows
-    # differ by rounding.
-    two, three = (one.to_numpy() for one in rows)
-    assert np.max(np.abs(two - three) / np.maximum(np.max(np.abs(two), axis=0), 1e-12)) < 1e-12
 
 
 @pytest.mark.slow

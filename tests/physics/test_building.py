@@ -241,22 +241,16 @@ RATIO = "damping_ratio = 0.01"
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("masses = [", "not TOML"),
-        (GOOD.replace("schema = 1", ""), "schema is missing: expected schema = 1"),
-        (GOOD.replace("schema = 1", "schema = 2"), "schema is 2, of another version"),
         (GOOD + "colour = 3\n", "unknown key 'colour'; there are .*'masses'"),
         (GOOD.replace("isolated", "floating"), 'base = \'floating\'; "isolated" or "fixed"'),
-        (GOOD.replace("[1.969", "[-1.969"), r"masses\[0\] = -1.969 must be positive"),
         (GOOD.replace("[1057.0", "[0.0"), r"stiffnesses\[0\] = 0.0 must be positive"),
         (GOOD.replace("[1.969", "[nan"), "masses must be a finite number, found nan"),
         (GOOD.replace("[1.969", "[inf"), "masses must be a finite number, found inf"),
         (GOOD.replace("[1.969", "[true"), "masses must be a finite number, found True"),
         (GOOD.replace("[1.969", '["2 kg"'), "masses must be a finite number, found '2 kg'"),
         (GOOD.replace("[1.969, 1.232, 1.232]", "[]"), "masses must be a list of numbers"),
-        (GOOD.replace("[1.969, 1.232, 1.232]", "2.0"), "masses must be a list of numbers"),
         (GOOD.replace("masses", "#"), "masses must be a list of numbers"),
         (GOOD.replace("stiffnesses", "#"), "stiffnesses must be a list of numbers"),
-        (GOOD.replace(", 1366.5]", "]"), "3 masses need as many stiffnesses, found 2"),
         (GOOD.replace(RATIO, ""), "give one of damping_ratio, modal, rayleigh; found none"),
         (GOOD + "modal = [0.01, 0.01, 0.01]\n", r"found \['damping_ratio', 'modal'\]"),
         (GOOD.replace("0.01", "1.0"), r"damping_ratio = 1.0 must lie in \[0, 1\)"),
@@ -292,10 +286,4 @@ def test_a_wrong_file_says_where_and_what(file: Path, text: str, says: str) -> N
 
 def test_a_file_that_is_not_there(file: Path) -> None:
     with pytest.raises(PhysicsError, match=r"building\.toml: there is no such file"):
-        read_building(file)
-
-
-def test_a_file_that_is_not_utf_8(file: Path) -> None:
-    file.write_bytes(b"schema = 1\nname = 'caf\xe9'\n")
-    with pytest.raises(PhysicsError, match=r"building\.toml:2: is not UTF-8"):
         read_building(file)

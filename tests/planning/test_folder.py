@@ -105,21 +105,11 @@ def test_no_plan(tmp_path: Path) -> None:
         read_plan(tmp_path / "nothing")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("rate = 500.0", "rate = 250.0", "500 samples per second, and 250"),
-        ('name = "plan_2"', 'name = "../plan_2"', "letters, digits"),
-        ('file = "plan_2.csv"', 'file = "../plan_2.csv"', "beside plan.toml"),
-    ],
-)
-def test_a_wrong_plan_file(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_rate_that_is_not_that_of_the_files_is_refused(tmp_path: Path) -> None:
     write_plan(bench(), tmp_path / "plan")
     path = tmp_path / "plan" / "plan.toml"
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
-    with pytest.raises(BristleError, match=said):
+    path.write_text(path.read_text().replace("rate = 500.0", "rate = 250.0"))
+    with pytest.raises(BristleError, match="500 samples per second, and 250"):
         read_plan(tmp_path / "plan")
 
 

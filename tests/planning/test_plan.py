@@ -444,24 +444,6 @@ def test_what_cannot_be_planned_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ('max_force = "2 kN"', 'max_force = "2 mm"', "max_force"),
-        ('max_force = "2 kN"\n', "", "lacks max_force"),
-        ('stroke = "20 mm"\n', "", "lacks stroke"), ("bingham", "bengham", "bingham"),
-        ('max_force = "2 kN"', 'max_force = "-2 kN"', "more than 0"),
-    ],
-)  # fmt: skip
-def test_a_data_sheet_with_mistakes_is_refused(
-    tmp_path: Path, old: str, new: str, told: str
-) -> None:
-    file = tmp_path / "rig.toml"
-    file.write_text(SHEET.replace(old, new))
-    with pytest.raises(StudyError, match=told):
-        bristle.plan(file)
-
-
-@pytest.mark.parametrize(
     ("verdict", "wanted"),
     [
         ({"kind": "ambiguous", "effects": ["gas_spring", "duffing"]},

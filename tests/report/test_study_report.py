@@ -181,11 +181,6 @@ def test_a_single_run_is_said_to_be_weaker(tmp_path):
             "No other effect of the library is above 3.1 % of the force",
         ),
         ({"kind": "effect", "effects": ["gas_spring"]}, "Missing from the model: gas spring"),
-        (
-            {"kind": "unknown", "coordinate": "displacement"},
-            "The remaining error depends mainly on displacement.",
-        ),
-        ({"kind": "insufficient", "reasons": ["All runs are equal."]}, "All runs are equal."),
         ({"kind": "effect", "effects": ["mine"]}, "mine is an effect of the user&#x27;s own"),
     ],
 )

@@ -148,17 +148,7 @@ def test_a_wrong_building_is_named(tmp_path: Path) -> None:
         read_task(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('schema = 1\nlaw = "maxwell"', 'there is no law "maxwell"'),
-        ('schema = 1\nlaw = "bingham"\n[parameters.f_z]\nvalue = 1', ":3: .*f_z"),
-        ('schema = 1\nlaw = "bingham"\n[parameters]\nf_c = 1', r"expected \{ value = ... \}"),
-        ('schema = 1\nlaw = "bingham"\n[parameters.f_c]\nvalue = 1\nunit = "kg"', "dimension"),
-        ('schema = 1\nlaw = "bingham"\n[effects.nonsense]', "nonsense"),
-    ],
-)
-def test_mistakes_of_a_model_are_named(tmp_path: Path, text: str, message: str) -> None:
-    path = write(tmp_path, text, "model.toml")
-    with pytest.raises(DesignError, match=message):
+def test_a_mistake_of_a_model_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path, 'schema = 1\nlaw = "bingham"\n[parameters.f_z]\nvalue = 1', "model.toml")
+    with pytest.raises(DesignError, match=r":3: .*f_z"):
         damper_from_model(path)

@@ -177,6 +177,7 @@ BROKEN = [
     ("model", '{ value = 81.2, unit = "N/m" }', "81.2", 10, "k is 81.2: expected { value = ... }"),
     ("rig", '"20 mm"', '"20 s"', 3, '"20 s": expected a number with its unit, such as "20 mm"'),
     ("rig", 'stroke = "20 mm"', 'strok = "20 mm"', 3, 'Did you mean "stroke"?'),
+    ("rig", '"1.5 kN"', '"2 mm"', 9, "max_force"),
     ("rig", '["0 V", "5 V"]', '["0 V"]', 5, "command is a list of 1: expected a list of 2"),
     ("rig", '["sine"]', '["sin"]', 6, 'no motion "sin". Did you mean "sine"?'),
     ("rig", '["sine"]', "[]", 6, "motions is empty: expected a list"),
