@@ -63,6 +63,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     config = session.config
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
     if whole and config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        _make_bytecode()
         script = Path(__file__).with_name("compile_ahead.py")
         state = str(Path(os.environ[studies.FOLDER]) / "state")
         path = os.pathsep.join([str(script.parents[1]), os.environ.get("PYTHONPATH", "")])
@@ -71,6 +72,22 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             env={**os.environ, "PYTHONPATH": path, trust.VARIABLE: "1", "BRISTLE_STATE": state},
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
+
+
+def _make_bytecode() -> None:
+    """Let two processes collect half of the tests each: else every worker compiles all modules."""
+    tests = Path(__file__).parent
+    parts = sorted(path for path in tests.iterdir() if path.is_dir() or path.match("test_*.py"))
+    command = [sys.executable, "-m", "pytest", "-n0", "--collect-only", "-qq"]
+    halves = [
+        subprocess.Popen(
+            [*command, *map(str, parts[k::2])],
+            cwd=tests.parent, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )
+        for k in (0, 1)
+    ]  # fmt: skip
+    for half in halves:
+        half.wait()
 
 
 _LONG = ("test_conform.py", "test_build.py", "test_slave.py", "test_docs.py", "test_flat.py",
