@@ -127,6 +127,8 @@ MAX_FILLED = 3
 _TOLERATED = 0.02  # share of the step by which a time may be off before all is resampled
 _MOVED = 0.02  # share of samples that may be off by more before all are interpolated
 
+_TWO_RUNS = 0.6
+"""Share of times that are those of the sample before, above which no second run explains them."""
 _AROUND = 8
 """Samples on each side that tell how far a channel goes from one to the next."""
 _AS_USUAL = 2.0
@@ -338,7 +340,8 @@ def _in_order(
             do = (
                 "If times were written with too few digits, --step S, the sampling step in s (here "
                 f"about {step}), takes their place."
-                if all(_one_signal(values, double) for values in channels.values())
+                if len(double) > _TWO_RUNS * len(time)
+                or all(_one_signal(values, double) for values in channels.values())
                 else "Channels jump to and fro there: two runs may lie in one file."
             )
             raise RecordError(

@@ -415,7 +415,9 @@ def _refuse_incomplete(
         for text in free:
             own = table.find(text).stated
             if own and any(_may_be(table, text, quantity) for quantity in what.split()):
-                way = f'"{text}" is in {own}, in which none is' + ", but in kgf" * (own == "kg")
+                way = f'"{text}" is in {own}, which is no unit of it'
+                if own == "kg":
+                    way += f'; a load cell shows kgf: --channel "force={text}@kgf"'
         wrong.append(f"no column can be {what}: {way}")
 
     if rig == "bench":

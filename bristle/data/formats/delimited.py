@@ -91,7 +91,8 @@ def read(content: bytes, name: str) -> Table:
     columns = _instants(columns, body, lines, layout)
     not_numeric = {columns[index].text: text for index, text in body.not_numeric.items()}
     values = {column.text: body.values[k] for k, column in enumerate(columns)}
-    if made := _time_by_rate(columns, lines[:first], len(body.lines)):
+    above = [";".join(layout.split(line)) for line in lines[:first]]
+    if made := _time_by_rate(columns, above, len(body.lines)):
         column, values[made[0].text], remark = made
         columns, remarks = (*columns, column), [*remarks, remark]
     return Table(

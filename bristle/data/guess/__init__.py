@@ -172,6 +172,8 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
         if len(good) < max(MIN_TIME_ROWS, 0.5 * table.rows):
             continue
         spacing = np.diff(good)
+        if not spacing.any():  # it stands still
+            continue
         rising = float(np.mean(spacing > 0.0)) > 0.98
         unit = column.stated
         timed = quantity_of_unit(unit) == "time"
@@ -226,6 +228,8 @@ def _other_times(table: Table, chosen: str) -> str:
 def _usual(spacing: Array) -> float:
     """Return the usual spacing of times, which may be written with few digits; of (n,)."""
     usual = float(np.median(spacing))
+    if usual == 0.0:  # most times are written twice
+        return float(spacing.mean())
     near = spacing[np.abs(spacing) <= 2.0 * abs(usual)]
     return float(near.mean()) if near.size else usual
 

@@ -244,6 +244,17 @@ def test_a_count_of_samples_is_no_time(tmp_path: Path, capsys) -> None:
     assert told(file, capsys, "--step", "0.002")[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("time", "said"),
+    [(0.0 * T, "no column can be the time: --step S"), (np.floor(T), "(here about 0.00167), takes"),
+     (np.floor(20.0 * T) / 20.0, "If times were written with too few digits, --step S")],
+)  # fmt: skip
+def test_times_that_stand_still_are_told(tmp_path: Path, capsys, time, said: str) -> None:
+    code, told_of = told(timed(tmp_path, "Time", time, P), capsys)
+    assert code == 2
+    assert said in told_of
+
+
 def test_advice_on_a_time_that_goes_back_leads_on(tmp_path: Path, capsys) -> None:
     half = N // 2
     runs = np.concatenate([T[:half], T[:half]])

@@ -53,7 +53,7 @@ def test_forces(tmp_path: Path, title: str, size: float) -> None:
     ("title", "said"),
     [("Force/10 [N]", '"/10" in it may be a factor'), ("Force [N] *10", '"*10" in it may be'),
      ("Force [1e3 N]", '"1e3" in it may be'), ("Force (N) x10", "may be a factor"),
-     ("Load (kg)", "is in kg, in which none is, but in kgf")],
+     ("Load (kg)", 'no unit of it; a load cell shows kgf: --channel "force=Load (kg)@kgf"')],
 )  # fmt: skip
 def test_what_may_be_another_force_is_asked(tmp_path, capsys, title, said) -> None:
     file = made(tmp_path, f"t [s];x [mm];{title}", X, F)
