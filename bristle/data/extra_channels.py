@@ -205,7 +205,7 @@ def _on_a_line(values: Array, other: Array, off: float, still: float) -> bool:
     values, other : (n,) of the columns
     off, still : as `SAME` and `RAW` have them
     """
-    both = np.flatnonzero(np.isfinite(values) & np.isfinite(other))
+    both = np.flatnonzero((np.abs(values) < ABSURD) & (np.abs(other) < ABSURD))
     if len(both) < MIN_VALUES:
         return False
     both = both[:: -(-len(both) // COMPARED)]

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from math import inf, isfinite, log10
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from statistics import median
 from typing import NamedTuple
 
@@ -385,7 +385,12 @@ def counted_names(header: Sequence[str], commanded: bool) -> list[str]:
         _take(names, commands)
     if TEMPERATURE not in names:
         _take(names, [TEMPERATURE if _in(column, UNITS[TEMPERATURE]) else "" for column in columns])
-    return names
+    return [
+        f"{name}_{column.unit.name}"  # as names of files tell it: pressure_psi
+        if name not in (*DRIVE, *UNITS) and column.unit and column.unit.name.isalpha()
+        else name
+        for name, column in zip(names, columns, strict=True)
+    ]
 
 
 def _take(names: list[str], found: Sequence[str]) -> None:
@@ -562,7 +567,9 @@ def _of_table(rows: Sequence[Facts], table: Path) -> list[str]:
             found.setdefault(name, {})[value] = text
     if not found:
         return []
-    told = "; ".join(f"{name} {listed(found[name].values(), 6)}" for name in sorted(found))
+    told = "; ".join(
+        f"{label_name(name)} {listed(found[name].values(), 6)}" for name in sorted(found)
+    )
     return [f"of each run, from {table}: {told}"]
 
 
@@ -734,12 +741,16 @@ def rows_of_table(path: Path, files: Sequence[Path], commanded: bool = False) ->
     if twice:
         raise StudyError(f'--runs {path}: {named.count(twice)} columns are called "{twice}".')
     names = counted_names(header, commanded)
+    for name in (*DRIVE, *UNITS):
+        own = [text.strip() for text, one in zip(header, names, strict=True) if one == name]
+        if len(own) > 1:
+            raise StudyError(f"--runs {path}: {listed(own)} all tell the {name}; one is right.")
     found: dict[str, Facts] = {}
     for number, row in enumerate(rows, 2):
         where = f"--runs {path}, row {number}"
         if len(row) != len(header):
             raise StudyError(f"{where}: {len(row)} fields under {len(header)} titles.")
-        file = Path(row[at[0]].strip()).name
+        file = PureWindowsPath(row[at[0]].strip()).name  # of paths of any system
         if file in found:
             raise StudyError(f"{where}: there is a row of {file} above; one is right.")
         found[file] = _facts(header, names, row, at[0], where)

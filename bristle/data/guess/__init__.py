@@ -190,7 +190,7 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
         score = 4 * named + 2 * timed + rising
         guess = Guess("time", column.text, unit or assumed, 1, reason, doubt)
         if best is None or score > best[0]:
-            best = score, guess, float(np.median(spacing)) * parse_unit(guess.unit or "s").factor
+            best = score, guess, _usual(spacing) * parse_unit(guess.unit or "s").factor
     if best is None:
         return None, 0.0
     doubt = joined(best[1].doubt, _other_times(table, best[1].column))

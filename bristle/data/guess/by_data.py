@@ -239,6 +239,8 @@ def fit_signs(
 
 def velocity_sign(search: Search, x: str, v: str) -> tuple[int, str]:
     """Return the sign that makes a column the derivative of another, and the reason."""
+    if search.step <= 0.0:
+        return 1, ""
     found = derivative_relation(search.column(x), search.column(v), search.step)
     if found is None or abs(found.correlation) < 0.9 or found.gain > 0.0:
         return 1, ""

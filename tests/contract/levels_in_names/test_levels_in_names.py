@@ -233,12 +233,21 @@ def test_a_stroke_in_the_name_and_a_rig_that_reaches_less_are_no_contradiction(t
     assert "by its label" not in " ".join(capsys.readouterr().out.split())
 
 
+def test_two_columns_of_one_command_are_refused(tmp_path, capsys) -> None:
+    data = made(tmp_path / "lab", {"a": (1.0, 1.0), "b": (2.0, 0.0)})
+    (tmp_path / "runs.csv").write_text("file,current [A],current [mA]\na,1,1000\nb,1,2\n")
+    options = ["--data", data, "--runs", str(tmp_path / "runs.csv")]
+    assert main(["study", "new", str(tmp_path / "rig"), *options]) == 2
+    assert "current [A], current [mA] all tell the current; one is" in capsys.readouterr().err
+
+
 def test_what_a_table_of_runs_says_is_told_with_its_units(tmp_path, capsys) -> None:
     data = made(tmp_path / "lab", {"a": (1.0, 1.0), "b": (2.0, 0.0)})
     table = tmp_path / "runs.csv"
     for text, told in (
         ("file,current,oil\na.csv,1000,new\nb.csv,0,new\n", "current 1000 A, 0 A; oil new"),
         ("file;current [mA]\na.csv;1,000\nb.csv;0\n", "current 0.001 A, 0 A"),
+        ("file;load [kN]\nC:\\lab\\a.csv;5\nC:\\lab\\b.csv;10\n", "load 5 kN, 10 kN"),
     ):
         table.write_text(text)
         study = str(tmp_path / f"rig {len(text)}")
