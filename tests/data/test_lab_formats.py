@@ -360,6 +360,18 @@ def table_of(tmp_path: Path, text: str, name: str = "run.txt") -> Table:
     return read_table(tmp_path / name)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [("X_Dimension\tTime", "X_Dimension\tFrequency", "X_Dimension is Frequency; Time is right"),
+     ("Y_Unit_Label\tmm\tkN", "Y_Unit_Label\tmm\tN", r"a segment of .*\[N\], .*, and the first one")],
+)  # fmt: skip
+def test_a_segment_of_other_units_or_of_a_spectrum_is_refused(tmp_path, old, new, said) -> None:
+    first, mark, last = lvm("One", 2).rpartition("Channels")
+    assert old in last
+    with pytest.raises(RecordError, match=rf"run\.lvm, line \d+: {said}"):
+        table_of(tmp_path, f"{first}{mark}{last.replace(old, new)}", "run.lvm")
+
+
 def lvm(time: str, segments: int = 1, comma: bool = False) -> str:
     lines = [
         "LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab",

@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.text import listed
 from ...errors import RecordError
+from ..channels import meaning
 from ..table import Table, from_arrays
 from . import delimited
 from ._one_time import Series, on_one_time, unset_step
@@ -63,6 +65,15 @@ def read(content: bytes, name: str) -> Table:
                 pairs = zip((every[k] for k in kept[1:]), units, strict=True)
                 own = [f"{title} [{unit}]" if unit else title for title, unit in pairs]
                 titles = titles or (own, len(found))
+                place = f"{name}, line {len(found) + 1}"
+                if own != titles[0]:
+                    raise RecordError(
+                        f"{place}: a segment of {listed(own, 4)}, and the first one has "
+                        f"{listed(titles[0], 4)}. Save each segment as a file."
+                    )
+                for axis in filter(None, _of_channels(about, "X_Dimension", len(own))):
+                    if (meant := meaning(axis, None)) is None or meant.quantity != "time":
+                        raise RecordError(f"{place}: X_Dimension is {axis}; Time is right here.")
             found.append(None)
             row = 0
         else:
@@ -181,11 +192,6 @@ def _numbers_of(
     line: _Line, count: int, comma: bool, at: int, name: str
 ) -> tuple[list[float], list[float], list[float]]:
     """Return the times, values and stated steps in a row, by channel; NaN where one is missing."""
-    if len(line.kept) - 1 != count:
-        raise RecordError(
-            f"{name}, line {at + 1}: a segment of {len(line.kept) - 1} channels, and the first one "
-            f"has {count}. Save each segment as a file."
-        )
     steps = [clock.step for clock in line.clocks]
     try:
         times, values = _cells(line, count, comma)
