@@ -363,7 +363,7 @@ def table_of(tmp_path: Path, text: str, name: str = "run.txt") -> Table:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [("X_Dimension\tTime", "X_Dimension\tFrequency", "X_Dimension is Frequency; Time is right"),
-     ("Y_Unit_Label\tmm\tkN", "Y_Unit_Label\tmm\tN", r"a segment of .*\[N\], .*, and the first one")],
+     ("Y_Unit_Label\tmm\tkN", "Y_Unit_Label\tmm\tN", r"a segment of .*\[N\], .*, and the first")],
 )  # fmt: skip
 def test_a_segment_of_other_units_or_of_a_spectrum_is_refused(tmp_path, old, new, said) -> None:
     first, mark, last = lvm("One", 2).rpartition("Channels")
