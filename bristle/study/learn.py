@@ -15,6 +15,7 @@ from ..diagnosis.decision import noise_not_known
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.rig_runs import RigRuns, runs_of_rig
 from ..errors import StudyError
+from ..identification.rig import DAMPER
 from ..learning.closed_forms import close, closed_forms
 from ..learning.closure import (
     FEWEST_REVERSALS,
@@ -105,20 +106,20 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     Raises
     ------
     StudyError
-        If the study has one short run for training, or is of a building, the data carry no
-        verdict, or the name is taken.
+        If the study has one short run for training, the damper's force was not measured, the data
+        carry no verdict, or the name is taken.
     """
     for why in study.usable_effects():
         tell(f"left out: {why}")
-    if study.settings.has_building:
-        raise StudyError(
-            f"{study.folder}: a closure is in parallel with a damper on a test bench; this study "
-            "is of a building. Learn a curve at one of its sites:  bristle learn --at SITE."
-        )
     given, name = name, name or _free_name(study, "closure")
     _refuse_no_word(name)
     _refuse_taken(study, name)
-    _, opened = opened_at(study, "")
+    _, opened = opened_at(study, DAMPER)
+    if opened.problem.reconstructed:
+        raise StudyError(
+            f"{study.folder}: a closure is in parallel with the damper, whose force was not "
+            "measured. Learn a curve at one of the building's sites:  bristle learn --at SITE."
+        )
     runs = opened.problem.runs
     if len(runs) == 1 and reversals(runs[0]) < FEWEST_REVERSALS:
         raise StudyError(
