@@ -126,6 +126,9 @@ def test_a_gain_in_one_stretch_alone_is_scatter() -> None:
     once = [np.where(np.arange(800) < 100, 0.0, 1.0)]
     assert not lowers(before, once, 0.02)
     assert lowers(before, [0.9 * np.ones(800)], 0.02)
+    strong = np.exp(-np.arange(800) / 30.0)  # an earthquake: all is in the first seconds
+    assert lowers([strong], [0.5 * strong], 0.02)
+    assert not lowers([strong], [np.where(np.arange(800) < 2, 0.0, strong)], 0.02)
 
 
 def test_its_file_is_an_effect_that_is_accepted() -> None:

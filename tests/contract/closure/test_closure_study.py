@@ -84,6 +84,33 @@ def test_a_single_run_that_hardly_turns_is_refused(tmp_path: Path, capsys: Captu
     assert not (rig / "effects" / "closure_1.py").exists()
 
 
+@pytest.mark.slow
+def test_in_a_building_the_response_is_nearer_with_it(tmp_path: Path, capsys: Capture) -> None:
+    tower = tmp_path / "tower"
+    told(capsys, "example", "building", tower, "--effect", "worn_bore", "--seed", "1")
+    told(capsys, "identify", tower, "--no-table")
+    found = asked(capsys, "learn", tower, "--closure")
+    assert found["error_after"] < 0.5 * found["error_before"]
+    told(capsys, "add", tower, found["name"])
+    rows = asked(capsys, "predict", tower, "--draws", "0")["rows"]
+    for kind in ("peak", "rms"):
+        before, after = (
+            np.median([abs(row[error]) for row in rows if row["kind"] == kind])
+            for error in ("error_before", "error")
+        )
+        assert after < 0.5 * before, kind
+
+
+@pytest.mark.slow
+def test_in_a_building_whose_damper_has_no_load_cell_it_is_refused(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    tower = tmp_path / "tower"
+    told(capsys, "example", "building", tower, "--effect", "worn_bore", "--no-load-cell")
+    told(capsys, "identify", tower, "--no-table")
+    assert "whose force was not measured" in told(capsys, "learn", tower, "--closure", code=2)
+
+
 def test_what_chooses_a_curve_does_not_go_with_it(rig: Path, capsys: Capture) -> None:
     for words in (("--along", "displacement"), ("--as", "force"), ("--at", "damper"), ("--table",)):
         why = told(capsys, "learn", rig, "--closure", *words, code=2)
