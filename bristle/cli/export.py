@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.text import command
+from ..core.text import command, joined
 from ..errors import ScenarioError, StudyError
 from ._options import Parser, builder, print_answer, print_json
 
@@ -82,7 +82,7 @@ def _refuse_for_fmus(arguments: argparse.Namespace) -> None:
     named = [option for option, is_given in given.items() if is_given]
     if named:
         verb = "is" if len(named) == 1 else "are"
-        raise ScenarioError(f"{' and '.join(named)} {verb} for an FMU, --web is for a page.")
+        raise ScenarioError(f"{joined(named)} {verb} for an FMU, --web is for a page.")
 
 
 def _as_one(arguments: argparse.Namespace) -> int:

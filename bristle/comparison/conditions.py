@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..core.arrays import Array, Flags
-from ..core.text import plain, quantity, short_z
+from ..core.text import joined, plain, quantity, short_z
 from ..data.channels import Label, Labels, label_name, label_text, varying
 from ..identification.search import z_scale
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .misfit import CLOSE
-from .names import joined
 from .predictions import RunPrediction
 
 STEADY = 1e-3

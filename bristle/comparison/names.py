@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 
+from ..core.text import joined
 from ..data.channels import label_name
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS
@@ -78,8 +79,3 @@ def site_names(sites: Sequence[str]) -> str:
     if spans:
         names.append(f"storey{'s' * (len(numbers) > 1)} {joined(spans)}")
     return joined(names)
-
-
-def joined(names: Sequence[str]) -> str:
-    """Return names as a list in words: "a, b and c"."""
-    return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..core.arrays import Array, Flags
-from ..core.text import plain, quantity, short_z
+from ..core.text import joined, plain, quantity, short_z
 from ..data.channels import UNITS
 from ..physics.drive import DRIVES
 from .conditions import Regime, label_sentence
-from .names import joined, name_of, site_name, site_names
+from .names import name_of, site_name, site_names
 from .patterns import Finder, ResidualPattern
 from .predictions import SHOWN, RunPrediction, shown
 from .result import Comparison

@@ -21,7 +21,7 @@ from ..campaign.ensemble_file import Distribution, EnsemblePlan, read_ensemble, 
 from ..campaign.table import RunsTable
 from ..core.files import cache_folder
 from ..core.progress import Count, listening
-from ..core.text import percent
+from ..core.text import joined, percent
 from ..core.toml_lines import toml_table, toml_text
 from ..engine import Engine
 from ..engine.cosimulation import Cosimulation, ignore
@@ -450,9 +450,7 @@ class Spread:
         parts = []
         what = [*(["masses", "stiffnesses"] * building), *(["damper parameters"] * damper)]
         if self.share and what:
-            *before, last = what
-            listed = " and ".join([", ".join(before), last] if before else [last])
-            parts.append(f"{listed} within {percent(self.share, 0)}")
+            parts.append(f"{joined(what)} within {percent(self.share, 0)}")
         if self.noise:
             parts.append(f"sensor noise of {percent(self.noise, 0)} of each signal")
         if self.delay:

@@ -183,6 +183,11 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f' Did you mean "{close[0]}"?' if close else ""
 
 
+def joined(names: Sequence[str]) -> str:
+    """Return names as a list in words: "a, b and c"."""
+    return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
 def listed(names: Iterable[str], most: int = LIST_AT_MOST) -> str:
     """Return names parted by commas, the first ones and a count of the rest where they are many.
 

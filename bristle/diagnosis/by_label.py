@@ -20,9 +20,9 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from scipy.special import fdtrc, stdtrit
 
-from ..comparison.names import effect_name, joined
+from ..comparison.names import effect_name
 from ..core.arrays import Array
-from ..core.text import with_interval
+from ..core.text import joined, with_interval
 from ..data.channels import TEMPERATURE, label_name, label_text, label_unit
 from ..data.extra_channels import as_word
 from ..data.measurement import Measurement

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..comparison.names import effect_name, joined
-from ..core.text import plain
+from ..comparison.names import effect_name
+from ..core.text import joined, plain
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem
 from ..identification.problem import Problem

@@ -16,10 +16,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from ..comparison.names import joined
 from ..core.arrays import Array
 from ..core.finding import Finding
-from ..core.text import plain, quantity
+from ..core.text import joined, plain, quantity
 from ..data.channels import channel_unit
 from ..data.cut_off import CHANNELS, LATE, derived_velocity, ends_of, outermost
 from ..data.measurement import Measurement

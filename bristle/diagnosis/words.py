@@ -9,8 +9,8 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..comparison.names import effect_name, effect_names, joined, name_of, site_name
-from ..core.text import quantity, short_z
+from ..comparison.names import effect_name, effect_names, name_of, site_name
+from ..core.text import joined, quantity, short_z
 from ..identification.error import ForceError
 from ..identification.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for

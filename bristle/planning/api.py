@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..core.text import written
+from ..core.text import joined, written
 from ..errors import StudyError
 from ..study.study import Study
 from .bench import plan_new, plan_study
@@ -145,6 +145,6 @@ def _refuse_of_building(bench: str | Path, limits: Mapping[str, Any], record: An
     """Refuse what a damper on a bench does not have, in place of leaving it out."""
     wrong = [name for name in ("damper_stroke", "drift") if name in limits]
     if record or wrong:
-        what = "ground motion; record" if record else f"storeys; {' and '.join(wrong)}"
+        what = "ground motion; record" if record else f"storeys; {joined(wrong)}"
         are = "is" if record or len(wrong) == 1 else "are"
         raise StudyError(f"{bench}: a damper on a bench has no {what} {are} for a building.")

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..comparison.names import joined
 from ..core.files import read_json
 from ..core.interrupt import keeps
 from ..core.progress import tell
-from ..core.text import command, short_z, unknown
+from ..core.text import command, joined, short_z, unknown
 from ..data.checks.runs import LEAST_LEVELS, command_levels, drives_of, tells_a_bend
 from ..data.measurement import Measurement
 from ..errors import BristleError, PhysicsError, StudyError

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..comparison.names import effect_name, effect_names, joined
+from ..comparison.names import effect_name, effect_names
 from ..comparison.predictions import run_predictions
 from ..comparison.view import (
     LOOPS,
@@ -23,6 +23,7 @@ from ..core.finding import grouped, sentence
 from ..core.text import (
     capital,
     command,
+    joined,
     listed,
     percent,
     plain,
