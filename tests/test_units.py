@@ -87,9 +87,11 @@ def test_factor_and_dimension(text: str, factor: float, dimension: tuple[int, ..
     assert (unit.factor, unit.dimension, unit.offset) == (factor, dimension, 0.0)
 
 
-def test_celsius_has_an_offset_and_stands_alone() -> None:
+def test_celsius_and_fahrenheit_have_an_offset_and_stand_alone() -> None:
     assert units.convert(20.0, "degC", "K") == pytest.approx(293.15)
     assert units.convert(293.15, "K", "degC") == pytest.approx(20.0)
+    assert units.convert(212.0, "degF", "degC") == pytest.approx(100.0)
+    assert units.convert(-40.0, "degC", "degF") == pytest.approx(-40.0)
     with pytest.raises(UnitError, match=r"degC in \"N/degC\".*In a product write K"):
         units.parse("N/degC")
 

@@ -226,6 +226,11 @@ def every_law(u, v, z, p, bingham_p, A, B, W, C, x, spare, bent, out):  # type: 
     out[16] = skyhook_switch(u, v, 8.0)
 
 
+def test_the_recent_level_is_a_size_that_fades() -> None:
+    assert control_laws.recent_level(1.0, -3.0, 0.5) == 3.0
+    assert control_laws.recent_level(4.0, -1.0, 0.5) == 2.0
+
+
 def test_python_and_numba_agree() -> None:
     rng = np.random.default_rng(2)
     fast = compiled(every_law)

@@ -244,13 +244,6 @@ def test_a_sheet_that_is_not_there_is_no_study(
     assert "rig.toml: there is no such file." in capsys.readouterr().err
 
 
-def test_the_pause_between_tests_is_told(sheet: Path, tmp_path: Path) -> None:
-    found = bristle.plan(
-        sheet, sharpen="f_c", pause="30 s", motions=["sine"], commands=["stairs"]
-    ).write(tmp_path / "plan")
-    assert "rests for 30 s between" in (found / "plan.md").read_text()
-
-
 @pytest.mark.slow
 def test_laws_are_told_apart_before_the_first_measurement(sheet: Path) -> None:
     few = {"motions": ["sine"], "commands": ["stairs"]}
@@ -322,7 +315,7 @@ def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Stu
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     rig: bristle.Study, tmp_path: Path
 ) -> None:
-    found = bristle.plan(rig, sharpen=["f_v"], runs=2, duration="6 s")
+    found = bristle.plan(rig, sharpen=["f_v"], runs=2, duration="6 s", pause="30 s")
     (row,) = found.outcomes
     assert row.name == "f_v"
     assert row.then < 0.9 * row.now
@@ -333,7 +326,9 @@ def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     assert read.study == rig.name
     for name in ("plan.md", "plan_1.png", "plan_2.csv"):
         assert (folder / name).is_file()
-    assert "f_v" in (folder / "plan.md").read_text()
+    said = (folder / "plan.md").read_text()
+    assert "f_v" in said
+    assert "rests for 30 s between" in said
     with pytest.raises(StudyError):
         found.write(tmp_path / "plan")
 

@@ -453,7 +453,8 @@ def test_an_input_without_unit_takes_anything_and_says_so(foreign):
     ]
 
 
-def test_an_fmu_that_lives_once_cannot_be_two_components(foreign):
-    again = '"structure.extra_force" = "mine.force"\n[components.twin]\nfmu = "once.fmu"\n[x]\n'
-    errors = foreign("once.fmu", extra=again)
-    assert any("once.fmu allows one instance per process" in error for error in errors)
+@pytest.mark.parametrize("name", ["once.fmu", "once_1.fmu"])  # true, as 1 too
+def test_an_fmu_that_lives_once_cannot_be_two_components(foreign, name):
+    again = f'"structure.extra_force" = "mine.force"\n[components.twin]\nfmu = "{name}"\n[x]\n'
+    errors = foreign(name, extra=again)
+    assert any(f"{name} allows one instance per process" in error for error in errors)
