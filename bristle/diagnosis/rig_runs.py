@@ -13,6 +13,7 @@ from copy import copy
 from dataclasses import replace
 from typing import Protocol
 
+from ..comparison.names import joined
 from ..core.finding import Finding
 from ..data.channels import DRIVE
 from ..data.checks.runs import tells_a_bend
@@ -167,6 +168,11 @@ OF_STOREY = (
     "there: what is found at the damper may be the storey's own."
 )
 
+NOT_ANCHORED = (
+    "{} was not measured: what of it is slow follows from the springs of the storeys, and {} has "
+    "more than a spring. Measure it: without it the damper is not judged."
+)
+
 SEARCHED = 12.0
 """Seconds of each run, from its begin, on which the damper's effects are searched: the strongest
 shaking is over. The best are then fitted to all that was recorded; held-out runs stay whole."""
@@ -294,6 +300,8 @@ class BuildingRuns:
         self._sensors = tuple(faults_in_building([*train, *holdout], building))
         right = [without_faults(list(runs), self._sensors, building) for runs in (train, holdout)]
         self._noise = median_noise([*right[0], *right[1]])
+        ends = [f"{end}_displacement" for end in _ends(building)]
+        self._anchored = [n for n in ends if not all(r.has(n) for part in right for r in part)]
         self.lacking = lacking_in_building([*train, *holdout], right, self._sensors, self._noise)
         say("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)
@@ -455,6 +463,10 @@ class BuildingRuns:
         """Return a site's diagnosis, none where instruments explain what is left; see `RigRuns`."""
         if found.site != DAMPER:
             return found
+        bent = [s for s, one in findings.items() if s.startswith("storey") and one.kind != "none"]
+        if found.kind != "none" and self._anchored and bent:
+            why = NOT_ANCHORED.format(joined(self._anchored), joined(bent))
+            return replace(found, kind="insufficient", effects=(), reasons=(why,))
         beside = findings.get(self._beside)
         if beside is not None and late_values(beside):
             most = left_by_filter(self._present.law, *self._problems[DAMPER])

@@ -90,6 +90,8 @@ class StructureProblem(Problem):
         Damping that the building has there already [N s/m]: a line may take that away and no more.
     """
 
+    shaken = True
+
     def __init__(
         self,
         runs: Sequence[Run],

@@ -428,6 +428,9 @@ class Problem:
     reconstructed = False
     """Whether the force is a result of equilibrium, not measured."""
 
+    shaken = False
+    """Whether the ground makes the motion: each run then has a largest one of its own."""
+
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
         self._benches: dict[tuple[str, tuple[str, ...]], DamperForces] = {}

@@ -198,8 +198,12 @@ def _limits(effect: str, base: Model, problem: Problem) -> dict[str, tuple[float
     """Return a model's limits with those between which the search for an effect stays."""
     declared, own = EFFECTS[effect].parameters, EFFECTS[effect].start_limits
     scale = _largest(problem) if own else {}
+    # One strong earthquake among weak ones says nothing of what these do not reach.
+    weak = scale
+    if own and problem.shaken:
+        weak = min((_largest(problem.of([run])) for run in problem.runs), key=lambda one: one["m"])
     return base.limits | {
-        f"{effect}.{name}": (low * scale[declared[name].unit], high * scale[declared[name].unit])
+        f"{effect}.{name}": (low * weak[declared[name].unit], high * scale[declared[name].unit])
         for name, (low, high) in own.items()
     }
 
