@@ -15,6 +15,7 @@ from bristle.diagnosis.rig_runs import runs_of_rig
 from bristle.diagnosis.rule import BENCH
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.identification.building_motion import responses
+from bristle.identification.start_grid import initial_guesses
 from bristle.model.model import Model
 
 OFF = np.array([0.0, 0.02, -0.03])
@@ -105,3 +106,27 @@ def test_numbers_of_the_file_come_before_a_second_effect(monkeypatch):
     monkeypatch.setattr(rig_runs, "within_prior", suiting)
     assert not rig.suit(pair)
     assert asked == [("duffing",)]
+
+
+def test_a_stop_is_sought_where_the_weaker_runs_meet_it():
+    b, runs = recorded(stop, without=("force",), peak=3.0)
+    problem = runs_of_rig(runs[:2], runs[2:], Model("tanh"), b).prepare("damper").problem
+    weak = replace(problem.runs[0], x=0.5 * problem.runs[0].x)
+    (low, high), *_ = [
+        guess.limits["end_stop.clearance"]
+        for guess in initial_guesses("end_stop", Model("tanh"), problem.of([weak, *problem.runs]))
+    ]
+    assert low == pytest.approx(0.4 * np.max(np.abs(weak.x)))
+    assert high == pytest.approx(max(np.max(np.abs(run.x)) for run in problem.runs))
+
+
+def test_a_damper_is_not_judged_by_a_displacement_that_a_bent_storey_gives():
+    b, runs = recorded(softening, without=("base_displacement", "force"), peak=3.0)
+    rig = runs_of_rig(runs[:2], runs[2:], Model("tanh"), b)
+    left = SiteDiagnosis("damper", "unknown", (), 8.0, 8.0, 0.0, 0.1)
+    bent = SiteDiagnosis("storey1", "effect", ("storey_softening",), 9.0, 1.0, 1.0, 0.1)
+    found = rig.excused(left, {"storey1": bent})
+    assert found.kind == "insufficient"
+    assert found.reasons[0].startswith("base_displacement was not measured")
+    straight = replace(bent, kind="none", effects=())
+    assert rig.excused(left, {"storey1": straight}) is left
