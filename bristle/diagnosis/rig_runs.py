@@ -13,8 +13,8 @@ from copy import copy
 from dataclasses import replace
 from typing import Protocol
 
-from ..comparison.names import joined
 from ..core.finding import Finding
+from ..core.text import joined
 from ..data.channels import DRIVE
 from ..data.checks.runs import tells_a_bend
 from ..data.cut_off import derived_velocity
