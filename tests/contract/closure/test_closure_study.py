@@ -51,6 +51,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rig
 
 
+@pytest.mark.slow  # 7 s, most of them to compile it: tests/learning/test_closure.py has one
 def test_it_is_learned_and_called_no_effect(rig: Path, capsys: Capture) -> None:
     found = asked(capsys, "learn", rig, "--closure")
     assert found["kept"] is True
