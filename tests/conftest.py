@@ -90,12 +90,23 @@ def _make_bytecode() -> None:
         half.wait()
 
 
-_LONG = ("test_conform.py", "test_build.py", "test_slave.py", "test_docs.py", "test_flat.py",
-         "test_public_names.py", "test_public.py", "test_compiled_laws.py")  # fmt: skip
+_LONG = ("test_conform.py", "test_build.py", "test_slave.py", "test_run.py")
 """Files whose tests take longest: begun first, so that no worker waits for another at the end.
 
-The first three compile nothing of what is compiled ahead; the others find it then.
+They compile nothing of what is compiled ahead, nor do the tests of the folders that come next.
 """
+_COMPILE_NOTHING = ("conformance", "fmu", "native", "data")
+_LONG_TOO = ("test_docs.py", "test_flat.py", "test_public_names.py", "test_public.py",
+             "test_compiled_laws.py")  # fmt: skip
+
+
+def _turn(item: pytest.Item) -> int:
+    name, folder = item.path.name, item.path.parent.name
+    if name in _LONG:
+        return _LONG.index(name)
+    if folder in _COMPILE_NOTHING:
+        return 10
+    return 20 + _LONG_TOO.index(name) if name in _LONG_TOO else 99
 
 
 @pytest.hookimpl(trylast=True)
@@ -106,8 +117,8 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files that take longest first; a worker runs a file whole."""
-    items.sort(key=lambda item: _LONG.index(item.path.name) if item.path.name in _LONG else 99)
+    """Put first what takes longest and waits for nothing; a worker runs a file whole."""
+    items.sort(key=_turn)
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
