@@ -410,7 +410,7 @@ def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None
         return None
     able = [one for one in tried if one[0] <= AS_GOOD * least]
     loss, _, closure = min(able, key=lambda one: one[:2][::-1])
-    return replace(closure, store=_store(train, closure)), loss, without
+    return replace(closure, store=_store(train, model, closure)), loss, without
 
 
 def _counts(run: Run) -> Flags:
@@ -699,7 +699,27 @@ def _descended(u: Array, y: Array, decay: float, seed: int) -> list[Array]:
     return split(minimize(loss, begin, jac=True, method="L-BFGS-B", options=options).x)
 
 
-def _store(train: Problem, closure: Closure) -> Store:
+def held_by_springs(train: Problem, model: Model) -> float:
+    """Return the energy [J] that springs of a model hold at the most, within the runs' motion.
+
+    It is the work of the force at rest, without any history, from one end to the other.
+    """
+    every = np.concatenate([run.x for run in train.runs])
+    x, most, still = np.linspace(float(np.min(every)), float(np.max(every)), 41), 0.0, np.zeros(2)
+    for run in train.runs:
+        fed = train.fed(model, run)
+        V, dt = np.full(2, float(np.mean(fed.moments.V))), fed.moments.dt
+        tracks = {name: values[:2] for name, values in fed.tracks.items()}
+        bench = train.bench(model)
+        force = np.array(
+            [bench.force(np.full(2, at), still, still, V, dt, fed.values, tracks)[0] for at in x]
+        )
+        work = np.append(0.0, np.cumsum(0.5 * np.diff(x) * (force[1:] + force[:-1])))
+        most = max(most, float(np.ptp(work)))
+    return most
+
+
+def _store(train: Problem, model: Model, closure: Closure) -> Store:
     """Return the energy that the device may give back: what the rig gave in the training runs."""
     begin = back = 0.0
     for run in train.runs:
@@ -711,6 +731,7 @@ def _store(train: Problem, closure: Closure) -> Store:
     soon = max(4.0 * max(run.dt for run in train.runs), SOON * _time(train.runs))
     least = closure.size * float(np.max(np.abs(speeds))) * soon
     sizes = [begin, max(ROOM * back, begin, least), soon, REST * float(np.std(speeds))]
+    sizes.append(held_by_springs(train, model))
     return Store(*rounded(np.array(sizes)).tolist())
 
 

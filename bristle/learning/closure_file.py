@@ -6,8 +6,9 @@ in parallel with the damper: it knows the motion of the rod and the command, not
 A store of energy keeps the device passive (energy tank: Duindam & Stramigioli 2004, IEEE ICRA). The
 store gains what the whole device takes in, and never holds more than `Store.most`; the network
 gives back what is in it, no faster than in the time `Store.soon`, and may take in energy at all
-times. So over a closed cycle the device gives no energy, and in all no more than `Store.begin`,
-whatever the weights, where law and effects are passive.
+times. It fills once the device has taken in `Store.kept`, which springs of the model may hold and
+give back themselves. So over a closed cycle the device gives no energy, and in all no more than
+`Store.begin`, whatever the weights, where law and effects are passive.
 """
 
 from __future__ import annotations
@@ -54,13 +55,15 @@ class Store:
     """Energy [J] that the device may give back: at the `begin`, and the `most`.
 
     `soon` [s] the shortest time in which it may do so; `slow` [m/s] the speed below which a network
-    that may give nothing fades, so that its force does not jump where the motion turns.
+    that may give nothing fades, so that its force does not jump where the motion turns. `kept` [J]
+    is what springs of law and effects may hold.
     """
 
     begin: float
     most: float
     soon: float
     slow: float
+    kept: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -160,8 +163,8 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         "",
         f"SIZE = {_n(closure.size)}",
         '"""Force [N] that it comes near at most."""',
-        f"BEGIN, MOST = {_n(store.begin)}, {_n(store.most)}",
-        '"""Energy [J] that the device may give back at the start, and at most."""',
+        f"BEGIN, MOST, KEPT = {_n(store.begin)}, {_n(store.most)}, {_n(store.kept)}",
+        '"""Energy [J] that the device may give back at the start, and at most; and in springs."""',
         f"SOON, SLOW = {_n(store.soon)}, {_n(store.slow)}",
         '"""Time [s] in which it may do so; speed [m/s] below which it fades where it may not."""',
         "",
@@ -218,7 +221,7 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         "",
         "    @staticmethod",
         "    def parallel(q, z, p):",
-        "        left = MOST - max(MOST - BEGIN, z.taken) + q.energy",
+        "        left = MOST - max(MOST - BEGIN + KEPT, z.taken) + q.energy",
         *(
             f"        u{k} = ({_signal(k, one)} - {_n(middle)}) / {_n(spread)}"
             for k, (one, middle, spread) in enumerate(

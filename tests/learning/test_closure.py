@@ -14,7 +14,14 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.trials import judge
 from bristle.identification.histories import DamperForces, force_history
 from bristle.identification.problem import Problem
-from bristle.learning.closure import LearnedClosure, learn_closure, lowers, one_amplitude, promised
+from bristle.learning.closure import (
+    LearnedClosure,
+    held_by_springs,
+    learn_closure,
+    lowers,
+    one_amplitude,
+    promised,
+)
 from bristle.learning.closure_file import Closure, closure_text
 from bristle.learning.closure_names import nearest_effect
 from bristle.model.model import Model
@@ -56,10 +63,10 @@ def network() -> Closure:
     return closure
 
 
-def forces(closure: Closure, motion, values=VALUES) -> np.ndarray:
+def forces(closure: Closure, motion, values=VALUES, beside=()) -> np.ndarray:
     """Return the force [N] of a Bingham damper with a closure for motions (x, v, a, V) at STEP."""
     with defined({NAME: closure_text(NAME, closure, ORIGIN)}):
-        model = DamperModel("bingham", values, [NAME])
+        model = DamperModel("bingham", values, [NAME, *beside])
         energy, before, out = 0.0, (0.0, 0.0), []
         for x, v, a, V in motion:
             force = model.step(x, v, a, V, STEP, energy, 0.0, False)
@@ -189,6 +196,36 @@ def test_the_device_never_gives_energy_whatever_the_weights(
     rounding = 1e-3 * amplitude * float(np.abs(force).max())
     assert taken.min() >= -wild.store.begin - rounding
     assert taken[-1] - taken[-1 - cycle] >= -rounding
+
+
+@pytest.mark.parametrize("times", [1.0, -30.0, 30.0])
+def test_what_a_spring_gives_back_is_not_given_twice(times: float) -> None:
+    closure, k, far = network(), 80.0, 0.008
+    kept = 0.5 * k * (1.2 * far) ** 2
+    wild = replace(
+        closure, out=times * closure.out, linear=times * closure.linear,
+        constant=times * closure.constant, size=30.0 * closure.size,
+        store=replace(closure.store, most=0.02, kept=kept),
+    )  # fmt: skip
+    # The spring is bent slowly, the rod shakes there, and the spring is let go: one closed cycle.
+    shaken = far + 0.15 * far * np.sin(2.0 * pi * 6.0 * STEP * np.arange(round(2.0 / STEP)))
+    way = np.linspace(0.0, far, round(1.0 / STEP))
+    x = np.concatenate([way, shaken, way[::-1]])
+    v = np.gradient(x, STEP)
+    thin = {"f_c": 0.05, "f_v": 0.05, "c_0": 0.5, "c_v": 0.1, "gas_spring.k": k}
+    motion = [(at, speed, 0.0, 2.0) for at, speed in zip(x, v, strict=True)]
+    power = forces(wild, motion, {**VALUES, **thin}, ("gas_spring",)) * v
+    taken = STEP * np.cumsum(0.5 * (power + np.append(0.0, power[:-1])))
+    assert taken.min() >= -wild.store.begin - 1e-5
+
+
+def test_the_energy_that_a_spring_holds_is_known() -> None:
+    problem = runs()
+    ends = [end(run.x) for run in problem.runs for end in (np.min, np.max)]
+    spring = Model("bingham", ("gas_spring",), {**VALUES, "gas_spring.k": 80.0})
+    most = 40.0 * max(abs(end) for end in ends) ** 2
+    assert held_by_springs(problem, spring) == pytest.approx(most, rel=0.1)
+    assert held_by_springs(problem, Model("bingham", (), VALUES)) == 0.0
 
 
 def test_runs_of_one_amplitude_are_told() -> None:
