@@ -404,7 +404,10 @@ def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None
     """Return the best network beside a model, its loss on left-out folds, and that without one."""
     grids, without = _grids(train, model)
     grid, _ = min(grids, key=lambda pair: min(loss for loss, _, _ in pair[1]))
-    tried = [*(one for _, drawn in grids for one in drawn), *map(grid.trained, DECAYS)]
+    if len(train.runs) == 1:  # its parts are alike: they would not see a network stray
+        tried = [grid.trained(max(DECAYS))]
+    else:
+        tried = [*(one for _, drawn in grids for one in drawn), *map(grid.trained, DECAYS)]
     least = min(loss for loss, _, _ in tried)
     if least > WORTH**2 * without:
         return None

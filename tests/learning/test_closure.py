@@ -103,6 +103,17 @@ def test_what_it_may_win_is_told_before_it_is_trained() -> None:
     assert promised(train.of([train.runs[0].of(slice(0, 60))]), base) == 1.0
 
 
+def test_of_a_single_run_it_says_that_it_knows_no_other() -> None:
+    problem = runs(late)
+    train, held = (problem.of([run]) for run in problem.runs[:2])
+    alone = Prepared(judge(Model("bingham", (), VALUES), train, held), train, held)
+    found = learn_closure(alone, NAME, names=False)
+    assert found.refused == ""
+    assert (
+        "parts of it chose the closure, which knows nothing that this run" in found.sentences()[-1]
+    )
+
+
 @pytest.mark.slow
 def test_the_effect_that_it_stands_for_is_named_and_tried() -> None:
     def hidden(x, v, V, F):
