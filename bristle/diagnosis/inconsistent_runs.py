@@ -12,10 +12,12 @@ from ..core.text import plain
 from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identification.building_sites import StructureProblem
-from ..identification.fit import fit, fit_from_starts
+from ..identification.fit import fit
+from ..identification.histories import counted
 from ..identification.problem import Expected, Problem, Run, in_noises, residuals, robust_z
 from ..identification.rig import DAMPER
 from ..identification.search import z_scale
+from ..identification.starts import start_models
 from ..model.model import Model
 from .clocks import clock_faults
 from .decision import OTHER_FORM, force_in
@@ -44,8 +46,17 @@ OF_FEW = 0.25
 """Share of these n - 1 times that is asked where it is less."""
 
 QUICK = 3
-"""Jacobians of a first fit without a run, which shows where others are unexplained without it too.
-"""
+"""Jacobians of a first fit without a run, which shows where others are unexplained without it too;
+of one to a group of runs and one more."""
+
+NEAR = 2.0
+"""Multiple of the largest z of a model that explains, up to which such a fit is gone on with."""
+
+STARTS = 2
+"""Starts of a fit to one run, where the values at hand lead to none that explains it."""
+
+MOST_SPENT = 40e6
+"""Steps of dampers' forces, see `Effort`, from which on no more groups of runs are sought."""
 
 
 def odd_run(
@@ -365,20 +376,37 @@ def groups(
     model : law and effects; it is refitted to each group
     train, held_out : the runs to group, in this order
     rule : the numbers that decide
-    restart : whether a group's fit begins from several starts too, not from the values at hand
+    restart : whether the fit to a run begins from several starts too, not from the values at hand
         alone: rigs may differ in size
     """
-    found: list[list[Run]] = []
     runs = [*train.runs, *held_out.runs]
-    for run in runs:
-        for group in found:
-            if _explains(model, train, [*group, run], rule, restart):
-                group.append(run)
-                break
-        else:
-            if len(found) == rule.most_groups or not _explains(model, train, [run], rule, restart):
+    with counted() as effort:
+        every = train.of(runs)
+        z = _z_of_runs(model, every, every.expectation(model))
+        own = dict.fromkeys(range(len(runs)), model)
+        # What no values of its own explain is in no group: the worst run tells that soonest.
+        for k in np.argsort(-z).tolist():
+            if z[k] > rule.misfit:
+                alone = _alone(model, train.of([runs[k]]), rule, restart)
+                if alone is None:
+                    return ""
+                own[k] = alone
+        found: list[list[Run]] = []
+        fitted: list[Model] = []
+        for k, run in enumerate(runs):
+            for g, group in enumerate(found):
+                together = _together(train.of([*group, run]), (fitted[g], own[k]), rule)
+                if together is not None:
+                    group.append(run)
+                    fitted[g] = together
+                    break
+            else:
+                if len(found) == rule.most_groups:
+                    return ""
+                found.append([run])
+                fitted.append(own[k])
+            if effort.steps > MOST_SPENT:
                 return ""
-            found.append([run])
     if len(found) < 2 or min(len(group) for group in found) < 2:
         return ""
     named = "; ".join(_list([run.name for run in group]) for group in found)
@@ -389,18 +417,36 @@ def groups(
     )
 
 
-def _explains(
-    model: Model, problem: Problem, runs: list[Run], rule: DecisionRule, restart: bool
-) -> bool:
-    """Return whether a model that is fitted to these runs alone leaves noise."""
-    part = problem.of(runs)
-    if robust_z(part, fit(part, model, with_std=False).model) <= rule.misfit:
-        return True
-    if not restart:
-        return False
+def _alone(model: Model, one: Problem, rule: DecisionRule, restart: bool) -> Model | None:
+    """Return a model that is fitted to a run alone, None where it does not explain that."""
+    fitted = fit(one, model, with_std=False).model
+    if robust_z(one, fitted) <= rule.misfit:
+        return fitted
     kept = {name: model.value(name) for name in model.fixed}
-    own = fit_from_starts(part, replace(model, values=kept), 2)
-    return robust_z(part, own.model) <= rule.misfit
+    starts = start_models(one, replace(model, values=kept), STARTS) if restart else []
+    for start in starts:
+        fitted = fit(one, start, with_std=False).model
+        if robust_z(one, fitted) <= rule.misfit:
+            return fitted
+    return None
+
+
+def _together(runs: Problem, starts: Sequence[Model], rule: DecisionRule) -> Model | None:
+    """Return a model that is fitted to runs of one rig, None where it does not explain them.
+
+    Parameters
+    ----------
+    runs : of a group, and one more
+    starts : as fitted to the group, and to that run: of one rig each comes near at once
+    rule : the numbers that decide
+    """
+    for start in starts:
+        quick = fit(runs, start, max_evaluations=QUICK, with_std=False).model
+        if robust_z(runs, quick) <= NEAR * rule.misfit:
+            fitted = fit(runs, quick, with_std=False).model
+            if robust_z(runs, fitted) <= rule.misfit:
+                return fitted
+    return None
 
 
 def _list(names: Sequence[str]) -> str:
