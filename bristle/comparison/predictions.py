@@ -342,7 +342,7 @@ def at_half_the_step(problem: Problem, model: Model, run: Run) -> Array:
     whole = run.whole if isinstance(run, StructureRun) else run
     if whole is None or whole.finer is None:
         return problem.predict(model, halved(run))[::2]
-    often = replace(whole, finer=whole.finer.halved())
+    often = replace(whole, finer=whole.finer.cut(2 * whole.finer.parts))
     again = replace(run, whole=often) if isinstance(run, StructureRun) else often
     return problem.predict(model, again)
 

@@ -81,9 +81,9 @@ class Finer:
         """Return that of some neighbouring samples."""
         return replace(self, since=self.since[part])
 
-    def halved(self) -> Finer:
-        """Return the same with twice as many moments."""
-        return Finer(2 * self.parts, 2.0 * self.since - 0.5)
+    def cut(self, parts: int) -> Finer:
+        """Return the same with another number of moments per sample."""
+        return Finer(parts, (self.since - 0.5) * parts / self.parts + 0.5)
 
     def motion(self, x: Array, v: Array, a: Array, dt: float) -> tuple[Array, Array, Array]:
         """Return a motion (n,) at all moments (m,): Hermite's cubics, that of `a` by its slope.

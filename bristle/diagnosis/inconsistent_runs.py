@@ -13,7 +13,7 @@ from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identification.building_sites import StructureProblem
 from ..identification.fit import fit
-from ..identification.histories import counted
+from ..identification.histories import Effort, counted
 from ..identification.problem import Expected, Problem, Run, in_noises, residuals, robust_z
 from ..identification.rig import DAMPER
 from ..identification.search import z_scale
@@ -55,8 +55,9 @@ NEAR = 2.0
 STARTS = 2
 """Starts of a fit to one run, where the values at hand lead to none that explains it."""
 
-MOST_SPENT = 40e6
-"""Steps of dampers' forces, see `Effort`, from which on no more groups of runs are sought."""
+MOST_SPENT = 60e6
+"""Steps of dampers' forces, see `Effort`, from which on no further run, clock or group of runs is
+looked at."""
 
 
 def odd_run(
@@ -65,6 +66,7 @@ def odd_run(
     held_out: Problem,
     rule: DecisionRule = BENCH,
     called: str = "One model",
+    effort: Effort | None = None,
 ) -> str:
     """Return, in words, the one run whose zero or gain is another one; "" where none is.
 
@@ -78,6 +80,7 @@ def odd_run(
     train, held_out : the runs
     rule : the numbers that decide
     called : what the sentence calls the model
+    effort : what was spent already, counted on; None where all runs in question are looked at
     """
     runs = [*train.runs, *held_out.runs]
     if len(runs) < FEWEST:
@@ -91,6 +94,8 @@ def odd_run(
     z = _z_of_runs(model, train.of(runs), expected)
     asked = max(1.0, min(OF_FEW * (len(runs) - 1), STANDS_OUT))
     for k in farthest[:SUSPECTS].tolist():
+        if effort is not None and effort.steps > MOST_SPENT:
+            break
         run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
         if not is_covered([(one.v, one.V) for one in (run, *others)], 1):
             continue
@@ -210,10 +215,11 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     prepared = prepared.with_excess(
         0.0
     )  # whether noise is all that a model leaves of some of the runs
-    for apart in (_but_for_a_run, _but_for_clocks):
-        odd = apart(found, prepared)
-        if odd is not found:
-            return odd
+    with counted() as effort:
+        for apart in (_but_for_a_run, _but_for_clocks):
+            odd = apart(found, prepared, effort)
+            if odd is not found:
+                return odd
     before, rule, at_damper = prepared.before, prepared.rule, found.site == DAMPER
     kind = kind_of(found.kind, before, found.after, rule)
     runs = prepared.searched, prepared.held_out, rule
@@ -231,7 +237,7 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     return replace(found, kind=kind, reasons=(text,))
 
 
-def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
+def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared, effort: Effort) -> SiteDiagnosis:
     """Return a finding that names the run whose zero or gain is another one, if there is one.
 
     Where a model explains all other runs, what they leave together is no other form of an effect,
@@ -241,16 +247,20 @@ def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     Parameters
     ----------
     found, prepared : as in `contradicted`
+    effort : what was spent; where it is enough, no further model is looked at
     """
     for trial, added in _to_be_explained(found, prepared):
+        if effort.steps > MOST_SPENT:
+            break
         called = f"The model with {' and '.join(added)}" if added else "One model"
-        text = odd_run(trial.model, prepared.searched, prepared.held_out, prepared.rule, called)
+        runs = prepared.searched, prepared.held_out
+        text = odd_run(trial.model, *runs, prepared.rule, called, effort)
         if text:
             return _with_reason(found, trial, text)
     return found
 
 
-def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
+def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) -> SiteDiagnosis:
     """Return a finding that names the runs whose loggers began apart, if that explains the rest.
 
     Beside a missing effect it shows only in what the effect leaves: clocks are looked at for the
@@ -258,9 +268,11 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
 
     Parameters
     ----------
-    found, prepared : as in `contradicted`
+    found, prepared, effort : as in `_but_for_a_run`
     """
     for trial, added in _to_be_explained(found, prepared):
+        if effort.steps > MOST_SPENT:
+            break
         clocks = clock_faults(trial, prepared.problem, prepared.held_out) if added else None
         if clocks is not None:
             text = " ".join(fault.text for fault in clocks.faults)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import is_
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,12 @@ DRAWS = Seeds(train=0, holdout=1000, apart=1)
 """Draws of the motion's error of a diagnosis's own: what a fit was drawn from does not judge it."""
 
 MANY = 60_000
-"""Samples of the training runs from which on effects are searched on a part of them."""
+"""Samples of the training runs from which on effects are searched on a part of them; moments at
+which a model is evaluated there from which on it is at `COARSE` per sample."""
+
+COARSE = 2
+"""Moments per sample of decimated runs that suffice for a search: a law's force is then off by a
+thousandth of its RMS at the most."""
 
 ENOUGH, FEWEST = 30_000, 8
 """Samples, about, of that part, for a search takes as long as they are; its runs at the least."""
@@ -183,12 +189,14 @@ def part_of(problem: Problem) -> Problem | None:
     """Return the part of the training runs that effects are searched on, None for all.
 
     Of many samples a part says nearly as much of which effect it is. It has the begins of runs, so
-    that what builds up in them is there, spread evenly over levels of the command and speeds. The
-    best effects are fitted to all runs.
+    that what builds up in them is there, spread evenly over levels of the command and speeds. Of
+    decimated runs models are evaluated at fewer moments. The best effects are fitted to all runs.
     """
     runs = problem.runs
+    if sum(len(run.smoothed.x) for run in runs) > MANY:
+        runs = [run.coarser(COARSE) for run in runs]
     if sum(len(run.force) for run in runs) <= MANY:
-        return None
+        return None if all(map(is_, runs, problem.runs)) else problem.of(runs)
 
     def place(run: Run) -> tuple[float, float]:
         level = float(np.mean(np.abs(run.V))) / problem.size("V")

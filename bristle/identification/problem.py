@@ -406,6 +406,12 @@ class Run:
         count = max(4 * self.skip, round(seconds / self.dt))
         return self.of(slice(count)) if count < len(self.force) else self
 
+    def coarser(self, parts: int) -> Self:
+        """Return the run with models evaluated at so many moments per sample at the most."""
+        if self.finer is None or self.finer.parts <= parts:
+            return self
+        return replace(self, finer=self.finer.cut(parts))
+
     def every(self, count: int) -> Self:
         """Return the run with one of so many samples, for what has no memory."""
         part = self.of(slice(None, None, count))

@@ -186,14 +186,16 @@ def _fit_law(own: Model, train: Problem, count: int, also: Values) -> Fit:
     layer = [name for name in own.effects if inside and EFFECTS[name].site == "structure"]
     if not layer:
         found = fit_from_starts(train, own, count)
-        late = [] if inside else [name for name in own.effects if EFFECTS[name].start_shares]
+        known = {name.partition(".")[0] for name in also}
+        far = [name for name in own.effects if EFFECTS[name].start_shares and name not in known]
+        late = [] if inside else far
         if late:  # whose defaults may be where the runs never come
             found = min(found, _fit_grown(own, late, train), key=lambda one: one.cost)
     else:  # of a reconstructed force the layer's effects are a part
         found = _fit_grown(own, layer, train)
     if also:
-        known = {name: value for name, value in also.items() if _belongs(name, own)}
-        values = {**found.model.values, **known}
+        there = {name: value for name, value in also.items() if _belongs(name, own)}
+        values = {**found.model.values, **there}
         other = fit(train, replace(found.model, values=values))
         if other.cost < found.cost:
             found = _in_place_of(found, other)

@@ -441,6 +441,7 @@ def identify_study(
     table: bool = True,
     write: bool = True,
     show: Show | None = None,
+    begin: Mapping[str, float] | None = None,
 ) -> Identified:
     """Identify the present model of a study on its training runs, its effects included.
 
@@ -457,6 +458,7 @@ def identify_study(
     table : whether to compare the laws as the paper does
     write : whether to make the result the present model, as a step of the history
     show : is told how many of `STAGES` are done
+    begin : values in SI by name that a search has come to: one start is then tried beside them
 
     Raises
     ------
@@ -478,7 +480,10 @@ def identify_study(
     model = _of_law(model or present, law)
     compile_ahead(model.law, model.effects)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
+    task = FitTask(
+        cutoff, 1 if begin else starts, table, begin=begin or {}, command=command,
+        show=show or _show_nothing,
+    )  # fmt: skip
     # Before is what the study had: at its defaults another law would be nobody's model.
     other = present.law != model.law
     task = replace(task, laws=all_of_them, present=present if other else None)

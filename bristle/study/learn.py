@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from itertools import count
@@ -194,9 +194,18 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     return replace(learned, file=file, picture=picture)
 
 
-def opened_at(study: Study, at: str) -> tuple[str, Prepared]:
-    """Return the site of a study to learn at, "" for that where the model errs, and its runs."""
-    rig, nothing = _rig(study), f"{study.folder}: nothing can be learned from these runs."
+def opened_at(
+    study: Study, at: str, begin: Mapping[str, float] | None = None
+) -> tuple[str, Prepared]:
+    """Return the site of a study to learn at, "" for that where the model errs, and its runs.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    at : a site, or ""
+    begin : values of the model in SI by name that its fit begins with, in place of the study's
+    """
+    rig, nothing = _rig(study, begin), f"{study.folder}: nothing can be learned from these runs."
     if rig.lacking is not None:
         raise StudyError(f"{nothing} {' '.join(rig.lacking.reasons)}")
     there = rig.sites()
@@ -213,8 +222,9 @@ def opened_at(study: Study, at: str) -> tuple[str, Prepared]:
     return max(able, key=lambda pair: pair[1].before.z)
 
 
-def _rig(study: Study) -> RigRuns:
+def _rig(study: Study, begin: Mapping[str, float] | None) -> RigRuns:
     model, runs = study.model(), study.runs()
+    model = replace(model, values={**model.values, **(begin or {})})
     return runs_of_rig(
         runs.train, runs.holdout, model, building_of(study, model),
         identified=is_identified(model), say=tell,

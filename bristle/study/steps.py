@@ -150,7 +150,8 @@ def take_law(study: Study, found: Diagnosis) -> Identified | None:
     model = study.model()
     if not found.law or (found.law == model.law and is_identified(model)):
         return None
-    return identify_study(study, model=with_law(model, found.law), table=False)
+    begin = found.laws.row.trial.model.values if found.laws is not None else {}
+    return identify_study(study, model=with_law(model, found.law), table=False, begin=begin)
 
 
 def _turned(study: Study) -> list[str]:
@@ -304,7 +305,7 @@ def identify_with(
     known = {**(present.values if alone else {}), **begin}
     start = {k: v for k, v in known.items() if k in model.values}
     # With the new effects at their defaults it would be nobody's model: before is the one without.
-    starts = 1 if alone else FitTask.starts
+    starts = 1 if alone or begin else FitTask.starts
     task = FitTask(study.settings.cut_off, starts, table=False, present=present, begin=start)
     return identify_model(study, model, task)
 

@@ -17,6 +17,7 @@ from ..diagnosis.by_label import promising
 from ..diagnosis.law_trials import LawTrial
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import LONG, SECONDS, Trial, missed_by, try_all
+from ..identification.histories import Effort, counted
 from ..identification.problem import Problem
 from ..identification.search import in_threads
 from ..identification.start_grid import refine
@@ -30,6 +31,9 @@ FOLDS = 3
 
 TRIED = 3
 """Laws, then effects, those that fit the training runs best, that folds compare at each step."""
+
+MOST_SPENT = 100e6
+"""Steps of dampers' forces, see `Effort`, from which on nothing further is compared."""
 
 SWEEPS = 4
 """Jacobians of the fit to a fold's runs, which begins at the values of all."""
@@ -63,35 +67,48 @@ def unproven(
     laws : all laws, fitted, where another one may be taken
     most : how many effects a model has at the most
     """
+    with counted() as effort:
+        return _chosen(prepared, trials, laws, most, effort)
+
+
+def _chosen(
+    prepared: Prepared, trials: Sequence[Trial], laws: Sequence[LawTrial], most: int, effort: Effort
+) -> Unproven:
+    """Return what `unproven` does; what comes when enough was spent is not compared any more."""
     missed = missed_by(prepared.before, prepared.searched)
     data = prepared.with_excess(missed) if missed > 0.0 else prepared
     problem = data.searched
     best, law = refine(prepared.before.model, problem, SWEEPS), ""
     errors = left_out_errors(best, problem)
 
-    def gaining(models: Sequence[Model]) -> int | None:
-        """Return which model lowers the error most, beyond chance; its errors are then those."""
+    def gaining(models: Sequence[Model], sweeps: int = 0) -> int | None:
+        """Return which model lowers the error most, beyond chance; its errors are then those.
+
+        Each is refined before, by so many sweeps.
+        """
         nonlocal best, errors
-        found = in_threads(lambda model: left_out_errors(model, problem), models)
-        able = [
-            (_mean_square(one), k)
-            for k, one in enumerate(found)
-            if lowers(errors, one, GAIN, BEYOND)
-        ]
+        able: list[tuple[float, int, Model, list[Array]]] = []
+        for k, model in enumerate(models):  # one by one, so that what is spent is told alike
+            if effort.steps > MOST_SPENT:
+                break
+            model = refine(model, problem, sweeps) if sweeps else model
+            found = left_out_errors(model, problem)
+            if lowers(errors, found, GAIN, BEYOND):
+                able.append((_mean_square(found), k, model, found))
         if not able:
             return None
-        _, k = min(able)
-        best, errors = refine(models[k], problem, LONG), found[k]
+        _, k, model, errors = min(able, key=lambda one: one[:2])
+        best = refine(model, problem, LONG)
         return k
 
     others = [row for row in laws if row.trial.model.law != best.law]
     others = sorted(others, key=lambda row: row.error_train.rms)[:TRIED]
-    taken = gaining([refine(row.trial.model, problem, LONG) for row in others])
+    taken = gaining([row.trial.model for row in others], LONG)
     if taken is not None:
         law = others[taken].law
     texts = promising(problem, best)
     with defined(texts):
-        while len(best.effects) < most:
+        while len(best.effects) < most and effort.steps <= MOST_SPENT:
             able = [] if texts else [one for one in trials if _joins(one, best)]
             if not able:
                 able = try_all(best, problem, data.held_out, shown=data.shown, most=SECONDS)
@@ -114,11 +131,12 @@ def _mean_square(errors: Sequence[Array]) -> float:
 
 def left_out_errors(model: Model, problem: Problem) -> list[Array]:
     """Return the errors [N] of a model on each fold, fitted to the others."""
-    return [
-        error
-        for others, own in folds(problem)
-        for error in errors_of(refine(_blind(model, others), others, SWEEPS), own)
-    ]
+
+    def errors(fold: tuple[Problem, Problem]) -> list[Array]:
+        others, own = fold
+        return errors_of(refine(_blind(model, others), others, SWEEPS), own)
+
+    return [error for part in in_threads(errors, [*folds(problem)]) for error in part]
 
 
 def _blind(model: Model, problem: Problem) -> Model:
