@@ -59,6 +59,9 @@ MOST_SPENT = 60e6
 """Steps of dampers' forces, see `Effort`, from which on no further run, clock or group of runs is
 looked at."""
 
+LOOK = 100
+"""Simulations of all runs, about, that a look at one run or at clocks takes."""
+
 
 def odd_run(
     model: Model,
@@ -66,7 +69,6 @@ def odd_run(
     held_out: Problem,
     rule: DecisionRule = BENCH,
     called: str = "One model",
-    effort: Effort | None = None,
 ) -> str:
     """Return, in words, the one run whose zero or gain is another one; "" where none is.
 
@@ -80,7 +82,6 @@ def odd_run(
     train, held_out : the runs
     rule : the numbers that decide
     called : what the sentence calls the model
-    effort : what was spent already, counted on; None where all runs in question are looked at
     """
     runs = [*train.runs, *held_out.runs]
     if len(runs) < FEWEST:
@@ -94,8 +95,6 @@ def odd_run(
     z = _z_of_runs(model, train.of(runs), expected)
     asked = max(1.0, min(OF_FEW * (len(runs) - 1), STANDS_OUT))
     for k in farthest[:SUSPECTS].tolist():
-        if effort is not None and effort.steps > MOST_SPENT:
-            break
         run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
         if not is_covered([(one.v, one.V) for one in (run, *others)], 1):
             continue
@@ -247,14 +246,14 @@ def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared, effort: Effort) -> 
     Parameters
     ----------
     found, prepared : as in `contradicted`
-    effort : what was spent; where it is enough, no further model is looked at
+    effort : what was spent; no model is looked at that would take more than is left
     """
+    runs = prepared.searched, prepared.held_out
     for trial, added in _to_be_explained(found, prepared):
-        if effort.steps > MOST_SPENT:
+        if not _affordable(trial.model, runs, effort):
             break
         called = f"The model with {' and '.join(added)}" if added else "One model"
-        runs = prepared.searched, prepared.held_out
-        text = odd_run(trial.model, *runs, prepared.rule, called, effort)
+        text = odd_run(trial.model, *runs, prepared.rule, called)
         if text:
             return _with_reason(found, trial, text)
     return found
@@ -270,15 +269,25 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) ->
     ----------
     found, prepared, effort : as in `_but_for_a_run`
     """
+    runs = prepared.problem, prepared.held_out
     for trial, added in _to_be_explained(found, prepared):
-        if effort.steps > MOST_SPENT:
+        if not _affordable(trial.model, runs, effort):
             break
-        clocks = clock_faults(trial, prepared.problem, prepared.held_out) if added else None
+        clocks = clock_faults(trial, *runs) if added else None
         if clocks is not None:
             text = " ".join(fault.text for fault in clocks.faults)
             where = f"Told from {force_in(prepared.problem)}."
             return _with_reason(found, trial, f"With {' and '.join(added)}: {text} {where}")
     return found
+
+
+def _affordable(model: Model, runs: tuple[Problem, Problem], effort: Effort) -> bool:
+    """Return whether a look at runs with a model leaves the effort within `MOST_SPENT`."""
+    with counted() as once:
+        for problem in runs:
+            for run in problem.runs:
+                problem.predict(model, run)
+    return effort.steps + LOOK * once.steps <= MOST_SPENT
 
 
 def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Trial, list[str]]]:

@@ -94,7 +94,7 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypa
         added.append((law, names, of))
         return "add stribeck, drift (not proven)", ""
 
-    monkeypatch.setattr(auto, "opened_at", lambda _study, _at: ("damper", "opened"))
+    monkeypatch.setattr(auto, "opened_at", lambda *_: ("damper", "opened"))
     monkeypatch.setattr(auto, "write_effects", lambda _study, _texts: None)
     monkeypatch.setattr(auto, "unproven", chosen)
     monkeypatch.setattr(auto, "add_unproven", add)
