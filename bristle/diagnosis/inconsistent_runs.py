@@ -55,7 +55,7 @@ NEAR = 2.0
 STARTS = 2
 """Starts of a fit to one run, where the values at hand lead to none that explains it."""
 
-MOST_SPENT = 60e6
+MOST_SPENT = 100e6
 """Steps of dampers' forces, see `Effort`, from which on no further run, clock or group of runs is
 looked at."""
 
@@ -246,11 +246,11 @@ def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared, effort: Effort) -> 
     Parameters
     ----------
     found, prepared : as in `contradicted`
-    effort : what was spent; no model is looked at that would take more than is left
+    effort : what was spent; with effects no model is looked at that would take more than is left
     """
     runs = prepared.searched, prepared.held_out
     for trial, added in _to_be_explained(found, prepared):
-        if not _affordable(trial.model, runs, effort):
+        if added and not _affordable(trial.model, runs, effort):
             break
         called = f"The model with {' and '.join(added)}" if added else "One model"
         text = odd_run(trial.model, *runs, prepared.rule, called)
@@ -271,7 +271,7 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) ->
     """
     runs = prepared.problem, prepared.held_out
     for trial, added in _to_be_explained(found, prepared):
-        if not _affordable(trial.model, runs, effort):
+        if added and not _affordable(trial.model, runs, effort):
             break
         clocks = clock_faults(trial, *runs) if added else None
         if clocks is not None:
