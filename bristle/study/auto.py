@@ -145,9 +145,11 @@ def _gained(
 ) -> tuple[Step | None, str]:
     """Add what improves the prediction and is not proven; return the step, or why there is none."""
     say("effects that improve the prediction")
-    before, fitted = study.model(), found.before.model if found.before is not None else None
-    same = fitted is not None and (fitted.law, fitted.effects) == (before.law, before.effects)
-    opened = opened_at(study, "", fitted.values if fitted is not None and same else None)[1]
+    before = fitted = study.model()
+    known = found.before.model if found.before is not None else before
+    if (known.law, known.effects) == (before.law, before.effects):
+        fitted = replace(before, values={**before.values, **known.values})
+    opened = opened_at(study, "", fitted)[1]
     laws = found.laws.rows if found.laws is not None and not before.effects else ()
     best = unproven(opened, found.trials, laws, MOST_EFFECTS)
     names = tuple(one for one in best.model.effects if one not in before.effects)

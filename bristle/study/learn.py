@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
 from itertools import count
@@ -14,6 +14,7 @@ from ..core.progress import tell
 from ..diagnosis.decision import noise_not_known
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.rig_runs import RigRuns, runs_of_rig
+from ..diagnosis.trials import judge
 from ..errors import StudyError
 from ..identification.rig import DAMPER
 from ..learning.closed_forms import close, closed_forms
@@ -30,6 +31,7 @@ from ..learning.curve_picture import curve_png
 from ..learning.effect_file import effect_text
 from ..learning.fit import learn
 from ..learning.result import LearnedEffect
+from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..trust import remember_made
 from ..user_code.load import flaw_of
@@ -194,18 +196,17 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     return replace(learned, file=file, picture=picture)
 
 
-def opened_at(
-    study: Study, at: str, begin: Mapping[str, float] | None = None
-) -> tuple[str, Prepared]:
+def opened_at(study: Study, at: str, fitted: Model | None = None) -> tuple[str, Prepared]:
     """Return the site of a study to learn at, "" for that where the model errs, and its runs.
 
     Parameters
     ----------
     study : the folder, opened
     at : a site, or ""
-    begin : values of the model in SI by name that its fit begins with, in place of the study's
+    fitted : the model of a test bench as these runs were fitted before, noise known or not; None
+        for the study's, which is refined
     """
-    rig, nothing = _rig(study, begin), f"{study.folder}: nothing can be learned from these runs."
+    rig, nothing = _rig(study), f"{study.folder}: nothing can be learned from these runs."
     if rig.lacking is not None:
         raise StudyError(f"{nothing} {' '.join(rig.lacking.reasons)}")
     there = rig.sites()
@@ -213,6 +214,10 @@ def opened_at(
         raise StudyError(
             f"--at: these runs do not show the site {at}; they show {', '.join(there)}."
         )
+    if fitted is not None and rig.damper is not None:
+        opened = rig.prepare(DAMPER, judge(fitted, *rig.damper))
+        assert opened is not None
+        return DAMPER, opened
     wanted = [at] if at else _wanted(study, there)
     prepared = {site: one for site in wanted if (one := rig.prepare(site)) is not None}
     able = [(site, one) for site, one in prepared.items() if one.held_out.noise_known]
@@ -222,9 +227,8 @@ def opened_at(
     return max(able, key=lambda pair: pair[1].before.z)
 
 
-def _rig(study: Study, begin: Mapping[str, float] | None) -> RigRuns:
+def _rig(study: Study) -> RigRuns:
     model, runs = study.model(), study.runs()
-    model = replace(model, values={**model.values, **(begin or {})})
     return runs_of_rig(
         runs.train, runs.holdout, model, building_of(study, model),
         identified=is_identified(model), say=tell,
