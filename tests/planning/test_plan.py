@@ -109,6 +109,9 @@ def test_deviations_and_distances_are_those_of_least_squares() -> None:
         assert known.deviations()[name] * asked.spread(name)[0] == pytest.approx(std, rel=0.01)
     # A dashpot of its own takes the thicker oil up whole; the model as it is does not.
     assert known.raw()["thicker"] == pytest.approx(3.0 * np.linalg.norm(J[:, 1]), rel=1e-3)
+    doubled = PreparedQuestion(question, Problem([run]), z=2.0).evidence([run])
+    told = Information(question, doubled).raw()["thicker"]  # an error of twice the noise
+    assert told == pytest.approx(0.5 * known.raw()["thicker"], rel=1e-9)
     assert known.distances()["thicker"] < 0.02 * known.raw()["thicker"]
 
 
