@@ -25,7 +25,7 @@ _WHOLE = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
 _DEGREES = re.compile(r"(?:deg(?:rees?|\.)?|grad|[°º])? ?(?:[cC](?:elsius)?|[fF](?:ahrenheit)?)")
 _TEMPERATURE = re.compile(
     rf"(?P<name>.*?\S)\s*(?:[\[(]\s*(?:{_DEGREES.pattern})\s*[\])]|[_/] ?(?:{_DEGREES.pattern})"
-    rf"|(?:,| in) (?:{_DEGREES.pattern}))\s*"
+    rf"|(?:,| in) (?:{_DEGREES.pattern})|\s(?=[dg°º])(?:{_DEGREES.pattern}))\s*"
 )
 _NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none", "ts", "rn", "no.")
 

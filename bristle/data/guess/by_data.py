@@ -230,10 +230,12 @@ def fit_signs(
         sign, text, doubt = force_sign(search.column(out[f].column.text), along)
         reason, doubt = joined(out[f].reason, text), joined(out[f].doubt, doubt)
         out[f] = replace(out[f], sign=sign, reason=reason, doubt=doubt)
-    for drive in DRIVE:
-        if drive in out:
-            doubt = drive_doubt(search.column(out[drive].column.text))
-            out[drive] = replace(out[drive], doubt=joined(out[drive].doubt, doubt))
+    drives = {one: search.column(out[one].column.text) for one in DRIVE if one in out}
+    for drive, values in drives.items():
+        doubt = drive_doubt(values)
+        if not np.ptp(values) and any(np.ptp(other) for other in drives.values()):
+            doubt = f"it never changes, as a supply: `study channels FOLDER --without {drive}`"
+        out[drive] = replace(out[drive], doubt=joined(out[drive].doubt, doubt))
     return out
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.data.guess import guess_channels
 from bristle.data.measurement import measurements_of
 from bristle.data.read import read_table
 
@@ -47,6 +48,17 @@ def test_forces(tmp_path: Path, title: str, size: float) -> None:
     (run,) = measurements_of(read_table(file), estimate=False)
     np.testing.assert_allclose(run["force"], F, atol=0.2)
     np.testing.assert_allclose(run["displacement"], 1e-3 * X, atol=1e-6)
+
+
+def test_a_supply_beside_a_command_is_doubted_and_a_temperature_is_known(tmp_path: Path) -> None:
+    titles = "t [s];x [mm];F [N];Voltage supply [V];Current coil [A];Temp °C"
+    table = read_table(
+        made(tmp_path, titles, X, F, 0.0 * T + 12.0, np.sign(X) + 1.0, 0.0 * T + 21.0)
+    )
+    found = {one.channel: one for one in guess_channels(table)}
+    assert "it never changes, as a supply" in found["voltage"].doubt
+    assert found["current"].doubt == ""
+    assert found["temperature"].unit == "degC"
 
 
 @pytest.mark.parametrize(
