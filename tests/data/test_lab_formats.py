@@ -172,17 +172,25 @@ def test_a_cell_that_is_shown_in_per_cent_is_read_so(
     assert np.max(run["displacement"]) == pytest.approx(1e-3 * np.max(X))
 
 
-def test_a_cell_that_is_shown_in_thousands_is_read_so(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("form", "size", "doubted"),
+    [("#,##0.000,;-#,##0.000,", 1e3, True), ('0.0," kN"', 1e3, False), ('0.0," MN"', 1.0, False)],
+)
+def test_a_cell_that_is_shown_in_thousands_is_read_so(
+    tmp_path: Path, form: str, size: float, doubted: bool
+) -> None:
     def change(sheet, book) -> None:
         for cell in sheet["C"][4:]:
-            cell.value, cell.number_format = 1e3 * cell.value, "#,##0.000,;-#,##0.000,"
+            cell.value, cell.number_format = size * cell.value, form
 
     one, other = (
         read_table(workbook(tmp_path / name, what))
         for name, what in (("a.xlsx", lambda *_: None), ("b.xlsx", change))
     )
     title = one.columns[2].text
+    assert one.columns[2].stated == "kN"
     np.testing.assert_allclose(other.values[title], one.values[title])
+    assert ("shown in thousands" in other.columns[2].doubt) == doubted
 
 
 # -- titles and units

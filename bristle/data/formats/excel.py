@@ -22,7 +22,7 @@ from ..channels import meaning, quantity_of_unit
 from ..noise import SHORTEST
 from ..pieces import SHEET
 from ..table import Table, one_below_the_other
-from ..titles import title_rows
+from ..titles import title_rows, unit_or_none
 from . import DAMAGED, delimited, library
 
 ENTRY = "xl/workbook.xml"
@@ -172,8 +172,7 @@ def _finished(book: Any, sheet: _Sheet, table: Table) -> Table:
     first = int(table.lines[0])
     _refuse_merged(sheet.part, table, lines[1:first], sheet.where)
     cells = next(book[sheet.title].iter_rows(min_row=first, max_row=first))
-    forms = [_QUOTED.sub("", cell.number_format or "") for cell in cells]
-    table = _as_shown(table, [form.partition(";")[0] for form in forms])
+    table = _as_shown(table, [(cell.number_format or "").partition(";")[0] for cell in cells])
     formulas = len(_formulas(sheet.part))
     told = [f"{formulas} cells hold formulas: their stored values are taken"] if formulas else []
     return replace(table, notes=(*told, *table.notes))
@@ -204,16 +203,25 @@ def _as_shown(table: Table, forms: Sequence[str]) -> Table:
     Parameters
     ----------
     table : as read from the sheet's text
-    forms : the format of the numbers in each column; a comma behind the digits shows thousands, and
-        what has another unit than % is in none
+    forms : the format of the numbers in each column; a comma behind the digits shows thousands, of
+        the unit that it writes behind them, and what has another unit than % is in none
     """
     values, notes, percent = dict(table.values), list(table.notes), parse_unit("%")
     columns = list(table.columns)
     for k, column in enumerate(columns):
-        form = forms[column.index] if column.index < len(forms) else ""
+        written = forms[column.index] if column.index < len(forms) else ""
+        form = _QUOTED.sub("", written)
         if match := _THOUSANDS.search(form):
-            values[column.text] = values[column.text] / 1e3 ** len(match[1])
-            notes.append(f'"{column.text}" is shown by its format "{form}", and is taken so')
+            behind = unit_or_none("".join(_QUOTED.findall(written)).strip('" '))
+            unit, own = behind or column.unit, column.unit or behind
+            if unit is None or own is None or unit.dimension == own.dimension:
+                size = unit.factor / own.factor if unit and own else 1.0
+                values[column.text] = values[column.text] * size / 1e3 ** len(match[1])
+            if behind is None:
+                told = f'its cells are shown in thousands, as "{form}", and taken as they are shown'
+                columns[k] = column = replace(column, doubt=told)
+            elif column.unit is None:
+                columns[k] = column = replace(column, unit=behind)
         if "%" not in form or column.problem or column.unit not in (None, percent):
             continue
         values[column.text] = 100.0 * values[column.text]
