@@ -134,6 +134,8 @@ _AROUND = 8
 _AS_USUAL = 2.0
 """How much further it may go where it goes on."""
 
+_SCALE = "The first row of numbers may be one of scales or ranges: remove it then."
+
 LOST = "lie in no piece"
 """How a note says that samples are not read at all, for too many are missing around them."""
 
@@ -315,10 +317,10 @@ def _in_order(
         k = int(back[0])
         # What is advised leads on: there are runs to cut, or channels that go on as on one clock.
         parts = [part for part in np.split(lines, back + 1) if len(part) >= SHORTEST]
-        way = []
+        way = [_SCALE] if k == 0 and len(back) == 1 else []
         if len(parts) > 1:
             way.append("If the file holds several runs, --split restart cuts it there.")
-        if all(goes_on(values, back) for values in channels.values()):
+        if k and all(goes_on(values, back) for values in channels.values()):
             way.append(
                 "All channels go on there: if the time is wrong, --step S, the sampling step in s, "
                 "takes its place."
@@ -337,13 +339,16 @@ def _in_order(
         )
         if not same:
             step = plain((time[-1] - time[0]) / (len(time) - 1), 3)
-            do = (
-                "If times were written with too few digits, --step S, the sampling step in s (here "
-                f"about {step}), takes their place."
-                if len(double) > _TWO_RUNS * len(time)
-                or all(_one_signal(values, double) for values in channels.values())
-                else "Channels jump to and fro there: two runs may lie in one file."
-            )
+            do = "Channels jump to and fro there: two runs may lie in one file."
+            if k == 0 and len(double) == 1:
+                do = _SCALE
+            elif len(double) > _TWO_RUNS * len(time) or all(
+                _one_signal(values, double) for values in channels.values()
+            ):
+                do = (
+                    "If times were written with too few digits, --step S, the sampling step in s "
+                    f"(here about {step}), takes their place."
+                )
             raise RecordError(
                 f"{name}, {place} {lines[k + 1]}: the time {time[k]:.9g} s appears twice with "
                 f"different values ({len(double)} such times in all). {do}"

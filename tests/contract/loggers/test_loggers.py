@@ -154,6 +154,13 @@ def test_a_block_in_another_unit_is_refused(tmp_path: Path) -> None:
         read_table(tmp_path / "run.csv")
 
 
+@pytest.mark.parametrize("row", ["1;1;1;10", "0;-50;0;-2000", "1.8;50;10;2000"])
+def test_a_row_of_scales_above_the_numbers_is_told(tmp_path: Path, row: str) -> None:
+    (tmp_path / "run.csv").write_text(f"{BLOCK}{row}\n{OWN}")
+    with pytest.raises(RecordError, match="first row of numbers may be one of scales or ranges"):
+        measurements_of(read_table(tmp_path / "run.csv"))
+
+
 def test_a_universal_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "run.unv").write_text("    -1\n    58\nDisp\n" + "  1.0  2.0\n" * 90 + "    -1\n")
     with pytest.raises(RecordError, match=r"a universal file \(UFF\), which is not read"):
