@@ -84,7 +84,8 @@ def passes(given: str, wanted: str) -> bool:
 class Description:
     """What a scenario needs to know of a component before it runs; `version` is that of FMI.
 
-    `begins` is the start time of its default experiment as the file writes it, "" without one.
+    `begins` is the start time of its default experiment as the file writes it, "" without one;
+    `unread` are its inputs of a type that is not read, which keep what the FMU begins with.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Description:
     capabilities: dict[str, str] = field(default_factory=dict)
     version: str = "2.0"
     begins: str = ""
+    unread: tuple[str, ...] = ()
 
     def of(self, causality: str) -> list[Variable]:
         """Return the variables of one causality ("input", "output", "parameter"), in order."""
@@ -268,7 +270,9 @@ def describe_fmi3(root: ElementTree.Element) -> Description:
             variables[name] = _variable_fmi3(element, types, units)
     _add_dependencies_fmi3(root, variables)
     mark_optional(variables, _annotation_fmi3(root, "optional") or "")
-    return _described(root, root.get("instantiationToken", ""), variables, "3.0")
+    described = _described(root, root.get("instantiationToken", ""), variables, "3.0")
+    unread = root.iterfind("ModelVariables/Binary[@causality='input']")
+    return replace(described, unread=tuple(one.get("name", "") for one in unread))
 
 
 def _described(

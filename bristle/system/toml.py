@@ -10,9 +10,10 @@ from typing import Any
 
 from ..core.config import ANY, Document
 from ..core.files import write_whole
-from ..core.text import unknown
+from ..core.text import listed, unknown
 from ..core.toml_lines import KeyPath, toml_key, toml_table, toml_value
 from ..errors import BristleError, PhysicsError, TrustError
+from ..fmu.description import Description
 from ..physics.forms import split_form
 from .library import Library
 from .model import Component, Part, RunSettings, Signal, System, existing_file
@@ -203,7 +204,7 @@ def _describe(
     try:
         if part.file:
             part.description = library.describe_file(part.file)
-            _check_begin(part, path, document)
+            _note_on_fmu(part, part.description, path, document)
         elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
             made_of = part.law.component if part.law else part.kind
             more: dict[str, Any] = {"effects": part.effects} if part.effects else {}
@@ -221,9 +222,12 @@ def _describe(
         document.error(at, f"{where}: {error}")
 
 
-def _check_begin(part: Part, path: KeyPath, document: Document) -> None:
-    """Say where an FMU's default experiment begins elsewhere than a run does."""
-    begins = part.description.begins.strip() if part.description else ""
+def _note_on_fmu(part: Part, fmu: Description, path: KeyPath, document: Document) -> None:
+    """Say which inputs of an FMU are not read, and where it begins elsewhere than a run does."""
+    if fmu.unread:
+        text = f"of type Binary, which is not read, its FMU has the input {listed(fmu.unread)}"
+        document.note(path, f"[components.{part.name}]: {text}.")
+    begins = fmu.begins.strip()
     try:
         if not begins or float(begins) == 0.0:
             return

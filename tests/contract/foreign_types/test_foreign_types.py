@@ -267,3 +267,13 @@ def test_an_item_that_a_package_gives_by_its_name(tmp_path, capsys, item, number
     else:
         assert code == 0
         assert f"mode = {number}" in (tmp_path / "out" / "p.toml").read_text()
+
+
+def test_an_input_of_a_type_that_is_not_read_is_told(tmp_path: Path, capsys) -> None:
+    binary = '<Binary name="radar" valueReference="1" causality="input"/>'
+    ports = port(0, "y", "output", version="3.0") + binary
+    fmu = write_fmu(tmp_path / "a.fmu", ports, version="3.0")
+    assert main(["check", str(write_scenario(tmp_path / "my.toml", {"a": (fmu, "")}))]) == 0
+    assert (
+        "of type Binary, which is not read, its FMU has the input radar" in capsys.readouterr().out
+    )
