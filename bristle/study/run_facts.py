@@ -139,17 +139,15 @@ def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
     for start, text, spelled, whole in found:
         unit = SPELLED.get(spelled) or SPELLED.get(spelled.removesuffix("s"), spelled)
         name = quantity_of(unit)
-        if name in out:
-            twice.add(name)
         value = value_of(text)
         if (digits := reading.digits.get(name, 0)) and not spelled.startswith(_SMALL):
             value /= 10.0**digits
         letter = re.search(r"[A-Za-z]*$", stem[:start])
         before = letter.group() if letter else ""
-        target = PLAIN.get(name) or UNITS.get(name, unit)
-        out[name] = Token(
-            convert(value, unit, target), before + whole, text, f"{before}{{}}{spelled}"
-        )
+        value = convert(value, unit, PLAIN.get(name) or UNITS.get(name, unit))
+        if name in out and out[name].value != value:
+            twice.add(name)
+        out[name] = Token(value, before + whole, text, f"{before}{{}}{spelled}")
     return {name: one for name, one in out.items() if name not in twice}
 
 
@@ -482,6 +480,9 @@ def facts_of(
         If a pattern fits no name, two sources differ, or the table cannot be read.
     """
     tones = tones or [None] * len(files)
+    paths = files
+    if len({file.parent for file in files}) > 1:  # lab/0.5A/run_1.csv
+        files = [Path(f"{one.parent.name}_{one.name}") for one in files]
     reading = reading_of([*files, *others], [*tones, *([None] * len(others))])
     found, notes = _offered(files, choices, commanded, reading)
     for pattern in choices.levels:
@@ -492,7 +493,7 @@ def facts_of(
         rows = [_matched(file, pattern, reading, level=False) for file in files]
         found = _joined(found, rows)
     if choices.table is not None:
-        rows = rows_of_table(choices.table, files, commanded)
+        rows = rows_of_table(choices.table, paths, commanded)
         found = _joined(found, rows)
         notes += _of_table(rows, choices.table)
     asked = {name for one in found for name in one.levels}

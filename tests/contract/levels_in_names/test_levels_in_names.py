@@ -165,6 +165,16 @@ def test_two_names_of_one_level_that_may_be_two_are_not_taken(tmp_path, capsys) 
     assert {level for _, level in runs(tmp_path / "rig").values()} == {None}
 
 
+def test_levels_in_the_names_of_folders_are_read(tmp_path) -> None:
+    for level in ("0.5", "1.0", "1.5"):
+        made(tmp_path / f"{level}A", {f"{f}Hz_{level}A": (f, float(level)) for f in (1.0, 2.0)})
+        for file in (tmp_path / f"{level}A").iterdir():
+            file.rename(file.with_stem(f"{file.stem.partition('_')[0]}_{tmp_path.name}"))
+    data = str(tmp_path / "*A" / "*.csv")
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
+    assert sorted({level for _, level in runs(tmp_path / "rig").values()}) == [0.5, 1.0, 1.5]
+
+
 @pytest.mark.parametrize(
     ("names", "said"),
     [(("1Hz_0.5A", "2Hz_1A", "3Hz_off"), 'are in 2 of 3 names, and not in "3Hz_off.csv"'),
