@@ -75,6 +75,11 @@ def law_sentences(verdict: Row) -> list[str]:
             f"{count} laws were tried, each alone and with every effect, and none explains the "
             f"runs. {law_name(mine)} comes nearest: alone its error is {z} {NOISE}{best}."
         ]
+    elif mine.get("z_with_effects", mine["z_holdout"]) > BENCH.clean:
+        out = [
+            f"Of {count} laws {law_name(mine)}{with_what} was taken; a part of the error remains: "
+            f"on held-out runs it is {z} {NOISE}."
+        ]
     else:
         out = [
             f"{law_name(mine)}{with_what} is the simplest of {count} laws that explains the runs: "
