@@ -110,18 +110,18 @@ class Finer:
     def filtered(self, force: Array) -> Array:
         """Return what the filter leaves at the samples (n,) of a force at all moments (m,)."""
         half = self.parts - 1
-        begin = 2.0 * force[0] - force[half:0:-1]
-        end = 2.0 * force[-1] - force[-2 : -half - 2 : -1]
-        around = np.concatenate([begin, force, end])
-        rows = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1)[:: self.parts]
-        return np.asarray(rows @ hann(self.parts))
+        with np.errstate(invalid="ignore"):  # a force that is not finite stays so, and is refused
+            begin = 2.0 * force[0] - force[half:0:-1]
+            end = 2.0 * force[-1] - force[-2 : -half - 2 : -1]
+            around = np.concatenate([begin, force, end])
+            rows = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1)[:: self.parts]
+            return np.asarray(rows @ hann(self.parts))
 
 
 # Channels whose clock is late, or runs fast or slow, at the times of the others.
 #
 # Values between two samples are interpolated linearly: a force that jumps would ring behind
-# anything
-# smoother. That lowers white noise, by a share that is known, so that noise is estimated before.
+# anything smoother. That lowers white noise, by a share that is known, so that noise is estimated before.
 # Where a force bends so much between two samples that no line follows it, its value is not judged.
 
 
