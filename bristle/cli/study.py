@@ -464,6 +464,7 @@ def _auto(arguments: argparse.Namespace) -> int:
         study, law=arguments.law, proven=arguments.proven, curves=arguments.learn,
         closure=arguments.closure,
     )  # fmt: skip
-    view = completed_view(study, done, verdict_of(study, done.verdict))
+    written = study.verdict()  # its error is that of the model that the study now has
+    view = completed_view(study, done, written or verdict_of(study, done.verdict))
     print_study_answer(arguments, done.as_dict(), view)
     return 0

@@ -121,8 +121,9 @@ class Finer:
 # Channels whose clock is late, or runs fast or slow, at the times of the others.
 #
 # Values between two samples are interpolated linearly: a force that jumps would ring behind
-# anything smoother. That lowers white noise, by a share that is known, so that noise is estimated before.
-# Where a force bends so much between two samples that no line follows it, its value is not judged.
+# anything smoother. That lowers white noise, by a share that is known, so that noise is estimated
+# before. Where a force bends so much between two samples that no line follows it, its value is not
+# judged.
 
 
 _ALONE = np.ones(1)

@@ -581,16 +581,17 @@ def study_page(study: Study) -> Page:
     return draw_run(runs[0])
 
 
-def diagnosed_view(verdict: Mapping[str, Any], folder: Path) -> View:
+def diagnosed_view(verdict: Mapping[str, Any], folder: Path, known: Sequence[str] = ()) -> View:
     """Return the view of a verdict on a study's model, with the commands that follow.
 
     Parameters
     ----------
     verdict : as verdict.json has it
     folder : of the study, as it is typed
+    known : the effects that its model has by now
     """
     view = verdict_view(verdict)
-    return view._replace(blocks=(*view.blocks, *next_steps(verdict, folder)))
+    return view._replace(blocks=(*view.blocks, *next_steps(verdict, folder, known)))
 
 
 def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
@@ -604,7 +605,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     model = study.model(to_show=True)
     gains = verdict.get("gains") or []
     new = [row for row in gains if not set(row["effects"]) <= set(model.effects)]
-    view = diagnosed_view({**verdict, "gains": new}, study.folder)
+    view = diagnosed_view({**verdict, "gains": new}, study.folder, model.effects)
     steps = history_steps(study.steps())
     judged = [one for one in steps if one.rms is not None]
     if not judged:
@@ -770,9 +771,16 @@ def or_nothing(z: float | None) -> str:
 # The commands that follow from a verdict.
 
 
-def next_steps(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
-    """Return the commands that follow from a verdict: what sets the data right comes first."""
-    then = _with_law(verdict, folder)
+def next_steps(verdict: Mapping[str, Any], folder: Path, known: Sequence[str] = ()) -> list[Next]:
+    """Return the commands that follow from a verdict: what sets the data right comes first.
+
+    Parameters
+    ----------
+    verdict : as verdict.json has it
+    folder : of the study, as it is typed
+    known : the effects that its model has by now
+    """
+    then = _with_law(verdict, folder, known)
     if not any(map(is_correctable, verdict.get("sensors") or [])):
         return then
     if verdict["kind"] == "insufficient":
@@ -781,22 +789,22 @@ def next_steps(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
     return [Next(correct, "corrects the runs that are named"), *then]
 
 
-def _with_law(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
+def _with_law(verdict: Mapping[str, Any], folder: Path, known: Sequence[str]) -> list[Next]:
     """Return the commands for the model; first another law where the verdict asks for it."""
-    then = _then(verdict, folder)
+    then = _then(verdict, folder, known)
     if not verdict.get("laws") or verdict["kind"] == "insufficient":
         return then
     law = joined_form(verdict["law"], verdict["command"])
     return then if law == verdict["law_before"] else [Next(law_command(folder, law)), *then]
 
 
-def _then(verdict: Mapping[str, Any], folder: Path) -> list[Next]:
+def _then(verdict: Mapping[str, Any], folder: Path, known: Sequence[str]) -> list[Next]:
     kind, report = verdict["kind"], Next(command("report", folder), "all of it on one page")
     if kind == "ambiguous":
-        return [
-            Next(command("plan", folder), "writes a test that distinguishes them"),
-            Next(command("add", folder, verdict["effects"][0]), "takes the first"),
-        ]
+        taken = set(verdict["effects"]) & set(known)
+        first = Next(command("add", folder, verdict["effects"][0]), "takes the first")
+        test = Next(command("plan", folder), "writes a test that distinguishes them")
+        return [test] if taken else [test, first]
     other_law = any(found.get("other_law") for found in verdict.get("findings") or [])
     every = Next(command("diagnose", folder, "--law", "all"), "tries every law with its effects")
     if kind == "effect":
