@@ -71,9 +71,26 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(tables[kind] if kind else tables)
         return 0
+    if kind == "ports":
+        tables = _by_causality(tables[kind])
     for title, rows in tables.items():
         _print(title, rows)
     return 0
+
+
+def _by_causality(ports: Rows) -> dict[str, Rows]:
+    """Return the tables of inputs, outputs and parameters, in short columns."""
+    tables: dict[str, Rows] = {}
+    for port in ports:
+        causality, _, optional = port["causality"].partition(" ")
+        row = {
+            "name": port["name"],
+            "unit": port["unit"] if port["type"] == "Real" else port["type"],
+            "start": port["start"], "from": port["minimum"], "to": port["maximum"],
+            "meaning": " ".join(filter(None, (optional, port["description"]))),
+        }  # fmt: skip
+        tables.setdefault(f"{causality}s", []).append(row)
+    return tables
 
 
 def _physics(word: str, arguments: argparse.Namespace) -> int:

@@ -154,13 +154,25 @@ def error_text(verdict: Verdict) -> str:
     """Return the error of the model as the study has it, which every command prints alike."""
     role = _judged(verdict)
     if not role:
-        return _gain(verdict).removeprefix("; ")
+        return _error_of_law(verdict)
     sites = (verdict.get("error_by_site") or {}).get(role, {})
     by_site = [f"{site_name(site)} {ForceError.of(one).text()}" for site, one in sites.items()]
     more = f" ({', '.join(by_site)})" if len(by_site) > 1 else ""
     error = ForceError.of(verdict["error"][role]).text()
     which = f"Force error of the study's model on the {_ROLES[role]}"
     return f"{which}: {error}{more}{_gain(verdict)}."
+
+
+def _error_of_law(verdict: Verdict) -> str:
+    """Return the error of the law of a verdict, where a study's own model has none."""
+    at = worst(verdict)
+    before, after = (at.get(f"error_holdout_{when}") for when in ("before", "after"))
+    if not before:
+        return ""
+    own = law_name(verdict) if verdict.get("laws") else "the model"
+    named = at.get("kind") == "effect" and after
+    then = f", with {effect_names(at['effects'])} {ForceError.of(after).text()}" if named else ""
+    return f"Force error of {own} on the held-out runs: {ForceError.of(before).text()}{then}."
 
 
 def _errors_beside(verdict: Verdict) -> list[str]:

@@ -12,7 +12,7 @@ from .blocks import Block, Formula, Next, Table, Text, View
 WIDTH = 100
 MOST = 12
 """Lines of an answer, besides its tables, notes and blank lines; the rest is with the details."""
-READ = 30
+READ = 24
 """Columns that the last cell of a row needs, where it is broken into lines."""
 WIDEST = 140
 """Of a table whose last cells have no more than that, before the cells stand below each other."""

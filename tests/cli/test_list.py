@@ -52,8 +52,9 @@ def test_ports_have_causality_unit_and_bounds(capsys):
 
 def test_ports_are_readable_without_json(capsys):
     lines = answer(capsys, "ports", "LuGreDamper").splitlines()
+    assert [line for line in lines if line[:1] != " "] == ["inputs", "outputs", "parameters"]
     row = next(line for line in lines if line.strip().startswith("sigma_b "))
-    assert row.split()[:5] == ["sigma_b", "parameter", "Real", "N.s/(m.V)", "20"]
+    assert row.split()[:5] == ["sigma_b", "N.s/(m.V)", "20", "0", "10⁷"]
 
 
 def test_ports_of_another_building(capsys, tmp_path):
