@@ -170,8 +170,9 @@ def _error_of_law(verdict: Verdict) -> str:
     if not before:
         return ""
     own = law_name(verdict) if verdict.get("laws") else "the model"
-    named = at.get("kind") == "effect" and after
-    then = f", with {effect_names(at['effects'])} {ForceError.of(after).text()}" if named else ""
+    then = ""
+    if after and at.get("kind") == "effect":
+        then = f", with {effect_names(at['effects'])} {ForceError.of(after).text()}"
     return f"Force error of {own} on the held-out runs: {ForceError.of(before).text()}{then}."
 
 

@@ -811,8 +811,15 @@ def _then(verdict: Mapping[str, Any], folder: Path, known: Sequence[str]) -> lis
         add = Next(command("add", folder, *verdict["effects"]), "puts it into the model")
         return [every, add] if other_law else [add]
     if kind == "unknown":
+        left = (verdict.get("not_tried") or {}).get("two_effects", ())
+        cut = [*dict.fromkeys(split_form(law)[0] for law in left)][:2]
+        pairs = [
+            Next(command("study", "auto", folder, "--law", law), "tries two effects of it at once")
+            for law in cut
+        ]
         return [
             *([every] if other_law else []),
+            *pairs,
             Next(command("learn", folder), "learns what is missing"),
             _gaining(verdict, folder),
         ]

@@ -24,6 +24,7 @@ from bristle.study.learn import opened_at
 from bristle.study.steps import add_unproven, create_study, diagnose_study
 from bristle.study.study import Study
 from bristle.study.unproven import unproven
+from bristle.study.view import next_steps
 from tests.independent.generate import make_case
 from tests.made import bench_run, write_runs
 
@@ -234,3 +235,10 @@ def test_no_effect_is_named_where_a_law_explains_the_runs():
     fitted = identify(train, "all", holdout=held_out)
     assert fitted.model.law.startswith("bingham")
     assert len(fitted.as_dict()["laws"]) == len(fitted.laws) > 8
+
+
+def test_laws_of_which_two_effects_were_not_tried_are_advised_first() -> None:
+    verdict = {"kind": "unknown", "not_tried": {"two_effects": ["dahl[quadratic]", "dahl"]}}
+    first, second, *_ = next_steps(verdict, Path("rig"))
+    assert first.command == "bristle study auto rig --law dahl"
+    assert second.command == "bristle learn rig"
