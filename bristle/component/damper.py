@@ -222,23 +222,29 @@ def present_force(
     return force_at(c.setup, now, state, work)
 
 
-def beyond(value: float, low: float, high: float, whole: float) -> float:
-    """Return how far a value is beyond a range, as a share of its larger end; 0 inside.
-
-    Parameters
-    ----------
-    value, low, high : in one unit; an end that is not known is `WIDE`
-    whole : what it is a share of where no end is known but 0
-    """
+def beyond(value: float, low: float, high: float, size: float) -> float:
+    """Return how far a value is beyond a range, as a share of a size in its unit; 0 inside."""
     over = max(low - value, value - high)
-    if over <= 0.0:
-        return 0.0
+    return over / size if over > 0.0 else 0.0
+
+
+def half_way(low: float, high: float, whole: float) -> float:
+    """Return half the way between two ends, or a whole where one of them is `WIDE` or both are one.
+
+    The zero of a displacement may be anywhere.
+    """
+    half = 0.5 * (high - low)
+    return half if 0.0 < half < 0.25 * WIDE else whole
+
+
+def larger_end(low: float, high: float, whole: float) -> float:
+    """Return the larger of the ends that are known, or a whole where none is but 0."""
     end = 0.0
     if low > -WIDE:
         end = abs(low)
     if high < WIDE:
         end = max(end, abs(high))
-    return over / end if end > 0.0 else over / whole
+    return end if end > 0.0 else whole
 
 
 def outside(x: float, v: float, V: float, c: Constants) -> float:
@@ -253,11 +259,13 @@ def outside(x: float, v: float, V: float, c: Constants) -> float:
     Returns
     -------
     float
-        What the worst of displacement, speed and command exceeds its range by: 0.3 is 30 %.
+        What the worst of displacement, speed and command exceeds its range by: 0.3 is 30 % of half
+        the stroke, of the speed, of the largest command.
     """
-    known = c.range
-    most = max(beyond(x, known[0], known[1], c.stroke), beyond(abs(v), 0.0, known[2], 1.0))
-    return max(most, beyond(V, known[3], known[4], c.v_max))
+    low, high, speed, least, most = c.range[0], c.range[1], c.range[2], c.range[3], c.range[4]
+    moved = beyond(x, low, high, half_way(low, high, c.stroke))
+    fast = beyond(abs(v), 0.0, speed, speed)
+    return max(moved, fast, beyond(V, least, most, larger_end(least, most, c.v_max)))
 
 
 def is_measured(inputs: Row, c: Constants) -> bool:

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from ..component.damper import RANGE, beyond
+from ..component.damper import RANGE, beyond, half_way, larger_end
 from ..core.progress import listening
 from ..core.text import percent, quantity, written
 from ..errors import RunError, not_usable
@@ -398,19 +398,21 @@ def left_data(system: System, name: str, table: RunTable) -> str:
 
     low, high, speed, least, most = map(number, RANGE)
     ends = {
-        "displacement": ("m", low, high, "stroke"), "velocity": ("m/s", -speed, speed, ""),
-        **{one.name: (one.unit, least, most, one.limit) for one in DRIVES.values()},
-    }  # fmt: skip
+        "displacement": ("m", low, high, half_way(low, high, number("stroke"))),
+        "velocity": ("m/s", -speed, speed, speed),
+    }
+    for one in DRIVES.values():
+        if one.name in known:
+            size = larger_end(least, most, number(one.limit))
+            ends[one.name] = one.unit, least, most, size
     worst = 0.0, ""
-    for port, (unit, lower, upper, whole) in ends.items():
-        if port not in known:
-            continue  # another command
+    for port, (unit, lower, upper, size) in ends.items():
         seen = [number(port)]
         if (wire := wires.get(port)) is not None:
             column = table[f"{wire.source}.{wire.output}"]
             seen = [wire.given(float(column.min())), wire.given(float(column.max()))]
         for value in seen:
-            over = beyond(value, lower, upper, number(whole) if whole else 1.0)
+            over = beyond(value, lower, upper, size)
             worst = max(worst, (over, f"{port} {quantity(value, unit)}"))
     first = table.time[(share > 0.0).argmax()]
     return (

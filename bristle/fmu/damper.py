@@ -67,7 +67,8 @@ class DamperSlave(ComponentSlave):
         if ranged:
             text = (
                 "0 within the range of the data that the model is from; else what the worst of "
-                f"displacement, speed and {drive.name} exceeds it by: 0.3 is 30 %"
+                f"displacement, speed and {drive.name} exceeds it by: 0.3 is 30 % of half the "
+                f"stroke, of the speed, of the largest {drive.name}"
             )
             moved = ["displacement", "velocity", drive.name]
             self.add_output(OUTSIDE, "1", text, depends=moved)
