@@ -22,6 +22,7 @@ from ..identification.start_grid import Search, refine
 from ..model.model import Model
 from ..physics.drive import DRIVES
 from .model_faults import ModelBasedFaults, explains, has_rival, promise
+from .prepared import COARSE
 from .rule import LIMITED, DecisionRule
 from .trials import Trial, judge
 
@@ -74,13 +75,14 @@ def limited_drive(
     """
     if before.z < 1.0 + rule.gain or not _moving(train):
         return None
-    expected = train.expectation(before.model)
-    at_first = mean_loss(loss(residuals(train, before.model, expected)))
-    looked = [_looked_at(kind, before.model, train, expected) for kind in LIMITS]
+    coarse = train.of([run.coarser(COARSE) for run in train.runs])
+    expected = coarse.expectation(before.model)
+    at_first = mean_loss(loss(residuals(coarse, before.model, expected)))
+    looked = [_looked_at(kind, before.model, coarse, expected) for kind in LIMITS]
     able = [one for one in looked if one and promise(one.cost, at_first) > rule.promise]
     if not able:
         return None
-    found = min((_fitted(one, train, expected) for one in able), key=lambda one: one.cost)
+    found = min((_fitted(one, coarse, expected) for one in able), key=lambda one: one.cost)
     explained = promise(found.cost, at_first)
     if explained < rule.share_when_clean or not found.value > rule.fault_sigma * found.std:
         return None

@@ -84,8 +84,8 @@ MANY = 60_000
 which a model is evaluated there from which on it is at `COARSE` per sample."""
 
 COARSE = 2
-"""Moments per sample of decimated runs that suffice for a search: a law's force is then off by a
-thousandth of its RMS at the most."""
+"""Moments per sample of decimated runs that suffice for a search: a law's force is then off by
+about a thousandth of its RMS."""
 
 ENOUGH, FEWEST = 30_000, 8
 """Samples, about, of that part, for a search takes as long as they are; its runs at the least."""

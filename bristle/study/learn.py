@@ -154,7 +154,7 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
 
 def promise_of(study: Study) -> float:
     """Return the error that a closure may leave, by the model's, as training folds tell it [1]."""
-    opened = opened_at(study, "")[1]
+    opened = opened_at(study, "", study.model())[1]  # which was just identified
     return promised(opened.problem, opened.before.model)
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from bristle.diagnosis.prepared import ENOUGH, FEWEST, MANY, part_of
+from bristle.data.decimate import Finer
+from bristle.diagnosis.prepared import COARSE, ENOUGH, FEWEST, MANY, part_of
 from bristle.identification.problem import Problem, Run
+from bristle.model.model import Model
 
 
 def runs(count, samples):
@@ -43,3 +47,15 @@ def test_runs_without_a_command_and_one_long_run_have_a_part_too():
         run.V[:] = 0.0
     assert len(part_of(problem).runs) == FEWEST
     assert len(part_of(runs(1, 2 * MANY)).runs[0].force) == ENOUGH
+
+
+def test_of_many_moments_per_sample_few_serve_and_the_force_hardly_changes():
+    problem = runs(10, MANY // 20)
+    finer = [replace(one, finer=Finer(6, np.full(len(one.x), 3.5))) for one in problem.runs]
+    part = part_of(problem.of(finer))
+    assert [len(run.force) for run in part.runs] == [MANY // 20] * 10
+    assert {run.finer.parts for run in part.runs} == {COARSE}
+    model = Model("lugre")
+    for coarse, fine in zip(part.runs, finer, strict=True):
+        exact = problem.predict(model, fine)
+        assert np.std(problem.predict(model, coarse) - exact) < 1e-2 * np.std(exact)
