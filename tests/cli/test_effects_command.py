@@ -32,13 +32,15 @@ def test_all_effects_are_listed_with_their_data(capsys: pytest.CaptureFixture[st
 
 @pytest.mark.parametrize("name", sorted(EFFECTS))
 def test_one_effect_is_told_in_full(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    said = answer(capsys, name)
+    lines = answer(capsys, name).splitlines()
+    assert max(map(len, lines)) <= 100
+    said = " ".join(" ".join(lines).split())
     effect = EFFECTS[name]
     assert effect.first_line() in said
     assert effect.source in said
     assert effect.expect in said
     for parameter, about in effect.parameters.items():
-        assert f"{name}.{parameter} = {typed(about.value)}" in said
+        assert f"{name}.{parameter} {typed(about.value)} {about.unit} " in said
         assert about.text in said
 
 
