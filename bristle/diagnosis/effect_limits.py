@@ -148,7 +148,8 @@ def _why_hidden(sized: Sized) -> str:
 
 
 BELOW = 0.9
-"""A z below this is no chance: the noise expected was too large."""
+"""A z below this is no chance: the noise expected was too large, as of the layer of a base that has
+no accelerometer, where room is left for jumps."""
 
 
 def detectable(

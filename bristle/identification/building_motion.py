@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-from scipy.ndimage import convolve1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
@@ -291,7 +290,7 @@ def corrected(
     dt : step [s]
     draws : how many draws, 0 for none
     seed : of the draws
-    sudden : whether forces on the level make its acceleration jump
+    sudden : whether forces that were not measured make the level's acceleration jump
     """
     state, r, have = level["state"] - level["forced"], level["r"], level["have"]
     n = len(state)
@@ -470,8 +469,9 @@ class Response:
     besides those that bristle knows. `known` says where all that was measured, and not filled in;
     `known_but` by reason where it would be, but for that one; `finer` is that of `Run`; `untold`
     names the channels whose noise cannot be told from their signal. `pulse` (2 k + 1,) is what is
-    shown of a pulse of the first level's acceleration where that is smoothed, None elsewhere: so
-    equilibrium shows the forces on that level, see `shown`.
+    shown of a pulse of the first level's acceleration where that is smoothed and the damper's force
+    was not measured, None elsewhere: so
+    equilibrium shows what acts on that level and was not measured.
     """
 
     name: str
@@ -512,10 +512,6 @@ class Response:
         if self.force is None:
             return list(self.others)
         return [Load(self.device, self.force, self.noise_force), *self.others]
-
-    def shown(self, force: Array) -> Array:
-        """Return what equilibrium shows of a force (n,) [N] on the first level."""
-        return force if self.pulse is None else convolve1d(force, self.pulse, mode="nearest")
 
     @property
     def white_a(self) -> Array:
@@ -665,8 +661,9 @@ def responses(
     out = []
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
+        hidden = first and not levels[0]["have"][2] and not m.has("force")
         for i, one in enumerate(levels):
-            if not one["have"][2] and (first or i not in ends):
+            if not one["have"][2] and (i not in ends or (hidden and i == 0)):
                 levels[i], error = corrected(one, m.step, draws, seed + i, i == 0)
                 errors.append(error)
             else:
@@ -677,25 +674,21 @@ def responses(
             found, device=device, others=_loads(m, building, device), across=own,
             known=_known(m, building, device) if reasons else None,
             known_but={why: _known(m, building, device, why) for why in reasons},
-            pulse=shown_pulse(levels[0], m.step) if first and not levels[0]["have"][2] else None,
+            pulse=shown_pulse(levels[0], m.step) if hidden else None,
         )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
     return out
 
 
 def _forced(m: Measurement, building: Building, device: Device) -> Array:
-    """Return the relative acceleration (levels, n) [m/s2] that ground and measured forces make.
-
-    Not the forces on the first level alone, see `shown_pulse`.
-    """
+    """Return the relative acceleration (levels, n) [m/s2] that ground and measured forces make."""
     loads = list(_loads(m, building, device))
     if m.has("force"):
         loads.append(Load(device, m["force"], 0.0))
     out = np.tile(-m["ground_acceleration"], (building.size, 1))
     for load in loads:
-        if not load.device.on_first:
-            shares = load.device.incidence(building.size) / np.diag(building.M)
-            out -= np.outer(shares, load.force)
+        shares = load.device.incidence(building.size) / np.diag(building.M)
+        out -= np.outer(shares, load.force)
     return out
 
 

@@ -253,7 +253,7 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
 
     Where the damper acts across that storey its force must be known.
     """
-    carried = Carried(*shear(response, building, level))
+    force, noise, drawn = shear(response, building, level)
     lower = level - 1
     x, v = response.x[level].copy(), response.v[level].copy()
     error = _error(response, level)
@@ -262,11 +262,10 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
         v -= response.v[lower]
         error[:, :, :3] -= _error(response, lower)[:, :, :3]
     if response.force is not None and response.device.crosses(level):
-        carried = _less_damper(response, response.force, carried)
+        force, noise = _less_damper(response, response.force, force, noise)
     motion = (x, v, response.a[level], response.V)
     made = structure_run(
-        response.name, response.dt, motion, carried.force, carried.noise, error,
-        drawn=carried.drawn,
+        response.name, response.dt, motion, force, noise, error, drawn=drawn,
         left_out=_left_out(response, level, response.device.crosses(level)),
         untold=_untold(response, building, level),
     )  # fmt: skip
@@ -299,48 +298,30 @@ def layer_run(response: Response, building: Building) -> StructureRun:
 
     Samples at which the base may be held are left out.
     """
-    carried = Carried(*shear(response, building, 0))
+    force, noise, drawn = shear(response, building, 0)
     if response.device.crosses(0):
         if response.force is None:
             raise RecordError(
                 f"{response.name}: force was not measured, so the forces of isolation layer and "
                 "damper cannot be separated."
             )
-        carried = _less_damper(response, response.force, carried)
+        force, noise = _less_damper(response, response.force, force, noise)
     x, v, a = response.x[0], response.v[0], response.a[0]
     made = structure_run(
-        response.name, response.dt, (x, v, a, response.V), carried.force, carried.noise,
-        _error(response, 0), sliding(response), carried.drawn,
-        _left_out(response, 0, response.device.crosses(0)),
+        response.name, response.dt, (x, v, a, response.V), force, noise, _error(response, 0),
+        sliding(response), drawn, _left_out(response, 0, response.device.crosses(0)),
         untold=_untold(response, building, 0),
     )  # fmt: skip
     return _of(response, made, True)
 
 
-class Carried(NamedTuple):
-    """What is carried below a level (n,) [N]; its white noise [N]; draws (d, n) of the rest."""
+def _less_damper(response: Response, own: Array, force: Array, noise: float) -> tuple[Array, float]:
+    """Return what is carried without the damper's `own` measured force (n,) [N], and its noise.
 
-    force: Array
-    noise: float
-    drawn: Array
-
-
-def _less_damper(response: Response, own: Array, carried: Carried) -> Carried:
-    """Return what is carried without the damper's `own` measured force (n,) [N].
-
-    Where the upper end has no accelerometer, the inertia there holds its noise: they cancel. Where
-    it shows the force as it is smoothed, so is that noise, and nobody knows when between two
-    samples the force jumped.
+    Where no accelerometer shows its upper end, the inertia there holds its noise: they cancel.
     """
-    force, noise, drawn = carried
-    if response.accelerometer[response.device.upper]:
-        return Carried(force - own, float(np.hypot(noise, response.noise_force)), drawn)
-    if response.pulse is not None:
-        generator = np.random.default_rng(0)
-        error = response.noise_force * generator.standard_normal(drawn.shape)
-        error += np.diff(own, append=own[-1]) * generator.uniform(-0.5, 0.5, drawn.shape)
-        drawn = drawn + response.shown(error)
-    return Carried(force - response.shown(own), noise, drawn)
+    shown = bool(response.accelerometer[response.device.upper])
+    return force - own, float(np.hypot(noise, response.noise_force)) if shown else noise
 
 
 def sliding(response: Response) -> Flags:
