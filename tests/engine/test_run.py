@@ -367,7 +367,8 @@ def test_ctrl_c_stops_between_two_steps(scenario_of: Maker, tmp_path: Path) -> N
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=20)
     assert process.returncode == 130
-    assert errors.startswith("interrupted. Rows up to t = ")
+    *_progress, last = errors.splitlines()  # a slow machine tells how far it is
+    assert last.startswith("interrupted. Rows up to t = ")
     assert len(left(tmp_path)) > 10
 
 
