@@ -211,9 +211,8 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     assert found.after is not None
     if not found.noise_known:
         return found  # of no run can be said what its error is over noise
-    prepared = prepared.with_excess(
-        0.0
-    )  # whether noise is all that a model leaves of some of the runs
+    # Whether noise is all that a model leaves of some of the runs.
+    prepared = prepared.with_excess(0.0)
     with counted() as effort:
         for apart in (_but_for_a_run, _but_for_clocks):
             odd = apart(found, prepared, effort)

@@ -94,7 +94,7 @@ def complete(
     proven : whether to leave out effects that only improve the prediction; else, where the verdict
         proves none in the end, those are added that folds of the training runs choose
     curves : whether to go on where the verdict is unknown, by learning a curve
-    closure : whether to end with a closure where the verdict is unknown then; the verdict stays
+    closure : whether to end with a closure where the verdict leaves an error; the verdict stays
     say : called with a few words at each stage
     """
     steps: list[Step] = []

@@ -295,7 +295,7 @@ def test_what_an_effect_says_wrongly_of_itself_is_refused(
         assert one.made is None, one.path
         word = words[one.path]
         if word in ("needs", "mimics") and one.path.read_text().count('("a", "b")'):
-            word = "a"  # it names what does not exist
+            word = "'b'"  # it names what does not exist
         assert word in one.error
         assert main(["check", str(one.path)]) == 2
         assert capsys.readouterr().err.startswith("PhysicsError: ")

@@ -119,7 +119,7 @@ def test_runs_are_equal_within_the_tolerance_that_the_fmu_states(
     assert found["repeatable"][1] == "equal within the tolerance of 0.0001"
 
 
-@pytest.mark.parametrize("tolerance", ["", "1e-9", "nan", "7"])
+@pytest.mark.parametrize("tolerance", ["", "1e-9", "0", "nan", "7"])
 def test_beyond_it_or_without_one_they_are_not(
     changed: Changed, capsys: pytest.CaptureFixture[str], tolerance: str
 ) -> None:
