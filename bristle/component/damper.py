@@ -223,7 +223,12 @@ def present_force(
 
 
 def beyond(value: float, low: float, high: float, size: float) -> float:
-    """Return how far a value is beyond a range, as a share of a size in its unit; 0 inside."""
+    """Return how far a value is beyond a range, as a share of a size; 0 inside.
+
+    Parameters
+    ----------
+    value, low, high, size : in one unit
+    """
     over = max(low - value, value - high)
     return over / size if over > 0.0 else 0.0
 

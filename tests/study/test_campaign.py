@@ -249,7 +249,7 @@ def test_a_table_of_runs_in_the_words_of_the_lab(tmp_path, encoding) -> None:
     table.write_text("Datei;I [mA];T (°C);gap [mm]\na.csv;500;23,5;1\n", encoding=encoding)
     (found,) = rows_of_table(table, [Path("a.csv")])
     assert found.levels == pytest.approx({"current": 0.5})
-    assert found.labels == {"temperature": 23.5, "gap": 1.0}
+    assert found.labels == {"temperature": 23.5, "gap_mm": 1.0}
     (beside,) = rows_of_table(table, [Path("a.csv")], commanded=True)
     assert not beside.levels  # the files hold the command: the nominal one is a label
     table.write_text("file;I [A];supply voltage [V];oil [degC];room [degC]\na.csv;1;2;3;4\n")
@@ -287,7 +287,8 @@ def test_a_speed_in_the_name_of_a_file_is_no_amplitude() -> None:
 
 def test_a_table_of_runs_that_is_no_text_is_refused(tmp_path) -> None:
     table = tmp_path / "runs.xlsx"
-    table.write_bytes(b"PK\x03\x04\0\0\0")
+    with zipfile.ZipFile(table, "w") as book:
+        book.writestr("xl/workbook.xml", "<workbook/>")
     with pytest.raises(StudyError, match="Save the table of runs as CSV"):
         rows_of_table(table, [Path("a.csv")])
 
