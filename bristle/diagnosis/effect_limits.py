@@ -218,7 +218,8 @@ def untestable(
         left = rms(change - basis @ (basis.T @ change)) / size
         if raw < rule.silent or rule.typical * left / raw < visible:
             out.append(name)
-    taken_up = [e.name for e in effects_of("damper", model.law) if absorbed(e, model.law)]
+    law = model.base_law
+    taken_up = [e.name for e in effects_of("damper", law) if absorbed(e, law)]
     return sorted({*out, *(name for name in taken_up if name not in model.effects)})
 
 

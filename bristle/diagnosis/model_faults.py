@@ -118,7 +118,7 @@ def _zero_of_force(
     before: Trial, train: Problem, held_out: Problem, rule: DecisionRule
 ) -> ModelBasedFaults | None:
     """Return the offset of the force that fits best, as a preload without stiffness."""
-    carrier = _carrier(before.model.law)
+    carrier = _carrier(before.model.base_law)
     if carrier is None or any(EFFECTS[name].offset for name in before.effects):
         return None  # an offset of its own would be that one
     base = before.model

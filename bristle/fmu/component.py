@@ -70,7 +70,8 @@ class EffectSlave(Slave):
 
     def add_physical(self, name: str, parameter: Parameter) -> None:
         """Declare a parameter of a law or effect."""
-        self.add_parameter(name, parameter.value, parameter.unit, parameter.text, parameter.bounds)
+        value = float(parameter.value)  # one that was declared as 0 is no Integer
+        self.add_parameter(name, value, parameter.unit, parameter.text, parameter.bounds)
 
     def effects_on(self) -> list[str]:
         """Return the names of the effects that are switched on."""

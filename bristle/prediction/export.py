@@ -433,7 +433,8 @@ def held_out(damper: Model, model: Model, rig: Rig, measured: Sequence[Measureme
     problem = site.problem_of("holdout")
     training = problem is None
     problem = site.train if problem is None else problem
-    inside = tuple(name for name in own.effects if EFFECTS[name].site != "structure")
+    bench = rig.building is None  # there every effect is the damper's, or an instrument's
+    inside = tuple(name for name in own.effects if bench or EFFECTS[name].site != "structure")
     runs = [run.entire() for run in problem.runs]
     zero = zero_on(problem, own)
     fitted = of_one_site(own, inside)

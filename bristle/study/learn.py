@@ -215,6 +215,7 @@ def opened_at(study: Study, at: str, fitted: Model | None = None) -> tuple[str, 
             f"--at: these runs do not show the site {at}; they show {', '.join(there)}."
         )
     if fitted is not None and rig.damper is not None:
+        fitted = replace(fitted, law=fitted.base_law)  # its variant is among the values
         opened = rig.prepare(DAMPER, judge(fitted, *rig.damper))
         assert opened is not None
         return DAMPER, opened

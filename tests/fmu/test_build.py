@@ -319,6 +319,13 @@ def test_an_effect_that_follows_a_channel_has_it_as_an_input(write: Any, tmp_pat
     assert two_builds([str(path)] * 3, given, "force") == pytest.approx([6.0, 15.0, 0.0])
 
 
+def test_a_parameter_that_is_declared_as_a_whole_number_is_real(write: Any) -> None:
+    file = write(OWN.replace("Parameter(0.5,", "Parameter(1,"), "ripple.py")
+    assert "Parameter(1," in file.read_text()
+    told = catalogue.describe("BinghamDamper", effects=[file]).variables
+    assert told["ripple.height"].kind == "Real"
+
+
 def test_an_input_is_not_called_as_a_parameter_of_the_law(write: Any) -> None:
     file = write(FOLLOWING.replace('"pressure"}', '"f_c"}'), "ripple.py")
     told = catalogue.describe("BinghamDamper", effects=[file]).variables

@@ -192,6 +192,9 @@ def test_a_dampers_own_stop_and_friction_are_in_the_fmu(bench: Study) -> None:
     )  # fmt: skip
     assert "end_stop" in (bench.folder / "model.toml").read_text()
     found = export_study(bench)
+    assert found.proof is not None
+    told = bristle.compare(bench.folder).total.error.rms
+    assert found.proof.told.rms == pytest.approx(told, rel=1e-9)
     run = prepare(bench.runs().holdout[0])
     expected = prediction(bench.model(), run)
     plain = DamperForces("lugre", []).force(

@@ -134,7 +134,10 @@ def test_what_is_explained_gets_no_further_effect(folder, monkeypatch):
 
 
 def test_folds_of_the_training_runs_choose_what_lowers_their_error(bench_study):
-    opened = opened_at(Study(bench_study), "")[1]
+    study = Study(bench_study)
+    opened = opened_at(study, "", with_law(study.model(), "bingham_standard"))[1]
+    assert opened.before.model.law == "bingham"  # the variant is in its values
+    opened = opened_at(study, "")[1]
     found = unproven(opened, (), (), 1)
     assert (found.model.effects, found.law) == (("gas_spring",), "")
     known = replace(opened, before=judge(found.model, opened.problem, opened.held_out))
