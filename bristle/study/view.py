@@ -605,7 +605,10 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     model = study.model(to_show=True)
     gains = verdict.get("gains") or []
     new = [row for row in gains if not set(row["effects"]) <= set(model.effects)]
-    view = diagnosed_view({**verdict, "gains": new}, study.folder, model.effects)
+    # Beside another law than the verdict's its effects are not advised.
+    other = verdict.get("law", model.law) not in (model.law, split_form(model.law)[0])
+    known = verdict["effects"] if other else model.effects
+    view = diagnosed_view({**verdict, "gains": new}, study.folder, known)
     steps = history_steps(study.steps())
     judged = [one for one in steps if one.rms is not None]
     if not judged:
@@ -690,7 +693,8 @@ def _unproven(study: Study, step: Step) -> str:
     """Return the sentences about a step that improves the prediction and is not proven."""
     fall = [errors.get("error_share_holdout") for errors in (step.before, step.after)]
     falls = " to ".join(percent(one) for one in fall if isinstance(one, float))
-    names = effect_names(unproven_of(study, step)) or step.what
+    what = step.what.removesuffix(f" ({NOT_PROVEN})")
+    names = what if what.startswith("take ") else effect_names(unproven_of(study, step))
     back = command("undo", study.folder)
     return (
         f"Improves the prediction, is not proven: {names}. "
