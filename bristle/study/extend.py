@@ -19,7 +19,7 @@ from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import StudyError
 from .new import refuse_other_columns, remarks_on
-from .run_facts import RunChoices, facts_of, roles_added
+from .run_facts import RunChoices, facts_of, roles_by_name
 from .runs import read_runs
 from .study import FILE as ADDED
 from .study import Study, note_addition
@@ -142,7 +142,7 @@ def _roles(
             held_out = any(fnmatchcase(path.name, pattern) for pattern in holdout)
             known[path.name] = "holdout" if held_out else known.get(path.name, "train")
     left = [path.name for path in paths if path.name not in known]
-    guessed, notes = roles_added(left) if left else ([], [])
+    guessed, notes = roles_by_name(left, added=True) if left else ([], [])
     known |= dict(zip(left, guessed, strict=True))
     return [known[path.name] for path in paths], notes
 

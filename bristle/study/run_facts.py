@@ -8,359 +8,31 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from math import inf, isfinite, log10
+from math import inf, isfinite
 from pathlib import Path, PureWindowsPath
-from statistics import median
-from typing import NamedTuple
+from typing import Any
 
 from ..core.text import command, listed, quantity
 from ..data.channels import DRIVE, PLAIN, TEMPERATURE, UNITS, Label, label_name, label_text, meaning
 from ..data.formats.delimited import decoded
-from ..data.titles import Column, title, unit_or_none
-from ..data.tone import (
-    Tone,
-    amplitude_fits,
-    amplitude_off,
-    frequency_fits,
-    frequency_off,
-    label_doubt,
+from ..data.run_names import (
+    DOUBTFUL,
+    SIGN,
+    SPELLED,
+    Reading,
+    Token,
+    number_in,
+    quantity_of,
+    reading_of,
+    tokens_of,
+    value_of,
 )
+from ..data.titles import Column, title, unit_or_none
+from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubt
 from ..errors import RecordError, StudyError, UnitError
 from ..units import convert, same_dimension
 from .runs import names_of_runs
 from .study_file import EXCLUDE, ROLES, TEST, RunFile, Settings
-
-# What the names of files tell of their runs: numbers with units, and how decimals are written.
-#
-# `0p5A`, `0,5A` and `0.5A` are half an ampere. In `0_5A`, `0-5A`, `0x5A` or `0d5A` the mark may be
-# a decimal mark, or part a number from another one; `050V` may stand for 0.50 V. All names of a
-# campaign settle that together: the frequency and the amplitude that they tell are held against the
-# measured motion, and numbers before the mark that count the runs are no part of a level. What
-# stays open is not taken.
-
-_HARDLY = "kKvVcCoO"
-DOUBTFUL = f"_- xXdD'~=;#^:\u2013\u2014{_HARDLY}"
-"""What may part two numbers, or be a decimal mark."""
-
-SPELLED = {
-    "pct": "%", "percent": "%", "C": "degC", "inch": "in", "PSI": "psi", "Nm": "N.m", "hz": "Hz",
-    "HZ": "Hz", "MM": "mm",
-    **{word: word[0].upper() for word in ("amp", "Amp", "AMP", "ampere", "Ampere", "volt", "Volt")},
-}  # fmt: skip
-"""Units as names spell them."""
-
-_LETTERS = DOUBTFUL[3 : -len(_HARDLY)]  # of these, which hardly part numbers
-_POINTS = ".,\u00b7\u2219\u22c5\u2027\u066b\uff0e"  # and raised points: 0·5A
-# "1p5", where a point would end a name
-_SURE = rf"(?:[{_POINTS}]|[pP][tT]?|point|dot|[kK]omma|comma|[pP]unkt)"
-_NO_DECIMALS = rf"(?<![\d.])(?<!\d[{_POINTS}])"  # of 0,5_1Hz, "5_1" is no number
-_OF_LABELS = {"pressure": "psi|PSI|mbar|bar|hPa|kPa|MPa|Pa", "load": "kN|lbf", "torque": "Nm"}
-"""Units that tell a label by themselves, which is then called by both: pressure_psi."""
-_UNITS_IN_NAMES = "|".join(
-    [
-        "mA|[aA]mperes?|[aA]mps?|AMP|A|mV|[vV]olts?|V|mT|pct|percent|%|Hz|hz|HZ|mm|MM|cm|um|inch|in",
-        "degC|degF|C",
-        *_OF_LABELS.values(),
-    ]
-)
-SIGN = r"(?:(?<![^_= ])-)?"
-"""T=-10C and cold_-10C have one; in run-10C the minus parts words."""
-_APART = r"(?:[ ]?|[_-](?=psi|PSI|bar|kPa|MPa))"  # 50_psi; but 3_A parts words
-_SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s1 is none
-_AFTER_UNIT = re.compile(
-    rf"(?<![\d.])({SIGN}\d+)({_UNITS_IN_NAMES})(\d+)(?![A-Za-z0-9.,%])"
-)  # 0A5, as resistors are marked
-_NO_POWER = r"(?<!\d[eE])(?<!\d[eE][-+])"  # 5E-1A is half an ampere, and not 1 A: it is not read
-_SMALL = ("mA", "mV", "mT")  # their numbers are whole
-_UNIT = "unit"  # the mark of these
-_DIGITS = {"0", "5", "00", "25", "50", "75"}  # decimals that hardly count repeated runs
-
-
-class Token(NamedTuple):
-    """A number with a unit in a name.
-
-    `value` is in the unit of its quantity, `text` as it stands there, `number` without the unit,
-    `pattern` that of --level.
-    """
-
-    value: float
-    text: str
-    number: str
-    pattern: str
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How the numbers in the names of a campaign are written.
-
-    `marks` are decimal marks besides those that are always; `digits` tells by quantity how many
-    decimals a number without a mark has; `open` what to say of the quantities that nothing settles;
-    `why` what was settled, in sentences.
-    """
-
-    marks: tuple[str, ...] = ()
-    digits: Mapping[str, int] = field(default_factory=dict)
-    open: Mapping[str, str] = field(default_factory=dict)
-    doubts: Mapping[str, str] = field(default_factory=dict)
-    why: tuple[str, ...] = ()
-
-
-def number_in(marks: Sequence[str] = ()) -> str:
-    """Return the regular expression of a number in a name, with marks besides those of all."""
-    more = re.escape("".join(mark for mark in marks if len(mark) == 1))
-    return rf"\d+(?:(?:{_SURE}{f'|[{more}]' if more else ''})\d+)?"
-
-
-def value_of(text: str) -> float:
-    """Return the number that a text in a name spells, whatever its decimal mark."""
-    minus = text.startswith("-")
-    whole, *rest = re.findall(r"\d+", text)
-    value = float(f"{whole}.{rest[0]}" if rest else whole)
-    return -value if minus else value
-
-
-def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
-    """Return what a name tells by quantity. What is told twice tells nothing."""
-    reading = reading or Reading()
-    out: dict[str, Token] = {}
-    twice = set()
-    number = number_in(reading.marks)
-    wanted = re.compile(
-        rf"{_NO_DECIMALS}{_NO_POWER}({SIGN}{number}){_APART}({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
-    )
-    stem = file.stem
-    found = [(match.start(), match[1], match[2], match[0]) for match in wanted.finditer(stem)]
-    if _UNIT in reading.marks:
-        after = {
-            match.start(): (match.start(), f"{match[1]}.{match[3]}", match[2], match[0])
-            for match in _AFTER_UNIT.finditer(stem)
-        }
-        found = [after.get(one[0], one) for one in found]
-    for start, text, spelled, whole in found:
-        unit = SPELLED.get(spelled) or SPELLED.get(spelled.removesuffix("s"), spelled)
-        name = quantity_of(unit)
-        value = value_of(text)
-        if (digits := reading.digits.get(name, 0)) and not spelled.startswith(_SMALL):
-            value /= 10.0**digits
-        letter = re.search(r"[A-Za-z]*$", stem[:start])
-        before = letter.group() if letter else ""
-        value = convert(value, unit, PLAIN.get(name) or UNITS.get(name, unit))
-        if name in out and out[name].value != value:
-            twice.add(name)
-        out[name] = Token(value, before + whole, text, f"{before}{{}}{spelled}")
-    return {name: one for name, one in out.items() if name not in twice}
-
-
-def quantity_of(unit: str) -> str:
-    """Return the command or the label that a unit in a name tells.
-
-    Raises
-    ------
-    UnitError
-        If it tells neither.
-    """
-    for name in (*DRIVE, *UNITS):
-        if same_dimension(unit, PLAIN.get(name) or UNITS[name]):
-            return name
-    for name, units in _OF_LABELS.items():
-        if unit in (SPELLED.get(one, one) for one in units.split("|")):
-            return f"{name}_{unit}"
-    raise UnitError(f'unit "{unit}" tells neither a command nor a label.')
-
-
-def reading_of(files: Sequence[Path], tones: Sequence[Tone | None]) -> Reading:
-    """Return how the numbers in the names of a campaign are written.
-
-    Parameters
-    ----------
-    files : (n,) of the campaign
-    tones : (n,) what the motion of each is, None where it is unknown or has no single frequency
-    """
-    plain = [tokens_of(file) for file in files]
-    marks, why, open_ = [], [], {}
-    for mark in (*DOUBTFUL, _UNIT):
-        with_mark = [tokens_of(file, Reading((mark,))) for file in files]
-        differ = sorted(
-            {n for a, b in zip(plain, with_mark, strict=True) for n in {*a, *b}
-             if _values(a, n) != _values(b, n)}
-        )  # fmt: skip
-        if not differ:
-            continue
-        seen = _by_motion(plain, with_mark, tones)
-        said = {name: _by_names(mark, name, plain, with_mark) for name in differ}
-        if seen > 0 or (seen == 0 and all(one > 0 for one in said.values())):
-            marks.append(mark)
-            what = f'"{mark}"' if mark != _UNIT else "a unit between digits"
-            by = "the measured motion" if seen > 0 else "all names together"
-            why.append(f"{what} in the names is a decimal mark, by {by}")
-            continue
-        for name in differ:
-            if said[name] > 0 or (seen == 0 and said[name] == 0):
-                open_[name] = _open_text(name, plain, with_mark)
-    open_ |= _with_and_without([tokens_of(file, Reading(tuple(marks))) for file in files])
-    digits, by_digits, doubts = _digits(plain, tones) if not marks else ({}, [], {})
-    return Reading(tuple(marks), digits, open_, doubts, (*why, *by_digits))
-
-
-def _values(tokens: Mapping[str, Token], name: str) -> float | None:
-    return tokens[name].value if name in tokens else None
-
-
-def _by_motion(
-    plain: Sequence[Mapping[str, Token]],
-    with_mark: Sequence[Mapping[str, Token]],
-    tones: Sequence[Tone | None],
-) -> int:
-    """Return 1 where the motion says that a mark is a decimal mark, -1 that it is none, else 0."""
-    for name, off, fits in (
-        ("frequency", frequency_off, frequency_fits),
-        ("amplitude", amplitude_off, amplitude_fits),
-    ):
-        votes = []
-        for a, b, tone in zip(plain, with_mark, tones, strict=True):
-            if tone is None or _values(a, name) == _values(b, name):
-                continue
-            one, other = (off(each[name].value, tone) if name in each else inf for each in (a, b))
-            nearest = (a if one < other else b).get(name)
-            votes.append(
-                0 if nearest is None or not fits(nearest.value, tone) else 1 if other < one else -1
-            )
-        if votes and abs(sum(votes)) >= 0.8 * len(votes):
-            return 1 if sum(votes) > 0 else -1
-    return 0
-
-
-def _by_names(
-    mark: str,
-    name: str,
-    plain: Sequence[Mapping[str, Token]],
-    with_mark: Sequence[Mapping[str, Token]],
-) -> int:
-    """Return 1 where the names say that a mark is a decimal mark, -1 that it is none, else 0."""
-    used = [
-        re.findall(r"\d+", b[name].number)
-        for a, b in zip(plain, with_mark, strict=True)
-        if name in b and _values(a, name) != _values(b, name)
-    ]
-    if any(len(one) != 2 for one in used) or not used:
-        return 0
-    heads, tails = [one[0] for one in used], [one[1] for one in used]
-    if mark in _HARDLY:  # a unit, as in 20C2A, unless the motion says otherwise
-        return 0 if "0" in heads else -1
-    if mark == _UNIT:
-        of_head = [sorted({int(t) for h, t in used if h == head}) for head in {*heads}]
-        if all(one == list(range(1, len(one) + 1)) for one in of_head):
-            return -1  # they count repeated runs: 2A1, 2A2
-        return 1 if {*tails} <= _DIGITS and {*tails} != {"0"} and "0" in heads else 0
-    if any(len(head) > 1 and head[0] == "0" for head in heads):  # of a date, or a counter
-        return -1
-    if len({len(tail) for tail in tails}) > 1 and any(
-        len(tail) > 1 and tail.endswith("0") for tail in tails
-    ):  # no decimals: 1_5A and 1_10A
-        return -1
-    counting = len({*heads}) == len(heads) > 2
-    some = len(used) < sum(name in one for one in with_mark)  # others have no mark: 1A
-    if "0" in heads:
-        sure = some or len({*heads}) < len(heads) or mark in _LETTERS
-        return 1 if sure and not (counting and mark not in _LETTERS and not some) else 0
-    if mark in _LETTERS:
-        return 1 if len({*tails}) > 1 and not counting else 0
-    parted = any(len(re.findall(r"\d+", a[name].number)) > 1 for a in plain if name in a)
-    if some and parted:  # others have a decimal mark that is sure: 1_0A beside 0p5A
-        return 0
-    return -1 if counting or len({*heads}) == 1 else 0
-
-
-def _open_text(
-    name: str, plain: Sequence[Mapping[str, Token]], with_mark: Sequence[Mapping[str, Token]]
-) -> str:
-    """Return what is said of a quantity whose numbers may be read in two ways."""
-    k = next(k for k, (a, b) in enumerate(zip(plain, with_mark, strict=True))
-             if _values(a, name) != _values(b, name))  # fmt: skip
-    told = with_mark[k].get(name) or plain[k][name]
-    one, other = (_text(tokens[k], name) for tokens in (plain, with_mark))
-    return (
-        f'"{told.text}" and the like in the names may be {one} or {other}, and nothing settles '
-        f"it: no {name} is taken. --runs FILE, a table with a row per file, says it"
-    )
-
-
-def _with_and_without(tokens: Sequence[Mapping[str, Token]]) -> dict[str, str]:
-    """Return what is said of a command whose levels are 050 in some names and 0.50 in others."""
-    out = {}
-    for name in DRIVE:
-        numbers = [one[name].number.lstrip("-") for one in tokens if name in one]
-        marked = next((one for one in numbers if not one.isdigit()), "")
-        bare = next((one for one in numbers if re.fullmatch(r"0+[1-9]\d*", one)), "")
-        if marked and bare:
-            out[name] = (
-                f'"{bare}" stands beside "{marked}" in the names, and may lack its decimal mark: '
-                f"no {name} is taken. --runs FILE, a table with a row per file, says it"
-            )
-    return out
-
-
-def _text(tokens: Mapping[str, Token], name: str) -> str:
-    if name not in tokens:
-        return "none"
-    return label_text(name, tokens[name].value, PLAIN[name] if name in DRIVE else "")
-
-
-def _digits(
-    plain: Sequence[Mapping[str, Token]], tones: Sequence[Tone | None]
-) -> tuple[dict[str, int], list[str], dict[str, str]]:
-    """Return by quantity how many decimals numbers without a mark have, why, and what is doubted.
-
-    Numbers of one length that begin with zeros may leave out their decimal mark: 050 for 0.50.
-    """
-    shared = [name for name in plain[0] if all(name in one for one in plain)] if plain else []
-    texts = {name: [one[name].number.lstrip("-") for one in plain] for name in shared}
-    wide = {
-        name: len(own[0])
-        for name, own in texts.items()
-        if len({len(text) for text in own}) == 1 and all(text.isdigit() for text in own)
-        and len(own[0]) > 1 and any(text[0] == "0" for text in own)
-        and any(int(text) for text in own)
-    }  # fmt: skip
-    powers = {}
-    for name in {"frequency", "amplitude"} & {*wide}:
-        stated = [(one[name].value, tone) for one, tone in zip(plain, tones, strict=True) if tone]
-        if (power := _power([one for one in stated if one[0] > 0.0], name)) is not None:
-            powers[name] = power
-    alike = {size: {p for n, p in powers.items() if wide[n] == size} for size in wide.values()}
-    known = {
-        name: powers[name] if name in powers else next(iter(alike[size]))
-        for name, size in wide.items()
-        if name in powers or len(alike[size]) == 1
-    }
-    digits = {name: power for name, power in known.items() if power > 0}
-    why = []
-    if digits:
-        name = next(iter(digits))
-        why.append(
-            f'"{texts[name][0]}" and the like in the names have {digits[name]} '
-            f"decimal{'s' * (digits[name] > 1)}, by the measured motion"
-        )
-    doubts = {}
-    for name in wide:
-        if name in known:
-            continue
-        text = next(text for text in texts[name] if int(text))
-        doubts[name] = f'"{text}" may stand for {text[0]}.{text[1:]}; --runs FILE says it then'
-    return digits, why, doubts
-
-
-def _power(stated: Sequence[tuple[float, Tone]], name: str) -> int | None:
-    """Return by which power of ten what names tell is larger than the motion; None if by none."""
-    fits = frequency_fits if name == "frequency" else amplitude_fits
-    measured = [tone.frequency if name == "frequency" else tone.amplitude for _, tone in stated]
-    if not stated:
-        return None
-    pairs = zip(stated, measured, strict=True)
-    power = round(median(log10(value / size) for (value, _), size in pairs))
-    right = all(fits(value / 10.0**power, tone) for value, tone in stated)
-    return power if power >= 0 and right else None
-
 
 # What the titles of a table of runs tell: `I [A]` is the current, `T (°C)` the temperature.
 
@@ -457,6 +129,10 @@ class Facts:
         )  # fmt: skip
 
 
+def _fact(name: str, value: Any, *, level: bool = False) -> Facts:
+    return Facts({name: value}) if level else Facts(labels={name: value})
+
+
 def facts_of(
     files: Sequence[Path],
     choices: RunChoices,
@@ -487,14 +163,16 @@ def facts_of(
     found, notes = _offered(files, choices, commanded, reading)
     for pattern in choices.levels:
         rows = [_matched(file, pattern, reading, level=True) for file in files]
-        found = _joined(found, rows)
-        notes.append(_levels_found(rows, pattern))
+        found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
+        (name,) = rows[0].levels
+        told = f"{name} of each run: from the names of the files, by '{pattern}'"
+        notes.append(f"{told}: {', '.join(_texts(rows, name))}")
     for pattern in choices.labels:
         rows = [_matched(file, pattern, reading, level=False) for file in files]
-        found = _joined(found, rows)
+        found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
     if choices.table is not None:
         rows = rows_of_table(choices.table, paths, commanded)
-        found = _joined(found, rows)
+        found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
         notes += _of_table(rows, choices.table)
     asked = {name for one in found for name in one.levels}
     if commanded and asked:
@@ -561,29 +239,17 @@ def _told_twice(files: Sequence[Path], tones: Sequence[Tone | None], reading: Re
 
 def _of_table(rows: Sequence[Facts], table: Path) -> list[str]:
     """Return the sentence that tells what a table says of the runs, with units that it may lack."""
-    found: dict[str, dict[Label, str]] = {}
-    for row in rows:
-        for name, value in (*row.levels.items(), *row.labels.items()):
-            text = label_text(name, value, PLAIN[name] if name in row.levels else "")
-            found.setdefault(name, {})[value] = text
-    if not found:
-        return []
-    told = "; ".join(
-        f"{label_name(name)} {listed(found[name].values(), 6)}" for name in sorted(found)
-    )
-    return [f"of each run, from {table}: {told}"]
+    names = sorted({name for row in rows for name in (*row.levels, *row.labels)})
+    told = "; ".join(f"{label_name(name)} {listed(_texts(rows, name), 6)}" for name in names)
+    return [f"of each run, from {table}: {told}"] if told else []
 
 
-def _levels_found(rows: Sequence[Facts], pattern: str) -> str:
-    """Return the sentence that tells which levels a pattern found."""
-    (name,) = rows[0].levels
-    values = sorted({row.levels[name] for row in rows})
-    levels = ", ".join(label_text(name, value, PLAIN[name]) for value in values)
-    return f"{name} of each run: from the names of the files, by '{pattern}': {levels}"
-
-
-def _joined(first: list[Facts], more: list[Facts]) -> list[Facts]:
-    return [one.and_(other) for one, other in zip(first, more, strict=True)]
+def _texts(rows: Sequence[Facts], name: str) -> list[str]:
+    """Return the values of a level or a label in words, each once, numbers in their order."""
+    values = {v for row in rows if (v := {**row.labels, **row.levels}.get(name)) is not None}
+    unit = PLAIN[name] if any(name in row.levels for row in rows) else ""
+    ordered = sorted(values, key=lambda one: (isinstance(one, str), one))
+    return [label_text(name, value, unit) for value in ordered]
 
 
 # -- names
@@ -618,10 +284,11 @@ def _offered(
             takes = takes if _fits(files, pattern, reading) else ""
             notes.append(f'"{seen}" and the like in the names may count the files{takes}')
             continue
-        unit = PLAIN[name] if drive else ""
-        levels = ", ".join(label_text(name, value, unit) for value in sorted(set(values)))
-        from_names = f'from the names of the files, as in "{seen}"'
-        text = f"{label_name(name)} of each run: {from_names}: {levels}"
+        more = [_fact(name, value, level=drive) for value in values]
+        text = (
+            f'{label_name(name)} of each run: from the names of the files, as in "{seen}": '
+            f"{', '.join(_texts(more, name))}"
+        )
         if name in reading.doubts:
             text += f". Doubtful: {reading.doubts[name]}"
         if drive:
@@ -629,9 +296,7 @@ def _offered(
             same = not reading.digits.get(name) and _fits(files, pattern, reading)
             text += f". --level '{pattern}' says the same" if same else ""
         notes.append(text)
-        for k, value in enumerate(values):
-            more = Facts(levels={name: value}) if drive else Facts(labels={name: value})
-            found[k] = found[k].and_(more)
+        found = [one.and_(other) for one, other in zip(found, more, strict=True)]
     return found, [*notes, *(reading.why if notes else ())]
 
 
@@ -675,7 +340,7 @@ def _matched(file: Path, pattern: str, reading: Reading, *, level: bool) -> Fact
     unit = SPELLED.get(spelled.group(), spelled.group()) if spelled else ""
     known = unit_or_none(unit) if unit else None
     if level:
-        named = named or (_quantity_or_none(known.name) if known else "")
+        named = named or (quantity_of(known.name) if known else "")
         if named not in DRIVE:
             raise StudyError(
                 f"{asked}: a unit must follow {{}}, A or V or %, or the "
@@ -696,21 +361,14 @@ def _matched(file: Path, pattern: str, reading: Reading, *, level: bool) -> Fact
     if match is None:
         raise StudyError(f'{asked}: it fits no part of "{file.name}".')
     if not number:
-        return Facts(labels={named: match.group(1)})
+        return _fact(named, match.group(1))
     value = value_of(match.group(1))
     if known is not None and target:
         try:
             value = convert(value, known.name, target)
         except UnitError as error:
             raise StudyError(f"{asked}: {named}: {error}") from None
-    return Facts(levels={named: value}) if level else Facts(labels={named: value})
-
-
-def _quantity_or_none(unit: str) -> str:
-    try:
-        return quantity_of(unit)
-    except UnitError:
-        return ""
+    return _fact(named, value, level=level)
 
 
 # -- a table beside the files
@@ -792,7 +450,7 @@ def _facts(
         if number is None and target:
             raise StudyError(f'{where}: {name} is "{value}"; a finite number is right.')
         if number is None:
-            found = found.and_(Facts(labels={name: value}))
+            found = found.and_(_fact(name, value))
             continue
         if target and column.problem:
             raise StudyError(
@@ -803,8 +461,7 @@ def _facts(
                 number = convert(number, column.unit.name, target)
             except UnitError as error:
                 raise StudyError(f"{where}: {name}: {error}") from None
-        more = Facts(levels={name: number}) if name in DRIVE else Facts(labels={name: number})
-        found = found.and_(more)
+        found = found.and_(_fact(name, number, level=name in DRIVE))
     return found
 
 
@@ -869,9 +526,9 @@ def roles_of(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[
     Parameters
     ----------
     names : of the files in data/
-    closed : which of them are test runs; see `_seen_roles` for the others
+    closed : which of them are test runs; see `roles_by_name` for the others
     """
-    roles, notes = _seen_roles([n for n, is_test in zip(names, closed, strict=True) if not is_test])
+    roles, notes = roles_by_name([n for n, test in zip(names, closed, strict=True) if not test])
     rest = iter(roles)
     every = [TEST if is_test else next(rest) for is_test in closed]
     test = listed(name for name, role in zip(names, every, strict=True) if role == TEST)
@@ -880,53 +537,33 @@ def roles_of(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[
     return [RunFile(f"data/{n}", role) for n, role in zip(names, every, strict=True)], notes
 
 
-def roles_added(names: list[str]) -> tuple[list[str], list[str]]:
-    """Return the roles of runs that are added to others, and the notes that tell why.
+def roles_by_name(names: list[str], *, added: bool = False) -> tuple[list[str], list[str]]:
+    """Return roles and why: by the names of files, else a third is held out.
 
     Parameters
     ----------
     names : of the files
+    added : whether they join runs that have roles: else names count where they give both
     """
     found = [_role_in(name) for name in names]
-    if any(found):
+    if any(found) if added else {*found} == {"train", "holdout"}:
         roles, note = [role or "train" for role in found], "roles follow the names of the files"
     elif len(names) == 1:
-        return ["train"], [f"{names[0]} is for training; --holdout '{names[0]}' holds it out"]
+        alone = "there is one run: its last 30 % are held out, which is weaker than a separate run"
+        joins = f"{names[0]} is for training; --holdout '{names[0]}' holds it out"
+        return ["train"], [joins if added else alone]
     else:
-        roles, note = _a_third(names)
-    return roles, [f"{note}. {_held_out(names, roles)}"]
-
-
-def _seen_roles(names: list[str]) -> tuple[list[str], list[str]]:
-    """Return roles and why: by the names of files, else a third is held out."""
-    found = [_role_in(name) for name in names]
-    if len(names) == 1:
-        return ["train"], [
-            "there is one run: its last 30 % are held out, which is weaker than a separate run"
-        ]
-    if (
-        "holdout" in found
-        and len(set(found) | {"train"}) == 2
-        and found.count("holdout") < len(found)
-    ):
-        roles = [role or "train" for role in found]
-        note = "roles follow the names of the files"
-    else:
-        roles, note = _a_third(names)
-    return roles, [f"{note}. {_held_out(names, roles)}"]
+        held, which = a_third(names)
+        roles = ["holdout" if k in held else "train" for k in range(len(names))]
+        note = f"{which} is held out; bristle study roles changes that"
+    held_out = [name for name, role in zip(names, roles, strict=True) if role == "holdout"]
+    return roles, [f"{note}. Held out: {listed(held_out) or 'none'}"]
 
 
 def _role_in(name: str) -> str:
     """Return the role that a file's name tells, "" where it tells none."""
     words = set(re.split(r"[^a-z]+", name.lower()))
     return "holdout" if words & _HOLDOUT else "train" if words & _TRAIN else ""
-
-
-def _a_third(names: list[str]) -> tuple[list[str], str]:
-    """Return roles of which a third is held out, and the note that says so."""
-    held, which = a_third(names)
-    roles = ["holdout" if k in held else "train" for k in range(len(names))]
-    return roles, f"{which} is held out; bristle study roles changes that"
 
 
 def a_third(names: Sequence[str]) -> tuple[set[int], str]:
@@ -958,12 +595,6 @@ def a_third(names: Sequence[str]) -> tuple[set[int], str]:
         out.add(best := min(set(range(len(names))) - out, key=lambda k: (*loss(k), k)))
         held.update(levels[best])
     return out, "a third of the runs, of each level as few as can be,"
-
-
-def _held_out(names: list[str], roles: list[str]) -> str:
-    """Return the words that tell which runs are held out."""
-    held_out = [name for name, role in zip(names, roles, strict=True) if role == "holdout"]
-    return f"Held out: {listed(held_out) or 'none'}"
 
 
 # Other roles for the runs of a study: which runs are meant, and what must be left.
