@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from math import inf, isfinite
@@ -166,7 +166,9 @@ def facts_of(
         found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
         (name,) = rows[0].levels
         told = f"{name} of each run: from the names of the files, by '{pattern}'"
-        notes.append(f"{told}: {', '.join(_texts(rows, name))}")
+        notes.append(
+            f"{told}: {', '.join(_texts(name, sorted({r.levels[name] for r in rows}), level=True))}"
+        )
     for pattern in choices.labels:
         rows = [_matched(file, pattern, reading, level=False) for file in files]
         found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
@@ -239,17 +241,20 @@ def _told_twice(files: Sequence[Path], tones: Sequence[Tone | None], reading: Re
 
 def _of_table(rows: Sequence[Facts], table: Path) -> list[str]:
     """Return the sentence that tells what a table says of the runs, with units that it may lack."""
-    names = sorted({name for row in rows for name in (*row.levels, *row.labels)})
-    told = "; ".join(f"{label_name(name)} {listed(_texts(rows, name), 6)}" for name in names)
+    found: dict[str, dict[Label, None]] = {}
+    for row in rows:
+        for name, value in (*row.levels.items(), *row.labels.items()):
+            found.setdefault(name, {})[value] = None
+    levels = {name for row in rows for name in row.levels}
+    told = "; ".join(
+        f"{label_name(name)} {listed(_texts(name, found[name], level=name in levels), 6)}"
+        for name in sorted(found)
+    )
     return [f"of each run, from {table}: {told}"] if told else []
 
 
-def _texts(rows: Sequence[Facts], name: str) -> list[str]:
-    """Return the values of a level or a label in words, each once, numbers in their order."""
-    values = {v for row in rows if (v := {**row.labels, **row.levels}.get(name)) is not None}
-    unit = PLAIN[name] if any(name in row.levels for row in rows) else ""
-    ordered = sorted(values, key=lambda one: (isinstance(one, str), one))
-    return [label_text(name, value, unit) for value in ordered]
+def _texts(name: str, values: Iterable[Label], *, level: bool) -> list[str]:
+    return [label_text(name, value, PLAIN[name] if level else "") for value in values]
 
 
 # -- names
@@ -287,7 +292,7 @@ def _offered(
         more = [_fact(name, value, level=drive) for value in values]
         text = (
             f'{label_name(name)} of each run: from the names of the files, as in "{seen}": '
-            f"{', '.join(_texts(more, name))}"
+            f"{', '.join(_texts(name, sorted({*values}), level=drive))}"
         )
         if name in reading.doubts:
             text += f". Doubtful: {reading.doubts[name]}"
