@@ -49,7 +49,11 @@ def comparison_view(comparison: Comparison) -> View:
     tables += [run_table(comparison), pattern_table(comparison), band_table(comparison)]
     if comparison.labels:
         tables.insert(-2, label_table(comparison))
-    figure = Figure(lambda: draw_comparison(comparison), title)
+    caption = (
+        "Dots are samples, lines through them their mean with its 95 % interval, blue bands twice "
+        "the expected noise. The spectrum of the error stands beside that of the noise."
+    )
+    figure = Figure(lambda: draw_comparison(comparison), title, caption)
     return View(title, (*map(Text, comparison.sentences), tables[0]), (*tables[1:], figure))
 
 
@@ -302,14 +306,12 @@ def sites_height(count: int) -> float:
     return 0.95 + 0.25 * count
 
 
-def draw_sites(axes: Axes, sites: Sequence[SiteMisfit], before: Sequence[SiteMisfit] = ()) -> None:
+def draw_sites(axes: Axes, sites: Sequence[SiteMisfit]) -> None:
     """Draw z at every site of a building, the top storey above, over the band of noise.
 
-    Small dots are runs, the large one all of them with the 95 % interval; `before` are the sites of
-    an earlier model, drawn as rings.
+    Small dots are runs, the large one all of them with the 95 % interval.
     """
     shown = sorted((one for one in sites if one.identifiable), key=lambda one: _floor(one.site))
-    earlier = {one.site: one.z for one in before if one.identifiable}
     axes.set_xscale("log")
     axes.axvspan(1.0 / CLOSE, CLOSE, color=FLOOR, lw=0.0)
     for y, one in enumerate(shown):
@@ -317,8 +319,6 @@ def draw_sites(axes: Axes, sites: Sequence[SiteMisfit], before: Sequence[SiteMis
         axes.plot(one.z_interval, [y, y], color=colour, lw=1.6)
         axes.plot([run.z for run in one.runs], [y] * len(one.runs), ".", ms=4, color=GREY)
         axes.plot([one.z], [y], "o", ms=5.5, color=colour)
-        if one.site in earlier:
-            axes.plot([earlier[one.site]], [y], "o", ms=6.5, mfc="none", mec=GREY, mew=1.1)
         pattern = one.pattern if one.fails and one.pattern and one.pattern.share >= FAINT else None
         turns = (
             f", along {name_of(pattern.coordinate, one.site).removeprefix('the ')}"
@@ -332,7 +332,6 @@ def draw_sites(axes: Axes, sites: Sequence[SiteMisfit], before: Sequence[SiteMis
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(-0.6, len(shown) - 0.4)
     every = [z for one in shown for z in (one.z, *one.z_interval, *(r.z for r in one.runs))]
-    every += list(earlier.values())
     low, high = min([*every, 0.7]), max([*every, 2.0])
     axes.set_xlim(0.9 * max(low, 0.1), 1.15 * high)
     steps = [z for z in _TICKS if axes.get_xlim()[0] <= z <= axes.get_xlim()[1]]
@@ -347,15 +346,6 @@ def _floor(site: str) -> int:
     if site.startswith("storey"):
         return int(site.removeprefix("storey"))
     return {"damper": -1}.get(site, 0)
-
-
-def sites_page(now: Comparison, before: Comparison | None, width: float) -> Page:
-    """Return z at every site of a building, and of the model before the last added effect."""
-    with look():
-        page = Page(width, sites_height(len(now.sites)), "")
-        grid = page.grid(1, 1, top=0.35, bottom=0.35, left=1.2, right=2.9)
-        draw_sites(page.figure.add_subplot(grid[0, 0]), now.sites, before.sites if before else ())
-    return page
 
 
 # The panels that hold a prediction against a measurement, one function each.
@@ -538,50 +528,6 @@ def draw_regimes(axes: Axes, comparison: Comparison) -> None:
     axes.set_yticks(range(len(rows)), [_short(name) for name in rows], fontsize=8)
     axes.grid(visible=False)
     axes.set_title("error / noise (z)")
-
-
-_MAP = 13
-"""Cells of a map along each coordinate."""
-
-
-def residual_map(comparison: Comparison) -> tuple[Array, Array, Array] | None:
-    """Return the mean normalised error (b, b) over displacement and velocity, after their edges.
-
-    Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
-    """
-    along = [one.judged_along() for one in comparison.predictions]
-    if not all("displacement" in one and "velocity" in one for one in along):
-        return None
-    x = np.concatenate([one["displacement"] for one in along])
-    v = np.concatenate([one["velocity"] for one in along])
-    r = np.concatenate([one.only_judged(one.normalised) for one in comparison.predictions])
-    r = np.clip(r, -30.0, 30.0)
-    edges = [_edges(y, _MAP) for y in (x, v)]
-    count = np.histogram2d(x, v, edges)[0]
-    total = np.histogram2d(x, v, edges, weights=r)[0]
-    with np.errstate(invalid="ignore"):
-        mean = np.where(count >= 8, total / np.maximum(count, 1), np.nan)
-    return edges[0], edges[1], mean
-
-
-def _edges(values: Array, bins: int) -> Array:
-    low, high = (float(q) for q in np.quantile(values, [0.004, 0.996]))
-    return np.linspace(low, high, bins + 1)
-
-
-def draw_map(axes: Axes, comparison: Comparison, limit: float) -> Any:
-    """Draw where over displacement and velocity the error is; return the image for a colour bar."""
-    found = residual_map(comparison)
-    if found is None:
-        axes.set_axis_off()
-        return None
-    x, v, mean = found
-    axes.set_facecolor("#dedede")  # no samples
-    image = axes.pcolormesh(1e3 * x, 1e3 * v, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
-    axes.set_xlabel(f"{_axis('displacement', comparison.site)} [mm]")
-    axes.set_ylabel(f"{_axis('velocity', comparison.site)} [mm/s]")
-    axes.grid(visible=False)
-    return image
 
 
 def _legend(axes: Axes, *names: tuple[str, str]) -> None:

@@ -33,6 +33,7 @@ from ..study.rig import Place, place_of_damper
 from ..study.runs import place_of_run, read_runs
 from ..study.study import Study
 from ..study.study_file import TEST, Settings, spec_text
+from ..study.view import channel_ranges
 from ..units import same_dimension
 
 POINTS = 2400
@@ -74,23 +75,14 @@ def data_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 def _channel_rows(study: Study, runs: Sequence[Measurement]) -> list[dict[str, Any]]:
     """Return a row per channel: where it is in the files, its range and noise in the unit shown."""
-    rows = []
-    for name in dict.fromkeys(name for run in runs for name in run.channels):
-        there = [run for run in runs if name in run.channels]
-        low = min(float(run[name].min()) for run in there)
-        high = max(float(run[name].max()) for run in there)
-        factor, unit = scale(there[0].units[name], max(abs(low), abs(high)))
-        spec = study.settings.channels.get(name)
-        noise = float(np.median([run.noise.get(name, 0.0) for run in there]))
-        rows.append(
-            {
-                "name": name, "unit": unit, "factor": factor, "low": factor * low,
-                "high": factor * high, "noise": factor * noise,
-                "column": spec.column if spec else "", "in_file": spec.unit if spec else "",
-                "turned": spec is not None and spec.sign < 0,
-            }
-        )  # fmt: skip
-    return rows
+    specs = study.settings.channels
+    return [
+        {
+            **one._asdict(), "column": spec.column if (spec := specs.get(one.name)) else "",
+            "in_file": spec.unit if spec else "", "turned": spec is not None and spec.sign < 0,
+        }
+        for one in channel_ranges(runs)
+    ]  # fmt: skip
 
 
 def _role(study: Study, run: Measurement) -> str:

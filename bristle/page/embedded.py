@@ -63,7 +63,7 @@ _STYLE = """
 def linked_section(found: Comparison, most: int = MOST) -> str:
     """Return the section of a report whose pictures a reader can choose samples in.
 
-    On paper it is left out: the figures of the report show the same.
+    On paper it is left out.
 
     Parameters
     ----------

@@ -16,29 +16,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..comparison.names import effect_names, name_of, site_name
+from ..comparison.names import effect_names
 from ..comparison.view import (
     LOOPS,
-    OneCycle,
-    band_table,
     chosen_cycles,
-    draw_loop,
-    draw_map,
-    draw_pattern,
-    draw_regimes,
-    draw_spectrum,
-    headline,
     loop_panels,
-    pattern_table,
-    residual_map,
     run_table,
-    site_table,
-    sites_page,
-    telling_patterns,
     under,
 )
 from ..core.progress import counted, tell
-from ..core.text import command, percent, plain, quantity, short_z
+from ..core.text import command, plain, short_z
 from ..core.text import with_interval as with_interval
 from ..data.channels import label_text
 from ..errors import BristleError
@@ -55,7 +42,7 @@ from ..study.read_again import devices_of
 from ..study.runs import names_of_runs, place_of_run
 from ..study.steps import NOT_PROVEN
 from ..study.study_file import TEST
-from ..study.view import or_nothing, steps_table, story_view
+from ..study.view import channel_table, or_nothing, steps_table, story_view
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
@@ -125,17 +112,6 @@ def what_if_section(study: Study) -> str:
 
 
 # The tables of the parameters and the data.
-
-_COLOURS = {
-    "white": "estimated from the samples: white",
-    "low-passed": "estimated from the samples: white, low-passed above",
-    "blue": "estimated from the samples: it grows with frequency, so this is an upper limit",
-    "resting": "estimated where the channel is at rest",
-    "slow": "estimated where the channel moves slowest: hard to separate from the signal",
-    "hidden": "estimated: hard to separate from the signal, so this is a lower limit",
-    "rough": "estimated: the signal itself is rough, so this is an upper limit",
-    "none": "none seen",
-}
 
 
 def parameter_table(model: Model, drive: str) -> tuple[list[str], list[list[str]], list[str]]:
@@ -215,24 +191,6 @@ def _known(study: Study, run: Measurement) -> str:
     return ", ".join([*texts, *(f"{n} {label_text(n, y)}" for n, y in run.labels.items())])
 
 
-def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
-    """Return header and rows: the noise of each channel over all runs, and how it was found."""
-    header = ["channel", "noise", "of its RMS", "how it was found"]
-    rows = []
-    for channel in dict.fromkeys(name for run in measured for name in run.channels):
-        having = [run for run in measured if channel in run.channels]
-        noise = float(np.median([run.noise.get(channel, 0.0) for run in having]))
-        size = float(np.median([np.std(run[channel]) for run in having]))
-        facts = [run.noise_facts.get(channel) for run in having]
-        found = dict.fromkeys(
-            "given" if f is None else _COLOURS.get(f.colour, f.colour) for f in facts
-        )
-        unit = having[0].units[channel]
-        of = percent(noise / size, 2) if size > 0.0 else "-"
-        rows.append([channel, quantity(noise, unit, fine=True), of, "; ".join(found)])
-    return header, rows
-
-
 # The curves that a study learned, in its report: picture, formula, and what each leaves.
 
 
@@ -295,96 +253,6 @@ def _rows(told: dict[str, Any]) -> list[list[str]]:
     ]
 
 
-# The pictures of a study's report: staircase, loops and maps before and after, the error now.
-
-_WIDTH = 9.2
-
-
-def loops_page(before: Comparison | None, now: Comparison, names: tuple[str, str]) -> Page:
-    """Return loops before and after the last added effect: single cycles by the command's level.
-
-    Of a run without cycles all of its loops are drawn.
-    """
-    both = [one for one in (before, now) if one is not None]
-    labels = names if before else names[1:]
-    shown = chosen_cycles(now.predictions)
-    if shown:
-        return _cycles_page(both, labels, shown)
-    chosen = before.worst.name if before else now.worst.name
-    with look():
-        page = Page(_WIDTH, 3.0 * len(both) + 0.1, "")
-        grid = page.grid(len(both), 2, top=0.4, bottom=0.5, row_gap=0.9, column_gap=0.75)
-        for row, (one, name) in enumerate(zip(both, labels, strict=True)):
-            prediction = next(h for h in one.predictions if h.name == chosen)
-            z = next(run.z for run in one.runs if run.name == chosen)
-            for column, over in enumerate(("displacement", "velocity")):
-                if over not in prediction.coordinates:
-                    continue
-                axes = page.figure.add_subplot(grid[row, column])
-                draw_loop(axes, prediction, over)
-                along = name_of(over, prediction.site)
-                if column == 0:
-                    axes.set_title(f"{name}: force [{prediction.unit}] over {along}")
-                else:
-                    axes.set_title(f"over {along}; z = {short_z(z)} on {prediction.name}")
-        return page
-
-
-def _cycles_page(
-    both: Sequence[Comparison], labels: Sequence[str], shown: Sequence[OneCycle]
-) -> Page:
-    """Return the same cycles under each of several models, over velocity and displacement."""
-    with look():
-        page = Page(_WIDTH, (LOOPS + 0.1) * len(both), "")
-        for row, (one, name) in enumerate(zip(both, labels, strict=True)):
-            loop_panels(page, (LOOPS + 0.1) * row, under(shown, one.predictions), name)
-    return page
-
-
-def maps_page(before: Comparison | None, now: Comparison, names: tuple[str, str]) -> Page | None:
-    """Return where over displacement and velocity the error is, before and after; None without."""
-    both = [one for one in (before, now) if one is not None]
-    found = [residual_map(one) for one in both]
-    if any(one is None for one in found):
-        return None
-    labels = names if before else names[1:]
-    limit = max(float(np.nanquantile(np.abs(one[2]), 0.97)) for one in found if one is not None)
-    limit = max(limit, 1.0)
-    with look():
-        page = Page(_WIDTH, 3.5, "")
-        grid = page.grid(1, 2, top=0.35, bottom=0.5, right=1.0, column_gap=0.75)
-        image: Any = None
-        for column, (one, name) in enumerate(zip(both, labels, strict=True)):
-            axes = page.figure.add_subplot(grid[0, column])
-            image = draw_map(axes, one, limit)
-            axes.set_title(f"{name}: z = {short_z(one.z)}")
-        height = page.height
-        room = page.figure.add_axes(
-            ((_WIDTH - 0.72) / _WIDTH, 0.75 / height, 0.14 / _WIDTH, (height - 1.5) / height)
-        )
-        bar = page.figure.colorbar(image, cax=room)
-        bar.set_label("mean error over noise", fontsize=8.5)
-        bar.outline.set_visible(False)
-    return page
-
-
-def error_page(now: Comparison) -> Page:
-    """Return where the error of the present model lives: two coordinates, spectrum, regimes."""
-    telling = telling_patterns(now)
-    first = telling[0] if now.second else None
-    with look():
-        rows = 1 + bool(telling)
-        page = Page(_WIDTH, 3.1 * rows, "")
-        grid = page.grid(rows, 2, top=0.4, bottom=0.55, row_gap=0.95, column_gap=1.15)
-        for column, pattern in enumerate(telling):
-            axes = page.figure.add_subplot(grid[0, column])
-            draw_pattern(axes, now, pattern, first if column else None)
-        draw_spectrum(page.figure.add_subplot(grid[rows - 1, 0]), now)
-        if now.regimes:
-            draw_regimes(page.figure.add_subplot(grid[rows - 1, 1]), now)
-    return page
-
-
 @dataclass(frozen=True)
 class Content:
     """What a report tells: everything that was read and computed for it.
@@ -410,6 +278,10 @@ class Content:
     what_if: str = ""
     linked: str = ""
     damper: SiteModel | None = None
+
+
+_WIDTH = 9.2
+"""Of the loops' figure [in]."""
 
 
 def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Content:
@@ -453,7 +325,6 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
 
 def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> HistoryStep:
     """Return a step with its z where the history does not tell it: an edit by hand."""
-    import numpy as np
 
     from ..identification.search import z_scale
 
@@ -551,10 +422,8 @@ def _performed(study: Study, plan: PlanFolder, others: bool) -> bool:
     their runs alike.
     """
     there = {Path(run.file).stem for run in study.settings.runs}
-    if not all(run.name in there for run in plan.runs):
-        return False
-    if not others:
-        return True
+    if not others or not all(run.name in there for run in plan.runs):
+        return all(run.name in there for run in plan.runs)
     measured = [(Path(run.source).stem, run) for run in study.read()]
     return all(
         any(name == planned.name and shows(run, planned, plan.motion) for name, run in measured)
@@ -655,38 +524,18 @@ def _tiles(content: Content) -> str:
         pairs.append(
             (f"{short_z(first)} → {short_z(now.z)}", "z of the first fitted model, and of this one")
         )
-    runs = content.study.settings.runs
-    count = sum(run.role == "holdout" for run in runs)
-    held_out = f"{count} of them held out" if count else "its last part held out"
-    test = sum(run.role == TEST for run in runs)
-    held_out += f", {test} test run{'s' * (test > 1)}" if test else ""
-    out = len(content.study.settings.excluded)
-    held_out += f"; {out} left out" if out else ""
-    pairs.append((f"{len(runs)} run{'s' * (len(runs) > 1)}", held_out))
     return html.tiles(pairs)
 
 
 def _where(content: Content) -> str:
-    now = content.now
+    title, now = "Error of the present model", content.now
     if now is None:
-        return html.section("Error of the present model", html.paragraphs(content.trouble))
-
-    along = "the two coordinates that it depends on most"
-    if now.second:
-        along = "the coordinate that it depends on most, and the remaining error along the next"
-    caption = (
-        f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
-        "interval, the blue band twice the expected noise. Below: its spectrum against that of "
-        f"the noise; z by speed{f' and {content.model.drive}' if content.study.drive else ''}."
-    )
-    title, say = headline(now), now.sentences
+        return html.section(title, html.paragraphs(content.trouble))
+    view = now.view()
+    shown = [one for one in (*view.blocks, *view.details) if not isinstance(one, Text)]
     return html.section(
-        "Error of the present model",
-        html.paragraphs(*say, kind="lead"),
-        *_sites(content),
-        html.figure(png(error_page(now)), title, caption),
-        html.blocks((run_table(now), pattern_table(now), band_table(now))),
-    )  # fmt: skip
+        title, html.paragraphs(*now.sentences, kind="lead"), html.blocks([shown[-1], *shown[:-1]])
+    )
 
 
 def _on_test_runs(content: Content) -> str:
@@ -704,29 +553,6 @@ def _on_test_runs(content: Content) -> str:
         html.paragraphs(*said, kind="lead"),
         html.blocks((run_table(content.test),)),
     )
-
-
-def _sites(content: Content) -> list[str]:
-    """Return the picture and table of a building's sites; nothing on a bench."""
-    now = content.now
-    if now is None or not now.sites:
-        return []
-
-    rings = f" Rings: without {content.added}." if content.before else ""
-    worst = now.sites[0]
-    name = site_name(worst.site)
-    title = f"The model is right within its noise at every site; {name} is worst"
-    if worst.fails:
-        title = f"Of the building's sites {name} is worst: z = {short_z(worst.z)}"
-    caption = (
-        "z at every site, from the top storey down, each compared with equilibrium on runs that no "
-        "fit has seen: small dots are runs, the large one all of them with its 95 % interval."
-        + rings
-    )
-    return [
-        html.figure(png(sites_page(now, content.before, 9.2)), title, caption),
-        html.blocks((site_table(now),)),
-    ]
 
 
 def _history(content: Content) -> str:
@@ -748,32 +574,25 @@ def _history(content: Content) -> str:
 
 
 def _before_after(content: Content) -> str:
-    if content.now is None or content.now.unit != "N":
+    now, before, added = content.now, content.before, content.added
+    cycles = chosen_cycles(now.predictions) if now is not None and now.unit == "N" else []
+    if now is None or before is None or not cycles:
         return ""
-
-    names = (f"without {content.added}", f"with {content.added}")
-    if content.before is None:
-        names = ("", "the model now")
-    z = f"z {short_z(content.before.z)} before, " if content.before else ""
-    title = f"Before and after {content.added}" if content.before else "The loops"
+    with look():
+        page = Page(_WIDTH, 2.0 * (LOOPS + 0.1), "")
+        for row, (one, name) in enumerate(((before, "without"), (now, "with"))):
+            loops = under(cycles, one.predictions)
+            loop_panels(page, (LOOPS + 0.1) * row, loops, f"{name} {added}")
     by = "the level of the command, else by speed" if content.study.drive else "speed"
-    loops = html.figure(
-        png(loops_page(content.before, content.now, names)),
-        f"Force loops, measured and predicted; {z}{short_z(content.now.z)} now",
+    z = f"z {short_z(before.z)} before, {short_z(now.z)} now"
+    caption = (
         f"Single cycles of held-out runs by {by}: measured (black), predicted (blue), and the band "
-        "in which 95 % of a true model's samples would be.",
+        "in which 95 % of a true model's samples would be."
     )
-    page = maps_page(content.before, content.now, names)
-    maps = ""
-    if page is not None:
-        maps = html.figure(
-            png(page),
-            "The error over displacement and velocity",
-            "Where the error is, over displacement and velocity, in units of the expected noise: "
-            "red where the measured force is above the model's, blue where it is below. A true "
-            "model leaves a pale map without a pattern.",
-        )
-    return html.section(title, loops, maps)
+    return html.section(
+        f"Before and after {added}",
+        html.figure(png(page), f"Force loops, measured and predicted; {z}", caption),
+    )
 
 
 def _parameters(content: Content) -> str:
@@ -792,8 +611,7 @@ def _data(content: Content) -> str:
     return html.section(
         "The data",
         html.table(header, rows, numbers=range(2, 5)),
-        "<h3>Noise, and how it was found</h3>",
-        html.table(*data_words(measured), numbers=(1, 2)),
+        html.blocks((channel_table(measured),)),
         html.items(content.notes),
     )
 

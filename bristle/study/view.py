@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -56,7 +56,7 @@ from .data_check import DataCheck
 from .forms import law_command
 from .history import HistoryStep, Step, history_steps
 from .identify import Identified
-from .pictures import draw_run, staircase_page
+from .pictures import draw_data_check, staircase_page
 from .steps import NOT_PROVEN, Added, Created, IdentifiedBuilding, unproven_of
 from .study import Study
 from .study_file import TEST
@@ -461,30 +461,54 @@ def data_check_view(found: DataCheck) -> View:
         told[one.level == "note"].append(Text(text, "note"))
     title = "The data can be used." if found.ok else "Correct these errors before you fit a model."
     figure = Figure(found.page, "All runs: channels over time, force over motion")
-    return View(title, (*told[False], _channels(found.runs), *told[True], figure))
+    return View(title, (*told[False], channel_table(found.runs), *told[True], figure))
 
 
-def _channels(runs: Sequence[Measurement]) -> Table:
+class ChannelRange(NamedTuple):
+    """A channel over all runs, in the unit that it is shown in, `factor` times the SI one.
+
+    `noise` and `rms` are those of the middle run, `kind` how its noise looks.
+    """
+
+    name: str
+    unit: str
+    factor: float
+    low: float
+    high: float
+    noise: float
+    rms: float
+    kind: str
+
+
+def channel_ranges(runs: Sequence[Measurement]) -> list[ChannelRange]:
+    """Return what each channel of some runs holds."""
+    found = []
+    for name in dict.fromkeys(name for run in runs for name in run.channels):
+        there = [run for run in runs if name in run.channels]
+        low = min(float(run[name].min()) for run in there)
+        high = max(float(run[name].max()) for run in there)
+        noise = float(np.median([run.noise.get(name, 0.0) for run in there]))
+        rms = float(np.median([np.std(run[name]) for run in there]))
+        factor, unit = scale(there[0].units[name], max(abs(low), abs(high)))
+        colours = [facts.colour for run in there if (facts := run.noise_facts.get(name))]
+        kind = max(set(colours), key=colours.count) if colours else "given"
+        low, high, noise, rms = (factor * one for one in (low, high, noise, rms))
+        found.append(ChannelRange(name, unit, factor, low, high, noise, rms, kind))
+    return found
+
+
+def channel_table(runs: Sequence[Measurement]) -> Table:
     """Return the table of the channels: range over all runs, noise in the middle one."""
-    rows = [_channel(name, [run for run in runs if name in run.channels])
-            for name in dict.fromkeys(name for run in runs for name in run.channels)]  # fmt: skip
+    rows = [
+        [
+            one.name, one.unit, plain(one.low, 4), plain(one.high, 4), plain(one.noise, 2),
+            f"{plain(100.0 * one.noise / one.rms, 2)} %" if one.rms > 0.0 else "", one.kind,
+        ]
+        for one in channel_ranges(runs)
+    ]  # fmt: skip
     rows += [_extra(name, runs) for name in dict.fromkeys(n for run in runs for n in run.extra)]
     header = ("channel", "unit", "lowest", "highest", "noise", "of RMS", "kind of noise")
     return Table(header, rows, range(2, 6))
-
-
-def _channel(name: str, there: Sequence[Measurement]) -> list[str]:
-    low = min(float(run[name].min()) for run in there)
-    high = max(float(run[name].max()) for run in there)
-    noise = float(np.median([run.noise.get(name, 0.0) for run in there]))
-    rms = float(np.median([np.std(run[name]) for run in there]))
-    factor, unit = scale(there[0].units[name], max(abs(low), abs(high)))
-    colours = [facts.colour for run in there if (facts := run.noise_facts.get(name))]
-    return [
-        name, unit, plain(factor * low, 4), plain(factor * high, 4), plain(factor * noise, 2),
-        f"{plain(100.0 * noise / rms, 2)} %" if rms > 0.0 else "",
-        max(set(colours), key=colours.count) if colours else "given",
-    ]  # fmt: skip
 
 
 def _extra(name: str, runs: Sequence[Measurement]) -> list[str]:
@@ -578,7 +602,7 @@ def study_page(study: Study) -> Page:
     runs = study.read("train") or study.read("holdout")
     if not runs:
         raise RecordError(f"{study.folder}: there is no run to draw.")
-    return draw_run(runs[0])
+    return draw_data_check(runs[:1])
 
 
 def diagnosed_view(verdict: Mapping[str, Any], folder: Path, known: Sequence[str] = ()) -> View:
