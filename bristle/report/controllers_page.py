@@ -36,7 +36,6 @@ def controllers_report(found: ControllerComparison) -> str:
         *(_motion(found, name) for name in found.motions),
         _constants(found),
         _limits(found),
-        _robust(found),
         _again(found),
     ]  # fmt: skip
     foot = (
@@ -130,32 +129,6 @@ def _limits(found: ControllerComparison) -> str:
             "of it is the price of not knowing the future."
         ),
         html.table(titles, texts, [1, 2, 3, 4]),
-    )
-
-
-def _robust(found: ControllerComparison) -> str:
-    """Return the worst cases over their members."""
-    spread = found.setting.spread
-    if spread is None or found.worst is None:
-        return ""
-    unit = found.setting.judged.unit
-    names = list(dict.fromkeys(found.worst["controller"]))
-    texts = []
-    for name in names:
-        row = [name]
-        for motion in found.motions:
-            worst = found.worst_value(motion, name)
-            more = 100.0 * (worst / found.value(motion, name) - 1.0)
-            row.append(f"{quantity(worst, unit)} (+{more:.0f} %)")
-        texts.append(row)
-    return html.section(
-        "The worst case",
-        html.paragraphs(
-            f"{spread.members} members with {found.setting.varied}; the same buildings and dampers "
-            "for all controllers, which know nothing of them. The largest value of the case and "
-            "its members, and how far it lies above the case."
-        ),
-        html.table(["", *found.motions], texts, range(1, 1 + len(found.motions))),
     )
 
 

@@ -104,7 +104,7 @@ def identified_view(found: Identified) -> View:
             *(Text(note, "note") for note in found.notes),
         ),
         (
-            Text(starts), error_table(found), errors_beside(found),
+            Text(starts), errors_beside(found),
             # Where all laws were asked for, they are told as they do with effects.
             *([law_errors(found)] if found.table and not found.laws else ()),
             Figure(lambda: draw_identified(found), f"{title}: force measured and predicted"),
@@ -142,17 +142,6 @@ def _columns(found: Identified) -> list[tuple[str, RigErrors]]:
 
 def _roles(found: Identified) -> list[str]:
     return [role for role in ROLES if role in found.errors.force]
-
-
-def error_table(found: Identified) -> Table:
-    """Return the error of the force on training and held-out runs."""
-    columns = _columns(found)
-    rows = [
-        [_NAMES[role], *(errors.force[role].text() for _, errors in columns)]
-        for role in _roles(found)
-    ]
-    header = ("force error", *(name for name, _ in columns))
-    return Table(header, rows, range(1, len(header)))
 
 
 def left_out(found: Identified) -> list[Text]:
