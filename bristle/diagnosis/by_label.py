@@ -204,7 +204,7 @@ def dependences(prepared: Prepared, *, with_motion: bool = False) -> list[Depend
         for one in labels_of([run.labels for run in runs])
         if len({run.labels[one.name] for run in train.runs}) > 1
     ]
-    if not labels or len(runs) < FEWEST or not prepared.held_out.noise_known:
+    if not labels or len(runs) < FEWEST:
         return []
     if any(run.force_draws is not None for run in runs):
         return []  # a force by equilibrium has the rest of a building in it
@@ -256,8 +256,8 @@ def _dependence(
     return Dependence(effect, text, label.name, gain)
 
 
-def promising(problem: Problem, model: Model) -> dict[str, str]:
-    """Return the texts of effects by name: of each label the dependence that fits runs best.
+def promising(problem: Problem, model: Model) -> list[Dependence]:
+    """Return of each label the dependence that fits runs best, the most promising first.
 
     Nothing is proven by that, of few runs least.
 
@@ -266,7 +266,7 @@ def promising(problem: Problem, model: Model) -> dict[str, str]:
     problem : the training runs, which alone are looked at
     model : fitted to them
     """
-    runs, out = problem.runs, dict[str, str]()
+    runs, out = problem.runs, list[Dependence]()
     for label in labels_of([run.labels for run in runs]):
         numbers = label.numbers()
         still = label.name == TEMPERATURE and float(np.ptp(numbers)) < WARM
@@ -274,13 +274,18 @@ def promising(problem: Problem, model: Model) -> dict[str, str]:
         if still or with_motion or not label.is_number:
             continue
         fits, middle = RunwiseFit(problem, model), float(numbers.mean())
-        gains = [(*fits.gain(j, (numbers - middle)[:, None]), j) for j in range(len(fits.names))]
+        gains = [
+            (*fits.gain(j, (numbers - middle)[:, None]), j)
+            for j, name in enumerate(fits.names)
+            if "_by_" not in name
+        ]
         gain, size, j = max(gains, key=lambda one: one[0])
         name = fits.names[j]
         effect = f"{name.replace('.', '_')}_by_{as_word(label.name)}"
         if gain >= WORTH and size.any() and effect.isidentifier() and effect not in EFFECTS:
-            out[effect] = _text(effect, name, label, model, size, (middle, numbers))
-    return out
+            text = _text(effect, name, label, model, size, (middle, numbers))
+            out.append(Dependence(effect, text, label.name, gain))
+    return sorted(out, key=lambda one: -one.gain)
 
 
 _made: ContextVar[dict[str, str] | None] = ContextVar("made", default=None)

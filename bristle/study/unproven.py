@@ -8,6 +8,7 @@ what lowers the error on the training runs left out of the fit; the held-out run
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -34,6 +35,9 @@ TRIED = 3
 
 MOST_SPENT = 100e6
 """Steps of dampers' forces, see `Effort`, from which on nothing further is compared."""
+
+TOGETHER = 2
+"""Dependences on labels that another law is compared with at once, at most."""
 
 SWEEPS = 4
 """Jacobians of the fit to a fold's runs, which begins at the values of all."""
@@ -71,6 +75,15 @@ def unproven(
         return _chosen(prepared, trials, laws, most, effort)
 
 
+@dataclass(frozen=True)
+class _Candidate:
+    """A model that may predict better, the law's name where it is another one, and its texts."""
+
+    model: Model
+    law: str = ""
+    written: Mapping[str, str] = field(default_factory=dict)
+
+
 def _chosen(
     prepared: Prepared, trials: Sequence[Trial], laws: Sequence[LawTrial], most: int, effort: Effort
 ) -> Unproven:
@@ -78,44 +91,108 @@ def _chosen(
     missed = missed_by(prepared.before, prepared.searched)
     data = prepared.with_excess(missed) if missed > 0.0 else prepared
     problem = data.searched
-    best, law = refine(prepared.before.model, problem, SWEEPS), ""
-    errors = left_out_errors(best, problem)
+    best = _Candidate(refine(prepared.before.model, problem, SWEEPS))
+    errors = left_out_errors(best.model, problem)
 
-    def gaining(models: Sequence[Model], sweeps: int = 0) -> int | None:
-        """Return which model lowers the error most, beyond chance; its errors are then those.
+    def gains(candidates: Sequence[_Candidate], sweeps: int = 0) -> bool:
+        """Take the candidate that lowers the error most, beyond chance; return whether one does.
 
         Each is refined before, by so many sweeps.
         """
         nonlocal best, errors
         able: list[tuple[float, int, Model, list[Array]]] = []
-        for k, model in enumerate(models):  # one by one, so that what is spent is told alike
+        for k, one in enumerate(candidates):  # one by one, so that what is spent is told alike
             if effort.steps > MOST_SPENT:
                 break
-            model = refine(model, problem, sweeps) if sweeps else model
-            found = left_out_errors(model, problem)
+            with defined({name: text for name, text in one.written.items() if name not in EFFECTS}):
+                model = refine(one.model, problem, sweeps) if sweeps else one.model
+                found = left_out_errors(model, problem)
             if lowers(errors, found, GAIN, BEYOND):
                 able.append((_mean_square(found), k, model, found))
         if not able:
-            return None
+            return False
         _, k, model, errors = min(able, key=lambda one: one[:2])
-        best = refine(model, problem, LONG)
-        return k
+        written = {**best.written, **candidates[k].written}
+        stay.enter_context(defined({n: text for n, text in written.items() if n not in EFFECTS}))
+        best = _Candidate(refine(model, problem, LONG), candidates[k].law or best.law, written)
+        return True
 
-    others = [row for row in laws if row.trial.model.law != best.law]
-    others = sorted(others, key=lambda row: row.error_train.rms)[:TRIED]
-    taken = gaining([row.trial.model for row in others], LONG)
-    if taken is not None:
-        law = others[taken].law
-    texts = promising(problem, best)
-    with defined(texts):
-        while len(best.effects) < most and effort.steps <= MOST_SPENT:
-            able = [] if texts else [one for one in trials if _joins(one, best)]
-            if not able:
-                able = try_all(best, problem, data.held_out, shown=data.shown, most=SECONDS)
+    with ExitStack() as stay:
+        gains(_other_laws(laws, best.model, problem), LONG)
+        while len(best.model.effects) < most and effort.steps <= MOST_SPENT:
+            texts = {one.name: one.text for one in promising(problem, best.model)}
+            with defined(texts):
+                able = [] if texts else [one for one in trials if _joins(one, best.model)]
+                if not able:
+                    able = try_all(
+                        best.model, problem, data.held_out, shown=data.shown, most=SECONDS
+                    )
             able.sort(key=lambda one: one.train)
-            if gaining([one.model for one in able[:TRIED]]) is None:
+            tried = [
+                _Candidate(one.model, "", {n: texts[n] for n in one.effects if n in texts})
+                for one in able[:TRIED]
+            ]
+            if not gains(tried):
                 break
-    return Unproven(best, law, {name: texts[name] for name in best.effects if name in texts})
+        model = _without_idle(best.model, prepared.before.model.effects, errors, problem)
+    written = {name: text for name, text in best.written.items() if name in model.effects}
+    return Unproven(model, best.law, written)
+
+
+def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> list[_Candidate]:
+    """Return the laws that fit the training runs best, each with what its parameters owe labels.
+
+    Where a label parts the runs, a law without it tells little of what the law can do.
+    """
+    able = []
+    for row in laws:
+        if row.trial.model.law != model.law:
+            gain = max((one.gain for one in promising(problem, row.trial.model)), default=0.0)
+            able.append((row.error_train.rms**2 * (1.0 - gain), gain > 0.0, row))
+    able.sort(key=lambda one: one[0])
+    closer = []
+    for left, labelled, row in able[: 2 * TRIED]:
+        one = _Candidate(row.trial.model, row.law)
+        if labelled:
+            one = _with_labels(one, problem)
+            with defined(one.written):
+                left = _mean_square(errors_of(one.model, problem))
+        closer.append((left, one))
+    closer.sort(key=lambda one: one[0])
+    return [one for _, one in closer[:TRIED]]
+
+
+def _with_labels(law: _Candidate, problem: Problem) -> _Candidate:
+    """Return a law with the dependences on labels that promise most, one after the other.
+
+    A yield force and the way to it may both go with a label: one alone then gains little.
+    """
+    model, written = law.model, dict[str, str]()
+    with ExitStack() as stay:
+        for _ in range(TOGETHER):
+            worth = promising(problem, model)[:1]
+            if not worth:
+                break
+            written[worth[0].name] = worth[0].text
+            stay.enter_context(defined({worth[0].name: worth[0].text}))
+            model = refine(model.with_effect(worth[0].name), problem, SWEEPS)
+    return _Candidate(model, law.law, written)
+
+
+def _without_idle(
+    model: Model, proven: Sequence[str], errors: list[Array], problem: Problem
+) -> Model:
+    """Return a model without the effects that lower its error on runs left out no more.
+
+    An effect that was taken first may be idle beside those that came later.
+    """
+    added = [name for name in model.effects if name not in proven]
+    for name in added[:-1]:  # the last one was just found to lower the error
+        fewer = refine(model.only([n for n in model.effects if n != name]), problem, LONG)
+        found = left_out_errors(fewer, problem)
+        if not lowers(found, errors, GAIN, BEYOND):
+            model, errors = fewer, found
+    return model
 
 
 def _joins(trial: Trial, model: Model) -> bool:
