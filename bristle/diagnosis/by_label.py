@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import wraps
+from types import SimpleNamespace
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -33,14 +34,15 @@ from ..identification.start_grid import Search, refine
 from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS
 from ..units import canonical
-from ..user_code.load import define, undefine
+from ..user_code.load import define, defined, undefine
 from .decision import TOLD
 from .prepared import Prepared
 from .site_diagnosis import SiteDiagnosis
 from .verdict import Diagnosis, gains_of
 
-LIKELY = 0.005
-"""Largest probability, over all labels and parameters looked at, that chance parts the runs so."""
+PLAUSIBLE, LIKELY = 0.05, 0.005
+"""Largest probability that chance parts the runs so: for a fit, and beside that fit, there over all
+labels and parameters looked at. A model that misses much says little of each run."""
 
 WORTH = 0.04
 """Smallest share of the training runs' loss that is worth a trial: z falls by half of it."""
@@ -50,6 +52,9 @@ BENT = 0.01
 
 WARM = 2.0
 """Kelvin by which runs differ at least for their temperature to be tried without proof."""
+
+SWEEPS = 4
+"""Jacobians of that fit."""
 
 FEWEST, MOST_LEVELS, MOST = 4, 6, 4
 """Runs that tell of a label, levels that have a step each, and dependences that are tried."""
@@ -217,15 +222,16 @@ def dependences(prepared: Prepared, *, with_motion: bool = False) -> list[Depend
         own = [
             one
             for j in range(len(fits.names))
-            if (one := _dependence(fits, j, label, train, model, looked))
+            if (one := _dependence(fits, j, label, train, model, BENT * looked / LIKELY))
         ]
         own.sort(key=lambda one: -one.gain)
-        found += [one for one in own[:2] if one.gain >= 0.5 * own[0].gain]
+        own = [one for one in own[:2] if one.gain >= 0.5 * own[0].gain]
+        found += [one for one in own if _beside(one, label, train, runs, model) <= looked]
     return sorted(found, key=lambda one: -one.gain)[:MOST]
 
 
 def _dependence(
-    fits: RunwiseFit, j: int, label: LabelOfRuns, train: Problem, model: Model, likely: float
+    fits: RunwiseFit, j: int, label: LabelOfRuns, train: Problem, model: Model, bent: float
 ) -> Dependence | None:
     """Return how a parameter depends on a label; None where it does not, or hardly."""
     name = fits.names[j]
@@ -240,13 +246,13 @@ def _dependence(
     of_line = chance_of(asked[told], line[told]) if label.is_number else 1.0
     stepped = not label.is_number or (
         2 < len(label.levels) <= MOST_LEVELS
-        and chance_of(asked[told], steps[told], line[told]) < BENT * likely / LIKELY
+        and chance_of(asked[told], steps[told], line[told]) < bent
     )
     if stepped and len({*at_train}) < len(label.levels):
         stepped = False  # a level that training has not seen has no step
-    if not stepped and (not label.is_number or of_line > likely):
+    if not stepped and (not label.is_number or of_line > PLAUSIBLE):
         return None
-    if stepped and chance_of(asked[told], steps[told]) > likely:
+    if stepped and chance_of(asked[told], steps[told]) > PLAUSIBLE:
         return None
     columns = steps if stepped else line
     gain, sizes = fits.gain(j, columns)
@@ -254,6 +260,27 @@ def _dependence(
         return None
     text = _text(effect, name, label, model, sizes, None if stepped else (middle, numbers))
     return Dependence(effect, text, label.name, gain)
+
+
+def _beside(
+    one: Dependence, label: LabelOfRuns, train: Problem, runs: list[Run], model: Model
+) -> float:
+    """Return the probability that chance parts runs by a dependence, told beside a fit with it."""
+    with defined({one.name: one.text}):
+        effect = cast(Any, EFFECTS[one.name])
+        whole = refine(model.with_effect(one.name), train, SWEEPS)
+        fits = RunwiseFit(train.of(runs), whole)
+        asked, told = fits.apart(fits.names.index(effect.changes))
+        p = {own: whole.value(f"{one.name}.{own}") for own in effect.parameters}
+        value = whole.value(effect.changes)
+        (word,), codes = effect.labels, label.numbers()
+        moved = [
+            effect.changed(SimpleNamespace(value=value), None, effect.values_of({**p, word: code}))
+            for code in codes
+        ]
+    asked = asked + np.array(moved) - value
+    design = label.steps() if effect.tables else (codes - codes.mean())[:, None]
+    return chance_of(asked[told], design[told])
 
 
 def promising(problem: Problem, model: Model) -> list[Dependence]:
