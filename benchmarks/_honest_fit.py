@@ -6,7 +6,7 @@ samples and the same smoothed motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from bristle.identification.starts import start_models
 from bristle.model.model import Model
 from bristle.physics.laws import base_and_variant, law_names
 
-from . import _measured
+from ._measured import BENCHES
 from ._rows import Row
 
 STARTS = 8
@@ -31,14 +31,6 @@ TRAINING, HELD_OUT = 1.02, 1.05
 MOST = 100
 """Evaluations of scipy's search, Jacobians not counted."""
 FAR = 1e9  # N, in place of a force that is not a number
-
-
-SETS: dict[str, Callable[[Path], _measured.Runs]] = {
-    "mr_damper_utfpr": _measured.utfpr_runs,
-    "mr_damper_mathworks": _measured.velocity_force_runs,
-    "friction_tribometer": _measured.friction_runs,
-    "shock_absorber_dyno": _measured.absorber_runs,
-}
 
 
 @dataclass(frozen=True)
@@ -58,7 +50,7 @@ class Beside:
 
 def beside(data: Path, sets: str = "", laws: tuple[str, ...] = ()) -> Iterator[Beside]:
     """Yield every law on every set that is there and whose name holds `sets`."""
-    for name, runs in SETS.items():
+    for name, (_, runs) in BENCHES.items():
         if sets not in name or not (data / name).is_dir():
             continue
         train, held_out = bench_rig(*runs(data / name)).sites(Model("bingham"))[DAMPER].pair
@@ -117,7 +109,7 @@ def rows(data: Path) -> list[Row]:
     """Return the figures: the largest ratio of each set, on training and on held-out runs."""
     out: list[Row] = []
     found = [*beside(data)]
-    for name in SETS:
+    for name in BENCHES:
         own = [one for one in found if one.data == name]
         if not own:
             out.append(Row(f"fit / least squares, {name}", f"not run: there is no {name}"))

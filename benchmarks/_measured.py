@@ -1,7 +1,5 @@
 """Published measurements: their runs to fit to and held out, and what is found on them."""
 
-# Longer than 300 lines: half of it says in words what each set is worth.
-
 from __future__ import annotations
 
 import time
@@ -28,8 +26,6 @@ Runs = tuple[list[Measurement], list[Measurement]]
 """Runs that are fitted to, and runs held out."""
 
 LAWS = ("bingham", "lugre")
-BEYOND = 0.5
-"""Share of the force that stays unexplained above which a law is not the rig's."""
 
 UTFPR_TRAIN = tuple(
     f"ident_{name}.csv"
@@ -49,7 +45,7 @@ LEVELS = ("base", *(f"floor{k}" for k in range(1, 6)))
 
 @dataclass
 class Row:
-    """One row: the data, what was fitted and held out, what was found and what it is worth.
+    """One row: the data, what was fitted and held out, what was found.
 
     `before`, `after`: share of the held-out force's RMS that is not predicted; `after_with` what
     was added for it; `least_squares` that share for the bare law fitted by least squares; `noise`
@@ -70,7 +66,6 @@ class Row:
     reference: str = ""
     verdict: str = ""
     words: str = ""
-    worth: str = ""
     seconds: float = float("nan")
     skipped: str = field(default="")
 
@@ -100,11 +95,6 @@ def bench_row(
     ]
     row.least_squares = error_table(*problems, 0.0, laws=(row.law,), starts=2)[0].error.share
     row.reference = told(after)
-    if row.after > BEYOND:
-        row.worth = (
-            f"Little by itself: {row.after:.0%} of the force stays unexplained. The law does not "
-            f"describe this rig, so the effect named with it means little. {row.worth}"
-        )
 
 
 def verdict_of(found: Diagnosis) -> str:
@@ -140,14 +130,6 @@ def utfpr(folder: Path, law: str) -> Row:
     train, held = utfpr_runs(folder)
     row.fitted = f"{len(train)} of 38 ident runs, 10 s each, 0 to 3.2 V"
     row.held_out = f"{len(held)} of 12 valid runs, 0.87 V and 2.18 V (a voltage not fitted)"
-    row.worth = (
-        "The force is offset by some 130 N, and the zero of the displacement differs between runs. "
-        "So the model needs a constant force and a stiffness, and gas_spring is the only effect "
-        "with a constant force. The data cannot distinguish an accumulator from an offset of the "
-        "load cell. The noise is small compared with the error of any law, and its estimates "
-        "differ between similar runs. So z has no firm unit here: read the share. Each run has one "
-        "frequency, and cannot show what needs several."
-    )
 
     def told(trial: Trial) -> str:
         texts = []
@@ -189,13 +171,6 @@ def velocity_force(folder: Path, law: str) -> Row:
     row = Row("MR damper, velocity to force", law)
     train, held = velocity_force_runs(folder)
     row.fitted, row.held_out = "samples 1-2000 (10 s)", "samples 2001-3499 (7.5 s)"
-    row.worth = (
-        "This is one run at one unknown current, cut in two parts. It shows nothing about the "
-        "voltage. The noise of the velocity cannot be separated from the velocity itself, so z has "
-        "no firm unit here: read the share. With a Bingham law, mount_compliance, presliding and "
-        "backlash leave nearly the same error. It is certain that the force lags behind a sign "
-        "law; it is not certain which of the three causes it."
-    )
     run = read_measurement(folder / "mrdamper.csv")
     viscous, best_tanh = (fit_of(run, tanh) for tanh in (False, True))
 
@@ -242,13 +217,6 @@ def friction(folder: Path, law: str) -> Row:
     row = Row("friction rig", law)
     train, held = friction_runs(folder)
     row.fitted, row.held_out = "20 - 50 s of 213 s", "150 - 170 s"
-    row.worth = (
-        "This is no damper, but dry friction under 5 N. Half of the time the slider is at rest, "
-        "where a Bingham law predicts no force and any value fits. Each reversal is a ramp over "
-        "0.1 mm, which is four tenths of the stroke: rig and contact act in series. There is no "
-        "voltage, one speed and one stroke, so a dependence on speed cannot be distinguished from "
-        "a dependence on time."
-    )
 
     def told(trial: Trial) -> str:
         low, high = np.percentile(predicted(trial, held)[0] / 5.0, [1.0, 99.0])
@@ -356,11 +324,13 @@ def shake_table(folder: Path, law: str) -> Row:
         f"{again.damping_ratios[0]:.1%} in the first mode. {verdict.words}"
     )
     row.reference = "none with the data"
-    row.worth = (
-        "The masses are not published. They were taken as equal, so stiffnesses are relative and "
-        "shear is per mass. The authors filtered the channels and integrated the accelerations to "
-        "displacements. So the estimated noise is far too small and z far too large. Keep the "
-        "first frequency and its damping. Rubber isolators are not linear, and the only hysteresis "
-        "of an isolation layer in the library is dry friction."
-    )
     return row
+
+
+BENCHES: dict[str, tuple[str, Callable[[Path], Runs]]] = {
+    "mr_damper_utfpr": ("MR damper on a crank (UTFPR)", utfpr_runs),
+    "mr_damper_mathworks": ("MR damper, velocity to force", velocity_force_runs),
+    "friction_tribometer": ("friction rig", friction_runs),
+    "shock_absorber_dyno": ("shock absorber", absorber_runs),
+}
+"""Folder, title and runs of the sets with a measured force, held out as they were published."""

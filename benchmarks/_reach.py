@@ -17,16 +17,8 @@ from . import _measured
 from ._answers import Answer, Answers
 from ._floor import LEARNERS, WITHOUT, have_learner, least_squares, without_physics
 from ._free import bare_laws, corrected_runs, opened_once, steps
-from ._measured import Row, Runs
+from ._measured import BENCHES, Row, Runs
 from ._rows import Row as Figure
-
-_GIVEN = {
-    "mr_damper_utfpr": ("MR damper on a crank (UTFPR)", _measured.utfpr_runs),
-    "mr_damper_mathworks": ("MR damper, velocity to force", _measured.velocity_force_runs),
-    "friction_tribometer": ("friction rig", _measured.friction_runs),
-    "shock_absorber_dyno": ("shock absorber", _measured.absorber_runs),
-}
-"""Folder, title and runs of the sets with a measured force, held out as they were published."""
 
 SPLITS = {"last third": _measured.last_third, "middle level": _measured.by_level}
 """Other ways of holding runs out: the worst of all counts."""
@@ -37,10 +29,10 @@ def _other(make: Callable[[Path], Runs], split: Callable[[Runs], Runs]) -> Calla
 
 
 SETS: dict[str, tuple[str, Callable[[Path], Runs]]] = {
-    **_GIVEN,
+    **BENCHES,
     **{
         f"{folder}/{name}": (f"{title}, {name} held out", _other(make, split))
-        for folder, (title, make) in _GIVEN.items()
+        for folder, (title, make) in BENCHES.items()
         for name, split in SPLITS.items()
         if name != "middle level" or folder in ("mr_damper_utfpr", "shock_absorber_dyno")
     },

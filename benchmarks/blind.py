@@ -8,7 +8,6 @@ the run continues there. Cases of an older version of the diagnoser are asked ag
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import secrets
 import sys
@@ -22,11 +21,10 @@ if __package__ in (None, ""):  # `python benchmarks/blind.py` finds only this fo
 from benchmarks import peers
 from benchmarks._blind import plan, record, table, work
 from benchmarks._blind.plan import CASES
-from benchmarks._rows import Row
+from benchmarks._rows import Row, show
 
 BUILDINGS = 40
 SHARED = 40
-MARK = "<!-- measured -->"
 
 
 def options() -> argparse.ArgumentParser:
@@ -46,11 +44,8 @@ def options() -> argparse.ArgumentParser:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
     parser.add_argument("--only", choices=plan.KINDS, default="", help="cases of one kind")
     parser.add_argument("--part", choices=work.PARTS, action="append", help="default: both")
-    parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask, tcp://host:port")
     parser.add_argument("--times", action="store_true", help="also time fresh processes")
     parser.add_argument("--report", action="store_true", help="count what is finished; run nothing")
-    parser.add_argument("--json", type=Path, help="write rows and conditions to a file")
-    parser.add_argument("--markdown", type=Path, help="write the table to a file, behind its mark")
     return parser
 
 
@@ -101,21 +96,8 @@ def main(given: Sequence[str] | None = None) -> int:
     times = _times(path, measure=arguments.times)
     rows = table.figures(work.finished(path, tasks, "diagnosis"), times)
     rows += peers.figures(work.finished(path, tasks, "peers"))
-    table.show(rows)
-    conditions = {"seed": seed, "cases": len(tasks), "digests": work.digests()}
-    if arguments.json:
-        whole = {**conditions, "rows": table.as_json(rows)}
-        arguments.json.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
-    if arguments.markdown:
-        _into_page(arguments.markdown, f"Seed {seed}, {len(tasks)} cases.", table.markdown(rows))
+    show([one.row() for one in rows])
     return code
-
-
-def _into_page(page: Path, conditions: str, text: str) -> None:
-    """Write a table into a page, behind its mark where it has one."""
-    head = page.read_text(encoding="utf-8") if page.exists() else ""
-    head = head[: head.index(MARK)] + MARK + "\n\n" if MARK in head else ""
-    page.write_text(f"{head}{conditions}\n\n{text}", encoding="utf-8")
 
 
 def advance(tasks: list[plan.Task], path: Path, arguments: argparse.Namespace) -> None:
@@ -129,7 +111,7 @@ def advance(tasks: list[plan.Task], path: Path, arguments: argparse.Namespace) -
         if task.key not in done[part] and part in work.parts_of(task)
     ]
     begun = time.monotonic()
-    for number, line in enumerate(work.runner(arguments.workers, arguments.cluster)(jobs), 1):
+    for number, line in enumerate(work.local(jobs, arguments.workers), 1):
         record.append(path, line)
         left = (time.monotonic() - begun) / number * (len(jobs) - number)
         if sys.stderr.isatty():
@@ -158,11 +140,7 @@ def run() -> list[Row]:
     path = record.path_of(seed)
     lines = work.finished(path, tasks, "diagnosis")
     rows = table.figures(lines, _times(path, measure=False))
-    return [
-        Row(row.name, f"{row.text()} ({row.counts})", row.goal, row.ratio)
-        for row in rows
-        if row.group == "main" and row.value is not None
-    ]
+    return [one.row() for one in rows if one.group == "main" and one.value is not None]
 
 
 if __name__ == "__main__":

@@ -23,25 +23,28 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
+import pandas as pd
 
-from bristle.data.measurement import Measurement
+from bristle.core.arrays import Array
+from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.diagnosis.joint_search import diagnose_laws
 from bristle.diagnosis.law_choice import LawAndEffects
 from bristle.diagnosis.sensor_faults import instruments_of
 from bristle.diagnosis.trials import joinable
+from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem
 from bristle.identification.start_grid import Search, initial_guesses
 from bristle.model.model import Model
 from bristle.physics.effect import effects_of
 from bristle.physics.forms import split_form
+from bristle.physics.laws import LAWS as LIBRARY
 
 from ._answers import Answer, asked
 from ._blind import cases, score
 from ._blind.plan import Task, make_plan
 from ._blind.subject import halves
 from ._rows import Row
-from .laws import recorded, truth_of
 
 LAWS = ("bouc_wen", "tanh", "dahl", "modified_bouc_wen")
 
@@ -51,6 +54,15 @@ LEAST, MOST = 0.1, 0.6
 """Share of the force that an effect must change, beyond what the law absorbs."""
 
 DRAWN = 4100
+
+STEP, FINER, SECONDS = 0.002, 10, 12.0
+"""Sampling step [s], steps of the truth within one of them, length of a run [s]."""
+
+NOISE = 0.01
+"""Standard deviation of a channel's noise, by that of the channel."""
+
+SPREAD = 1.5
+"""A parameter of the truth lies between its default over this and times it."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +92,54 @@ def other_law(number: int, with_effect: bool) -> Hidden:
         effects = (effect,)
     runs = [recorded(law, values, rng, name, effects) for name in RUNS]
     return Hidden(law, effects, strength, runs[:4], runs[4:])
+
+
+def motion(rng: np.random.Generator) -> tuple[Array, ...]:
+    """Return t [s], x [m], v [m/s], a [m/s2] and V [V], every STEP / FINER."""
+    t = np.arange(round(SECONDS / STEP) * FINER + 1) * STEP / FINER
+    x, v, a = np.zeros((3, len(t)))
+    for low, high, size in ((0.5, 1.5, 4e-3), (1.5, 3.0, 2.5e-3), (3.0, 6.0, 1.2e-3)):
+        w, phase = 2.0 * np.pi * rng.uniform(low, high), rng.uniform(0.0, 2.0 * np.pi)
+        size *= rng.uniform(0.7, 1.3)
+        x += size * np.sin(w * t + phase)
+        v += size * w * np.cos(w * t + phase)
+        a -= size * w * w * np.sin(w * t + phase)
+    swing = 2.5 * (1.0 + np.sin(2.0 * np.pi * rng.uniform(0.3, 1.2) * t))
+    levels = rng.uniform(0.0, 8.0, 12)
+    held = levels[np.minimum((t / SECONDS * 12).astype(int), 11)]
+    return t, x, v, a, np.where(t < 0.5 * SECONDS, swing, held)
+
+
+def truth_of(law: str, rng: np.random.Generator) -> dict[str, float]:
+    """Return parameters of a law about its defaults; those that no fit moves stay there."""
+    found = {}
+    for name, parameter in LIBRARY[law].parameters.items():
+        if name not in LIBRARY[law].fixed():
+            low, high = parameter.bounds
+            value = parameter.value * SPREAD ** rng.uniform(-1.0, 1.0)
+            if parameter.value == 0.0:
+                value = rng.uniform(-0.5, 0.5)
+            found[name] = float(np.clip(value, low + 0.1 * abs(value), high))
+    return found
+
+
+def recorded(
+    law: str,
+    values: dict[str, float],
+    rng: np.random.Generator,
+    name: str,
+    effects: Sequence[str] = (),
+) -> Measurement:
+    """Return one run of a law, and of effects with it, measured with noise."""
+    t, x, v, a, V = motion(rng)
+    force = DamperForces(law, list(effects)).force(x, v, a, V, STEP / FINER, values)
+    seen = {"displacement [m]": x, "velocity [m/s]": v, "voltage [V]": V, "force [N]": force}
+    frame = {"time [s]": t[::FINER]}
+    for title, signal in seen.items():
+        shown = signal[::FINER]
+        noise = NOISE * np.std(shown) * rng.standard_normal(len(shown))
+        frame[title] = shown if title.startswith("voltage") else shown + noise
+    return measurements_of_frame(pd.DataFrame(frame), name)[0]
 
 
 def _strong(model: Model, rng: np.random.Generator) -> tuple[str, dict[str, float], float]:

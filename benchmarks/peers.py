@@ -54,4 +54,4 @@ def run() -> list[Row]:
     if seed is None:
         return [Row("peers of the diagnosis", "not run yet: python benchmarks/blind.py")]
     rows = figures(work.finished(record.path_of(seed), plan.make_plan(seed, plan.CASES), "peers"))
-    return [Row(r.name, f"{r.text()} ({r.counts})") for r in rows if r.value is not None]
+    return [one.row() for one in rows if one.value is not None]

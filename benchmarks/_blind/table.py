@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from .._rows import Row
 from . import score
 from .plan import APART, SITES
 from .score import Count, Line, count
@@ -31,11 +32,16 @@ class Figure:
     ratio: float | None
     group: str = "main"
 
-    def text(self) -> str:
-        """Return the value in words."""
-        if self.value is None:
-            return NOT_YET
-        return f"{self.value:.1f} %" if self.interval is not None else f"{self.value:.3g}"
+    def row(self) -> Row:
+        """Return the figure as one of all benchmarks, with its counts and its interval."""
+        measured = NOT_YET
+        if self.value is not None and self.interval is not None:
+            low, high = self.interval
+            measured = f"{self.value:.1f} % ({self.counts}; {low:.0f}-{high:.0f} %)"
+        elif self.value is not None:
+            measured = f"{self.value:.3g} ({self.counts})"
+        name = self.name if self.group == "main" else f"{self.group}: {self.name}"
+        return Row(name, measured, self.goal, self.ratio)
 
 
 def share(
@@ -85,7 +91,7 @@ def figures(lines: list[Line], times: dict[str, float] | None = None) -> list[Fi
     """Return the rows of the table at 1 % noise, then the same by parts, then at 3 %."""
     bench = [line for line in lines if line["task"]["kind"] not in APART]
     rows = main_rows(bench, 0.01, "main") + parameter_rows(bench, 0.01, "main")
-    rows += time_rows(bench, times or {}) + shared_rows(lines) + further_rows(lines)
+    rows += time_rows(bench, times or {}) + shared_rows(lines)
     rows += structure_rows(lines) + part_rows(bench)
     if any(abs(line["task"]["noise"] - 0.03) < 1e-9 for line in bench):
         rows += main_rows(bench, 0.03, "3 % noise") + parameter_rows(bench, 0.03, "3 % noise")
@@ -196,17 +202,6 @@ def shared_rows(lines: list[Line]) -> list[Figure]:
     ]  # fmt: skip
 
 
-def further_rows(lines: list[Line]) -> list[Figure]:
-    """Return the rows of the outside effects that the main plan leaves out, if there are any."""
-    strong = binned(of_kind(lines, "further", 0.01), "15 %", "40 %")
-    unknown = [line for line in strong if score.calls_unknown(line)]
-    rows = [
-        ("further outside effect unknown, 15 and 40 %", count(strong, score.calls_unknown)),
-        ("further: its coordinate right, of those unknown", count(unknown, score.coordinate_right)),
-    ]
-    return [share(name, found) for name, found in rows] if strong else []
-
-
 def structure_rows(lines: list[Line]) -> list[Figure]:
     """Return the rows of the building rig."""
     rows = []
@@ -313,49 +308,3 @@ def by_effect(lines: list[Line]) -> dict[str, list[Line]]:
     """Return lines by the effect that is hidden, in the order of the names."""
     names = sorted({line["task"]["effect"] for line in lines})
     return {name: [line for line in lines if line["task"]["effect"] == name] for name in names}
-
-
-def as_json(rows: list[Figure]) -> list[dict[str, Any]]:
-    """Return the rows as plain data."""
-    return [asdict(row) for row in rows]
-
-
-def _cells(row: Figure) -> tuple[str, str, str, str, str]:
-    spread = ""
-    if row.interval is not None and row.value is not None:
-        spread = f"{row.interval[0]:.0f}-{row.interval[1]:.0f} %"
-    mark = "" if row.ratio is None else "reached" if row.ratio <= 1.0 else "missed"
-    return row.text(), row.counts, spread, row.goal, mark
-
-
-HEAD = ("figure", "measured", "of", "95 % interval", "goal", "")
-
-
-def markdown(rows: list[Figure]) -> str:
-    """Return the rows as Markdown tables, one per group."""
-    out = []
-    for group in dict.fromkeys(row.group for row in rows):
-        out += [f"### {group}", "", "| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
-        out += [
-            "| " + " | ".join((row.name, *_cells(row))) + " |" for row in rows if row.group == group
-        ]
-        out.append("")
-    return "\n".join(out)
-
-
-def show(rows: list[Figure]) -> None:
-    """Print the rows."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, markup=False, width=140)
-    for group in dict.fromkeys(row.group for row in rows):
-        table = Table(box=None, pad_edge=False, title=group, title_justify="left")
-        for column in HEAD:
-            table.add_column(column, overflow="fold")
-        for row in rows:
-            if row.group == group:
-                table.add_row(row.name, *_cells(row))
-        console.print(table)

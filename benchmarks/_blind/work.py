@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -99,22 +99,3 @@ def local(jobs: list[tuple[str, Task, str]], workers: int) -> Iterator[dict[str,
                 yield future.result()
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-
-
-def cluster(jobs: list[tuple[str, Task, str]], address: str) -> Iterator[dict[str, Any]]:
-    """Yield finished lines as they come from the workers of a Dask scheduler.
-
-    The workers need this checkout on their Python path.
-    """
-    from dask.distributed import Client
-    from dask.distributed import as_completed as completed
-
-    with Client(address) as client:
-        futures = [client.submit(do, *job, pure=False) for job in jobs]
-        for future in completed(futures):
-            yield future.result()
-
-
-def runner(workers: int, address: str) -> Callable[[Any], Iterator[dict[str, Any]]]:
-    """Return what runs jobs: this machine's processes, or a cluster where its address is given."""
-    return (lambda jobs: cluster(jobs, address)) if address else (lambda jobs: local(jobs, workers))

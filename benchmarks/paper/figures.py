@@ -5,20 +5,15 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from bristle.core.progress import Progress
-from bristle.errors import ScenarioError, not_usable
+from bristle.errors import not_usable
 from bristle.version import __version__
-from bristle.view.style import FORMATS, look
+from bristle.view.style import look
 
 from . import identification, loops, optimum, stiction
 from .runs import Drawing, Runs
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)
@@ -55,22 +50,6 @@ def paper_figures() -> dict[str, PaperFigure]:
     return {figure.name: figure for figure in found}
 
 
-def find_figure(name: str) -> PaperFigure:
-    """Return the figure of a name.
-
-    Raises
-    ------
-    ScenarioError
-        If there is none; the text names the nearest.
-    """
-    known = paper_figures()
-    if name in known:
-        return known[name]
-    near = get_close_matches(name, known, 1)
-    hint = f' Did you mean "{near[0]}"?' if near else ""
-    raise ScenarioError(f'no figure is named "{name}". There are: {", ".join(known)}, all.{hint}')
-
-
 def make(
     name: str,
     folder: Path,
@@ -101,13 +80,11 @@ def make(
 
     Raises
     ------
-    ScenarioError
-        There is no such figure.
     RunError
         A run failed; or, with exit code 2, a file cannot be written.
     """
-    figure = find_figure(name)
-    prepare(folder, format)
+    figure = paper_figures()[name]
+    make_folder(folder)
     with Progress(figure.name, figure.runs, progress) as bar, look():
         drawing = figure.draw(Runs(engine, bar.show))
         image = folder / f"{name}.{format}"
@@ -125,10 +102,8 @@ def make(
     return written
 
 
-def prepare(folder: Path, format: str) -> None:
-    """Refuse a folder or format that cannot be written before anything is run."""
-    if format not in FORMATS:
-        raise not_usable(f'format "{format}" is not known; there are {", ".join(FORMATS)}.')
+def make_folder(folder: Path) -> None:
+    """Refuse a folder that cannot be written before anything is run."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -14,7 +13,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from benchmarks.paper.command import answer, main, show
+from benchmarks.paper.command import main, show
 from benchmarks.paper.comparison import experiment, make
 from benchmarks.paper.comparison.experiment import (
     BEYOND,
@@ -220,7 +219,7 @@ def test_everything_is_written(written: Path) -> None:
     assert {"5", "9", "13", "17"} <= set(re.findall(r"fig(\d+)", " ".join(figures)))
     if len(motions()[0]) > 1:
         assert {"14", "15", "16"} <= set(re.findall(r"fig(\d+)", " ".join(figures)))
-    assert {"summary.png", "accelerations-el-centro.png", "voltages.png"} <= figures
+    assert "summary.png" in figures
 
 
 @pytest.mark.slow
@@ -278,7 +277,6 @@ def test_runs_beyond_the_stroke_are_told_in_table_and_text(
     page = (report.folder / "report.html").read_text(encoding="utf-8")
     tabled = gone["law"].isin(experiment.LAWS).sum()
     assert page.count(f"{MARK}</td>") == tabled
-    assert len(re.findall(rf"\d{MARK}", said)) == tabled
     for text in (said, page):
         for _, row in gone.iterrows():
             told = f"{row['law']} {row['peak base drift [mm]']:.1f} mm"
@@ -330,22 +328,11 @@ def test_figures_14_to_17_show_what_the_papers_show(report: Report) -> None:
 
 
 @pytest.mark.slow
-def test_the_answer_as_json_holds_tables_and_ledger(report: Report) -> None:
-    told = json.loads(json.dumps(answer(report), allow_nan=False))
-    assert [row["number"] for row in told["ledger"]] == list(range(1, 22))
-    assert len(told["tables"]["table4"]) == len(told["tables"]["table5"])
-    assert len(told["beyond_stroke"]) == len(beyond_stroke(report.comparison))
-    assert all(Path(path).is_file() for path in told["files"])
-
-
-@pytest.mark.slow
-def test_what_is_printed_holds_tables_and_verdicts(
+def test_what_is_printed_holds_the_verdicts(
     report: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
     show(report)
     said = capsys.readouterr().out
-    assert "Table IV: peaks of all motions" in said
-    assert "Table V: RMS of all motions, over the record as published" in said
     assert len(re.findall(r"^ *\d+  (?:not )?(?:reproduced|undecidable)", said, re.M)) == 21
     assert max(map(len, said.splitlines())) < 400
 

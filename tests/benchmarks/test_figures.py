@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import matplotlib
@@ -16,7 +15,7 @@ from benchmarks.paper.command import main
 from benchmarks.paper.figures import make, paper_figures
 from bristle.engine.results import summarise
 from bristle.engine.view import draw_run, run_figure
-from bristle.errors import RunError, ScenarioError
+from bristle.errors import RunError
 from bristle.view.style import COLOURS, ramp
 
 # The sine loops at 2 Hz, 0.1 m/s: largest force [N] and energy per cycle [J] of an independent
@@ -332,27 +331,27 @@ def test_every_figure_is_an_image_with_numbers_that_say_their_source(drawn: Path
 
 
 def test_the_command_lists_the_figures(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["figures", "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)
-    assert [row["name"] for row in rows] == list(paper_figures())
     assert main(["figures"]) == 0
-    assert "Fig. 5" in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[:-1]] == list(paper_figures())
+    assert "Fig. 5" in " ".join(lines)
 
 
 def test_the_command_says_where_everything_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "deep" / "er"
-    assert main(["figures", "loops-voltage", "--out", str(out), "--json"]) == 0
-    written = json.loads(capsys.readouterr().out)["written"]["loops-voltage"]
-    assert sorted(map(Path, written)) == sorted(out.iterdir())
+    assert main(["figures", "loops-voltage", "--out", str(out)]) == 0
+    written = capsys.readouterr().out.splitlines()[1:]
+    assert sorted(Path(line.strip()) for line in written) == sorted(out.iterdir())
 
 
-def test_an_unknown_figure_is_an_error_that_names_the_nearest(
+def test_an_unknown_figure_is_an_error_that_names_those_there_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["figures", "stictoin", "--out", str(tmp_path / "new")]) == 2
-    assert 'Did you mean "stiction"?' in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["figures", "stictoin", "--out", str(tmp_path / "new")])
+    assert "stiction" in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
 
 
@@ -360,8 +359,4 @@ def test_a_place_that_cannot_be_written_is_found_before_anything_runs(tmp_path: 
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match="is a file; figures go into a folder"):
         make("passive-optimum", tmp_path / "file")
-    with pytest.raises(RunError, match='format "gif" is not known'):
-        make("passive-optimum", tmp_path, format="gif")
-    with pytest.raises(ScenarioError, match="no figure is named"):
-        make("fig99", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

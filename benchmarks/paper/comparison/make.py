@@ -21,7 +21,7 @@ from bristle.version import __version__
 from bristle.view.style import Page, look
 
 from .. import optimum, stiction
-from ..figures import prepare, write
+from ..figures import make_folder, write
 from ..runs import Drawing, Runs
 from . import identification, pictures
 from . import page as page_of
@@ -41,10 +41,6 @@ FIGURES: dict[str, tuple[str, Callable[[Comparison], Page | None]]] = {
     "fig16-northridge-weak": ("Fig. 16", pictures.northridge_weak),
     "fig17-el-centro": ("Fig. 17", pictures.el_centro),
     "summary": ("", pictures.summary),
-    "accelerations-el-centro": ("", pictures.responses),
-    "drift-el-centro": ("", pictures.drifts),
-    "accelerations-northridge": ("", pictures.northridge),
-    "voltages": ("", pictures.voltages),
 }
 """File name to the paper's number, "" for this project's own, and what draws it."""
 _ROOT = Path(__file__).resolve().parents[3]
@@ -91,7 +87,7 @@ def make(folder: Path, newhall: Path | None = None, progress: bool = False) -> R
     """
     began = time.perf_counter()
     found, left_out = motions(newhall)
-    prepare(folder, "png")
+    make_folder(folder)
     total = len(cases(found)) + stiction.RUNS + optimum.RUNS + identification.RUNS
     with designing(folder) as controllers, Progress("controllers", total, progress) as bar:
         # The march that controllers need serves the other runs as well: it alone is compiled.

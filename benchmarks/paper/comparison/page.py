@@ -36,14 +36,6 @@ CAPTIONS = {
     "floor 2, base drift, parameter of LPV.",
     "summary": "Peak and RMS acceleration of floor 2 in all cases of Tables IV and V, per cent of "
     "those at 0 V: 4 V beside the three controllers.",
-    "accelerations-el-centro": "Acceleration of floor 2 under El Centro at two intensities: 4 V "
-    "beside the three controllers.",
-    "drift-el-centro": "Base drift under El Centro at two intensities: 4 V beside the three "
-    "controllers.",
-    "accelerations-northridge": "Acceleration of floor 2 under {motion} at two intensities: 4 V "
-    "beside the three controllers.",
-    "voltages": "El Centro, nominal 0.6 g: voltage over time and force over velocity of the three "
-    "controllers.",
 }
 """Motion, scale and what is compared of each figure; all motions are at 0.45 of the nominal."""
 DOTS = 160
@@ -161,7 +153,7 @@ def _figures(report: Report) -> str:
     motion = report.comparison.strong[0]
     listed = next(m for m in report.comparison.motions if m.name == motion).intensities
     strong, weak = (f"{motion}, nominal {g:g} g" for g in (max(listed), min(listed)))
-    said = {n: c.format(motion=motion, strong=strong, weak=weak) for n, c in CAPTIONS.items()}
+    said = {n: c.format(strong=strong, weak=weak) for n, c in CAPTIONS.items()}
     figures = [
         html.figure(
             Path(report.folder, f"{name}.png").read_bytes(), number or said[name],

@@ -1,7 +1,4 @@
-"""The paper's Fig. 13 drawn anew from the runs of the comparison, and this project's own pictures.
-
-Figs 14 to 17 are in `cases`.
-"""
+"""The paper's Figs 13 to 17 drawn anew from the runs of the comparison, and a summary of all."""
 
 from __future__ import annotations
 
@@ -97,82 +94,6 @@ def anti_windup(c: Comparison) -> Page:
     return page
 
 
-def histories(c: Comparison, motion: str, column: str, what: str, unit: str, factor: float,
-              laws: tuple[str, ...]) -> Page:  # fmt: skip
-    """Draw one response over time at a weak and a strong intensity, a panel per law.
-
-    Parameters
-    ----------
-    c : the runs
-    motion : name of the ground motion
-    column, factor : of the results, and what brings its SI values to `unit`
-    what, unit : name and unit of the response, for title and axes
-    laws : a panel for each
-    """
-    listed = next(m for m in c.motions if m.name == motion).intensities
-    weak, strong = listed[0], 0.6 if 0.6 in listed else listed[-1]
-    peaks = {
-        (g, law): factor * float(c.frames[motion, g, law][column].abs().max())
-        for g in (weak, strong)
-        for law in laws
-    }
-    best = [min(laws, key=lambda law, g=g: peaks[g, law]) for g in (weak, strong)]  # type: ignore[misc]
-    title = (
-        f"{what} is lowest with {short(best[0])} at {weak:g} g and with {short(best[1])} at "
-        f"{strong:g} g"
-        if best[0] != best[1]
-        else f"{what} is lowest with {short(best[0])} at {weak:g} g and at {strong:g} g"
-    )
-    free_peaks = [factor * float(c.frames[motion, g, NONE][column].abs().max())
-                  for g in (weak, strong)]  # fmt: skip
-    subtitle = (
-        f"{motion}, nominal {weak:g} g (left) and {strong:g} g (right). Grey: without damper, up "
-        f"to {free_peaks[0]:.3g} and {free_peaks[1]:.3g} {unit}. Dots: each law's largest value."
-    )
-    page = Page(10.0, 1.25 * len(laws) + 0.75, title, subtitle, NOTE)
-    grid = page.grid(len(laws), 2, left=0.5, column_gap=0.35, row_gap=0.36)
-    for place, g in enumerate((weak, strong)):
-        begin, end = strong_part(c.frames[motion, g, NONE], longest=20.0)
-        size = 1.35 * max(peaks[g, law] for law in laws)
-        free = factor * c.frames[motion, g, NONE].loc[begin:end, column]
-        for row, law in enumerate(laws):
-            axes = page.figure.add_subplot(grid[row, place])
-            part = factor * c.frames[motion, g, law].loc[begin:end, column]
-            axes.plot(free.index, free, color=PALE, linewidth=0.7, alpha=0.8)
-            axes.plot(part.index, part, color=COLOUR[law], linewidth=0.9)
-            axes.set_ylim(-size, size)
-            axes.set_xlim(begin, end)
-            mark(axes, part, unit)
-            axes.set_title(f"{short(law)} [{unit}]", color=COLOUR[law], fontsize=9)
-            axes.tick_params(labelbottom=row == len(laws) - 1)
-            if row == len(laws) - 1:
-                axes.set_xlabel("time [s]", loc="right", labelpad=0)
-    return page
-
-
-def responses(c: Comparison) -> Page:
-    """Return a picture of floor 2's acceleration under El Centro."""
-    laws = (FOUR, *CONTROLLERS)
-    what = "Under El Centro the peak acceleration of floor 2"
-    return histories(c, EL_CENTRO, _Y, what, "m/s²", 1.0, laws)
-
-
-def drifts(c: Comparison) -> Page:
-    """Return a picture of the base drift under El Centro."""
-    laws = (FOUR, *CONTROLLERS)
-    return histories(c, EL_CENTRO, _X, "The base drift under El Centro", "mm", 1e3, laws)
-
-
-def northridge(c: Comparison) -> Page | None:
-    """Return a picture of floor 2's acceleration under Northridge; None without a record."""
-    motion = c.strong[0]
-    if motion == EL_CENTRO:
-        return None
-    laws = (FOUR, *CONTROLLERS)
-    what = f"Under {motion} the peak acceleration of floor 2"
-    return histories(c, motion, _Y, what, "m/s²", 1.0, laws)
-
-
 def summary(c: Comparison) -> Page:
     """Return peak and RMS of floor 2 with every law, as shares of those at 0 V."""
     table: Any = c.table.set_index(["motion", "intensity [g]", "law"])
@@ -225,45 +146,6 @@ def summary(c: Comparison) -> Page:
     return page
 
 
-def voltages(c: Comparison) -> Page:
-    """Return voltage over time and force over velocity of the controllers, El Centro 0.6 g."""
-    frames = {law: c.frames[EL_CENTRO, 0.6, law] for law in CONTROLLERS}
-    between = {
-        law: float(((f["controller.voltage"] > 0) & (f["controller.voltage"] < 8)).mean())
-        for law, f in frames.items()
-    }
-    title = (
-        "The clipped law switches between 0 and 8 V; LPV is strictly between for "
-        f"{100 * between[LPV]:.0f} % of the time, H-infinity with inverse for "
-        f"{100 * between[HINF]:.0f} %"
-    )
-    subtitle = "El Centro, nominal 0.6 g. Left: voltage, six seconds. Right: force over velocity."
-    page = Page(10.0, 5.6, title, subtitle, NOTE)
-    grid = page.grid(3, 2, left=0.5, column_gap=0.7, row_gap=0.5, width_ratios=(2.0, 1.0))
-    shared: Axes | None = None
-    for row, (law, frame) in enumerate(frames.items()):
-        axes = page.figure.add_subplot(grid[row, 0])
-        part = frame.loc[1.5:7.5]
-        axes.plot(part.index, part["controller.voltage"], color=COLOUR[law], linewidth=0.8)
-        axes.set_title(f"{short(law)}: voltage [V]", color=COLOUR[law])
-        axes.set_xlim(1.5, 7.5)
-        axes.set_ylim(-0.4, 8.4)
-        axes.set_yticks([0, 2, 4, 6, 8])
-        loop = page.figure.add_subplot(grid[row, 1], sharex=shared, sharey=shared)
-        shared = shared or loop
-        own = frame.loc[0.0:20.0]
-        loop.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)
-        loop.axvline(0.0, color=PALE, linewidth=0.8, zorder=1)
-        loop.plot(1e3 * own["structure.base_velocity"], own["damper.force"], color=COLOUR[law],
-                  linewidth=0.5)  # fmt: skip
-        loop.set_title("force [N]")
-        for panel, axis_name in ((axes, "time [s]"), (loop, "velocity [mm/s]")):
-            panel.tick_params(labelbottom=row == 2)
-            if row == 2:
-                panel.set_xlabel(axis_name, loc="right", labelpad=0)
-    return page
-
-
 def mark(axes: Axes, values: pd.Series[Any], unit: str) -> None:
     """Mark the largest absolute value of a history, with its unit."""
     place = int(np.argmax(np.abs(values.to_numpy())))
@@ -288,7 +170,6 @@ def strong_part(frame: pd.DataFrame, longest: float = 10.0) -> tuple[float, floa
 
 # The paper's Figs 14 to 17: one ground motion each, laws side by side, over time.
 
-_Y, _X = "structure.floor2_acceleration_absolute", "structure.base_displacement"
 _LASTS = 16.0
 """Length of the part of a run that is shown [s]."""
 
