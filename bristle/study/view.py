@@ -176,7 +176,7 @@ def z_text(found: Identified) -> str:
         return "How much of it is noise is not known: the force does not tell."
     z = {role: found.after[f"z_{role}"] for role in reversed(ROLES) if f"z_{role}" in found.after}
     told = joined([f"{short_z(one)} on the {_NAMES[role]}" for role, one in z.items()])
-    begin = "" if max(z.values()) > 1.15 else "The noise explains it. "
+    begin = "The noise explains it. " if all(one <= 1.15 for one in z.values()) else ""
     return f"{begin}Error / noise (z; a true model has 1): {told}."
 
 
