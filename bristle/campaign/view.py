@@ -33,13 +33,18 @@ def ensemble_view(found: Ensemble) -> View:
     """Return the view of an ensemble: its quantiles, what widens them, and what failed."""
     done = int((found.runs["status"] == "done").sum())
     before = f", {found.continued} of them from before" if found.continued else ""
-    columns = [str(name) for name in found.quantiles.columns if name != "unit"]
+    table = found.quantiles
+    # How many are done and failed says the title, unless outputs differ in it.
+    columns = [
+        str(name) for name in table.columns
+        if name != "unit" and not (name in ("done", "failed") and table[name].nunique() == 1)
+    ]  # fmt: skip
     rows = [
         [
-            str(name), *(f"{row[one]:.5g}" for one in columns),
-            "" if row["unit"] == "1" else str(row["unit"]),
+            str(name) if row["unit"] == "1" else f"{name} [{row['unit']}]",
+            *(plain(row[one], 4) for one in columns),
         ]
-        for name, row in found.quantiles.iterrows()
+        for name, row in table.iterrows()
     ]  # fmt: skip
     title = f"{found.plan.title}: {done} runs done, {len(found.runs) - done} failed"
     failures = (
@@ -49,7 +54,7 @@ def ensemble_view(found: Ensemble) -> View:
     return View(
         title,
         (
-            Table(("output", *columns, "unit"), rows, range(1, len(columns) + 1)),
+            Table(("output", *columns), rows, range(1, len(columns) + 1)),
             *_limits(found),
             Text(f"{len(found.runs)} runs{before} in {found.wall_time:.1f} s"),
             *(Text(note, "note") for note in (*found.notes, *failures)),
@@ -92,7 +97,7 @@ def passive_view(found: Passive) -> View:
         title,
         (
             Table(header, best, range(1, len(header))),
-            Table(("for all of them", "voltage [V]", ""), rows, (1,)),
+            Table(("for all of them", "voltage [V]", "value"), rows, (1,)),
             Text(f"{found.runs} runs"), *(Text(note, "note") for note in found.notes),
         ),
         (Figure(lambda: draw_passive(found), title),),

@@ -14,7 +14,6 @@ import pkgutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from difflib import get_close_matches
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
@@ -101,13 +100,10 @@ def build_parser(only: str = "") -> Parser:
 
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
-    """Return the arguments of a command line; of a misspelt command say the one that is near."""
+    """Return the arguments of a command line, for which one command's module is read."""
     words = sys.argv[1:] if argv is None else argv
     known = {one.name.strip("_").replace("_", "-") for one in pkgutil.iter_modules(__path__)}
-    parser = build_parser(words[0] if words and words[0] in known else "")
-    if words and words[0] not in known and (near := get_close_matches(words[0], known, 1)):
-        parser.error(f"there is no command {words[0]}. Did you mean  bristle {near[0]}")
-    return parser.parse_args(words)
+    return build_parser(words[0] if words and words[0] in known else "").parse_args(words)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterable
@@ -12,8 +13,10 @@ from fnmatch import fnmatchcase
 from functools import partial
 from glob import glob
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, NoReturn
 
+from ..core.text import did_you_mean
 from ..errors import TrustError
 
 if TYPE_CHECKING:
@@ -27,6 +30,26 @@ class Parser(argparse.ArgumentParser):
 
     Of an option that takes a value, `value` is what help calls that; `more` is as argparse has it.
     """
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # type: ignore[override]
+        """Return what the parser knows of a line; what it does not know is an error of its own.
+
+        argparse would leave the error to `bristle`, which does not know the command's options.
+        """
+        known, rest = super().parse_known_args(args, namespace)
+        if rest:
+            options = [name for action in self._actions for name in action.option_strings]
+            self.error(f"unrecognized arguments: {' '.join(rest)}.{did_you_mean(rest[0], options)}")
+        return known, rest
+
+    def error(self, message: str) -> NoReturn:
+        """End the command; of a misspelt word say the one that is near, as Python 3.14 does."""
+        wrong = re.match(r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)$", message)
+        if wrong:
+            names = re.findall(r"[\w.-]+", wrong[3])
+            near = did_you_mean(wrong[2], names) or f" There are: {', '.join(names)}."
+            message = fill(f'{wrong[1]}: there is no "{wrong[2]}".{near}', 80)
+        super().error(message)
 
     def flag(self, name: str, text: str, default: object = False) -> None:
         """Add an option that is there or not."""
@@ -237,10 +260,13 @@ def print_answer(
     files : that were written
     """
     from ..view import terminal
+    from ..view.blocks import Table
 
     if arguments.json:
         return print_json(answer)
     print(terminal.text(view))
+    if view.blocks and isinstance(view.blocks[-1], Table):
+        print()  # paths are no rows
     for path in files:
         print(f"  {path}")
 

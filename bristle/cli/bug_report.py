@@ -57,7 +57,7 @@ def main(arguments: argparse.Namespace) -> int:
     if last := _last_traceback():
         members["traceback.txt"] = last.read_text(encoding="utf-8", errors="replace")
     if not arguments.json:
-        print(f"{arguments.out} will hold, and no measurements:\n")
+        print(f"{arguments.out} will hold these files, and no measurement:\n")
         for name, text in members.items():
             print(f"  {name}  {len(text.encode())} bytes")
         for name in ("versions.txt", "shapes.txt"):
@@ -130,12 +130,14 @@ def _shapes(folder: Path) -> str:
         runs = Study(folder).runs()
     except BristleError as error:
         return f"The runs cannot be read: {type(error).__name__}: {error}\n"
-    lines = []
+    lines, before = [], ""
     for role, of_role in (("train", runs.train), ("holdout", runs.holdout)):
         for run in of_role:
             step = plain(float(run.time[1] - run.time[0])) if len(run.time) > 1 else "?"
             named = ", ".join(f"{name} [{run.units[name]}]" for name in run.channels)
-            lines.append(f"{run.name} ({role}): {len(run.time)} samples every {step} s: {named}")
+            lines += [f"channels: {named}"] if named != before else []
+            lines.append(f"{run.name} ({role}): {len(run.time)} samples every {step} s")
+            before = named
     return "\n".join([*lines, *runs.notes]) + "\n"
 
 

@@ -52,11 +52,11 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({**found.as_dict(), "picture": str(picture.absolute())})
         return 0
-    print("\n".join(found.mapping_lines()))
     for one in found.outputs:
-        print(f"\n{one.quantity} [{one.unit}]")
-        print(terminal.text(one.view(), details=arguments.details))
-    print(f"\nPicture: {picture}")
+        print(f"{one.quantity} [{one.unit}]")
+        print(terminal.text(one.view(), details=arguments.details), end="\n\n")
+    print("\n".join(found.mapping_lines()))
+    print(f"Picture: {picture}")
     return 0
 
 

@@ -71,10 +71,19 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(tables[kind] if kind else tables)
         return 0
+    switches: list[str] = []
     if kind == "ports":
-        tables = _by_causality(tables[kind])
+        ports = tables[kind]
+        if not name.lower().endswith(".fmu"):  # one of the library's, which may have any effect
+            switches = [port["name"] for port in ports if port["name"].endswith(".on")]
+        hidden = tuple(switch.removesuffix("on") for switch in switches)
+        tables = _by_causality([port for port in ports if not port["name"].startswith(hidden)])
     for title, rows in tables.items():
         _print(title, rows)
+    if switches:
+        effects = ", ".join(switch.removesuffix(".on") for switch in switches)
+        _say(f"Effects, each with a switch EFFECT.on and parameters of its own: {effects}.")
+        print("All of one:  bristle list effects NAME")
     return 0
 
 

@@ -48,7 +48,7 @@ def main(arguments: argparse.Namespace) -> int:
         from ..system.scenario import copy_scenario
 
         file = copy_scenario(arguments.like, Path(f"{name.removesuffix('.toml')}.toml"))
-        then = f"{command('check', file)}  and  {command('run', file)}"
+        then = command("run", file)
     elif kind == "controller":
         file, about[kind] = _controller(name)
         then = command("build", file)

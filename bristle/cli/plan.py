@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
-from ..view.blocks import Next, Text
+from ..view.blocks import Next
 from ._options import Parser, print_json
 
 if TYPE_CHECKING:
@@ -133,6 +133,6 @@ def text(found: Plan, study: Path | None, folder: Path | None, *, details: bool 
         then = command("study", "new", "my_rig", "--data", "MEASURED.csv")
         if study is not None:
             then = command("study", "extend", study, "MEASURED.csv", "--plan", folder)
-        more = (Text(f"Files: {folder}"), Next(then, "once they are measured"))
-        view = view._replace(blocks=(*view.blocks, *more))
-    return terminal.text(view, details=details)
+        view = view._replace(blocks=(*view.blocks, Next(then, "once they are measured")))
+    told = terminal.text(view, details=details)
+    return told if folder is None else f"{told}\nFiles: {folder}"

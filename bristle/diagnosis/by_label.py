@@ -525,7 +525,7 @@ def _steps_text(label: LabelOfRuns, word: str, unit: str, sizes: Array, what: st
             "    }",
             "    tables = {",
             f'        "step": Table(LEVELS, ({values}), "{unit}", ({-most:.6g}, {most:.6g}),',
-            f"            {_literal(f'change against {texts[0]}')}),",
+            f"            {_literal(f'change with {label_name(label.name)} from {texts[0]}')}),",
             "    }",
         ],
         f"q.value + interpolate(p.{word}, LEVELS, p.step)",

@@ -351,13 +351,12 @@ class RigFit:
             total += part @ found.covariance @ part.T
         return total
 
-    def notes(self) -> list[str]:
-        """Return what was found of the lines, one sentence each."""
-        out = []
-        for name, found in self.fits.items():
-            if self.sites[name].is_line:
-                out.append(f"{name}: {_line_text(found, self.sites[name])}")
-        return out
+    def notes(self) -> dict[str, str]:
+        """Return what was found of the lines: site to sentence."""
+        return {
+            name: _line_text(found, self.sites[name])
+            for name, found in self.fits.items() if self.sites[name].is_line
+        }  # fmt: skip
 
 
 def _line_text(found: Fit, site: Site) -> str:
@@ -373,7 +372,7 @@ def _line_text(found: Fit, site: Site) -> str:
         whole = plain(already + found.model.value(DAMPING), 4)
         error = plain(1.96 * found.std[DAMPING], 2)
         texts.append(f"c = {whole} ± {error} N s/m, {plain(already, 4)} of the file")
-    text = ", ".join(texts) + " (fitted too, not in model.toml)."
+    text = ", ".join(texts) + " (fitted as well; not in model.toml)."
     if at_bound(found.model):
         text += (
             " The data ask for a negative damping, so it is held at zero "

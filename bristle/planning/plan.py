@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..comparison.names import effect_name
+from ..comparison.names import effect_name, site_name
 from ..core.files import json_text
 from ..core.text import plain, quantity
 from ..diagnosis.effect_size import ONE_SIDED, TWO_SIDED
@@ -68,12 +68,16 @@ class Outcome:
     excited: bool = True
     needs: str = ""
 
+    @property
+    def named(self) -> str:
+        """The question as people write it: of an effect its name in words."""
+        site, colon, name = self.name.rpartition(": ")
+        own = effect_name(name).removesuffix(f" of {site_name(site)}")
+        return f"{site.replace('storey', 'storey ')}{colon}{own}"
+
     def cells(self) -> list[str]:
         """Return the row of a table."""
-        site, colon, name = self.name.rpartition(": ")
-        named = effect_name(name).removesuffix(f" of the {site}")
-        shown = self.shown(self.now), self.shown(self.then)
-        return [f"{site}{colon}{named}", self.what, self.needs, *shown]
+        return [self.named, self.what, self.needs, self.shown(self.now), self.shown(self.then)]
 
     def shown(self, value: float) -> str:
         """Return one of its numbers with the unit."""
@@ -351,7 +355,7 @@ class Plan(Viewable):
 
     def _left_open(self) -> list[str]:
         """Return what the tests do not settle, and whether another one would."""
-        return [f"{one.name}: {self._why(one)}" for one in self.outcomes if not one.settled]
+        return [f"{one.named}: {self._why(one)}" for one in self.outcomes if not one.settled]
 
     def _why(self, one: Outcome) -> str:
         """Return why the tests do not settle something."""

@@ -113,6 +113,7 @@ class ClosedLoop(Viewable):
             return (
                 f"{given}, the model predicts these responses; nothing was measured to compare "
                 "them with.",
+                *([f'Before: by the model before the step "{self.step}".'] if self.step else []),
                 *self._limits(),
             )
         said = [f"{given}, the model predicts {_both(judged, before=False)}."]

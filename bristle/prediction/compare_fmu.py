@@ -14,7 +14,7 @@ from ..comparison.comparison import compare_predictions
 from ..comparison.predictions import RunPrediction, coordinates_of, rms
 from ..comparison.result import Comparison
 from ..core.arrays import Array
-from ..core.text import percent, unknown
+from ..core.text import joined, percent, unknown
 from ..data.channels import (
     DRIVE,
     MOTION,
@@ -75,15 +75,17 @@ class PortMap:
     left: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """Return the mapping in words, a line per port."""
-        out = [
-            f"  {one.name} [{one.unit}] is fed from {_turned(one)}: {one.reason}"
-            for one in self.inputs
-        ]
-        out += [
-            f"  {one.name} [{one.unit}] is compared with {_turned(one)}: {one.reason}"
-            for one in self.outputs
-        ]
+        """Return the mapping in words: ports named as their channel together, others alone."""
+        out = []
+        for ports, verb in ((self.inputs, "fed from"), (self.outputs, "compared with")):
+            same = [one.name for one in ports if (one.name, one.sign) == (one.signal, 1)]
+            if same:
+                named = f"{joined(same)} {'is' if len(same) == 1 else 'are'}"
+                out.append(f"  {named} {verb} the channel{'s' * (len(same) > 1)} of that name")
+            out += [
+                f"  {one.name} [{one.unit}] is {verb} {_turned(one)}: {one.reason}"
+                for one in ports if one.name not in same
+            ]  # fmt: skip
         return out + [f"  {text}" for text in self.left]
 
 
@@ -285,11 +287,9 @@ def _fits(unit: str | None, other: str) -> bool:
 def _left(variable: Variable, signals: Mapping[str, str]) -> str:
     told = told_unit(variable)
     unit = f" [{told}]" if told else ""
-    stays = (
-        f"{variable.name}{unit} is fed from nothing and stays at its start value {variable.start}"
-    )
+    stays = f"{variable.name}{unit} is fed from nothing: it stays at {variable.start}"
     if variable.optional:
-        return f"{stays} (it is optional)"
+        return f"{stays} (optional)"
     same = [name for name in signals if _fits(told, signals[name])] if told else []
     there = (
         f"measured in that unit: {', '.join(same)}" if same else "nothing of that unit was measured"

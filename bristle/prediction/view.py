@@ -18,7 +18,7 @@ def exported_view(found: Exported) -> View:
         f"{found.fmu}: the damper with the model's values.",
         (
             *map(Text, proof), *notes,
-            Next(command("run", found.scenario), f"applies the motion of {found.run} to it"),
+            Next(command("run", found.scenario), f"applies the motion of {found.run}"),
         ),
     )  # fmt: skip
 
@@ -78,4 +78,5 @@ def _widening(row: Predicted) -> str:
 def _signed(error: float | None) -> str:
     if error is None:
         return ""
-    return f"{'+' if error >= 0.0 else '-'}{percent(abs(error))}"
+    size = percent(abs(error))
+    return size if size == percent(0.0) else f"{'+' if error > 0.0 else '-'}{size}"

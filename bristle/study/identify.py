@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..comparison.names import site_name
 from ..core.progress import tell
-from ..core.text import percent, plain, unknown
+from ..core.text import percent, short_z, unknown
 from ..data.cut_off import saturated_share
 from ..data.measurement import Measurement
 from ..diagnosis.by_label import extrapolated
@@ -312,8 +313,9 @@ def by_site(models: SiteModels) -> list[str]:
     z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
     if not z:
         return []
-    text = ", ".join(f"{site} {plain(z[site])}" for site in sorted(z, key=lambda site: -z[site]))
-    return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
+    worst_first = sorted(z, key=lambda site: -z[site])
+    text = ", ".join(f"{site_name(site)} {short_z(z[site])}" for site in worst_first)
+    return [f"The errors are of all sites together, z is that of the worst; held-out runs: {text}."]
 
 
 def weighing(rows: list[LawError], model: Model, own: ForceError, z: float) -> list[str]:
@@ -581,7 +583,7 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
     task.show(4)
     error = after.at["train"][at.site.name]
     notes += [
-        *fits.notes(),
+        *(f"{site_name(site)}: {text}" for site, text in fits.notes().items()),
         *by_site(models),
         *weighing(rows, model, error, after.numbers["z_train"]),
     ]

@@ -233,8 +233,8 @@ def resolve_scenario(name: str | Path) -> Path:
     by_stem = {Path(entry).stem: entry for entry in beside} | {stem: stem for stem in names}
     close = nearest(file.stem, by_stem)
     hint = f' Did you mean "{by_stem[close[0]]}"?' if close else ""
-    listed = f" Stock scenarios: {', '.join(names)}." if names else ""
-    raise ScenarioError(f'there is no scenario file "{name}".{hint}{listed}')
+    stock_ones = " bristle list scenarios names those of the library." if names else ""
+    raise ScenarioError(f'there is no scenario file "{name}".{hint}{stock_ones}')
 
 
 def copy_scenario(name: str, target: Path | None = None) -> Path:

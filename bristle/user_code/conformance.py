@@ -243,7 +243,7 @@ def _matters(effect: type[Effect]) -> Check:
         ]
         change = float(np.sqrt(np.mean((rows[1] - rows[0]) ** 2) / np.mean(rows[0] ** 2)))
         best = max(best, change)
-    text = f"{100.0 * best:.3g} % of the force RMS on a damper of 10 N, at its defaults"
+    text = f"{100.0 * best:.3g} % of the RMS of a damper of 10 N, at its defaults"
     return Check("it changes the force by more than 1 %", best > 0.01, text)
 
 

@@ -267,8 +267,17 @@ run_and_exit()
     assert done.stdout.split() == ["False", chosen or "1"]
 
 
-def test_a_misspelt_command_is_told_the_one_that_is_near(capsys):
+@pytest.mark.parametrize(
+    ("line", "near"),
+    [
+        (["diagnos", "my_rig"], "diagnose"),
+        (["study", "chek", "my_rig"], "check"),
+        (["list", "efects"], "effects"),
+        (["diagnose", "my_rig", "--detials"], "--details"),
+    ],
+)
+def test_of_a_misspelt_word_the_one_that_is_near_is_told(capsys, line, near):
     with pytest.raises(SystemExit) as ended:
-        main(["diagnos", "my_rig"])
+        main(line)
     assert ended.value.code == 2
-    assert "Did you mean  bristle diagnose" in capsys.readouterr().err
+    assert f'Did you mean "{near}"?' in capsys.readouterr().err

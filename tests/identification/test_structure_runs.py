@@ -285,12 +285,12 @@ def test_a_line_damps_and_says_where_the_data_push_it_below(truth):
     assert found.covariance.shape == (2, 2)
     assert found.model.value("k") == pytest.approx(b.stiffnesses[1], rel=0.05)
     site = Site("storey1", lambda _role: problem, is_line=True)
-    (text,) = RigFit({"storey1": found}, {"storey1": site}).notes()
+    (text,) = RigFit({"storey1": found}, {"storey1": site}).notes().values()
     assert "ask for a negative damping" in text
     plain = fit_line(problem, "linear_storey")
     assert plain.covariance == pytest.approx(plain.covariance.T)
     assert np.sqrt(np.diag(plain.covariance)) == pytest.approx(list(plain.std.values()))
-    (text,) = RigFit({"storey1": plain}, {"storey1": site}).notes()
+    (text,) = RigFit({"storey1": plain}, {"storey1": site}).notes().values()
     shown = float(text.split("c = ")[1].split()[0])
     assert shown == pytest.approx(problem.damped + plain.model.value("c"), rel=1e-3)
     assert f"{problem.damped:.4g} of the file" in text

@@ -302,7 +302,7 @@ def test_a_stock_scenario_is_found_by_name(tmp_path, monkeypatch):
     assert resolve_scenario(str(stock)) == stock
     with pytest.raises(ScenarioError, match='Did you mean "half_sine"') as raised:
         resolve_scenario("half_sin")
-    assert "Stock scenarios: half_sine." in str(raised.value)
+    assert "bristle list scenarios" in str(raised.value)
     with pytest.raises(ScenarioError, match="there is no scenario file"):
         resolve_scenario("folder/half_sine")
 
