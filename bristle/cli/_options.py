@@ -31,7 +31,7 @@ class Parser(argparse.ArgumentParser):
     Of an option that takes a value, `value` is what help calls that; `more` is as argparse has it.
     """
 
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # type: ignore[override]
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return what the parser knows of a line; what it does not know is an error of its own.
 
         argparse would leave the error to `bristle`, which does not know the command's options.

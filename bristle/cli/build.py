@@ -44,6 +44,7 @@ def add_arguments(parser: Parser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Build one FMU, unless the same stands there already; say where it is and what it offers."""
+    from ..errors import BuildError
     from ..fmu.build import built_guid, plan
     from ..fmu.component import SWITCH
     from ..fmu.description import read_description
@@ -61,6 +62,8 @@ def main(arguments: argparse.Namespace) -> int:
         starts={} if every else {name + SWITCH: True for name in names},
     )
     target = (arguments.out or Path()) / f"{what.name}.fmu"
+    if target.parent.suffix.lower() == ".fmu":
+        raise BuildError(f"--out {arguments.out}: a folder is right; --name names the FMU in it.")
     fresh = not arguments.native and built_guid(target) == what.guid()
     make = builder(arguments)
     if not fresh:

@@ -6,7 +6,6 @@ import hashlib
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +14,7 @@ from typing import Any
 from .. import units
 from ..core.config import toml_content
 from ..core.files import cache_folder, components_folder, reading, write_whole
+from ..core.text import unknown
 from ..errors import BuildError, StudyError
 from ..physics.forms import split_form
 from ..physics.law import LAWS
@@ -79,11 +79,8 @@ def source(name: str) -> Path:
     try:
         return sources()[name]
     except KeyError:
-        near = get_close_matches(name, component_names(), 1)
-        hint = f' Did you mean "{near[0]}"?' if near else ""
-        raise BuildError(
-            f'no component is named "{name}". There are: {", ".join(component_names())}.{hint}'
-        ) from None
+        all_of_them = "bristle list components"
+        raise BuildError(unknown("component", name, component_names(), all_of_them)) from None
 
 
 def component_of_law(law: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import simulate_fmu
+from fmpy import read_model_description, simulate_fmu
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -25,12 +25,15 @@ def columns(path: Path) -> dict[str, Any]:
 def force_of(proof: dict[str, Any], run: str, parts: int) -> Any:
     """Return the force (n,) [N] that the FMU gives at the samples of a run."""
     given = columns(FOLDER / f"{run}_inputs.csv")
+    fmu = str(FOLDER.parent / proof["fmu"])
+    inputs = [v.name for v in read_model_description(fmu).modelVariables if v.causality == "input"]
+    missing = [name for name in inputs if name not in given]  # FMPy would warn of them
+    given |= dict.fromkeys(missing, 0.0 * given["time"])
     rows = np.array(list(zip(*given.values(), strict=True)), dtype=[(n, float) for n in given])
     step = proof["step"]
     found = simulate_fmu(
-        str(FOLDER.parent / proof["fmu"]), stop_time=float(given["time"][-1]), step_size=step,
-        output_interval=step, input=rows, output=["force"],
-        start_values=proof["start_values"][run],
+        fmu, stop_time=float(given["time"][-1]), step_size=step, output_interval=step, input=rows,
+        output=["force"], start_values=proof["start_values"][run],
     )  # fmt: skip
     time = columns(FOLDER / f"{run}_force.csv")["time"]
     moments = np.linspace(time[0], time[-1], (len(time) - 1) * parts + 1)

@@ -361,7 +361,7 @@ class Proof:
         confirmed = "confirms it" if self.agrees else "does NOT confirm it"
         out.append(f"The FMU in FMPy {confirmed}: {self.fmu.text()} at a step of {step}{over}.")
         if self.part < 1.0 and self.expected is not None:
-            out[-1] += f" Over the same part the model has {self.expected.text()}."
+            out[-1] += f" The model has {self.expected.text()} there; all of it would take long."
         out.append(
             f"Give FMPy output_interval={self.step:.10g}: by itself it takes longer steps, "
             "1,000 per run at most."
@@ -370,7 +370,7 @@ class Proof:
         if self.raw is None:
             return [*out, "It was not fed with measured columns: none is the motion of the damper."]
         there = "" if self.part == 1.0 else ", over the same part"
-        out.append(f"Fed with the measured columns as they are{there}: {self.raw.text()}.")
+        out.append(f"Fed with the measured columns, noise and all{there}: {self.raw.text()}.")
         return out
 
     def as_dict(self) -> dict[str, Any]:

@@ -75,7 +75,7 @@ def test_a_record_is_baked_in(here: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["Structur"], 'no component is named "Structur"'),
+        (["Structur"], 'no component "Structur". Did you mean "Structure"?'),
         (["Structure", "--building", "gone.toml"], "gone.toml: there is no such file"),
         (["LuGreDamper", "--building", "my.toml"], "a building goes into Structure"),
         (["Structure", "--record", "my.toml"], "a record goes into GroundMotion"),

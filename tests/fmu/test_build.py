@@ -146,7 +146,7 @@ def test_a_name_a_building_and_start_values_change_the_digest(write: Any) -> Non
 
 
 def test_a_name_that_no_component_has_is_refused_with_the_near_one() -> None:
-    with pytest.raises(BuildError, match=r'no component is named "LuGreDampr".*"LuGreDamper"'):
+    with pytest.raises(BuildError, match=r'no component "LuGreDampr".*"LuGreDamper"'):
         plan("LuGreDampr")
 
 
@@ -534,7 +534,7 @@ def test_what_does_not_belong_together(write: Any) -> None:
         plan("LuGreDamper", building=write(BUILDING, "a.toml"))
     with pytest.raises(BuildError, match="a record goes into GroundMotion, not into Structure"):
         plan("Structure", record=write(RAMP, "a.csv"))
-    with pytest.raises(BuildError, match=r'named "Structur".*Did you mean "Structure"'):
+    with pytest.raises(BuildError, match=r'no component "Structur".*Did you mean "Structure"'):
         plan("Structur")
 
 

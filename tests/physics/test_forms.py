@@ -23,7 +23,7 @@ from bristle.physics.laws import LAWS, laws_of
 from bristle.physics.parameter import Parameter
 from bristle.user_code.trial import cycle
 
-NAMES = [law.name for law in laws_of("damper") if law.has("command")]
+NAMES = [law.name for law in laws_of("damper") if choosable(law)]  # others have a form of their own
 KNOTS = (0.0, 1.5, 4.0)
 LEVELS = (0.0, 0.7, 1.5, 2.0, 4.0)
 

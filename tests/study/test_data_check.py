@@ -218,7 +218,7 @@ def test_held_out_run_beyond_the_training_is_found(tmp_path: Path) -> None:
     look = check_data(create_study(tmp_path / "rig", files).study)
     (finding,) = found(look, "beyond")
     assert (finding.run, finding.channel) == ("run_2", "voltage")
-    assert finding.do.startswith('Exchange the roles in study.toml: run_2 to "train", run_')
+    assert finding.do.startswith("Exchange the roles (bristle study roles): run_2 to train, run_")
 
 
 def test_run_of_another_rig_is_found(tmp_path: Path) -> None:

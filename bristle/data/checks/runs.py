@@ -247,7 +247,7 @@ def _exchange(
         return max(ratios)
 
     goes = min(train, key=left)
-    text = f'Exchange the roles in study.toml: {run.run} to "train", {goes.run} to "holdout"'
+    text = f"Exchange the roles (bristle study roles): {run.run} to train, {goes.run} to holdout"
     if left(goes) <= BEYOND:
         return text + "."
     return text + "; other runs reach further than those for training still, so measure more."

@@ -7,7 +7,7 @@ X_REF = 0.01  # m; keeps the unit of k_3 for every shape
 
 
 class Duffing(Effect):
-    """Duffing spring: the isolation springs grow stiffer, or softer, with displacement.
+    """Duffing spring: a spring grows stiffer, or softer, with displacement.
 
         F = k_3 X_r^2 (|x|/X_r)^(shape-1) x,   X_r = 10 mm;   shape 3 is Duffing's cubic
 

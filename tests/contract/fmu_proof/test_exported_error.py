@@ -121,4 +121,4 @@ def test_a_proof_names_the_step_that_fmpy_does_not_take_by_itself_and_what_it_is
     said = "\n".join(Proof(told, 3.125e-05, told, told, told, 0.5).lines(tmp_path))
     assert "output_interval=3.125e-05:" in said
     assert "the first 50 % of each run" in said
-    assert "columns as they are, over the same part:" in said
+    assert "columns, noise and all, over the same part:" in said
