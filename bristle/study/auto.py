@@ -39,7 +39,7 @@ class Completed:
     """What `complete` came to: the last diagnosis, and the steps that it made.
 
     `curves` are those learned where no effect of the library explained the error; `unproven` the
-    step that improves the prediction by what the verdict does not prove, `refuted` why the one that
+    steps that improve the prediction by what no verdict proves, `refuted` why the one that
     training runs chose was not made; `closure` what the network came to that was asked for in the
     end, `no_closure` why these runs carry none; `promise` what one that was not asked for may leave
     of the error, on left-out parts of the training runs.
@@ -48,7 +48,7 @@ class Completed:
     verdict: Diagnosis
     steps: tuple[Step, ...]
     curves: tuple[LearnedEffect, ...] = ()
-    unproven: Step | None = None
+    unproven: tuple[Step, ...] = ()
     refuted: str = ""
     closure: LearnedClosure | None = None
     no_closure: str = ""
@@ -59,7 +59,7 @@ class Completed:
         return {
             "verdict": self.verdict.as_dict(),
             **({"learned": [one.as_dict() for one in self.curves]} if self.curves else {}),
-            **({"unproven": self.unproven.what} if self.unproven else {}),
+            **({"unproven": [one.what for one in self.unproven]} if self.unproven else {}),
             **({"closure": self.closure.as_dict()} if self.closure else {}),
             **({"closure_may_leave": self.promise} if self.promise < 1.0 else {}),
             "steps": [
@@ -99,6 +99,7 @@ def complete(
     """
     steps: list[Step] = []
     learned: list[LearnedEffect] = []
+    gained: list[Step] = []
 
     def stepped(step: Step | None) -> None:
         if step is not None:
@@ -117,10 +118,14 @@ def complete(
             learned.append(learn_effect(study))
             names = (learned[-1].name,) if learned[-1].file is not None else ()
         if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
-            done = Completed(found, (), tuple(learned))
+            done = Completed(found, (), tuple(learned), tuple(gained))
             if _open(found) and not proven and not study.settings.has_building:
                 step, refuted = _gained(study, found, say, stepped)
-                done = replace(done, unproven=step, refuted=refuted)
+                if step is not None:
+                    gained.append(step)
+                    if gained == [step] and halves(step):
+                        continue  # a verdict on a model that errs twice as much tells little
+                done = replace(done, unproven=tuple(gained), refuted=refuted)
             lacks_one = _open(found) and not closures(study.model().effects)
             if lacks_one and closure:
                 try:
@@ -138,6 +143,12 @@ def _open(found: Diagnosis) -> bool:
     """Return whether a verdict leaves an error that more of a model may lower, proven or not."""
     judged = all(one.after is not None for one in found.findings.values())
     return found.kind in ("unknown", "ambiguous") or (judged and not found.noise_known)
+
+
+def halves(step: Step) -> bool:
+    """Return whether a step takes half of the error on held-out runs: the verdict is made anew."""
+    before, after = (one.get("error_share_holdout") for one in (step.before, step.after))
+    return bool(before and after and after <= 0.5 * before)
 
 
 def _gained(

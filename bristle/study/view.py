@@ -51,7 +51,7 @@ from ..physics.forms import joined_form, shown_law, split_form
 from ..physics.laws import base_and_variant
 from ..view.blocks import Block, Figure, Formula, Next, Table, Text, View, view_of
 from ..view.style import Page, look
-from .auto import Completed
+from .auto import Completed, halves
 from .data_check import DataCheck
 from .forms import law_command
 from .history import HistoryStep, Step, history_steps
@@ -689,8 +689,7 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     view = story_view(study, verdict)
     table = steps_table(history_steps(study.steps()), study.settings.cut_off)
     learned = [Text(" ".join(one.sentences())) for one in done.curves]
-    if done.unproven:
-        learned.append(Text(_unproven(study, done.unproven)))
+    learned += [Text(_unproven(study, one, one is done.unproven[0])) for one in done.unproven]
     learned += [Text(done.refuted)] if done.refuted else []
     learned += map(Text, done.closure.sentences() if done.closure else ())
     learned += [Text(f"No closure: {done.no_closure}")] if done.no_closure else []
@@ -702,8 +701,9 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     return view._replace(blocks=(first, *learned, *rest, table, *then))
 
 
-def _unproven(study: Study, step: Step) -> str:
+def _unproven(study: Study, step: Step, first: bool) -> str:
     """Return the sentences about a step that improves the prediction and is not proven."""
+    on = "with" if first and halves(step) else "without"
     fall = [errors.get("error_share_holdout") for errors in (step.before, step.after)]
     falls = " to ".join(percent(one) for one in fall if isinstance(one, float))
     what = step.what.removesuffix(f" ({NOT_PROVEN})")
@@ -712,7 +712,7 @@ def _unproven(study: Study, step: Step) -> str:
     return (
         f"Improves the prediction, is not proven: {names}. "
         "Chosen on training runs left out of the fit; the error on held-out runs goes from "
-        f"{falls} of the force. The verdict is on the model without it. {back} takes it back; "
+        f"{falls} of the force. The verdict is on the model {on} it. {back} takes it back; "
         "--proven keeps it out from the start."
     )
 

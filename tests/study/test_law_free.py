@@ -20,6 +20,7 @@ from bristle.study import auto, steps
 from bristle.study.api import diagnose, identify
 from bristle.study.auto import MOST_EFFECTS, complete
 from bristle.study.forms import law_command, law_or_all, with_law
+from bristle.study.history import Step
 from bristle.study.learn import opened_at
 from bristle.study.steps import add_unproven, create_study, diagnose_study
 from bristle.study.study import Study
@@ -81,10 +82,13 @@ def told(monkeypatch, answers):
     monkeypatch.setattr(auto, "diagnose_study", lambda _study, **_given: next(found))
 
 
-@pytest.mark.parametrize("kind", ["unknown", "ambiguous"])
-def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypatch, kind):
+@pytest.mark.parametrize(("kind", "left"), [("unknown", 0.2), ("ambiguous", 0.2), ("unknown", 0.1)])
+def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypatch, kind, left):
+    """Where it takes half of the error, the verdict is made anew: here nothing is missing then."""
     found = verdict(kind, 6.0, ("stribeck", 4.0))
-    told(monkeypatch, [found])
+    told(monkeypatch, [found, verdict("none", 1.0)])
+    step = Step(2, "add stribeck, drift (not proven)", "", {"error_share_holdout": 0.25})
+    step.after["error_share_holdout"] = left
     asked, added = [], []
 
     def chosen(*given):
@@ -93,7 +97,7 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypa
 
     def add(_study, law, names, values, of):
         added.append((law, names, of))
-        return "add stribeck, drift (not proven)", ""
+        return step, ""
 
     monkeypatch.setattr(auto, "opened_at", lambda *_: ("damper", "opened"))
     monkeypatch.setattr(auto, "write_effects", lambda _study, _texts: None)
@@ -102,8 +106,9 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypa
     done = complete(folder, say=print)
     assert asked == [("opened", found.trials, (), MOST_EFFECTS)]
     assert added == [("", ("stribeck", "drift"), found)]
-    assert done.steps == ("add stribeck, drift (not proven)",)
-    assert done.promise == 0.6
+    assert done.steps == done.unproven == (step,)
+    assert done.verdict.kind == (kind if left > 0.125 else "none")
+    assert done.promise == (0.6 if left > 0.125 else 1.0)
 
 
 def test_what_the_held_out_runs_refute_is_not_kept(bench_study, monkeypatch):
@@ -128,7 +133,7 @@ def test_only_what_is_proven_is_added_where_that_is_asked_for(folder, monkeypatc
 def test_what_is_explained_gets_no_further_effect(folder, monkeypatch):
     told(monkeypatch, [verdict("none", 1.0)])
     done = complete(folder, say=print)
-    assert done.unproven is None
+    assert not done.unproven
     assert done.promise == 1.0
     assert folder.names == []
 
