@@ -26,7 +26,7 @@ from bristle.diagnosis.rig_runs import BenchRuns
 from bristle.diagnosis.rule import BENCH, DecisionRule
 from bristle.diagnosis.sensor_faults import instruments_of
 from bristle.diagnosis.site import Trials, diagnose_line, is_organised, prepare_line
-from bristle.diagnosis.trials import BLOCK, Trial, parts_of
+from bristle.diagnosis.trials import Trial, parts_of
 from bristle.identification.building_sites import structure_problems
 from bristle.identification.rig import DAMPER
 from bristle.model.model import Model
@@ -183,7 +183,7 @@ def keep(task: Task, found: list[Stored]) -> Path:
 def _about(one: Stored, arrays: dict[str, Array]) -> dict[str, Any]:
     def number(trial: Trial) -> dict[str, Any]:
         name = f"losses_{len(arrays)}"
-        arrays[name] = np.array([part.mean() for part in parts_of(trial.losses, BLOCK)])
+        arrays[name] = np.array([part.mean() for part in parts_of(trial.losses)])
         return {
             "effects": trial.effects, "train": trial.train, "z": trial.z, "rms": trial.rms,
             "refined": trial.refined, "losses": name, "samples": len(trial.losses),
@@ -206,7 +206,7 @@ def read(path: Path) -> list[Stored]:
 
         def trial(told: dict[str, Any]) -> Trial:
             means = file[told["losses"]]
-            sizes = [len(part) for part in parts_of(np.zeros(told["samples"]), BLOCK)]
+            sizes = [len(part) for part in parts_of(np.zeros(told["samples"]))]
             losses = np.repeat(means, sizes)  # a block keeps its mean: no more is asked of it
             model = Model(task.law, tuple(told["effects"]))
             return Trial(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -275,6 +276,16 @@ def written(value: object) -> str:
     if isinstance(value, int) and abs(value) > 10**20:
         return "a whole number beyond all bounds"
     return str(value)
+
+
+def literal(text: str) -> str:
+    """Return a text as a Python literal in double quotes, whatever quotes it holds."""
+    return json.dumps(text, ensure_ascii=False)  # Python has all of its escapes
+
+
+def in_docstring(text: str) -> str:
+    """Return a text as it stands between triple quotes, where Python reads that text."""
+    return text.replace("\\", "\\\\").replace('"""', r"\"\"\"")
 
 
 def number(value: object) -> float | str:

@@ -116,9 +116,7 @@ def ends_of(
     ]
 
 
-def beyond_range(
-    values: Array, noise: float, level: float, longest: int = LONGEST, crowded: float = CROWDED
-) -> Flags:
+def beyond_range(values: Array, noise: float, level: float) -> Flags:
     """Return which samples (n,) of a signal may have been cut off.
 
     What is cut may get its noise behind the cut: then it stands a little inside of it, too.
@@ -128,14 +126,13 @@ def beyond_range(
     values : (n,) in the channel's unit
     noise : standard deviation of the channel, in the same unit
     level : size at which the channel was seen to be cut: a run may touch it a few times only
-    longest, crowded : as of `checks.clipping.stands_at_top`
     """
     lost = np.zeros(len(values), dtype=np.bool_)
     near = _rounding(values)
     for way in (1.0, -1.0):
         turned = way * values
         top = float(turned.max())
-        if stands_at_top(turned, near, longest, crowded) or abs(top - level) <= near:
+        if stands_at_top(turned, near, LONGEST, CROWDED) or abs(top - level) <= near:
             lost |= turned >= top - near - BESIDE * noise
     return lost
 

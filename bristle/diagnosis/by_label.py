@@ -23,7 +23,7 @@ from scipy.special import fdtrc, stdtrit
 
 from ..comparison.names import effect_name
 from ..core.arrays import Array
-from ..core.text import joined, with_interval
+from ..core.text import in_docstring, joined, literal, with_interval
 from ..data.channels import TEMPERATURE, label_name, label_text, label_unit
 from ..data.extra_channels import as_word
 from ..data.measurement import Measurement
@@ -391,12 +391,12 @@ def _text(
         value = f"max({value}, min(q.value, {least}))"
         formula = f"{formula}, never below {least}"
     lines = [
-        f'"""The {_plain(about)}, by the label {label.name} of the runs."""',
+        f'"""The {in_docstring(about)}, by the label {label.name} of the runs."""',
         "", *imports, "",
         *given,
         "",
         f"class {''.join(one.capitalize() for one in effect.split('_'))}(Effect):",
-        f'    """The {_plain(about)} depends on {label_name(label.name)}.',
+        f'    """The {in_docstring(about)} depends on {label_name(label.name)}.',
         "",
         f"        {formula}",
         "",
@@ -412,10 +412,10 @@ def _text(
         "    passive = True",
         "    zero_at_rest = False",
         '    source = "Learned from runs: what each of them asks of the parameter, by its label"',
-        f"    expect = {_literal(f'an error that goes with {label.name} from run to run')}",
+        f"    expect = {literal(f'an error that goes with {label.name} from run to run')}",
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
         *fields,
-        f"    labels = {{{_literal(word)}: {_literal(label.name)}}}",
+        f"    labels = {{{literal(word)}: {literal(label.name)}}}",
         *parameters,
         "",
         "    @staticmethod",
@@ -449,8 +449,8 @@ def _line_text(
     size = f"{{abs(p.slope):.3g}} {unit}" if unit != "1" else "{abs(p.slope):.3g}"
     return (
         f"value + slope ({word} - middle)", [],
-        ['    amount = "slope"', f'    assumed = ({_literal(word)}, "middle")',
-         f'    label_means = {{"middle": {_literal(name)}}}'],
+        ['    amount = "slope"', f'    assumed = ({literal(word)}, "middle")',
+         f'    label_means = {{"middle": {literal(name)}}}'],
         [
             "    parameters = {",
             f'        "slope": {_declared(slope, of, f"change with each {per}")},',
@@ -473,7 +473,7 @@ def _arrhenius_text(word: str, share: float, line: tuple[float, Array], what: st
     size = -share * (middle + ZERO_C) ** 2
     return (
         f"value exp(B (1/{word} - 1/middle)), temperatures in K", [],
-        ['    amount = "B"', f'    assumed = ({_literal(word)}, "middle")',
+        ['    amount = "B"', f'    assumed = ({literal(word)}, "middle")',
          f'    label_means = {{"middle": "{TEMPERATURE}"}}'],
         [
             "    parameters = {",
@@ -508,7 +508,7 @@ def _steps_text(label: LabelOfRuns, word: str, unit: str, sizes: Array, what: st
     ]  # fmt: skip
     words = tuple(str(one) for one in label.levels)
     named = [] if label.is_number else [
-        f"    label_words = {{{_literal(label.name)}: {json.dumps(words, ensure_ascii=False)}}}"
+        f"    label_words = {{{literal(label.name)}: {json.dumps(words, ensure_ascii=False)}}}"
         .replace("[", "(").replace("]", ")")
     ]  # fmt: skip
     pairs = [f"{level:g} {text}" for level, text in zip(levels, texts, strict=True)]
@@ -516,16 +516,16 @@ def _steps_text(label: LabelOfRuns, word: str, unit: str, sizes: Array, what: st
     return (
         f"value + step({word})",
         [f"LEVELS = ({', '.join(repr(one) for one in levels)})",
-         f'"""Of the label: {_plain(", ".join(texts))}."""', ""],
-        [f'    assumed = ({_literal(word)}, "step[1]")', *named],
+         f'"""Of the label: {in_docstring(", ".join(texts))}."""', ""],
+        [f'    assumed = ({literal(word)}, "step[1]")', *named],
         [
             "    parameters = {",
             f'        "{word}": Parameter({levels[1]!r}, "1", {_span(np.array(levels))}, '
-            f"{_literal(f'of the run{told}')}),",
+            f"{literal(f'of the run{told}')}),",
             "    }",
             "    tables = {",
             f'        "step": Table(LEVELS, ({values}), "{unit}", ({-most:.6g}, {most:.6g}),',
-            f"            {_literal(f'change with {label_name(label.name)} from {texts[0]}')}),",
+            f"            {literal(f'change with {label_name(label.name)} from {texts[0]}')}),",
             "    }",
         ],
         f"q.value + interpolate(p.{word}, LEVELS, p.step)",
@@ -555,7 +555,7 @@ def _span(values: Array) -> str:
 
 def _declared(value: float, unit: str, text: str) -> str:
     most = 100.0 * abs(value)
-    return f'Parameter({value:.6g}, "{unit}", ({-most:.6g}, {most:.6g}), {_literal(text)})'
+    return f'Parameter({value:.6g}, "{unit}", ({-most:.6g}, {most:.6g}), {literal(text)})'
 
 
 def _word_of(label: str) -> str:
@@ -563,15 +563,6 @@ def _word_of(label: str) -> str:
     word = as_word(label)
     taken = word in ("slope", "middle", "step", "on", "b", "") or word.endswith("_0")
     return "label" if taken or not re.fullmatch(r"[a-z][a-z0-9_]*", word) else word
-
-
-def _literal(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
-def _plain(text: str) -> str:
-    """Return a text as it stands between triple quotes."""
-    return text.replace("\\", "\\\\").replace('"""', r"\"\"\"")
 
 
 def _braced(text: str) -> str:

@@ -12,6 +12,7 @@ over pieces, so that an instrument's lag, corner and bias show, and how sure the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -41,6 +42,12 @@ UNITS = {
 # gains on that of the motion; "range" [the channel's unit] and "slew" [that per second] limit a
 # command between its record and the coil. No model corrects "clipping", so that its `run` is "" and
 # `runs` are those that it was seen in.
+
+
+def _fault(
+    kind: str, channel: str, value: float, std: float, text: str, either: str = ""
+) -> Finding:
+    return Finding(kind, "warning", text, channel=channel, value=value, std=std, either=either)
 
 
 def as_json(fault: Finding) -> dict[str, object]:
@@ -92,15 +99,9 @@ def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Fi
             every = [end for cut in ends.values() for end in cut]
             at = joined([quantity(end, channel_unit(channel), 4) for end in outermost(every)])
             named = joined([*ends]) if len(ends) <= NAMED else f"{len(ends)} runs"
-            found.append(
-                Finding(
-                    "clipping", "warning",
-                    f"{channel.capitalize()} repeats the very same extreme in {named}: its range "
-                    f"ended at {at}.",
-                    channel=channel, value=max(map(abs, every)), std=0.0,
-                    runs=tuple(ends) if len(ends) < len(runs) else (),
-                )
-            )  # fmt: skip
+            text = f"{channel.capitalize()} repeats the very same extreme in {named}: its range "
+            fault = _fault("clipping", channel, max(map(abs, every)), 0.0, f"{text}ended at {at}.")
+            found.append(replace(fault, runs=tuple(ends) if len(ends) < len(runs) else ()))
     return found
 
 
@@ -134,16 +135,12 @@ def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[Findi
         return []
     first = late[0]
     value = LATE[how[first.name]] * first.step
-    return [
-        Finding(
-            "derived", "warning",
-            f"Velocity is the {how[first.name]} difference of displacement, half a sample "
-            f"({plain(1e3 * abs(value))} ms) {'late' if value > 0.0 else 'early'}: it was "
-            f"computed, "
-            "not measured, and is left out.",
-            channel="velocity", value=value, std=0.0,
-        )
-    ]  # fmt: skip
+    text = (
+        f"Velocity is the {how[first.name]} difference of displacement, half a sample "
+        f"({plain(1e3 * abs(value))} ms) {'late' if value > 0.0 else 'early'}: it was computed, "
+        "not measured, and is left out."
+    )
+    return [_fault("derived", "velocity", value, 0.0, text)]
 
 
 def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
@@ -160,14 +157,11 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     if sum(len(_begins(run)) for run in runs) < FEWEST:
         return []  # the spread over pieces is what says how sure a fault is
     if _unrelated_share(runs) > rule.unrelated:
-        return [
-            Finding(
-                "unrelated", "warning",
-                "Velocity is not the rate of displacement, whatever gain and delay it is given: "
-                "one of the two belongs to another motion, or is not connected.",
-                channel="velocity", value=0.0, std=0.0, either="displacement",
-            )
-        ]  # fmt: skip
+        text = (
+            "Velocity is not the rate of displacement, whatever gain and delay it is given: one of "
+            "the two belongs to another motion, or is not connected."
+        )
+        return [_fault("unrelated", "velocity", 0.0, 0.0, text, "displacement")]
     theta, std = _pooled(runs)
     gain = 1.0 / theta[0]
     found = []
@@ -176,40 +170,28 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         theta = -theta
         gain = -gain
     if abs(theta[4]) > max(rule.fault_sigma * std[4], rule.least_corner):
-        found.append(
-            Finding(
-                "high-pass", "warning",
-                "Velocity lacks the low frequencies of the rate of displacement, like a geophone "
-                f"with a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
-                channel="velocity", value=theta[4] * gain, std=std[4] * gain,
-            )
-        )  # fmt: skip
-        return found
+        corner = theta[4] * gain
+        text = (
+            "Velocity lacks the low frequencies of the rate of displacement, like a geophone with "
+            f"a corner near {plain(corner / (2.0 * np.pi), 2)} Hz."
+        )
+        return [*found, _fault("high-pass", "velocity", corner, std[4] * gain, text)]
     theta, std = _pooled(runs, slow=False)
     theta, gain = theta * np.sign(theta[0]), 1.0 / abs(theta[0])
     spread = std[0] * gain * gain
     if abs(gain - 1.0) > max(rule.fault_sigma * spread, rule.least_gain):
-        found.append(
-            Finding(
-                "gain", "warning",
-                f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is "
-                f"off, and neither motion nor force shows which one. If velocity is right, "
-                f"displacement shows {1.0 / gain:.3f} of what it should.",
-                channel="velocity", value=gain, std=spread, either="displacement",
-            )
-        )  # fmt: skip
+        text = (
+            f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is off, "
+            "and neither motion nor force shows which one. If velocity is right, displacement "
+            f"shows {1.0 / gain:.3f} of what it should."
+        )
+        found.append(_fault("gain", "velocity", gain, spread, text, "displacement"))
     found += _late(theta * gain, std * gain, _mean_step(runs), rule)
     bias, bias_std = -theta[5] * gain, std[5] * gain
     rms = float(np.sqrt(np.mean(np.concatenate([run["velocity"] for run in runs]) ** 2)))
     if abs(bias) > max(rule.fault_sigma * bias_std, rule.least_bias * rms):
-        found.append(
-            Finding(
-                "bias", "warning",
-                f"Velocity shows {plain(bias)} m/s too much: its integral drifts away from "
-                "displacement.",
-                channel="velocity", value=bias, std=bias_std,
-            )
-        )  # fmt: skip
+        text = f"Velocity shows {plain(bias)} m/s too much: its integral drifts away from "
+        found.append(_fault("bias", "velocity", bias, bias_std, f"{text}displacement."))
     return found
 
 
@@ -218,25 +200,12 @@ def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> Finding:
     power = _power(runs)
     begin = "Displacement and velocity have opposite signs: "
     if abs(power) < rule.resists:
-        return Finding(
-            "sign",
-            "warning",
-            begin + "one of the two is reversed.",
-            channel="velocity",
-            value=-1.0,
-            std=0.0,
-            either="displacement",
-        )
+        text = f"{begin}one of the two is reversed."
+        return _fault("sign", "velocity", -1.0, 0.0, text, "displacement")
     channel = "velocity" if power < 0.0 else "displacement"
     verb = "speed up" if power < 0.0 else "resist"
-    return Finding(
-        "sign",
-        "warning",
-        f"{begin}the force seems to {verb} the velocity, so {channel} is reversed.",
-        channel=channel,
-        value=-1.0,
-        std=0.0,
-    )
+    text = f"{begin}the force seems to {verb} the velocity, so {channel} is reversed."
+    return _fault("sign", channel, -1.0, 0.0, text)
 
 
 def _power(runs: Sequence[Measurement]) -> float:
@@ -264,22 +233,14 @@ def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[Fin
         return []
     order = _order(theta, std, rule) if late > 0.0 else 0
     if order:
-        return [
-            Finding(
-                "lag", "warning",
-                f"Velocity lags the rate of displacement by {1e3 * late:.2f} ms and rounds it, "
-                f"as an instrument of {'first' if order == 1 else 'second'} order does.",
-                channel="velocity", value=late, std=late_std,
-            )
-        ]  # fmt: skip
-    channel = "velocity" if late > 0.0 else "displacement"
-    return [
-        Finding(
-            "delay", "warning",
-            f"{channel.capitalize()} is {1e3 * abs(late):.2f} ms late relative to the other.",
-            channel=channel, value=abs(late), std=late_std,
+        text = (
+            f"Velocity lags the rate of displacement by {1e3 * late:.2f} ms and rounds it, as an "
+            f"instrument of {'first' if order == 1 else 'second'} order does."
         )
-    ]  # fmt: skip
+        return [_fault("lag", "velocity", late, late_std, text)]
+    channel = "velocity" if late > 0.0 else "displacement"
+    text = f"{channel.capitalize()} is {1e3 * abs(late):.2f} ms late relative to the other."
+    return [_fault("delay", channel, abs(late), late_std, text)]
 
 
 def _order(theta: Array, std: Array, rule: DecisionRule) -> int:
@@ -365,14 +326,11 @@ def signs(
     found = []
     turned = any(fault.kind == "sign" for fault in known)
     if not turned and _power(runs) < -rule.resists:
-        found.append(
-            Finding(
-                "sign", "warning",
-                "Force times velocity is negative on average: a damper would feed energy in. "
-                "The sign of the force, or of the motion, is reversed.",
-                channel="force", value=-1.0, std=0.0,
-            )
-        )  # fmt: skip
+        text = (
+            "Force times velocity is negative on average: a damper would feed energy in. The sign "
+            "of the force, or of the motion, is reversed."
+        )
+        found.append(_fault("sign", "force", -1.0, 0.0, text))
     for drive in ("voltage", "duty"):  # a current or a field may well be driven both ways
         drives = [run[drive] for run in runs if run.has(drive)]
         if not drives:
@@ -380,11 +338,6 @@ def signs(
         V = np.concatenate(drives)
         low, high = np.quantile(V, [0.02, 0.98])
         if low < 0.0 and -low > rule.turned * max(high, 0.0):
-            found.append(
-                Finding(
-                    "sign", "warning",
-                    f"The {drive} is negative nearly always: its sign is reversed.",
-                    channel=drive, value=-1.0, std=0.0,
-                )
-            )  # fmt: skip
+            text = f"The {drive} is negative nearly always: its sign is reversed."
+            found.append(_fault("sign", drive, -1.0, 0.0, text))
     return found

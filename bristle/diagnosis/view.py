@@ -317,15 +317,14 @@ _SHORT = 0.05
 """Distance of a value from 1 below which its bar would not be seen: a dot is."""
 
 
+BAND = (0.9, 1.1)
+"""Values of z that noise explains."""
+
+
 def draw_ranking(
-    axes: Axes,
-    names: Sequence[str],
-    values: Sequence[float],
-    before: float,
+    axes: Axes, names: Sequence[str], values: Sequence[float], before: float,
     strong: Collection[str] = (),
-    *,
-    band: tuple[float, float] = (0.9, 1.1),
-) -> None:
+) -> None:  # fmt: skip
     """Draw what each candidate leaves of a value: a bar from what noise explains to the value.
 
     Parameters
@@ -335,10 +334,9 @@ def draw_ranking(
     values : one per candidate, positive
     before : the value without any candidate, a line
     strong : names that are drawn in colour
-    band : the values that noise explains
     """
     axes.set_xscale("log")
-    axes.axvspan(*band, color=FLOOR, lw=0.0)
+    axes.axvspan(*BAND, color=FLOOR, lw=0.0)
     axes.axvline(before, color=GREY, lw=0.9, linestyle=(0, (3, 2)))
     for row, (name, value) in enumerate(zip(names, values, strict=True)):
         colour = BLUE if name in strong else PALE

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.text import literal
 from ..physics.drive import drive_named, unit_for
 from ..physics.effect import CLOSURE
-from .effect_file import class_data, literal
+from .effect_file import class_data
 
 FADES = 0.25
 """Share of its reach over which a network fades beyond it."""

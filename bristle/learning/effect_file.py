@@ -9,21 +9,10 @@ import json
 import math
 from collections.abc import Sequence
 
+from ..core.text import in_docstring, literal
 from ..physics.drive import drive_named, unit_for
 from .curve import BOUND, Curve, CurveFormula, bounds_of, followed
 from .signals import FOLLOWING, GIVEN, MEMORIES, SLIP
-
-# Values as the text of a Python file: a study's name may hold quotes and backslashes.
-
-
-def literal(text: str) -> str:
-    """Return a text as a Python literal in double quotes."""
-    return json.dumps(text, ensure_ascii=False)  # Python has all of its escapes
-
-
-def in_docstring(text: str) -> str:
-    """Return a text as it stands between triple quotes, where Python reads that text."""
-    return text.replace("\\", "\\\\").replace('"""', r"\"\"\"")
 
 
 def class_data(value: object) -> str:

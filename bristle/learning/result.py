@@ -14,9 +14,8 @@ from ..view import Viewable
 from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
 from .curve import Curve
 from .fit import LearnedCurve
-from .rule import LEARN
 from .signals import RING, SLIP
-from .surface import continues, separated
+from .surface import continues
 
 DRAWN = 400
 """Points of a closed form that a page draws."""
@@ -165,23 +164,10 @@ def _levels(curve: Curve) -> dict[str, Any]:
 
 def _of_surface(curve: Curve) -> list[str]:
     """Return what is said of a surface beside what it explains."""
-    one, other = (signal.words for signal in curve.signals)
-    kind, left = separated(curve)
-    out = (
-        f"The surface is nearly the {kind} of a curve along {one} and one along {other} "
-        f"({100.0 * left:.0f} % of its variation remains)."
-        if left <= LEARN.follows
-        else "The surface is neither the sum nor the product of two curves: the nearest "
-        f"{kind} leaves {100.0 * left:.0f} % of its variation."
-    )
     few, count = len(continues(curve)), len(curve.values)
-    if not few:
-        return [out]
     verb = "continues" if few == 1 else "continue"
-    return [
-        out,
-        f"{few} of its {count} values {verb} those beside them: these runs hardly reach there.",
-    ]
+    text = f"{few} of its {count} values {verb} those beside them: these runs hardly reach there."
+    return [text] if few else []
 
 
 def _excess(z: float) -> float:

@@ -50,11 +50,6 @@ WEAK = 1e-3
 FLAT = 1e-2
 """Weight of first differences over that of second ones: beyond the data a surface levels off."""
 
-TURNS = 100
-"""Times that each curve of a product is sought while the other one stays."""
-
-TINY = 1e-300
-"""Least divisor."""
 
 _SAME = ({"velocity", "speed"}, {"acceleration", "slowing"})
 """Signals that say nearly the same."""
@@ -223,42 +218,3 @@ def continued(surface: Curve) -> Curve:
     pull = -bend[np.ix_(weak, free)] @ values[free]
     values[weak] = np.linalg.solve(bend[np.ix_(weak, weak)], pull)
     return replace(surface, values=inside(surface.of, values))
-
-
-def separated(surface: Curve) -> tuple[str, float]:
-    """Return whether a surface is nearly a sum or a product of two curves, and what that leaves.
-
-    "sum" or "product", and the share of the surface's variation that remains, as RMS over the
-    knots that the data support.
-    """
-    grid = np.array(surface.values).reshape(len(surface.levels), len(surface.knots))
-    weight = np.ones(grid.size)
-    weight[list(continues(surface))] = 0.0
-    weight = weight.reshape(grid.shape)
-    size = float(np.sqrt(np.sum(weight * (grid - np.average(grid, weights=weight)) ** 2)))
-    if not size > 0.0:
-        return "sum", 0.0
-    left = {"sum": _left_of_sum(grid, weight), "product": _left_of_product(grid, weight)}
-    nearest = min(left, key=lambda kind: left[kind])
-    return nearest, left[nearest] / size
-
-
-def _left_of_sum(grid: Array, weight: Array) -> float:
-    """Return the root of the sum of squares that a sum of two curves leaves of a grid (l, k)."""
-    levels, knots = grid.shape
-    columns = np.hstack(
-        [np.repeat(np.eye(levels), knots, axis=0), np.tile(np.eye(knots), (levels, 1))]
-    )
-    root = np.sqrt(weight).ravel()
-    found = np.linalg.lstsq(columns * root[:, None], root * grid.ravel(), rcond=None)[0]
-    return float(np.linalg.norm(root * (grid.ravel() - columns @ found)))
-
-
-def _left_of_product(grid: Array, weight: Array) -> float:
-    """Return the same of a product of two curves, which are sought in turn by least squares."""
-    columns = np.linalg.svd(weight * grid)[2][0]  # not 1: the mean of an odd surface is zero
-    rows = np.zeros(len(grid))
-    for _ in range(TURNS):
-        rows = (weight * grid) @ columns / np.maximum(weight @ columns**2, TINY)
-        columns = (weight * grid).T @ rows / np.maximum(weight.T @ rows**2, TINY)
-    return float(np.sqrt(np.sum(weight * (grid - rows[:, None] * columns) ** 2)))

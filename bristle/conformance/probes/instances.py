@@ -63,12 +63,8 @@ def judged(bench: Bench, difference: str) -> Finding:
 )
 def many_instances(bench: Bench) -> Finding:
     """Live many lives one after the other; the last run equals the first."""
-    steps = min(3, bench.plan.steps)
     for _ in range(bench.plan.instances):
-        instance = bench.ready()
-        bench.run(instance, 0, steps)
-        good(instance.terminate(), "Terminate")
-        instance.free()
+        _life(bench)
     difference = bench.differs(bench.whole_run(), bench.reference())
     if difference:
         return judged(bench, f"after {bench.plan.instances} instances: {difference}")
@@ -118,38 +114,33 @@ def two_libraries(bench: Bench) -> Finding:
     """Run a copy from another folder, then the FMU itself beside it."""
     copy = Path(bench.plan.work) / "copy"
     extract(bench.plan.fmu, copy)
-    return _beside(bench, _bench_of(bench, copy), companion_first=True)
+    other = Bench(replace(bench.plan, folder=str(copy)), bench.box)
+    return _beside(bench, other, companion_first=True)
 
 
-@Probe(
-    "another FMU before",
-    rule="robustness",
-    tried="another FMU loaded and running in the same process, then this one",
-    standard="No clause; a co-simulation has several FMUs in one process, so no FMU may take what "
-    "another one needs (module names, symbols, settings of the process).",
-    unless=lambda plan: None if plan.beside else "there is no other FMU at hand",
-)
-def another_before(bench: Bench) -> Finding:
-    """Load the companion first."""
-    assert bench.plan.beside is not None
-    return _beside(bench, Bench(bench.plan.beside, bench.box), companion_first=True)
+for _when, _tried, _why in (
+    (
+        "before", "another FMU loaded and running in the same process, then this one",
+        "a co-simulation has several FMUs in one process, so no FMU may take what another one "
+        "needs (module names, symbols, settings of the process).",
+    ),
+    (
+        "after", "this FMU running, then another one loaded and run in the same process",
+        "an FMU that comes later must not change one that is already running.",
+    ),
+):  # fmt: skip
 
-
-@Probe(
-    "another FMU after",
-    rule="robustness",
-    tried="this FMU running, then another one loaded and run in the same process",
-    standard="No clause; an FMU that comes later must not change one that is already running.",
-    unless=lambda plan: None if plan.beside else "there is no other FMU at hand",
-)
-def another_after(bench: Bench) -> Finding:
-    """Load the companion second."""
-    assert bench.plan.beside is not None
-    return _beside(bench, Bench(bench.plan.beside, bench.box), companion_first=False)
-
-
-def _bench_of(bench: Bench, folder: Path) -> Bench:
-    return Bench(replace(bench.plan, folder=str(folder)), bench.box)
+    @Probe(
+        f"another FMU {_when}",
+        rule="robustness",
+        tried=_tried,
+        standard=f"No clause; {_why}",
+        unless=lambda plan: None if plan.beside else "there is no other FMU at hand",
+    )
+    def another(bench: Bench, first: bool = _when == "before") -> Finding:
+        """Load the companion first, or second."""
+        assert bench.plan.beside is not None
+        return _beside(bench, Bench(bench.plan.beside, bench.box), companion_first=first)
 
 
 def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:

@@ -55,65 +55,52 @@ def wrong_guid(bench: Bench) -> Finding:
     return forbidden(bench, lambda: 0, instance)
 
 
-@Probe(
-    "step before initialisation",
-    rule="robustness",
-    tried="fmi2DoStep right after fmi2Instantiate",
-    standard=_ORDER,
-)
-def step_first(bench: Bench) -> Finding:
-    """Step an instance that was never initialised."""
-    instance = bench.instance()
-    return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
-
-
-@Probe(
-    "step in initialisation",
-    rule="robustness",
-    tried="fmi2DoStep between entering and leaving initialisation mode",
-    standard=_ORDER,
-)
-def step_in_initialisation(bench: Bench) -> Finding:
-    """Step an instance in initialisation mode."""
-    instance = bench.entered()
-    return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
-
-
-@Probe(
-    "step after terminate",
-    rule="robustness",
-    tried="fmi2DoStep after fmi2Terminate",
-    standard=_ORDER,
-)
-def step_last(bench: Bench) -> Finding:
-    """Step an instance that was terminated."""
+def _terminated(bench: Bench) -> Handle:
     instance = bench.under_way()
     good(instance.terminate(), "Terminate")
-    return forbidden(bench, lambda: instance.step(bench.time(2), bench.plan.step), instance)
+    return instance
 
 
-@Probe(
-    "initialise twice",
-    rule="robustness",
-    tried="fmi2EnterInitializationMode in mid-run",
-    standard=_ORDER,
-)
-def initialise_twice(bench: Bench) -> Finding:
-    """Enter initialisation mode again without a reset."""
-    instance = bench.under_way()
-    return forbidden(bench, instance.enter, instance)
+_Begin = Callable[[Bench], Handle]
+_Call = Callable[[Handle, Bench], int]
 
 
-@Probe(
-    "leave what was not entered",
-    rule="robustness",
-    tried="fmi2ExitInitializationMode right after fmi2Instantiate",
-    standard=_ORDER,
-)
-def leave_first(bench: Bench) -> Finding:
-    """Leave initialisation mode without having entered it."""
-    instance = bench.instance()
-    return forbidden(bench, instance.leave, instance)
+def _step(instance: Handle, bench: Bench) -> int:
+    return instance.step(bench.plan.start, bench.plan.step)
+
+
+def _third(instance: Handle, bench: Bench) -> int:
+    return instance.step(bench.time(2), bench.plan.step)
+
+
+_CALLS: tuple[tuple[str, str, _Begin, _Call], ...] = (
+    (
+        "step before initialisation", "fmi2DoStep right after fmi2Instantiate",
+        Bench.instance, _step,
+    ),
+    (
+        "step in initialisation",
+        "fmi2DoStep between entering and leaving initialisation mode", Bench.entered, _step,
+    ),
+    ("step after terminate", "fmi2DoStep after fmi2Terminate", _terminated, _third),
+    (
+        "initialise twice", "fmi2EnterInitializationMode in mid-run",
+        Bench.under_way, lambda instance, _: instance.enter(),
+    ),
+    (
+        "leave what was not entered", "fmi2ExitInitializationMode right after fmi2Instantiate",
+        Bench.instance, lambda instance, _: instance.leave(),
+    ),
+)  # fmt: skip
+"""Forbidden calls: name, what is tried, what makes the instance, the call."""
+
+for _name, _words, _begin, _call in _CALLS:
+
+    @Probe(_name, rule="robustness", tried=_words, standard=_ORDER)
+    def out_of_order(bench: Bench, begin: _Begin = _begin, call: _Call = _call) -> Finding:
+        """Make a call where it has no place."""
+        instance = begin(bench)
+        return forbidden(bench, lambda: call(instance, bench), instance)
 
 
 def _fixed(bench: Bench) -> Variable | None:

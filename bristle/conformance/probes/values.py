@@ -101,26 +101,22 @@ _REFERENCE = (
 )
 
 
-@Probe(
-    "reading what is not there",
-    rule="robustness",
-    tried="fmi2GetReal with value references that no variable has",
-    standard=_REFERENCE,
+_ACTS: tuple[tuple[str, str, Callable[[Handle, int], int]], ...] = (
+    ("reading", "Get", lambda instance, r: instance.get("Real", [r])[0]),
+    ("setting", "Set", lambda instance, r: instance.set("Real", [r], [0.0])),
 )
-def read_unknown(bench: Bench) -> Finding:
-    """Get unknown references."""
-    return _bad_reference(bench, lambda instance, r: instance.get("Real", [r])[0])
 
+for _name, _verb, _act in _ACTS:
 
-@Probe(
-    "setting what is not there",
-    rule="robustness",
-    tried="fmi2SetReal with value references that no variable has",
-    standard=_REFERENCE,
-)
-def set_unknown(bench: Bench) -> Finding:
-    """Set unknown references."""
-    return _bad_reference(bench, lambda instance, r: instance.set("Real", [r], [0.0]))
+    @Probe(
+        f"{_name} what is not there",
+        rule="robustness",
+        tried=f"fmi2{_verb}Real with value references that no variable has",
+        standard=_REFERENCE,
+    )
+    def unknown(bench: Bench, act: Callable[[Handle, int], int] = _act) -> Finding:
+        """Get or set unknown references."""
+        return _bad_reference(bench, act)
 
 
 @Probe(
