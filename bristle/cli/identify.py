@@ -49,25 +49,23 @@ def main(arguments: argparse.Namespace) -> int:
         return _main_building(arguments)
     from ..core.files import json_text
     from ..core.interrupt import keeps
-    from ..core.progress import Progress, tell
-    from ..study.identify import STAGES, identify_study
+    from ..core.progress import tell
+    from ..study.identify import identify_study
     from ..study.study import Study
     from ..study.view import identified_with_next
 
     study = Study(arguments.folder)
     if not arguments.dry_run:
         import_ahead("bristle.study.pictures", "bristle.study.view")
-    with Progress("identifying", STAGES, True, even=False) as progress:
-        found = identify_study(
-            study,
-            law=arguments.law,
-            command=arguments.form,
-            cutoff=arguments.cutoff,
-            starts=arguments.starts,
-            table=not arguments.no_table,
-            write=not arguments.dry_run,
-            show=progress.show,
-        )
+    found = identify_study(
+        study,
+        law=arguments.law,
+        command=arguments.form,
+        cutoff=arguments.cutoff,
+        starts=arguments.starts,
+        table=not arguments.no_table,
+        write=not arguments.dry_run,
+    )
     tell("drawing")
     if not arguments.dry_run:
         keeps("The new step is kept in the study's history; its pictures were not all drawn.")

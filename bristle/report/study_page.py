@@ -10,11 +10,9 @@ import shlex
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
 
 from ..comparison.names import effect_names
 from ..comparison.view import (
@@ -24,7 +22,7 @@ from ..comparison.view import (
     run_table,
     under,
 )
-from ..core.progress import counted, tell
+from ..core.progress import tell
 from ..core.text import command, plain, short_z
 from ..core.text import with_interval as with_interval
 from ..data.channels import label_text
@@ -51,7 +49,6 @@ from ..view.style import Page, look, png
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from ..comparison.comparison import RigComparer
     from ..comparison.result import Comparison
     from ..data.channels import ChannelSpec
     from ..data.measurement import Measurement
@@ -290,7 +287,7 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
     `open_test` False leaves test runs closed; else the study counts that they were opened.
     `what_if` adds sliders that compute the model in the page, which needs zig.
     """
-    from ..study.steps import compare_study, comparer
+    from ..study.steps import compare_study, comparer, last_added
 
     moved = what_if_section(study) if what_if else ""  # first: it may lack its compiler
     model, steps = study.model(to_show=True), tuple(study.steps())
@@ -302,17 +299,10 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
         study.model()  # raises where the code of an effect waits for consent
         against = comparer(study)
         now, damper = against.compare(model), against.damper(model)
-        for step in reversed(steps):
-            gone = set(study.model_of(step.number).effects)
-            if step.number == 0 or not gone <= set(model.effects):
-                break
-            earlier = study.model_of(step.number - 1)
-            new = [name for name in model.effects if name not in earlier.effects]
-            if new:
-                tell("the model before its last effect")
-                before, added = against.compare(earlier), effect_names(new)
-                break
-        found = [_with_error(one, against, study) for one in counted(found, "step")]
+        last = last_added(study)
+        if last is not None and {*last.effects} <= {*model.effects}:
+            tell("the model before its last effect")
+            before, added = against.compare(last.before), effect_names(last.effects)
         if open_test and study.files(TEST):
             test = compare_study(study, role=TEST)
     except BristleError as error:
@@ -321,19 +311,6 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
         study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble,
         test, moved, damper=damper,
     )  # fmt: skip
-
-
-def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> HistoryStep:
-    """Return a step with its z where the history does not tell it: an edit by hand."""
-
-    from ..identification.search import z_scale
-
-    if step.z is not None or step.number == 0:
-        return step  # the model that a study begins with is nobody's guess of this damper
-    runs = against.predictions(study.model_of(step.number))
-    if not all(one.noise_known for one in runs):
-        return step
-    return replace(step, z=z_scale(np.concatenate([one.normalised for one in runs])))
 
 
 # The model in a study's report: its equations with numbers, and what makes its force.

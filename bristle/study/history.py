@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import count, takewhile
-from math import sqrt
+from math import inf, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -214,6 +214,12 @@ def _learned(study: Path) -> Iterator[Path]:
                 yield file
 
 
+OF_MODEL = (
+    "identify.png", "identify.json", "force_budget.png", "compare.png", "diagnose.png",
+    "report.html",
+)  # fmt: skip
+"""Reports that show a model: its step keeps them when another becomes the present one."""
+
 EARLIER = "verdict_before_runs.json"
 """Where a step keeps the verdict that was on other runs, or on the same with other corrections."""
 
@@ -262,27 +268,20 @@ class History:
         if data.get("schema", 1) != 1:
             raise StudyError(f"{path}: {other_schema(data['schema'])}")
         try:
-            return Step(
-                int(data["number"]),
-                str(data["what"]),
-                str(data["why"]),
-                dict(data["before"]),
-                dict(data["after"]),
-            )
+            what, why, before, after = (data[key] for key in ("what", "why", "before", "after"))
+            return Step(int(data["number"]), str(what), str(why), dict(before), dict(after))
         except (KeyError, TypeError, ValueError) as error:
             raise StudyError(
                 f"{path}: no step of a study: {error!r} is missing or wrong."
             ) from None
 
-    def made_by(self, number: int) -> str:
-        """Return the version of bristle that made a step, "" where it is not told."""
-        path = self.path(number) / "step.json"
-        return str(read_json(path).get("bristle", "")) if path.is_file() else ""
+    def noted(self, number: int, key: str) -> str:
+        """Return what a step notes: "bristle", the version that made it, or "data", their digest.
 
-    def data_of(self, number: int) -> str:
-        """Return the digest of the data that a step's model was fitted to, "" where not told."""
+        "" where it is not told.
+        """
         path = self.path(number) / "step.json"
-        return str(read_json(path).get("data", "")) if path.is_file() else ""
+        return str(read_json(path).get(key, "")) if path.is_file() else ""
 
     def path(self, number: int) -> Path:
         """Return the folder of a step."""
@@ -292,15 +291,16 @@ class History:
         """Return the model.toml of a step."""
         return self.path(number) / "model.toml"
 
-    def add(self, step: Step, model: str, data: str = "") -> None:
+    def add(self, step: Step, model: str, data: str = "", before: float = inf) -> None:
         """Add a step with its model, make that the present one, and drop the present verdict.
 
         Parameters
         ----------
         step, model : the step, and the text of its model.toml
         data : digest of the data that the model was fitted to, "" for none
+        before : ns, from when on reports are of the new model
         """
-        self._keep_verdict(step.number - 1)
+        self._keep_results(step.number - 1, before)
         self._begin({"add": step.number})
         draft = Path(tempfile.mkdtemp(dir=self.folder, prefix=".draft-"))
         try:
@@ -320,9 +320,10 @@ class History:
     def keep_edit(self) -> None:
         """Make a step of a model.toml that was edited by hand, so that no step loses it."""
         if self.is_edited():
-            last, text = self.numbers()[-1], (self.study / "model.toml").read_bytes()
+            last, file = self.numbers()[-1], self.study / "model.toml"
             step = Step(last + 1, "edited by hand", "model.toml was changed in an editor")
-            self.add(step, text.decode("utf-8-sig"), self.data_of(last))
+            text = file.read_bytes().decode("utf-8-sig")
+            self.add(step, text, self.noted(last, "data"), file.stat().st_mtime_ns)
 
     def is_edited(self) -> bool:
         """Return whether model.toml is another one than that of the last step."""
@@ -348,7 +349,7 @@ class History:
             )
         self.refuse_damaged()
         last = self.step(numbers[-1])
-        self._keep_verdict(last.number)
+        self._keep_results(last.number)
         self._begin({"undo": last.number})
         self.recover()
         return last
@@ -436,11 +437,16 @@ class History:
             write_whole(self.path(numbers[-1]) / EARLIER, verdict.read_bytes())
         verdict.unlink()
 
-    def _keep_verdict(self, number: int) -> None:
-        """Keep the present verdict with the step whose model it judges."""
-        verdict = self.study / "verdict.json"
-        if verdict.is_file() and self.path(number).is_dir():
-            write_whole(self.path(number) / "verdict.json", verdict.read_bytes())
+    def _keep_results(self, number: int, before: float = inf) -> None:
+        """Keep the present verdict, and reports, with the step whose model they are of."""
+        verdict, kept = self.study / "verdict.json", self.path(number)
+        if not kept.is_dir():
+            return
+        if verdict.is_file():
+            write_whole(kept / "verdict.json", verdict.read_bytes())
+        for report in (self.study / "reports" / name for name in OF_MODEL):
+            if report.is_file() and report.stat().st_mtime_ns < before:
+                report.replace(kept / report.name)
 
 
 # The staircase of a study's history: the error of each model, step by step.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
@@ -423,11 +423,6 @@ def refuse_effect(model: Model, name: str, bench: bool) -> None:
             raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
 
 
-Show = Callable[[int], None]
-
-STAGES = 4
-"""How many stages `identify_study` reports to `show`."""
-
 _TABLE_STARTS = 3
 _LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
 
@@ -442,7 +437,6 @@ def identify_study(
     starts: int = 4,
     table: bool = True,
     write: bool = True,
-    show: Show | None = None,
     begin: Mapping[str, float] | None = None,
 ) -> Identified:
     """Identify the present model of a study on its training runs, its effects included.
@@ -459,7 +453,6 @@ def identify_study(
     starts : how many starting points are tried
     table : whether to compare the laws as the paper does
     write : whether to make the result the present model, as a step of the history
-    show : is told how many of `STAGES` are done
     begin : values in SI by name that a search has come to: one start is then tried beside them
 
     Raises
@@ -482,10 +475,7 @@ def identify_study(
     model = _of_law(model or present, law)
     compile_ahead(model.law, model.effects)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    task = FitTask(
-        cutoff, 1 if begin else starts, table, begin=begin or {}, command=command,
-        show=show or _show_nothing,
-    )  # fmt: skip
+    task = FitTask(cutoff, 1 if begin else starts, table, begin=begin or {}, command=command)
     # Before is what the study had: at its defaults another law would be nobody's model.
     other = present.law != model.law
     task = replace(task, laws=all_of_them, present=present if other else None)
@@ -499,10 +489,6 @@ def identify_study(
     return replace(found, step=step)
 
 
-def _show_nothing(done: int) -> None:
-    """Tell nobody how many stages are done."""
-
-
 @dataclass(frozen=True)
 class FitTask:
     """How a model is to be identified.
@@ -511,7 +497,7 @@ class FitTask:
     tried; `table` whether to compare the laws; `present` the model whose errors are those before,
     None for the one that is identified; `command` the form or forms of the command, None for the
     model's; `laws` whether every law is tried as well; `begin` values in SI by name from which one
-    more fit begins, the better one counts; `show` is told how many of `STAGES` are done.
+    more fit begins, the better one counts.
     """
 
     cutoff: float
@@ -520,7 +506,6 @@ class FitTask:
     present: Model | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
     command: str | Sequence[str] | None = None
-    show: Show = _show_nothing
     laws: bool = False
 
 
@@ -567,9 +552,8 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
     rig.prepare(model)
     notes = [*runs.notes, *doubts([run for run in runs.all if run.has("force")])]
     notes += extrapolated(model, runs.train, runs.holdout)
-    task.show(1)
+    tell("identifying")
     fits = fit_rig(rig, model, task.starts, task.begin)
-    task.show(2)
     fit = fits.whole(model)
     models = site_models(rig, fit.model)
     old = site_models(rig, present)
@@ -577,10 +561,8 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
     fitted_before = is_identified(present) or _lines_alone(old)
     before = errors_of(old, task.cutoff) if fitted_before else None
     after = errors_of(models, task.cutoff)
-    task.show(3)
     at = models.get(DAMPER) or _worst(models)
     rows = _table(at, task) if task.table else []
-    task.show(4)
     error = after.at["train"][at.site.name]
     notes += [
         *(f"{site_name(site)}: {text}" for site, text in fits.notes().items()),

@@ -488,7 +488,7 @@ def before_after(study: Study) -> BeforeAfter | None:
     model, verdict = study.model(), study.verdict() or {}
     if any(one not in EFFECTS for one in (verdict.get("refined") or {}).get("effects", ())):
         study.usable_effects()  # one of the user's own, which no model has yet
-    return _refined(model, verdict) or _added(study)
+    return _refined(model, verdict) or last_added(study)
 
 
 def _refined(model: Model, verdict: Mapping[str, Any]) -> BeforeAfter | None:
@@ -506,7 +506,7 @@ def _refined(model: Model, verdict: Mapping[str, Any]) -> BeforeAfter | None:
     return BeforeAfter(effects, model, replace(after, values={**after.values, **known}))
 
 
-def _added(study: Study) -> BeforeAfter | None:
+def last_added(study: Study) -> BeforeAfter | None:
     """Return the models on both sides of the last step that added an effect; None without one."""
     numbers = study.history.numbers()
     later: Model | None = None

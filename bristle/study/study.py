@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from hashlib import sha256
-from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -55,50 +54,6 @@ from .study_file import (
     with_mask,
     with_roles,
 )
-
-# Reports of models that are no longer the present one: each step has a folder for its own.
-
-OF_MODEL = (
-    "identify.png", "identify.json", "force_budget.png", "compare.png", "diagnose.png",
-    "report.html",
-)  # fmt: skip
-"""Reports that show a model: they are set aside when another becomes the present one."""
-
-
-def keep_reports(reports: Path, number: int, before: float = inf) -> None:
-    """Put the reports of a step's model into a folder of that step.
-
-    Parameters
-    ----------
-    reports : the folder of a study's reports; the caller holds the lock
-    number : of the step
-    before : ns, a date of files: those that are not older stay
-    """
-    for name in OF_MODEL:
-        old = reports / name
-        if old.is_file() and old.stat().st_mtime_ns < before:
-            kept = reports / f"step_{max(number, 0):03d}"
-            kept.mkdir(exist_ok=True)
-            old.replace(kept / name)
-
-
-def make_room(reports: Path, number: int, undone: str) -> None:
-    """Put the reports of a step that was undone aside, for another step has its number now.
-
-    Parameters
-    ----------
-    reports : the folder of a study's reports; the caller holds the lock
-    number : of the step
-    undone : the name under which the history keeps the step that was undone
-    """
-    kept = reports / f"step_{number:03d}"
-    if kept.is_dir():
-        place = reports / "undone" / undone
-        while place.exists():
-            place = place.with_name(f"{place.name}_")
-        place.parent.mkdir(exist_ok=True)
-        kept.replace(place)
-
 
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
@@ -318,7 +273,7 @@ class Study(Viewable):
     def _other_version(self) -> str:
         """Return that another version of bristle wrote the present model, "" where this one did."""
         numbers = self.history.numbers()
-        made_by = self.history.made_by(numbers[-1]) if numbers else ""
+        made_by = self.history.noted(numbers[-1], "bristle") if numbers else ""
         if made_by in ("", __version__):
             return ""
         return f"\n  bristle {made_by} wrote this model, and this is bristle {__version__}."
@@ -354,7 +309,7 @@ class Study(Viewable):
         """
         with self.writing():
             self.refuse_if_changed()
-            self._keep_edit()
+            self.history.keep_edit()
             numbers = self.history.numbers()
             step = Step(
                 numbers[-1] + 1 if numbers else 0, what, why, {**(before or {})}, {**(after or {})}
@@ -362,7 +317,6 @@ class Study(Viewable):
             text = model_text(model, self.folder / "model.toml")
             data = data_digest(self.folder, self.settings, model.building)
             self.history.add(step, text, data)
-            self._move_reports(step.number - 1, step.number)
             self._seen, self._seen_data = self._state(), data
         return step
 
@@ -377,10 +331,9 @@ class Study(Viewable):
         with self.writing():
             self.history.refuse_damaged()  # before an edit is kept
             added = additions(self)
-            self._keep_edit()
+            self.history.keep_edit()
             step = self.history.undo()
             note_undone(self, added, step.number)
-            keep_reports(self.reports_folder, step.number)
             self._seen, self._seen_data = self._state(), ""
         return step
 
@@ -525,7 +478,7 @@ class Study(Viewable):
         """Write the verdict on the model that was read here; see `add_step` for what is raised."""
         with self.writing():
             self.refuse_if_changed()
-            self._keep_edit()  # the verdict is on it
+            self.history.keep_edit()  # the verdict is on it
             self._seen = self._state()
             write_json(self.folder / "verdict.json", {**verdict, "data": self.data})
 
@@ -535,23 +488,6 @@ class Study(Viewable):
         with self.writing():
             write_whole(path, content)
         return path
-
-    def _keep_edit(self) -> None:
-        """Make a step of a model.toml that was edited by hand, as `History.keep_edit`.
-
-        Reports from before the edit are of the model that was edited.
-        """
-        if not self.history.is_edited():
-            return
-        edited = (self.folder / "model.toml").stat().st_mtime_ns
-        self.history.keep_edit()
-        number = self.history.numbers()[-1]
-        self._move_reports(number - 1, number, before=edited)
-
-    def _move_reports(self, old: int, new: int, before: float = inf) -> None:
-        """Keep reports of a step's model apart, and those of an undone step with a new number."""
-        keep_reports(self.reports_folder, old, before)
-        make_room(self.reports_folder, new, self.history.undone(new).name)
 
     def __repr__(self) -> str:
         steps = self.steps()
@@ -815,7 +751,7 @@ def other_data(study: Study) -> str:
         new = listed(names[file] for file in files)
         return f"{len(files)} {what} added after the present model was identified: {new}."
     numbers = study.history.numbers()
-    known = study.history.data_of(numbers[-1]) if len(numbers) > 1 else ""
+    known = study.history.noted(numbers[-1], "data") if len(numbers) > 1 else ""
     other = other_than(known, study.data, study.settings) if known else ""
     if not other:
         return ""

@@ -146,25 +146,24 @@ def test_pictures_of_another_model_are_set_aside(tmp_path: Path) -> None:
     for name in ("identify.png", "compare.png", "data_check.png"):
         study.write_report(name, b"of step 0")
     study.add_step("add stribeck", "to see", study.model().with_effect("stribeck"))
-    reports = study.reports_folder
-    assert sorted(path.name for path in reports.iterdir()) == ["data_check.png", "step_000"]
-    assert (reports / "step_000" / "identify.png").read_bytes() == b"of step 0"
+    reports, history = study.reports_folder, study.history.folder
+    assert [path.name for path in reports.iterdir()] == ["data_check.png"]
+    assert (history / "000" / "identify.png").read_bytes() == b"of step 0"
     study.write_report("compare.png", b"of step 1")
     study.undo()
     assert not (reports / "compare.png").exists()
-    assert (reports / "step_001" / "compare.png").read_bytes() == b"of step 1"
+    assert (history / "undone" / "001" / "compare.png").read_bytes() == b"of step 1"
     assert (reports / "data_check.png").is_file()
 
 
 def test_pictures_of_an_undone_step_stay_when_another_has_its_number(tmp_path: Path) -> None:
     files = [write(tmp_path / "lab" / f"run_{k}.csv", bench_run(k, 2.0)) for k in (1, 2, 3)]
     study = create_study(tmp_path / "rig", files).study
-    reports = study.reports_folder
+    undone = study.history.folder / "undone"
     for effect in (b"stribeck", b"gas_spring", b"stribeck"):
         study.add_step("add", "to see", study.model().with_effect(effect.decode()))
         study.write_report("force_budget.png", effect)
         study.undo()
     study.add_step("add", "to see", study.model().with_effect("stribeck"))
-    kept = [reports / "undone" / name / "force_budget.png" for name in ("001", "001_2", "001_3")]
+    kept = [undone / name / "force_budget.png" for name in ("001", "001_2", "001_3")]
     assert [file.read_bytes() for file in kept] == [b"stribeck", b"gas_spring", b"stribeck"]
-    assert not (reports / "step_001").exists()
