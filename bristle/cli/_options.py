@@ -166,14 +166,17 @@ def test_files(patterns: list[str], files: list[str]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def channels_of(texts: list[str]) -> dict[str, ChannelSpec]:
-    """Return where channels are, as --channel says; StudyError where one is given twice."""
+def channels_of(texts: list[str], step: float | None = None) -> dict[str, ChannelSpec]:
+    """Return where channels are, as --channel and --step say; StudyError where one is twice."""
+    from ..data.channels import ChannelSpec
     from ..errors import StudyError
     from ..study.new import parse_channel
 
-    channels: dict[str, ChannelSpec] = {}
+    channels = {} if step is None else {"time": ChannelSpec(step=step)}
     for text in texts:
         name, spec = parse_channel(text)
+        if name == "time" and step is not None:
+            raise StudyError("--step and --channel time=... exclude each other.")
         if name in channels:
             raise StudyError(f"--channel {name} is given twice; once is right.")
         channels[name] = spec

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from ..core.text import tick, typed
 from ..view.blocks import Table, Text
@@ -64,10 +64,7 @@ def main(arguments: argparse.Namespace) -> int:
     if kind in (None, "scenarios"):
         tables["scenarios"] = _scenarios()
     if kind is None:
-        tables |= {
-            f"{word}s": [_in_brief(row) for row in _all_of(_kind(word))]
-            for word in ("effect", "law")
-        }
+        tables |= {f"{word}s": _all_of(word) for word in ("effect", "law")}
     if arguments.json:
         print_json(tables[kind] if kind else tables)
         return 0
@@ -104,17 +101,43 @@ def _by_causality(ports: Rows) -> dict[str, Rows]:
 
 def _physics(word: str, arguments: argparse.Namespace) -> int:
     """Print a table of effects or laws, or everything about one."""
-    kind, told, left_out = _found(word, arguments.name, arguments.study)
+    from ..core.text import unknown
+    from ..errors import PhysicsError
+    from ..user_code.load import waiting
+
+    study, name = arguments.study, arguments.name
+    left_out = _read_own(study, word)
+    known = _registered(word)
+    if name in left_out and (untrusted := waiting(study / f"{word}s" / f"{name}.py")):
+        raise untrusted
+    if name is not None and name not in known:
+        raise PhysicsError(left_out.get(name) or unknown(word, name, sorted(known)))
+    as_dict, show = _TOLD[word]
     if arguments.json:
-        print_json(told)
-    elif isinstance(told, dict):
-        kind.one(told)
+        print_json(as_dict(known[name]) if name else [as_dict(known[one]) for one in sorted(known)])
+    elif name:
+        show(as_dict(known[name]))
     else:
-        _print(f"{word}s", [_in_brief(row) for row in told])
+        _print(f"{word}s", _all_of(word))
         print(f"All of one:  bristle list {word}s NAME")
-    for text in left_out:
+    for text in left_out.values():
         print(f"left out: {text}", file=sys.stderr)
     return 0
+
+
+def _all_of(word: str) -> Rows:
+    """Return the rows of effects or laws in the table of all."""
+    known = _registered(word)
+    return [_in_brief(_TOLD[word][0](known[name])) for name in sorted(known)]
+
+
+def _registered(word: str) -> Mapping[str, Any]:
+    """Return the effects or laws that are known, by name."""
+    from ..physics import effects as _registered  # noqa: F401  (importing registers them)
+    from ..physics.effect import EFFECTS
+    from ..physics.laws import laws_of
+
+    return EFFECTS if word == "effect" else {law.name: law for law in laws_of("damper")}
 
 
 def _in_brief(row: dict[str, Any]) -> dict[str, Any]:
@@ -209,56 +232,6 @@ def _cell(value: Any) -> str:
     return typed(value) if isinstance(value, float) else str(value)
 
 
-class _ListedKind(NamedTuple):
-    """What differs between effects and laws.
-
-    `word` is "effect" or "law"; `registered` holds those that are known by name; `told` returns
-    what is told of one, as JSON has it; `one` prints that.
-    """
-
-    word: str
-    registered: Mapping[str, Any]
-    told: Callable[[Any], dict[str, Any]]
-    one: Callable[[dict[str, Any]], None]
-
-
-def _found(
-    word: str, name: str | None, study: Path | None
-) -> tuple[_ListedKind, dict[str, Any] | list[dict[str, Any]], list[str]]:
-    """Return the kind, what is told of one or of all, and why files of a study are left out.
-
-    Parameters
-    ----------
-    word : "effect" or "law"
-    name : of the one that is asked for; None for all
-    study : folder whose own count too
-    """
-    left_out = _read_own(study, word)
-    if study is not None and name in left_out:
-        _refuse_untrusted(study / f"{word}s" / f"{name}.py")
-    kind = _kind(word)
-    if name is not None:
-        told: dict[str, Any] | list[dict[str, Any]] = kind.told(_find(name, kind, left_out))
-    else:
-        told = _all_of(kind)
-    return kind, told, list(left_out.values())
-
-
-def _all_of(kind: _ListedKind) -> Rows:
-    return [kind.told(one) for _, one in sorted(kind.registered.items())]
-
-
-def _kind(word: str) -> _ListedKind:
-    from ..physics import effects as _registered  # noqa: F401  (importing registers them)
-    from ..physics.effect import EFFECTS
-    from ..physics.laws import laws_of
-
-    if word == "effect":
-        return _ListedKind(word, EFFECTS, effect_as_dict, _print_effect)
-    laws = {law.name: law for law in laws_of("damper")}
-    return _ListedKind(word, laws, law_as_dict, _print_law)
-
-
 def _read_own(study: Path | None, word: str) -> dict[str, str]:
     """Register the files of a study; return those that are left out, and why."""
     if study is None:
@@ -270,26 +243,6 @@ def _read_own(study: Path | None, word: str) -> dict[str, str]:
         raise PhysicsError(f"--study {study}: there is no such folder.")
     load(study / "laws", "law")  # what an effect joins
     return {one.name: one.error for one in load(study / f"{word}s", word) if one.error}
-
-
-def _refuse_untrusted(file: Path) -> None:
-    """Raise where the effect or law that is asked for waits for consent."""
-    from ..user_code.load import waiting
-
-    if untrusted := waiting(file):
-        raise untrusted
-
-
-def _find(name: str, kind: _ListedKind, left_out: dict[str, str]) -> Any:
-    """Return the one of a name; PhysicsError that names the nearest where there is none."""
-    from ..core.text import unknown
-    from ..errors import PhysicsError
-
-    if name in kind.registered:
-        return kind.registered[name]
-    if name in left_out:
-        raise PhysicsError(left_out.pop(name))
-    raise PhysicsError(f"{unknown(kind.word, name, sorted(kind.registered))}")
 
 
 def effect_as_dict(effect: Any) -> dict[str, Any]:
@@ -376,6 +329,10 @@ def _print_law(found: dict[str, Any]) -> None:
     _say(f"Source: {found['source']}.")
     _print_parameters(found, "")
     print(f"\nIn a study:  bristle identify STUDY --law {found['name']}")
+
+
+_TOLD = {"effect": (effect_as_dict, _print_effect), "law": (law_as_dict, _print_law)}
+"""What is told of one, as JSON has it, and what prints that."""
 
 
 def _say(text: str) -> None:

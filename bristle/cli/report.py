@@ -20,7 +20,6 @@ def add_arguments(parser: Parser) -> None:
         "add sliders for the model's parameters; the page computes the run (needs bristle[native])"
     )
     parser.flag("--what-if", text)
-    parser.flag("--static", "leave out the interactive pictures and all scripts")
     parser.add_trust()
     parser.add_json()
 
@@ -37,7 +36,7 @@ def main(arguments: argparse.Namespace) -> int:
 
     study = Study(arguments.folder)
     content = gather(study, open_test=not arguments.keep_test_closed, what_if=arguments.what_if)
-    if content.now is not None and not arguments.static:
+    if content.now is not None:
         content = replace(content, linked=linked_section(content.now))
     tell("drawing")
     page = render(content)

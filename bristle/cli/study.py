@@ -44,17 +44,11 @@ def add_channels(parser: Parser) -> None:
 
 def _channels(arguments: argparse.Namespace) -> int:
     """Correct the channels that are named; without any print them all."""
-    from ..data.channels import ChannelSpec
-    from ..errors import StudyError
     from ..study.read_again import correct_channels
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    channels = channels_of(arguments.channel)
-    if arguments.step is not None:
-        if "time" in channels:
-            raise StudyError("--step and --channel time=... exclude each other.")
-        channels["time"] = ChannelSpec(step=arguments.step)
+    channels = channels_of(arguments.channel, arguments.step)
     if not channels and not arguments.without:
         _print_channels(study, as_json=arguments.json)
         return 0
@@ -328,7 +322,6 @@ def _add_runs(parser: Parser) -> None:
 
 
 def _new(arguments: argparse.Namespace) -> int:
-    from ..data.channels import ChannelSpec
     from ..errors import StudyError
     from ..physics.laws import law_names
     from ..study.run_facts import RunChoices
@@ -337,11 +330,7 @@ def _new(arguments: argparse.Namespace) -> int:
     law = arguments.law
     if law is not None and law not in law_names():
         raise StudyError(f'--law "{law}"; there are: {", ".join(law_names())}.')
-    channels = channels_of(arguments.channel)
-    if arguments.step is not None:
-        if "time" in channels:
-            raise StudyError("--step and --channel time=... exclude each other.")
-        channels["time"] = ChannelSpec(step=arguments.step)
+    channels = channels_of(arguments.channel, arguments.step)
     table = arguments.runs
     files = [file for file in files_of(arguments.data) if table is None or Path(file) != table]
     test = test_files(arguments.test, files)

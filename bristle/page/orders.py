@@ -416,16 +416,13 @@ def _design(study: str, options: Options) -> list[str]:
 
 def _passive(study: str, options: Options) -> list[str]:
     """Return the command that finds the best constant voltage on the motions of a closed loop."""
-    sets = options.get("sets", [])
-    if not isinstance(sets, list) or not all(isinstance(one, str) for one in sets):
-        raise RequestError(f"sets: {written(sets)}; a list of NAME=VALUE is right.")
+    sets = _list(options, "sets", "NAME=VALUE")
     for one in sets:
-        if not _SET.fullmatch(one):
+        if not isinstance(one, str) or not _SET.fullmatch(one):
             raise RequestError(f"sets: {written(one)}; NAME=VALUE is right.")
-    records = options.get("motions")
-    if not isinstance(records, list) or not records:
-        raise RequestError(f"motions: {written(records)}; a list of ground motions is right.")
-    motions = [record_name(one) for one in records]
+    motions = [record_name(one) for one in _list(options, "motions", "ground motions")]
+    if not motions:
+        raise RequestError("motions: a list of ground motions is right.")
     peak = peak_of("motions", options.get("peak"))
     words = ["optimise", "passive", "--motions", *motions, f"--intensities={peak:g}"]
     words += ["--grid", "33", f"--out={study}/{FOLDER}/passive", "--no-figure"]

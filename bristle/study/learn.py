@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import date
 from itertools import count
 from keyword import iskeyword
+from pathlib import Path
 
 from ..core.files import write_whole
 from ..core.progress import tell
@@ -72,9 +73,7 @@ def learn_effect(
     """
     for why in study.usable_effects():
         tell(f"left out: {why}")
-    given, name = name, name or _free_name(study)
-    _refuse_no_word(name)
-    _refuse_taken(study, name)
+    given, name = name, _new_name(study, name, "learned")
     site, opened = opened_at(study, at)
     refuse_elsewhere(parts, along, CurvePlace(site), study.settings.beside)
     found = learn(opened, name, parts=parts, along=along)
@@ -113,9 +112,7 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     """
     for why in study.usable_effects():
         tell(f"left out: {why}")
-    given, name = name, name or _free_name(study, "closure")
-    _refuse_no_word(name)
-    _refuse_taken(study, name)
+    given, name = name, _new_name(study, name, "closure")
     _, opened = opened_at(study, DAMPER)
     if opened.problem.reconstructed:
         raise StudyError(
@@ -138,15 +135,9 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
         return replace(found, refused=f"The network can be no effect: {flaw}")
     if not write:
         return found
-    with study.writing():
-        study.refuse_if_changed()
-        if given:
-            _refuse_taken(study, given)
-        name = given or _free_name(study, "closure")
-        file, text = study.effects_folder / f"{name}.py", closure_text(name, found.closure, origin)
-        write_whole(file, text)
-        remember_made(file, text)
-    found = replace(found, name=name, file=file)
+    network = found.closure
+    file = _write(study, given, "closure", lambda name: closure_text(name, network, origin))
+    found = replace(found, name=file.stem, file=file)
     told = json.dumps(found.as_dict(), indent=2, ensure_ascii=False)
     study.write_report(f"{name}.json", told)
     return found
@@ -156,6 +147,18 @@ def promise_of(study: Study) -> float:
     """Return the error that a closure may leave, by the model's, as training folds tell it [1]."""
     opened = opened_at(study, "", study.model())[1]  # which was just identified
     return promised(opened.problem, opened.before.model)
+
+
+def _write(study: Study, given: str, begin: str, text_of: Callable[[str], str]) -> Path:
+    """Write an effect's file by its name: the given one, or the next free one."""
+    with study.writing():
+        study.refuse_if_changed()
+        # A fit takes minutes, in which another process may have taken the name.
+        name = _new_name(study, given, begin)
+        file, text = study.effects_folder / f"{name}.py", text_of(name)
+        write_whole(file, text)
+        remember_made(file, text)
+    return file
 
 
 def _text(study: Study, learned: LearnedEffect, name: str) -> str:
@@ -179,15 +182,8 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     learned : the effect
     given : the name that its user gave it, "" for the next free one
     """
-    with study.writing():
-        study.refuse_if_changed()
-        # A fit takes minutes, in which another process may have taken the name.
-        if given:
-            _refuse_taken(study, given)
-        name = given or _free_name(study)
-        file, text = study.effects_folder / f"{name}.py", _text(study, learned, name)
-        write_whole(file, text)
-        remember_made(file, text)
+    file = _write(study, given, "learned", lambda name: _text(study, learned, name))
+    name = file.stem
     learned = replace(learned, found=replace(learned.found, name=name))
     drawn = curve_png(learned.found, learned.forms, learned.closed)
     picture = study.write_report(f"{name}.png", drawn)
@@ -249,19 +245,17 @@ def _wanted(study: Study, there: Sequence[str]) -> list[str]:
     return [site for site in there if site in unknown] or list(there)
 
 
-def _free_name(study: Study, begin: str = "learned") -> str:
-    """Return the first of learned_1, learned_2 ... that no effect has."""
-    return next(name for k in count(1) if not _is_taken(study, name := f"{begin}_{k}"))
-
-
-def _refuse_no_word(name: str) -> None:
-    if not name.isidentifier() or iskeyword(name):
-        raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
-
-
-def _refuse_taken(study: Study, name: str) -> None:
-    if _is_taken(study, name):
-        raise StudyError(f'an effect is named "{name}" already. Another name is right.')
+def _new_name(study: Study, given: str, begin: str) -> str:
+    """Return the name that was given, else the first of learned_1, learned_2 ... that is free."""
+    if not given:
+        return next(name for k in count(1) if not _is_taken(study, name := f"{begin}_{k}"))
+    if not given.isidentifier() or iskeyword(given):
+        raise StudyError(
+            f'the name "{given}" is no word of letters, digits and _, as worn_bore is.'
+        )
+    if _is_taken(study, given):
+        raise StudyError(f'an effect is named "{given}" already. Another name is right.')
+    return given
 
 
 def _is_taken(study: Study, name: str) -> bool:
