@@ -55,7 +55,7 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print_json(answer)
         return 0
-    print("\n".join(terminal.lines(steps_table(content.history_steps, study.settings.cut_off))))
+    print("\n".join(terminal.lines(steps_table(content.history_steps))))
     if content.trouble:
         print(f"The model could not be compared: {content.trouble}")
     print(f"\nReport: {file}")

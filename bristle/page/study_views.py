@@ -365,7 +365,6 @@ def _step(study: Study, step: Step, one: HistoryStep) -> dict[str, Any]:
     return {
         "number": step.number, "what": step.what, "why": step.why, "z": one.z, "train": one.z_train,
         "rms": one.rms, "share": one.share, "parameters": parameters,
-        "below": study.settings.cut_off if one.cut_off is None else one.cut_off,
     }  # fmt: skip
 
 

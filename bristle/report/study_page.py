@@ -534,7 +534,7 @@ def _on_test_runs(content: Content) -> str:
 
 def _history(content: Content) -> str:
     with_z = [one for one in content.history_steps if one.z is not None]
-    table = steps_table(content.history_steps, content.study.settings.cut_off)
+    table = steps_table(content.history_steps)
     rows = [[*row, step.why] for row, step in zip(table.rows, content.steps, strict=True)]
     table = table._replace(header=[*table.header, "why"], rows=rows)
     picture = ""

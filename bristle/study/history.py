@@ -459,9 +459,7 @@ CLOSE = 1.1
 class HistoryStep:
     """One step of the staircase: what was done, and z and error [N] of the model after it.
 
-    `share` is the error on held-out runs over the force's RMS [1]. A step of a version that knew
-    the low-passed error alone has that one: `cut_off` [Hz] of its low-pass is then not 0, or None
-    where the step does not tell it.
+    `share` is the error on held-out runs over the force's RMS [1].
     """
 
     number: int
@@ -470,7 +468,6 @@ class HistoryStep:
     z_train: float | None
     rms: float | None
     share: float | None = None
-    cut_off: float | None = None
 
     @property
     def missed(self) -> float:
@@ -487,14 +484,9 @@ def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
         errors: dict[str, Any] = {**step.after}
         if not errors and k + 1 < len(steps):
             errors = {**steps[k + 1].before}
-        new = "error_holdout" in errors
-        names = (
-            ("error_holdout", "error_share_holdout") if new else ("rms_holdout", "share_holdout")
-        )
-        keys = ("z_holdout", "z_train", *names)
-        z, z_train, rms, share = (_staircase_number(errors.get(key)) for key in keys)
-        low = 0.0 if new else _staircase_number(errors.get("cut_off"))
-        out.append(HistoryStep(step.number, step.what, z, z_train, rms, share, low))
+        keys = ("z_holdout", "z_train", "error_holdout", "error_share_holdout")
+        numbers = (_staircase_number(errors.get(key)) for key in keys)
+        out.append(HistoryStep(step.number, step.what, *numbers))
     return out
 
 

@@ -243,7 +243,7 @@ def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None) -> N
     """Write z and error over a step, and at its riser by how much the error fell."""
     assert one.z is not None
     told = [f"z = {short_z(one.z)}"]
-    if one.rms is not None and one.cut_off == 0.0:  # else it is of low-passed forces
+    if one.rms is not None:
         share = "" if one.share is None else f" ({percent(one.share)})"
         told.insert(0, f"{quantity(one.rms, 'N')}{share}")
     # Above the higher of both lines, so that neither strikes it through.

@@ -125,11 +125,6 @@ class Study(Viewable):
     """The files of laws/, each with its law or why it is left out."""
 
     @classmethod
-    def open(cls, folder: Path | str, *, trust: bool = False) -> Study:
-        """Return the study in a folder; the same as `Study(folder)`."""
-        return cls(folder, trust=trust)
-
-    @classmethod
     def create(cls, folder: Path | str, files: Sequence[Path | str], **choices: Any) -> Study:
         """Make a study's folder from files; see `bristle.study.create_study` for the choices."""
         make_folder(Path(folder), files, **choices)
@@ -464,8 +459,8 @@ class Study(Viewable):
 
     def stale(self, verdict: Mapping[str, Any]) -> str:
         """Return how data or model are others than a verdict's, and what to do; "" if not."""
-        known = str(verdict.get("data", ""))  # a verdict of an older version has none
-        other = other_than(known, self.data, self.settings) if known else ""
+        known = str(verdict.get("data", ""))
+        other = other_than(known, self.data)
         if other:
             text = f"{other[:1].upper()}{other[1:]} are no longer those of this verdict."
         elif self.history.is_edited():
@@ -555,7 +550,7 @@ class Study(Viewable):
         """Refuse a result where the data are others than were read, by the study.toml of now."""
         building = building_in(self.folder / "model.toml")
         now = data_digest(self.folder, settings, building)
-        if other := other_than(self._seen_data or self.data, now, settings):
+        if other := other_than(self._seen_data or self.data, now):
             raise StudyError(
                 f"{self.folder}: {other} have been changed meanwhile, so that this result is not "
                 f"of the present data. {_AGAIN}"
@@ -573,7 +568,7 @@ T = TypeVar("T")
 # Content counts, and no date, so that a study that was copied or cloned stays as it is.
 
 _KIND = "2"
-"""How the digest begins; that of older studies, `Settings.data` alone, has no such beginning."""
+"""How the digest begins."""
 
 _OTHER = (
     "runs, their roles, labels, corrections or channels in study.toml",
@@ -598,17 +593,14 @@ def data_digest(folder: Path, settings: Settings, building: str) -> str:
     return "-".join((_KIND, *parts))
 
 
-def other_than(known: str, now: str, settings: Settings) -> str:
+def other_than(known: str, now: str) -> str:
     """Return what is no longer as it was: "the numbers of the building"; "" where nothing is.
 
     Parameters
     ----------
     known : the digest that a result was made with, "" where it does not tell
     now : the present one
-    settings : the present content of study.toml
     """
-    if not known.startswith(f"{_KIND}-"):  # of an older study: what it does not hold is unknown
-        return _OTHER[0] if known not in ("", settings.data) else ""
     pairs = zip(known.split("-")[1:], now.split("-")[1:], _OTHER, strict=False)
     return next((text for one, other, text in pairs if one != other), "")
 
@@ -752,7 +744,7 @@ def other_data(study: Study) -> str:
         return f"{len(files)} {what} added after the present model was identified: {new}."
     numbers = study.history.numbers()
     known = study.history.noted(numbers[-1], "data") if len(numbers) > 1 else ""
-    other = other_than(known, study.data, study.settings) if known else ""
+    other = other_than(known, study.data)
     if not other:
         return ""
     return (

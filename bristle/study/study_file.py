@@ -358,8 +358,8 @@ class Settings:
     def data(self) -> str:
         """A digest of the runs that a fit and its judge see, corrected, and of how they are read.
 
-        Titles, labels, the order of runs, and runs for tests or left out do not count. Steps of
-        older studies hold it: it stays as it is, and `data_digest` adds what it lacks.
+        Titles, labels, the order of runs, and runs for tests or left out do not count;
+        `data_digest` adds what it lacks.
         """
         runs = sorted(
             [run.name, run.role, sorted(run.levels.items()), [[*one] for one in run.corrections]]

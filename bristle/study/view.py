@@ -571,7 +571,7 @@ def study_view(study: Study) -> View:
             Text(settings.excluded_text),
             Text(f"Verdict: {verdict.get('words')}" if verdict else ""),
             Text(study.stale(verdict) if verdict else ""),
-            steps_table(history_steps(study.steps()), settings.cut_off),
+            steps_table(history_steps(study.steps())),
             Figure(lambda: study_page(study), settings.title),
         ),
     )  # fmt: skip
@@ -636,9 +636,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     told = [Text(text, "say") for text in own]
     if verdict.get("kind") != "none":
         told.insert(0, Text(view.title, "say"))
-    # The errors of earlier versions are low-passed: they and the others show no fall together.
-    alike = [one for one in judged if one.cut_off == judged[-1].cut_off]
-    fall = Text(_fall(alike, study.settings.cut_off))
+    fall = Text(_fall(judged))
     # What a missing effect would gain stands in the verdict's sentence alone.
     said = Text(verdict_error(verdict)) if verdict.get("kind") != "effect" else None
     rest = [one for one in view.blocks if one != said]
@@ -687,7 +685,7 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     verdict : the last one, as verdict.json has it
     """
     view = story_view(study, verdict)
-    table = steps_table(history_steps(study.steps()), study.settings.cut_off)
+    table = steps_table(history_steps(study.steps()))
     learned = [Text(" ".join(one.sentences())) for one in done.curves]
     learned += [Text(_unproven(study, one, one is done.unproven[0])) for one in done.unproven]
     learned += [Text(done.refuted)] if done.refuted else []
@@ -722,23 +720,15 @@ def _sizes(model: Model, effect: str) -> dict[str, tuple[float, float | None, st
     return {name: (f.value, f.std, f.unit) for name, f in model.written_of(effect).items()}
 
 
-def _fall(steps: Sequence[HistoryStep], cut_off: float) -> str:
-    """Return the sentence that tells how the error on held-out runs fell; of one step, what it is.
-
-    Parameters
-    ----------
-    steps : whose errors are of the same low-pass, which is told
-    cut_off : Hz, of that low-pass where they do not tell it
-    """
+def _fall(steps: Sequence[HistoryStep]) -> str:
+    """Return the sentence that tells how the error on held-out runs fell, or what it is."""
     factor, unit = scale("N", max(one.rms or 0.0 for one in (steps[0], steps[-1])))
     proven = [one for one in steps if NOT_PROVEN not in one.what] or steps
     texts = [_error(one, factor, unit) for one in dict.fromkeys([proven[0], proven[-1]])]
     more = ""
     if steps[-1] is not proven[-1]:
         more = f", with what is not proven {_error(steps[-1], factor, unit)}"
-    low = cut_off if steps[-1].cut_off is None else steps[-1].cut_off
-    below = f" below {low:g} Hz" if low else ""
-    return f"Force error{below} on the held-out runs: {' -> '.join(texts)}{more}."
+    return f"Force error on the held-out runs: {' -> '.join(texts)}{more}."
 
 
 def _error(step: HistoryStep, factor: float, unit: str) -> str:
@@ -746,16 +736,10 @@ def _error(step: HistoryStep, factor: float, unit: str) -> str:
     return f"{plain(factor * (step.rms or 0.0), 4)} {unit}{share}"
 
 
-def steps_table(steps: Sequence[HistoryStep], cut_off: float = 0.0) -> Table:
-    """Return the table of a history: the error of each model on held-out runs.
-
-    Parameters
-    ----------
-    steps : of the history
-    cut_off : Hz, of the low-pass on the forces of a step that does not tell its own; 0 for none
-    """
+def steps_table(steps: Sequence[HistoryStep]) -> Table:
+    """Return the table of a history: the error of each model on held-out runs."""
     factor, unit = scale("N", max((one.rms for one in steps if one.rms is not None), default=0.0))
-    rows = [[_named(one, cut_off), *_step(one, factor)] for one in steps]
+    rows = [[f"{one.number} {one.what}", *_step(one, factor)] for one in steps]
     header = ["step", f"error [{unit}]", "of force", "z", "z train"]
     title = "Error of each model on the held-out runs"
     note = "z: error / noise; a true model has 1."
@@ -763,13 +747,6 @@ def steps_table(steps: Sequence[HistoryStep], cut_off: float = 0.0) -> Table:
         header, rows = header[:3], [row[:3] for row in rows]
         note = "How much of it is noise is not known."
     return Table(header, rows, range(1, len(header)), title, note=note)
-
-
-def _named(step: HistoryStep, cut_off: float) -> str:
-    """Return a step with its number, and below which frequency its error is if not all of it."""
-    low = cut_off if step.cut_off is None else step.cut_off
-    below = f" (below {low:g} Hz)" if low and step.rms is not None else ""
-    return f"{step.number} {step.what}{below}"
 
 
 def _step(step: HistoryStep, factor: float) -> list[str]:

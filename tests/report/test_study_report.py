@@ -80,12 +80,12 @@ def folder(tmp_path_factory) -> Path:
     model = study.model().with_values(VALUES, {"f_c": 0.01, "c_0": 0.2})
     study.add_step(
         "identify bingham", "fit to 3 training runs", model, {"z_holdout": 90.0},
-        {"z_train": 4.1, "z_holdout": 4.3, "rms_holdout": 0.4},
+        {"z_train": 4.1, "z_holdout": 4.3, "error_holdout": 0.4},
     )  # fmt: skip
     more = model.with_effect("gas_spring").with_values({"gas_spring.k": 1.0}, {"gas_spring.k": 0.5})
     study.add_step(
         "add gas_spring", "verdict: effect", more, {"z_holdout": 4.3},
-        {"z_train": 1.5, "z_holdout": 1.6, "rms_holdout": 0.2},
+        {"z_train": 1.5, "z_holdout": 1.6, "error_holdout": 0.2},
     )  # fmt: skip
     study.write_verdict(VERDICT)
     return study.folder

@@ -43,5 +43,5 @@ def test_what_a_load_cell_cut_off_is_in_no_fit_and_no_error(study):
     assert found.after["z_train"] < 1.15
     assert [note for note in found.notes if note.startswith("cut: force is cut off at 7.2 N")]
     assert found.model.values["f_c"] == pytest.approx(5.0, abs=0.1)
-    compared = compare_study(Study.open(study.folder), role="train")
+    compared = compare_study(Study(study.folder), role="train")
     assert max(run.z for run in compared.runs) < 1.2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -85,17 +84,6 @@ def test_a_study_that_was_cloned_is_of_the_same_data(study: Study, tmp_path: Pat
     for file in (clone / "data").glob("*"):  # as git does on Windows
         file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
     assert other_data(Study(clone)) == ""
-
-
-def test_a_step_of_an_older_study_tells_what_it_holds(study: Study) -> None:
-    file = study.history.path(1) / "step.json"
-    step = json.loads(file.read_text())
-    file.write_text(json.dumps({**step, "data": study.settings.data}))
-    for act in (label, extra, measured_again("run_1.csv")):  # it does not hold these
-        act(study)
-        assert other_data(Study(study.folder)) == ""
-    Study(study.folder).with_roles({"run_3": "holdout"})
-    assert "no longer" in other_data(Study(study.folder))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ from bristle.study.view import created_view, diagnosed_view, story_view, study_v
 from bristle.view import terminal
 
 BEGAN, NOW = new_model("bingham"), new_model("bingham", ("gas_spring",))
-LOW = {"z_holdout": 4.0, "rms_holdout": 2.0, "share_holdout": 0.2, "cut_off": 18.0}
 FULL = {"z_holdout": 1.0, "error_holdout": 0.5, "error_share_holdout": 0.05}
 ERROR = {
     "rms": 0.5, "share": 0.05, "rms_counted": 0.5, "signal_counted": 10.0, "rms_all": 0.5,
@@ -54,12 +53,6 @@ def test_the_error_falls_from_the_first_judged_step_to_the_last():
 
 def test_of_one_judged_step_the_error_is_told_once():
     assert "Force error on the held-out runs: 0.5 N (5.0 %)." in told(FULL)
-
-
-def test_a_low_passed_error_and_one_that_is_not_show_no_fall():
-    assert "Force error on the held-out runs: 0.5 N (5.0 %)." in told(LOW, FULL)
-    low = told(LOW, {**LOW, "rms_holdout": 1.0, "share_holdout": 0.1})
-    assert "Force error below 18 Hz on the held-out runs: 2 N (20.0 %) -> 1 N (10.0 %)." in low
 
 
 def test_what_a_further_effect_gains_is_told():

@@ -53,7 +53,6 @@ function orders(page, found) {
 }
 
 /** What the error of a step of an earlier version is of: its forces are low-passed. */
-const below = (step) => (step.rms !== null && step.below ? ` below ${number(step.below)} Hz` : "");
 
 /** The error of each model on held-out runs, on a logarithmic scale from the noise floor. */
 function staircase(found) {
@@ -66,7 +65,7 @@ function staircase(found) {
     bars("error / noise (z) of each step on held-out runs", found.steps.map((step) => ({
       name: `${step.number} ${step.what}`, value: step.z === null ? null : log(step.z), strong: true,
       good: step.z !== null && step.z <= found.close,
-      text: step.z === null ? "not judged" : `${z(step.z)}${step.rms === null ? "" : ` · ${number(step.rms, 4)} N${below(step)}`}`,
+      text: step.z === null ? "not judged" : `${z(step.z)}${step.rms === null ? "" : ` · ${number(step.rms, 4)} N`}`,
     })), { most: top, edge: log(1) }),
     h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic, and the RMS error. Green line: the noise floor, z = 1. Green bar: a model that reaches it."));
 }
@@ -111,8 +110,8 @@ function compare(page, found) {
       table("Errors", ["error", a.what, b.what], [
         ["z, held-out runs", z(a.z), z(b.z)],
         ["z, training runs", z(a.train), z(b.train)],
-        ["error, held-out runs [N]", ...[a, b].map((step) => `${number(step.rms, 4)}${below(step)}`)],
-        ["error over the RMS of the force", ...[a, b].map((step) => (step.share === null ? "–" : `${percent(step.share)}${below(step)}`))],
+        ["error, held-out runs [N]", ...[a, b].map((step) => `${number(step.rms, 4)}`)],
+        ["error over the RMS of the force", ...[a, b].map((step) => (step.share === null ? "–" : `${percent(step.share)}`))],
       ], [1, 2]),
       table("Parameters", ["parameter", a.what, b.what, "unit"], names.map((name) => [
         h("code", {}, name), cell(of(a, name)), cell(of(b, name)), (of(a, name) ?? of(b, name)).unit.replace(/^1$/, ""),
