@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -90,6 +91,29 @@ def write_new(
     except OSError as error:
         raise raises(f"{path}: cannot be written ({error.strerror or error}).") from None
     return path
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """Yield a folder beside a new one's place, which goes there once it is whole.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be written.
+    """
+    draft: Path | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
+        yield draft
+        draft.chmod(0o755)
+        draft.replace(path)
+    except OSError as error:
+        raise StudyError(f"{path}: cannot be written ({error.strerror or error}).") from None
+    finally:
+        if draft is not None:
+            shutil.rmtree(draft, ignore_errors=True)
 
 
 def replaced_by(path: Path, write: Callable[[Path], object]) -> None:

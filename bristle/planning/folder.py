@@ -7,8 +7,6 @@ NAME.csv      time [s], displacement [mm] or ground_acceleration [m/s2], the com
 from __future__ import annotations
 
 import re
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +17,9 @@ from scipy.signal import correlate, correlation_lags
 
 from ..core.arrays import Array
 from ..core.config import Document, Key, Spec
+from ..core.files import new_folder
 from ..core.text import plain, scale
+from ..core.toml_lines import toml_text
 from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit
 from ..data.measurement import Measurement, measurements_of
 from ..data.pieces import holds_several
@@ -158,28 +158,16 @@ def write_plan(
     Raises
     ------
     StudyError
-        If the folder exists or cannot be written, or the plan is none: no runs, names that no file
-        can have, channels that differ.
+        If the folder exists or cannot be written.
     """
     path = Path(path)
     refuse_existing(path)
-    _refuse_wrong(folder)
     files = {FILE: _toml_text(folder), **(others or {})}
     files |= {f"{run.name}.csv": _csv_text(run) for run in folder.runs}
-    draft: Path | None = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
+    with new_folder(path) as draft:
         for name, content in files.items():
             data = content.encode() if isinstance(content, str) else content
             (draft / name).write_bytes(data)
-        draft.chmod(0o755)
-        draft.replace(path)
-    except OSError as error:
-        raise StudyError(f"{path}: cannot be written ({error.strerror or error}).") from None
-    finally:
-        if draft is not None:
-            shutil.rmtree(draft, ignore_errors=True)
 
 
 def refuse_existing(path: Path) -> None:
@@ -260,51 +248,16 @@ def _refuse_other_rate(path: Path, time: Array, rate: float) -> None:
         )
 
 
-def _refuse_wrong(plan: PlanFolder) -> None:
-    """Refuse to write what could not be read back."""
-    if plan.rig not in MOTION:
-        raise StudyError(f'rig = "{plan.rig}"; "bench" or "structure" is right.')
-    names = [run.name for run in plan.runs]
-    if not names:
-        raise StudyError("a plan has at least one run.")
-    wanted = {plan.motion, *([plan.command] if plan.command else [])}
-    for run in plan.runs:
-        if not NAME.fullmatch(run.name) or names.count(run.name) > 1:
-            raise StudyError(f'run "{run.name}": a name of its own, which a file can have, is due.')
-        if run.role not in ROLES:
-            raise StudyError(f'{run.name}: role "{run.role}"; "train" or "holdout" is right.')
-        if {*run.signals} != wanted:
-            raise StudyError(
-                f"{run.name}: its channels are {', '.join(run.signals)}; "
-                f"{', '.join(sorted(wanted))} are right."
-            )
-        for values in (run.time, *run.signals.values()):
-            if values.shape != run.time.shape or not np.all(np.isfinite(values)):
-                raise StudyError(
-                    f"{run.name}: time and signals are finite numbers, as many of each."
-                )
-
-
 def _toml_text(plan: PlanFolder) -> str:
-    import tomlkit
-
-    document = tomlkit.document()
     facts: dict[str, Any] = {
-        "schema": 1, "rig": plan.rig, "study": plan.study, "rate": float(plan.rate)
+        "schema": 1, "rig": plan.rig, "study": plan.study, "rate": float(plan.rate),
+        **({"command": plan.command} if plan.command else {}),
     }  # fmt: skip
-    if plan.command:
-        facts["command"] = plan.command
-    for key, value in facts.items():
-        document.add(key, tomlkit.item(value))
-    document["rate"].comment("samples per second")
-    runs = tomlkit.aot()
-    for run in plan.runs:
-        table = tomlkit.table()
-        facts = {"name": run.name, "file": f"{run.name}.csv", "role": run.role, "about": run.about}
-        table.update(facts)
-        runs.append(table)
-    document.add("runs", runs)
-    return tomlkit.dumps(document)
+    runs = [
+        {"name": run.name, "file": f"{run.name}.csv", "role": run.role, "about": run.about}
+        for run in plan.runs
+    ]
+    return "\n[[runs]]\n".join(map(toml_text, (facts, *runs)))
 
 
 def _csv_text(run: PlannedRun) -> str:

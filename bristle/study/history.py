@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -18,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.config import other_schema, toml_content
-from ..core.files import read_json, write_json, write_whole
+from ..core.files import new_folder, read_json, write_json, write_whole
 from ..errors import StudyError
 from ..version import __version__
 
@@ -302,19 +301,10 @@ class History:
         """
         self._keep_results(step.number - 1, before)
         self._begin({"add": step.number})
-        draft = Path(tempfile.mkdtemp(dir=self.folder, prefix=".draft-"))
-        try:
+        with new_folder(self.path(step.number)) as draft:
             write_whole(draft / "model.toml", model)
             made = {"schema": 1, "bristle": __version__, **({"data": data} if data else {})}
             write_json(draft / "step.json", {**made, **asdict(step)})
-            draft.chmod(0o755)
-            draft.replace(self.path(step.number))
-        except OSError as error:
-            raise StudyError(
-                f"{self.path(step.number)}: cannot be written ({error.strerror or error})."
-            ) from None
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
         self.recover()
 
     def keep_edit(self) -> None:
@@ -412,7 +402,7 @@ class History:
                 self.path(number).replace(kept)
         if "channels" in unfinished:
             set_results_aside(self.study, int(unfinished["channels"]), int(unfinished["first"]))
-        for draft in self.folder.glob(".draft-*"):
+        for draft in self.folder.glob(".*-*"):
             shutil.rmtree(draft, ignore_errors=True)
         self.pending.unlink(missing_ok=True)
 

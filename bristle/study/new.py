@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, log10
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.files import new_folder
 from ..core.progress import counted
 from ..core.text import capital, command, listed, plain
 from ..data.building_file import read_building
@@ -597,27 +597,14 @@ def _write(
     law: str,
 ) -> None:
     """Write the folder beside its place, then move it there."""
-    draft: Path | None = None
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
+    model = new_model(law, drive=settings.drive or VOLTAGE.name)
+    with new_folder(folder) as draft:
         for sub in ("data", "effects", "history", "reports"):
             (draft / sub).mkdir()
         for name, source in data.items():
             shutil.copyfile(source, draft / "data" / name)
-        model = new_model(law, drive=settings.drive or VOLTAGE.name)
         if building is not None:
             shutil.copyfile(building, draft / Path(building).name)
             model = replace(model, building=Path(building).name)
         write_settings(draft / "study.toml", settings)
-        text = model_text(model)
-        History(draft).add(Step(0, f"begin with {law}", "the study was made"), text)
-        draft.chmod(0o755)
-        draft.replace(folder)
-    except OSError as error:
-        raise StudyError(
-            f"{error.filename or folder}: the study cannot be written ({error.strerror or error})."
-        ) from None
-    finally:
-        if draft is not None:
-            shutil.rmtree(draft, ignore_errors=True)
+        History(draft).add(Step(0, f"begin with {law}", "the study was made"), model_text(model))
