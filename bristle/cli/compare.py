@@ -79,10 +79,9 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _opened(study: Study) -> dict[str, Any]:
     """Return when the test runs were opened, nothing where the study has none."""
-    from dataclasses import asdict
 
     from ..study.steps import uses_of_test_set
     from ..study.study_file import TEST
 
-    opened = [asdict(one) for one in uses_of_test_set(study)]
+    opened = [{"date": one.date, "step": one.step} for one in uses_of_test_set(study)]
     return {"test_openings": opened} if study.files(TEST) else {}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from ..comparison.comparison import RigComparer
 from ..comparison.misfit import run_error
 from ..comparison.predictions import RunPrediction
 from ..comparison.result import Comparison
-from ..core.files import write_json, write_whole
+from ..core.files import write_whole
 from ..core.interrupt import keeps
 from ..core.progress import tell, telling
 from ..core.text import command, percent, plain, unknown
@@ -57,7 +56,7 @@ from .new import make_folder
 from .rig import building_of, rig_of
 from .run_facts import RunChoices
 from .runs import Runs, refuse_seen, usable
-from .study import Study, noted
+from .study import Note, Study, note, noted
 from .study_file import ALL, TEST
 
 Say = Callable[[str], None]
@@ -321,14 +320,6 @@ FILE = "test_openings.json"
 """Where a study counts."""
 
 
-@dataclass(frozen=True)
-class TestSetUse:
-    """A comparison of a model with the test runs: when (UTC), and the step of that model."""
-
-    date: str
-    step: int
-
-
 def runs_for_test(study: Study, runs: Runs) -> Runs:
     """Return the runs for training, and the test runs in place of those held out.
 
@@ -355,7 +346,7 @@ def runs_for_test(study: Study, runs: Runs) -> Runs:
     return Runs(runs.train, found, idle)
 
 
-def uses_of_test_set(study: Study) -> tuple[TestSetUse, ...]:
+def uses_of_test_set(study: Study) -> tuple[Note, ...]:
     """Return when the test runs were opened, the first time first.
 
     Raises
@@ -363,11 +354,11 @@ def uses_of_test_set(study: Study) -> tuple[TestSetUse, ...]:
     StudyError
         If the file that counts is damaged.
     """
-    return noted(
-        study.folder / FILE, "openings", lambda one: TestSetUse(str(one["date"]), int(one["step"])),
+    damaged = (
         "it counts the openings of the test runs, and is damaged. Restore it from a copy of the "
-        "study.",
-    )  # fmt: skip
+        "study."
+    )
+    return noted(study.folder / FILE, "openings", damaged)
 
 
 def count_test_set_use(study: Study) -> None:
@@ -379,10 +370,7 @@ def count_test_set_use(study: Study) -> None:
         If the study cannot be written, or the file that counts is damaged.
     """
     with study.writing():
-        numbers = study.history.numbers()
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        counted = (*uses_of_test_set(study), TestSetUse(now, numbers[-1] if numbers else 0))
-        write_json(study.folder / FILE, {"schema": 1, "openings": [asdict(one) for one in counted]})
+        note(study, study.folder / FILE, "openings", uses_of_test_set(study), ())
 
 
 def opened_text(times: int) -> str:

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from filelock import FileLock, Timeout
 
@@ -559,9 +559,6 @@ class Study(Viewable):
 
 # What is new in the data of a study since its model was identified: runs, roles, corrections.
 
-T = TypeVar("T")
-
-
 # A digest of what a fit and its judge see: by it a result on other data is known.
 #
 # It has three parts: what study.toml says, what the files of the runs hold, and the building.
@@ -644,13 +641,21 @@ def _digest(seen: dict[str, Any] | Sequence[Any]) -> str:
     return sha256(text.encode()).hexdigest()[:16]
 
 
-def noted(path: Path, key: str, make: Callable[[Any], T], damaged: str) -> tuple[T, ...]:
-    """Return the entries of a file of notes, none where there is no file.
+@dataclass(frozen=True)
+class Note:
+    """What was done with runs of a study: when (UTC), the step of the model then, their files."""
+
+    date: str
+    step: int
+    files: tuple[str, ...] = ()
+
+
+def noted(path: Path, key: str, damaged: str) -> tuple[Note, ...]:
+    """Return the notes in a file, the first one first; none where there is no file.
 
     Parameters
     ----------
-    path, key : the file; where its entries are
-    make : of an entry what is returned
+    path, key : the file; where its notes are
     damaged : what is said of a file that cannot be read so
     """
     if not path.is_file():
@@ -659,25 +664,27 @@ def noted(path: Path, key: str, make: Callable[[Any], T], damaged: str) -> tuple
     if data.get("schema") != 1:
         raise StudyError(f"{path}: {other_schema(data.get('schema'))}")
     try:
-        return tuple(map(make, data[key]))
-    except (KeyError, TypeError, ValueError):
+        return tuple(
+            Note(str(one["date"]), int(one["step"]), tuple(map(str, one.get("files", ()))))
+            for one in data[key]
+        )
+    except (AttributeError, KeyError, TypeError, ValueError):
         raise StudyError(f"{path}: {damaged}") from None
+
+
+def note(study: Study, path: Path, key: str, before: Sequence[Note], files: Sequence[str]) -> None:
+    """Write a note of now, on the present model, behind others; the caller holds the lock."""
+    numbers = study.history.numbers()
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    made = Note(now, numbers[-1] if numbers else 0, tuple(files))
+    write_json(path, {"schema": 1, key: [asdict(one) for one in (*before, made)]})
 
 
 FILE = "added_runs.json"
 """Where a study notes it."""
 
 
-@dataclass(frozen=True)
-class Addition:
-    """Runs that were added at once: when (UTC), the step of the model then, files of the runs."""
-
-    date: str
-    step: int
-    files: tuple[str, ...]
-
-
-def additions(study: Study) -> tuple[Addition, ...]:
+def additions(study: Study) -> tuple[Note, ...]:
     """Return which runs were added, the first time first.
 
     Raises
@@ -685,23 +692,16 @@ def additions(study: Study) -> tuple[Addition, ...]:
     StudyError
         If the file that says so is damaged.
     """
-    return noted(
-        study.folder / FILE, "additions",
-        lambda one: Addition(str(one["date"]), int(one["step"]), tuple(map(str, one["files"]))),
-        "it lists runs that were added, and is damaged. Remove it.",
-    )  # fmt: skip
+    damaged = "it lists runs that were added, and is damaged. Remove it."
+    return noted(study.folder / FILE, "additions", damaged)
 
 
 def note_addition(study: Study, files: Sequence[str]) -> None:
     """Write down that runs are added now, to the present model; the caller holds the lock."""
-    numbers = study.history.numbers()
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    made = Addition(now, numbers[-1] if numbers else 0, tuple(files))
-    every = [asdict(one) for one in (*additions(study), made)]
-    write_json(study.folder / FILE, {"schema": 1, "additions": every})
+    note(study, study.folder / FILE, "additions", additions(study), files)
 
 
-def note_undone(study: Study, listed: Sequence[Addition], number: int) -> None:
+def note_undone(study: Study, listed: Sequence[Note], number: int) -> None:
     """Write down that a step is undone: the model before it does not know its later runs either.
 
     Parameters
