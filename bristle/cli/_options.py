@@ -12,6 +12,7 @@ from contextlib import suppress
 from fnmatch import fnmatchcase
 from functools import partial
 from glob import glob
+from math import inf
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -300,12 +301,21 @@ def print_study_answer(
         print(f"Picture: {picture}")
 
 
-def share_of(text: str) -> float:
-    """Return a share [1] from a text such as "10%" or "0.1"; NaN where it is none."""
+def share_of(option: str, text: str, *, small: bool = False) -> float:
+    """Return a share [1] from a text such as "10%" or "0.1"; RunError where it is none.
+
+    One that is `small` is above 0 and below 1.
+    """
+    from ..errors import not_usable
+
     try:
-        return float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
+        value = float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
     except ValueError:
-        return float("nan")
+        value = inf
+    if not (0.0 < value < 1.0 if small else 0.0 <= value < inf):
+        ends = " above 0 and below 1" if small else ""
+        raise not_usable(f"{option} {text!r}: a share{ends}, as 0.2% or 0.002, is right.")
+    return value
 
 
 # Asks on a terminal whether code that came with a file may run; shows it first.

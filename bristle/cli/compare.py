@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
 from ..view.blocks import Block, Next, Text
-from ._options import Parser, print_json
+from ._options import Parser, print_study_answer
 
 if TYPE_CHECKING:
     from ..study.study import Study
@@ -46,7 +46,6 @@ def main(arguments: argparse.Namespace) -> int:
     from ..core.progress import tell
     from ..study.steps import compare_study
     from ..study.study import Study
-    from ..view import terminal
     from ..view.style import png
 
     study = Study(arguments.folder)
@@ -59,21 +58,15 @@ def main(arguments: argparse.Namespace) -> int:
         picture = arguments.out
         page.save(picture, dpi=160)
     notes = study.runs().notes
-    if arguments.json:
-        print_json(
-            {
-                **comparison.as_dict(), "role": arguments.role, **_opened(study),
-                "notes": list(notes), "picture": str(picture.absolute()),
-            }
-        )  # fmt: skip
-        return 0
+    answer = {
+        **comparison.as_dict(), "role": arguments.role, **_opened(study), "notes": list(notes),
+        "picture": str(picture.absolute()),
+    }  # fmt: skip
     then = Next(command("diagnose", study.folder), "finds what is missing")
     blocks: tuple[Block, ...] = (*(Text(note, "note") for note in notes), then)
     view = comparison.view()
     view = view._replace(blocks=(*view.blocks, *blocks))
-    elsewhere = command("report", study.folder)
-    print(terminal.text(view, details=arguments.details, elsewhere=elsewhere))
-    print(f"Picture: {picture}")
+    print_study_answer(arguments, answer, view, picture)
     return 0
 
 

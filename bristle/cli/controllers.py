@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -128,23 +127,12 @@ def _spread(arguments: argparse.Namespace) -> Any:
     """Return how far reality may lie from the case, None where nobody asks."""
     from ..controller_comparison import Spread
 
-    given = {
-        "share": _share("--spread", arguments.spread), "noise": _share("--noise", arguments.noise),
-        "members": arguments.ensemble, "delay": arguments.delay,
-    }  # fmt: skip
+    given = {"members": arguments.ensemble, "delay": arguments.delay}
     given = {name: value for name, value in given.items() if value is not None}
+    for name, option in (("share", "spread"), ("noise", "noise")):
+        if (text := getattr(arguments, option)) is not None:
+            given[name] = share_of(f"--{option}", text)
     return Spread(**given) if given else None
-
-
-def _share(option: str, text: str | None) -> float | None:
-    from ..errors import not_usable
-
-    if text is None:
-        return None
-    value = share_of(text)
-    if not (isfinite(value) and value >= 0.0):
-        raise not_usable(f"{option} {text!r}: a share, as 10% or 0.1, is right.")
-    return value
 
 
 def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:

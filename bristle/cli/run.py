@@ -131,7 +131,7 @@ def _steps_for(
 
     if arguments.engine != "fmu":
         raise not_usable('--tolerance: engine "compiled" makes no coupling error; "fmu" does.')
-    tolerance = _share(arguments.tolerance)
+    tolerance = share_of("--tolerance", arguments.tolerance, small=True)
     again = again_by(Cosimulation(arguments.fmus, ignore, progress=True))
     scenario = find_step(load_scenario(file, overrides), tolerance, again)
     own = {name: one.step for name, one in scenario.components.items() if one.step is not None}
@@ -139,16 +139,6 @@ def _steps_for(
     said = f"a step of {1e3 * scenario.step:.6g} ms{f' ({of_own})' if own else ''} keeps"
     print(f"{said} the coupling error below {100 * tolerance:.3g} %", file=sys.stderr)
     return {"run.step": scenario.step, **{f"{name}.step": step for name, step in own.items()}}
-
-
-def _share(text: str) -> float:
-    """Return a share [1] from a text such as "0.2%" or "0.002"."""
-    from ..errors import not_usable
-
-    value = share_of(text)
-    if not 0.0 < value < 1.0:
-        raise not_usable(f"--tolerance {text!r}: a share above 0 and below 1, as 0.2% or 0.002.")
-    return value
 
 
 def _answer(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> dict[str, Any]:
