@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -338,18 +339,14 @@ def _refuse_nothing(
     out: list[Port],
 ) -> None:
     there = ", ".join(f"{name} [{unit}]" for name, unit in signals.items())
-    if not out:
-        has = ", ".join(f"{v.name} [{told_unit(v) or '?'}]" for v in outputs.values()) or "none"
-        raise FmuError(
-            f"{description.name}: no output matches a measured channel. It has: {has}; "
-            f"measured: {there}. --map OUTPUT=CHANNEL says which belong together."
-        )
-    if description.of("input") and not into:
-        has = ", ".join(f"{v.name} [{told_unit(v) or '?'}]" for v in description.of("input"))
-        raise FmuError(
-            f"{description.name}: no input matches a measured channel. It has: {has}; "
-            f"measured: {there}. --map INPUT=CHANNEL says which belong together."
-        )
+    inputs = description.of("input")
+    for kind, ports, found in (("output", [*outputs.values()], out), ("input", inputs, into)):
+        if not found and (ports or kind == "output"):
+            has = ", ".join(f"{v.name} [{told_unit(v) or '?'}]" for v in ports) or "none"
+            raise FmuError(
+                f"{description.name}: no {kind} matches a measured channel. It has: {has}; "
+                f"measured: {there}. --map {kind.upper()}=CHANNEL says which belong together."
+            )
 
 
 # Whether an FMU's output has the unit and the sign that it is taken to have, from the numbers.
@@ -387,14 +384,15 @@ def doubts(outputs: tuple[Comparison, ...], ports: PortMap, fmu: str) -> list[st
         if not (np.std(y) > 0.0 and np.std(p) > 0.0):
             continue
         correlation = float(np.corrcoef(y, p)[0, 1])
-        text = _sign(port, correlation)
-        if text and not port.sign_given:
-            channel = f"{port.name}={{}}{port.signal}"
-            raise FmuError(
-                f"{fmu}: {text}: its sign is in doubt. --map {channel.format('-')} reverses it, "
-                f"--map {channel.format('+')} keeps it."
-            )
-        notes += [text] if text else []
+        if correlation < AGAINST:
+            text = f"{port.name} has the opposite sign of {port.signal}"
+            text += f" (correlation {correlation:.2f})"
+            if not port.sign_given:
+                raise FmuError(
+                    f"{fmu}: {text}: its sign is in doubt. --map {port.name}=-{port.signal} "
+                    f"reverses it, --map {port.name}=+{port.signal} keeps it."
+                )
+            notes.append(text)
         text, unit = _unit(port, float(np.std(y) / np.std(p)), correlation)
         if text and not port.unit_given:
             raise FmuError(
@@ -403,12 +401,6 @@ def doubts(outputs: tuple[Comparison, ...], ports: PortMap, fmu: str) -> list[st
             )
         notes += [text] if text else []
     return notes
-
-
-def _sign(port: Port, correlation: float) -> str:
-    if correlation >= AGAINST:
-        return ""
-    return f"{port.name} has the opposite sign of {port.signal} (correlation {correlation:.2f})"
 
 
 def _unit(port: Port, ratio: float, correlation: float) -> tuple[str, str]:
@@ -514,17 +506,13 @@ def signals_of(
     even = evenly(time, values, table.lines, table.source, table.place)
     units = {name: unit for name, (_, unit) in columns.items()}
     stem = Path(table.source).stem
-    many = len(even.pieces) > 1
+    names = [stem]
+    if len(even.pieces) > 1:
+        names = [f"{stem} ({k})" for k in range(1, len(even.pieces) + 1)]
     found = [
-        replace(
-            _signals(
-                f"{stem} ({k})" if many else stem, even.sampling.step, piece, units, channels,
-                k,
-            ),
-            measured=measured,
-        )
-        for k, (_, piece, measured) in enumerate(even.pieces, 1)
-    ]  # fmt: skip
+        replace(_signals(name, even.sampling.step, piece, units, channels, k), measured=measured)
+        for k, (name, (_, piece, measured)) in enumerate(zip(names, even.pieces, strict=True), 1)
+    ]
     return found, notes + even.notes
 
 
@@ -549,15 +537,13 @@ def _signals(
         motion = smooth(x, v, dt, sizes)
         have = (x is not None, v is not None)
         drawn = posterior_draws(n, dt, sizes, motion.jerk, have, DRAWS, seed, motion)
-        names = [f"{prefix}{kind}" for kind in _KINEMATIC]
-        for i, (one, y) in enumerate(zip(names, (motion.x, motion.v, motion.a), strict=True)):
-            if prefix and kind_of(one) == "acceleration":
-                continue  # of a structure it is the absolute one that is meant
+        motions = (motion.x, motion.v, motion.a)[: 2 if prefix else 3]
+        for i, (kind, y) in enumerate(zip(_KINEMATIC, motions, strict=False)):
+            one = f"{prefix}{kind}"
             if one not in raw:
                 derived.append(one)
-            values[one], errors[one] = y, drawn[:, :, i]
-            unit[one] = PLAIN[kind_of(one)]
-        rates |= {names[0]: names[1], names[1]: names[2]}
+            values[one], errors[one], unit[one] = y, drawn[:, :, i], PLAIN[kind]
+        rates |= {f"{prefix}{a}": f"{prefix}{b}" for a, b in pairwise(_KINEMATIC)}
     for one in DRIVE:
         if one in raw:
             values[one], errors[one] = smooth_drive(raw[one], noise[one], dt, DRAWS, seed + 1)
@@ -566,11 +552,6 @@ def _signals(
             errors[one] = generator.standard_normal((DRAWS, n)) * noise.get(one, 0.0)
     kept = {a: b for a, b in rates.items() if a in values and b in values}
     return FedSignals(name, dt, values, unit, errors, raw, noise, kept, tuple(derived), untold)
-
-
-def kind_of(name: str) -> str:
-    """Return "velocity" of "base_velocity"."""
-    return name.removeprefix("base_")
 
 
 HALVINGS = 2
