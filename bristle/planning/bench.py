@@ -21,13 +21,12 @@ from ..identification.problem import REFERENCE, Problem, Run
 from ..identification.rig import DAMPER
 from ..identification.smoothing import posterior_draws
 from ..model.model import Model
-from ..physics.effect import plain_name
 from ..physics.laws import LAWS
 from ..study.identify import is_identified
 from ..study.study import Study
-from .information import DRAWS, Question
+from .information import DRAWS, Information, Question
 from .limits import RigLimits, Test, limits_given, limits_of_runs, read_sheet, with_given
-from .plan import Outcome, Plan, outcomes
+from .plan import Outcome, Plan, or_beyond, outcomes
 from .questions import (
     NONE,
     PlanRequest,
@@ -40,8 +39,7 @@ from .questions import (
     default_request,
     effects_beside,
     law_rivals,
-    misfit_note,
-    note_of_missing,
+    notes_of_error,
     open_parts,
     parameters_of,
     refuse_no_rival,
@@ -275,15 +273,7 @@ def plan_study(
         1.0 / runs[0].dt, seed=seed, drive=runs[0].drive,
     )  # fmt: skip
     made = planned(study.name, found, planner, study.drive)
-    return replace(made, notes=_notes(study, opened))
-
-
-def _notes(study: Study, opened: Prepared) -> tuple[str, ...]:
-    """Return what weakens a plan: an error that an effect would take away first."""
-    missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
-    if not missing and opened.before.z > opened.rule.clean:
-        return (f"The model {misfit_note(opened.before.z)}",)
-    return missing
+    return replace(made, notes=notes_of_error(study, {"": opened}))
 
 
 def _errors(run: Run) -> Any:
@@ -335,22 +325,17 @@ def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
     goal, limits = found.goal, planner.limits
     tests = planner.plan()
     after = goal.with_tests(tests)[: goal.count]
-    told = outcomes(found.purposes, found.asked, found.known, after)
-    told = [one if one.settled else _or_beyond(one, found, planner) for one in told]
+
+    def told(known: Sequence[Information]) -> list[Outcome]:
+        return outcomes(found.purposes, found.asked, found.known, known[: goal.count])
+
+    rows = or_beyond(
+        told(after), lambda: [told(goal.with_pair(one)) for one in planner.looked_at()]
+    )
     costs = [cost_of(found.purposes.figures(one)) for one in (found.known, after)]
     gain = float(np.exp(costs[0] - costs[1]))
     return Plan(
         name, tuple(one.test for one in tests),
         tuple(one.test.signals(limits) for one in tests),
-        tuple(told), limits, drive, gain, tuple(one.role for one in tests),
+        tuple(rows), limits, drive, gain, tuple(one.role for one in tests),
     )  # fmt: skip
-
-
-def _or_beyond(left: Outcome, found: Stated, planner: Planner) -> Outcome:
-    """Return what a plan leaves open, with whether a test of its own would settle it."""
-    for one in planner.looked_at():
-        after = found.goal.with_pair(one)[: found.goal.count]
-        told = outcomes(found.purposes, found.asked, found.known, after)
-        if any(other.name == left.name and other.settled for other in told):
-            return left
-    return replace(left, beyond=True)

@@ -25,14 +25,13 @@ from ..identification.rig import DAMPER
 from ..identification.smoothing import smooth_steps
 from ..physics.building import Building, frequencies
 from ..physics.drive import DRIVES
-from ..physics.effect import plain_name
 from ..prediction.model_system import BuildingWithFile
 from ..study.rig import building_of
 from ..study.study import Study
 from .folder import PlannedRun
 from .information import DRAWS, Goal, Information, of_roles
 from .limits import RESERVE, SLOWEST, ZERO, PrescribedSignals, RigLimits, with_given
-from .plan import Outcome, Plan, along, outcomes
+from .plan import Outcome, Plan, along, or_beyond, outcomes
 from .questions import (
     Key,
     PlanRequest,
@@ -43,8 +42,7 @@ from .questions import (
     cost_of,
     default_requests,
     largest_motion,
-    misfit_note,
-    note_of_missing,
+    notes_of_error,
     of_one_force,
     purposes_at,
     stated,
@@ -277,7 +275,7 @@ def plan_building(
         ),
     )  # fmt: skip
     made = _planned(study, stand, planner)
-    return replace(made, notes=_notes(study, sites))
+    return replace(made, notes=notes_of_error(study, sites))
 
 
 def _within(done: RigLimits, given: Mapping[str, Any]) -> RigLimits:
@@ -335,15 +333,6 @@ def _opened(study: Study, found: BuildingRuns) -> dict[str, Prepared]:
     return sites
 
 
-def _notes(study: Study, sites: Mapping[str, Prepared]) -> tuple[str, ...]:
-    """Return what weakens a plan: an error that an effect would take away first."""
-    missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
-    if missing:
-        return missing
-    loud = {site: one.before.z for site, one in sites.items() if one.before.z > one.rule.clean}
-    return tuple(f"At {site_name(site)} the model {misfit_note(z)}" for site, z in loud.items())
-
-
 def _stated(purposes: Any, opened: Prepared, seed: int) -> Stated:
     measured = RunsAtHand(opened.problem.runs, opened.held_out.runs)
     return stated(purposes, opened.searched, measured, max(opened.before.z, 1.0), seed)
@@ -374,7 +363,13 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
         cost_of(one.purposes.figures(one.known)) - cost_of(one.purposes.figures(then[site]))
         for site, one in stand.items()
     ]
-    rows = [one if one.settled else _or_beyond(one, stand, planner) for one in _rows(stand, then)]
+    rows = or_beyond(
+        _rows(stand, then),
+        lambda: [
+            _rows(stand, _by_site(stand, planner.goal.with_pair(one)))
+            for one in planner.looked_at()
+        ],
+    )
     shown = [planner.response(one) for one in tests]
     tell("looking at sensors")
     assert planner.table is not None
@@ -408,15 +403,6 @@ def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Information]]
         rows += at_site(site, outcomes(one.purposes, one.asked, one.known, then[site]))
     alike = {f"{DAMPER}: {pair}" for pair in of_one_force(stand)}
     return [_of_one_force(one) if one.name in alike else one for one in rows]
-
-
-def _or_beyond(left: Outcome, stand: Mapping[str, Stated], planner: TablePlanner) -> Outcome:
-    """Return what a plan leaves open, with whether a test of its own would settle it."""
-    for one in planner.looked_at():
-        told = _rows(stand, _by_site(stand, planner.goal.with_pair(one)))
-        if any(other.name == left.name and other.settled for other in told):
-            return left
-    return replace(left, beyond=True)
 
 
 def at_site(site: str, rows: Sequence[Outcome]) -> list[Outcome]:

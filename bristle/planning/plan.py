@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from math import ceil, inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -100,6 +100,22 @@ class Outcome:
             "then": self.then if isfinite(self.then) else None, "settled": self.settled,
             "beyond": self.beyond,
         }  # fmt: skip
+
+
+def or_beyond(
+    rows: Sequence[Outcome], alone: Callable[[], Sequence[Sequence[Outcome]]]
+) -> list[Outcome]:
+    """Return what a plan comes to, where it is open with whether a test of its own would settle it.
+
+    Parameters
+    ----------
+    rows : what the plan comes to
+    alone : returns the outcomes of each test that was looked at
+    """
+    if all(one.settled for one in rows):
+        return [*rows]
+    able = {one.name for told in alone() for one in told if one.settled}
+    return [one if one.settled or one.name in able else replace(one, beyond=True) for one in rows]
 
 
 def outcomes(

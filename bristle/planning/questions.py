@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.names import site_name
 from ..core.progress import tell
 from ..core.text import command, quantity, short_z, unknown
 from ..diagnosis.conclusion import lookalikes
@@ -550,28 +551,26 @@ def notes_of_change(study: Study) -> tuple[str, ...]:
     return tuple(note for note in (behind_data(study), stale) if note)
 
 
-def note_of_missing(study: Study, there: Sequence[str]) -> tuple[str, ...]:
-    """Return what is said of effects that a verdict names and a model lacks, nothing of others.
+def notes_of_error(study: Study, sites: Mapping[str, Prepared]) -> tuple[str, ...]:
+    """Return what weakens a plan: effects that a verdict names and a model lacks, or its error.
 
     Parameters
     ----------
-    study : with its verdict
-    there : the effects of the model
+    study : with its model and verdict
+    sites : the models with their runs by site, "" on a bench
     """
-    verdict = study.verdict() or {}
-    if verdict.get("kind") != "effect":
-        return ()
-    named = [name for name in map(plain_name, verdict["effects"]) if name in EFFECTS]
-    missing = [name for name in named if name not in there]
-    if not missing:
-        return ()
-    add = command("add", study.folder, *missing)
-    return (f"The model misses {', '.join(missing)}; a plan shows more after  {add} .",)
-
-
-def misfit_note(z: float) -> str:
-    """Return what is said of a model's error over noise."""
-    return f"errs by {short_z(z)} times the noise; the plan counts that as noise."
+    verdict, there = study.verdict() or {}, [plain_name(one) for one in study.model().effects]
+    named = verdict["effects"] if verdict.get("kind") == "effect" else ()
+    missing = [one for one in map(plain_name, named) if one in EFFECTS and one not in there]
+    if missing:
+        add = command("add", study.folder, *missing)
+        return (f"The model misses {', '.join(missing)}; a plan shows more after  {add} .",)
+    return tuple(
+        f"{f'At {site_name(site)} the' if site else 'The'} model errs by "
+        f"{short_z(one.before.z)} times the noise; the plan counts that as noise."
+        for site, one in sites.items()
+        if one.before.z > one.rule.clean
+    )
 
 
 # What a plan asks at each site of a building: effects, rivals, parameters, open parts.

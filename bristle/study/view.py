@@ -181,8 +181,9 @@ def z_text(found: Identified) -> str:
 
 
 def errors_beside(found: Identified) -> Table:
-    """Return the errors at each site, the low-passed ones, and z."""
-    columns, roles, rows = _columns(found), _roles(found), []
+    """Return the errors of the force, at each site, the low-passed ones, and z."""
+    columns, roles = _columns(found), _roles(found)
+    rows = [[_NAMES[role], *(errors.force[role].text() for _, errors in columns)] for role in roles]
     for role in roles:
         sites = found.errors.at[role]
         rows += [
