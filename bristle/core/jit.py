@@ -33,12 +33,15 @@ from .progress import tell
 
 with deferred():  # an import of numba that Ctrl-C breaks off is never made good in this process
     import numba
+    from numba import _dynfunc
     from numba.core import event, ir, types
+    from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.compiler_machinery import register_pass
     from numba.core.errors import NumbaError
     from numba.core.registry import cpu_target
+    from numba.core.typed_passes import NativeLowering
     from numba.core.untyped_passes import InlineInlinables
     from numba.extending import intrinsic
 
@@ -72,14 +75,50 @@ class _Inline(InlineInlinables):  # type: ignore[misc]
             return super().run_pass(state)
 
 
+class _Linked(JITCodeLibrary):  # type: ignore[misc]
+    """Code that callers take in: it is optimised there, and becomes machine code there alone."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lower(NativeLowering):  # type: ignore[misc]
+    """Makes code of a function as numba does, but of a callee none that could be called by itself.
+
+    That was a sixth of the time, and was never run.
+    """
+
+    _name = "bristle_lower"
+
+    def run_pass(self, state: Any) -> Any:
+        if state.flags.no_cpython_wrapper:
+            state.library = _Linked(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.flags.no_compile = True
+        done = super().run_pass(state)
+        if state.flags.no_compile:
+            state.library.finalize()
+            made, held = state["cr"], (state.library,)
+            name = made.fndesc.qualname
+            key = _dynfunc.make_function(made.fndesc.lookup_module(), name, "", 0, made.env, held)
+            state.targetctx.insert_user_function(key, made.fndesc, held)
+            state["cr"] = made._replace(cfunc=key)
+        return done
+
+
+_OURS = {InlineInlinables: _Inline, NativeLowering: _Lower}
+
+
 class _Compiler(CompilerBase):  # type: ignore[misc]
-    """numba's compiler, but for `_Inline`."""
+    """numba's compiler, with passes of our own."""
 
     def define_pipelines(self) -> list[Any]:
         found = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        found.passes = [
-            (_Inline if one is InlineInlinables else one, text) for one, text in found.passes
-        ]
+        found.passes = [(_OURS.get(one, one), text) for one, text in found.passes]
         found.finalize()
         return [found]
 

@@ -62,18 +62,12 @@ def functions_text(what: BuildPlan, functions: str) -> Path:
     BuildError
         If the compiler refuses a function; if the cache cannot be written.
     """
-    from filelock import FileLock
 
-    kept = zig.folder() / f"{functions}.c"
-    if kept.is_file():
-        return kept
-    with FileLock(kept.with_suffix(".lock")):  # two who need it do not both compile it
+    def compile_text(path: Path) -> None:
+        tell(f"compiling the functions of {what.name}, once")
+        compile_functions(what, functions, path)
 
-        def compile_text(path: Path) -> None:
-            tell(f"compiling the functions of {what.name}, once")
-            compile_functions(what, functions, path)
-
-        return keep(kept, compile_text)
+    return keep(zig.folder() / f"{functions}.c", compile_text)
 
 
 def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2) -> bytes:
@@ -120,12 +114,19 @@ def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2)
 
 
 def keep(path: Path, make: Callable[[Path], None]) -> Path:
-    """Return a file of the cache; if it is not there, `make` writes it into a folder of its own."""
+    """Return a file of the cache; if it is not there, `make` writes it into a folder of its own.
+
+    Two processes that need it do not both make it: the second waits.
+    """
+    from filelock import FileLock
+
     if not path.is_file():
-        with tempfile.TemporaryDirectory(dir=path.parent) as temporary:
-            part = Path(temporary) / path.name
-            make(part)
-            part.replace(path)
+        with FileLock(f"{path}.lock"):
+            if not path.is_file():
+                with tempfile.TemporaryDirectory(dir=path.parent) as temporary:
+                    part = Path(temporary) / path.name
+                    make(part)
+                    part.replace(path)
     return path
 
 

@@ -325,8 +325,8 @@ def _made(text: str, path: Path, shown: Path, word: str) -> Any:
     if other is not None and other.own:  # of another folder: the one that is read last stays
         for known in [p for p, (_, one) in _known.items() if one.made is other]:
             _forget(known)
-    folder = hashlib.sha256(str(path.parent).encode()).hexdigest()[:8]
-    module = ModuleType(f"{PACKAGE}.{folder}.{path.stem}")
+    # Of no folder: machine code names the modules of its functions, and serves every copy of them.
+    module = ModuleType(f"{PACKAGE}.{word}.{path.stem}")
     module.__file__ = str(path)
     module.__package__ = kind.package
     before = dict(kind.known)
