@@ -74,7 +74,16 @@ def main(arguments: argparse.Namespace) -> int:
         frame, trouble = error.frame, str(error)
         code = 1 if isinstance(error, IncompleteRunError) else 130
     written = {"results": folder / f"results.{arguments.format}", "log": folder / "log"}
-    for name, make in _further(arguments) if code != 130 else ():  # Ctrl-C waits for nothing more
+    further: dict[str, Callable[[pd.DataFrame, Path], None]] = {}
+    if not arguments.no_figure:
+        from ..engine.view import run_figure
+
+        further["figure.png"] = run_figure
+    if arguments.spectrum:
+        from ..engine.results import SPECTRUM_FILE, write_spectra
+
+        further[SPECTRUM_FILE] = write_spectra
+    for name, make in further.items() if code != 130 else ():  # Ctrl-C waits for nothing more
         try:
             make(frame, folder / name)
             written[name.partition(".")[0]] = folder / name
@@ -99,22 +108,6 @@ def _show(scenario: System) -> None:
         again = ["import-ssp", name] if name else ["check", scenario.where]
         more = f"and {len(remarks) - LINES + 1} more; all:  {command(*again, '--json')}"
         print(more, file=sys.stderr, flush=True)
-
-
-def _further(
-    arguments: argparse.Namespace,
-) -> list[tuple[str, Callable[[pd.DataFrame, Path], None]]]:
-    """Return the files that are made of the results, and what makes each."""
-    found: list[tuple[str, Callable[[pd.DataFrame, Path], None]]] = []
-    if not arguments.no_figure:
-        from ..engine.view import run_figure
-
-        found.append(("figure.png", run_figure))
-    if arguments.spectrum:
-        from ..engine.results import SPECTRUM_FILE, write_spectra
-
-        found.append((SPECTRUM_FILE, write_spectra))
-    return found
 
 
 def _steps_for(

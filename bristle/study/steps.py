@@ -20,7 +20,6 @@ from ..core.interrupt import keeps
 from ..core.progress import tell, telling
 from ..core.text import command, percent, plain, unknown
 from ..data.channels import ChannelSpec
-from ..data.guess import Guess
 from ..diagnosis import Diagnosis, diagnose_rig
 from ..diagnosis.joint_search import diagnose_laws
 from ..errors import StudyError
@@ -52,7 +51,7 @@ from .identify import (
     refuse_effect,
     refuse_left_out,
 )
-from .new import make_folder
+from .new import NewStudy, make_folder
 from .rig import building_of, rig_of
 from .run_facts import RunChoices
 from .runs import Runs, refuse_seen, usable
@@ -636,17 +635,10 @@ def _half(std: float) -> float | None:
 
 
 @dataclass(frozen=True, repr=False)
-class Created(Viewable):
-    """A study that was made: what was guessed, what was left out, and what to know.
-
-    `extra` are the channels besides those that bristle knows, by name.
-    """
+class Created(NewStudy, Viewable):
+    """A study that was made, with what was guessed, what was left out, and what to know."""
 
     study: Study
-    guesses: tuple[Guess, ...]
-    extra: Mapping[str, ChannelSpec]
-    unused: tuple[str, ...]
-    notes: tuple[str, ...]
 
 
 def create_study(
@@ -702,4 +694,4 @@ def create_study(
         Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law,
         runs=runs, device=device, without=without,
     )  # fmt: skip
-    return Created(Study(folder), made.guesses, made.extra, made.unused, made.notes)
+    return Created(**vars(made), study=Study(folder))

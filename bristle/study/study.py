@@ -50,7 +50,6 @@ from .study_file import (
     read_draft,
     read_settings,
     with_corrections,
-    with_excluded,
     with_mask,
     with_roles,
 )
@@ -372,7 +371,7 @@ class Study(Viewable):
         if len({*places}) == len(self.settings.runs):
             raise StudyError(f"{path}: these are all runs; some for training are needed.")
         refuse_too_few(path, self.settings, dict.fromkeys(places, EXCLUDE))
-        return self._with_settings(lambda text: with_excluded(text, places))
+        return self._with_settings(lambda text: with_roles(text, dict.fromkeys(places, EXCLUDE)))
 
     def with_roles(self, roles: Mapping[str, str]) -> Study:
         """Write what runs are for into study.toml, and return the study as it is then.

@@ -537,25 +537,6 @@ def with_mask(text: str) -> str:
     return "\n".join([*lines[:first], line, *lines[first:]])
 
 
-def with_excluded(text: str, files: Sequence[tuple[str, int]]) -> str:
-    """Return the text of a study.toml with runs left out from now on, all else as it was.
-
-    Parameters
-    ----------
-    text : of the file
-    files : file and piece of each run, its piece 0 where the file holds one
-    """
-    import tomlkit
-
-    document: Any = tomlkit.parse(text)
-    for table in document["runs"]:
-        if (table["file"], table.get("piece", 0)) in files:
-            before = table.get("role", "train")
-            table["role"] = EXCLUDE
-            table["role"].comment(f"was {before}")
-    return tomlkit.dumps(document)
-
-
 def with_roles(text: str, roles: Mapping[tuple[str, int], str]) -> str:
     """Return the text of a study.toml with other roles of runs, all else as it was.
 
@@ -570,7 +551,10 @@ def with_roles(text: str, roles: Mapping[tuple[str, int], str]) -> str:
     for table in document["runs"]:
         role = roles.get((table["file"], table.get("piece", 0)))
         if role is not None:
+            before = table.get("role", "train")
             table["role"] = role
+            if EXCLUDE == role != before:
+                table["role"].comment(f"was {before}")
     return tomlkit.dumps(document)
 
 

@@ -80,6 +80,6 @@ def test_a_law_that_explains_what_is_named_is_told_whatever_the_length():
 )
 def test_of_a_single_run_the_last_part_is_held_out(roles, says):
     own = study(roles=roles)
-    made = Created(own, (), {}, (), ())
+    made = Created((), {}, (), (), own)
     assert created_view(made).title == f"rig: a study of {says}"
     assert f"rig: {says}" in terminal.text(study_view(own))
