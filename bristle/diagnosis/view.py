@@ -146,7 +146,7 @@ def _gain(verdict: Verdict) -> str:
     if at.get("kind") != "effect" or not all(both):
         return ""
     before, after = (ForceError.of(one).text() for one in both if one)
-    where = f" at the {at['site']}" if len(verdict["findings"]) > 1 else ""
+    where = f" at {site_name(at['site'])}" if len(verdict["findings"]) > 1 else ""
     return f"; fitted again{where} {before}, with {effect_names(at['effects'])} {after}"
 
 
