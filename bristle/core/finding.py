@@ -99,7 +99,8 @@ def _range_text(group: Sequence[Finding]) -> str:
     columns = zip(*(list(_NUMBER.finditer(one.text)) for one in group), strict=True)
     for column in columns:
         texts = [match.group() for match in column]
-        if len(set(texts)) > 1:
+        error = column[0].string[: column[0].start()].endswith("± ")  # of the number before it
+        if len(set(texts)) > 1 and not error:
             unit = _unit(column[0])
             low, high = min(texts, key=float), max(texts, key=float)
             runs = len({one.run for one in group})

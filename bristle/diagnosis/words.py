@@ -82,8 +82,7 @@ def law_sentences(verdict: Row) -> list[str]:
         ]
     else:
         out = [
-            f"{law_name(mine)}{with_what} is the simplest of {count} laws that explains the runs: "
-            f"the error on held-out runs is {z} {NOISE}."
+            f"{law_name(mine)}{with_what} is the simplest of {count} laws that explains the runs."
         ]
     if unfit:
         out.append(left_out(unfit))

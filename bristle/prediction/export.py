@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.files import write_whole, writing
-from ..core.text import quantity
+from ..core.text import command, quantity
 from ..data.measurement import Measurement
 from ..errors import FmuError, RecordError, StudyError
 from ..fmu.build import BuildPlan, build, plan
@@ -112,6 +112,9 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
     measurement = _one_run(study, runs)
     folder = study.folder / "export" if out is None else out
     notes: list[str] = []
+    if not any(value.origin in ("identified", "measured") for value in model.facts.values()):
+        then = command("identify", study.folder)
+        notes.append(f"Warning: nothing was fitted: these are the law's own values. First:  {then}")
     held = _held_out(study, model, runs, notes)
     step = step_for(held) if held else None
     with writing(folder, StudyError):

@@ -172,7 +172,7 @@ def test_no_sign_is_advised_that_would_be_wrong_in_another_run(tmp_path: Path) -
             replaced("U [V]", lambda d: np.full(len(d["F [N]"]), 4.0)),
             "drive",
             "warning",
-            "voltage is 4 V in all runs: coil_lag, remanence and saturation cannot be tested",
+            "voltage is 4 V in all runs: coil lag, remanence and saturation cannot be tested",
         ),
         (
             replaced("U [V]", lambda d: np.where(d["U [V]"] > 3.0, 5.0, 0.0)),

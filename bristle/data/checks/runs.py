@@ -168,10 +168,10 @@ def _drive(runs: list[Excitation]) -> Iterator[Finding]:
     if len(distinct) == 1:
         text = f"{name} is {levels} {unit} in all runs: "
         text += (
-            "coil_lag, remanence and saturation cannot be tested, nor what it adds to the force."
+            "coil lag, remanence and saturation cannot be tested, nor what it adds to the force."
         )
     else:
-        text = f"{name} is constant within each run ({levels} {unit}): coil_lag and remanence "
+        text = f"{name} is constant within each run ({levels} {unit}): coil lag and remanence "
         text += "cannot be tested" + (", nor can saturation." if len(distinct) < 3 else ".")
     yield Finding(
         "drive", "warning", text, f"Switch the {name} between three levels or more in a run."
