@@ -336,6 +336,7 @@ def test_the_bench_scenario_plays_a_run_with_a_command_to_its_end_without_notes(
     study = Study.create(tmp_path / "rig", sorted(tmp_path.glob("*.csv")))
     found = export_study(study)
     assert found.run == "holdout_2"
+    assert found.notes[0].startswith("Warning: nothing was fitted")
     assert main(["check", str(found.scenario)]) == 0
     told = capsys.readouterr()
     assert "has no unit" not in told.out + told.err
