@@ -66,7 +66,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, start.first, measurement.left_out(*needed),
-        drive or VOLTAGE.name, measurement.labels, start.rest, measurement.extra,
+        drive or VOLTAGE.name, measurement.labels, start.rest, start.opening, measurement.extra,
         finer=measurement.finer, untold=untold(measurement, ("force",)),
     )  # fmt: skip
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple, Self
@@ -24,7 +26,7 @@ from ..physics.effect import AT, EFFECTS, Effect, effects_of
 from ..physics.laws import LAWS, base_and_variant
 from ..user_code.conformance import shown
 from .histories import DamperForces
-from .run_start import carrying_state, start_under_load
+from .run_start import carrying_state, remembering_states, start_in_motion, start_under_load
 from .search import HUBER, z_scale
 
 # Instruments that show a channel late or changed: sensor effects inside a fit.
@@ -308,6 +310,9 @@ class Fed(NamedTuple):
     tracks: dict[str, Array]
 
 
+_held_starts: ContextVar[dict[int, dict[str, float]] | None] = ContextVar("starts", default=None)
+
+
 @dataclass(frozen=True)
 class Run:
     """A measured run, its motion smoothed.
@@ -316,7 +321,8 @@ class Run:
     standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `left_out` why
     samples say nothing, by reason (n,) True where that holds. `drive` is the channel that V holds,
     in its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
-    samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
+    samples at its begin the damper rests under load, `opening` in how many a damper that begins in
+    motion remembers what was before, 0 where it begins otherwise; `extra` its channels
     besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
     was not measured and follows from the motion, beside `noise` and each with its draw of `draws`;
     `finer` how models are evaluated between the samples of a decimated run, None for others;
@@ -339,6 +345,7 @@ class Run:
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
     rest: int = 0
+    opening: int = 0
     extra: Mapping[str, Extra] = field(default_factory=dict)
     force_draws: Array | None = None
     finer: Finer | None = None
@@ -391,15 +398,22 @@ class Run:
         Where some between are left out, nothing is known between samples.
         """
         dense = part.step in (None, 1)
-        rest = 0 if part.start else len(range(self.rest)[part])
+        rest, opening = (
+            0 if part.start else len(range(one)[part]) for one in (self.rest, self.opening)
+        )
         return replace(
-            self, rest=rest, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
-            force=self.force[part], draws=self.draws[:, part],
+            self, rest=rest, opening=opening, x=self.x[part], v=self.v[part], a=self.a[part],
+            V=self.V[part], force=self.force[part], draws=self.draws[:, part],
             left_out={reason: where[part] for reason, where in self.left_out.items()},
             force_draws=None if self.force_draws is None else self.force_draws[:, part],
             extra={name: one.of(part) for name, one in self.extra.items()},
             finer=self.finer.of(part) if self.finer and dense else None,
         )  # fmt: skip
+
+    @cached_property
+    def begun(self) -> Self:
+        """The samples that tell how the run began."""
+        return self.of(slice(0, self.rest or self.opening))
 
     def first(self, seconds: float) -> Self:
         """Return the first so many seconds of the run, or all of it."""
@@ -557,26 +571,49 @@ class Problem:
 
     def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, or for one draw of its motion."""
-        carrying = self.carrying(model, run)
-        if carrying:
-            model = replace(model, values={**model.values, **carrying})
-        return self._force(model, run, draw)
+        return self._force(self._begun(model, run), run, draw)
+
+    def _begun(self, model: Model, run: Run) -> Model:
+        """Return the model with the start values that a run's force tells."""
+        start = self.carrying(model, run)
+        return replace(model, values={**model.values, **start}) if start else model
+
+    @contextmanager
+    def starts_held(self, model: Model) -> Iterator[None]:
+        """Hold in this context what runs that begin in motion begin with, as it is for a model.
+
+        For derivatives by the parameters: where the starts lower the error the most, it changes
+        with them no further.
+        """
+        starts = {id(run): self.carrying(model, run) for run in self.runs if run.opening}
+        before = _held_starts.set(starts)
+        try:
+            yield
+        finally:
+            _held_starts.reset(before)
 
     def carrying(self, model: Model, run: Run) -> dict[str, float]:
-        """Return the start value of the state that carries the load of a run at rest, by name.
+        """Return the start values of the states that carry the force of a run's start, by name.
 
-        Nothing where the run does not begin so, or no state of the model does.
+        Nothing where the run sets out from rest without a load, or no state of the model holds one.
         """
-        if not run.rest:
+        if not (run.rest or run.opening):
             return {}
-        part = run.of(slice(0, run.rest))
+        if (held := _held_starts.get()) is not None and id(run) in held:
+            return held[id(run)]
+        part, stroke = run.begun, float(np.ptp(run.x))
 
-        def resting(start: Mapping[str, float]) -> Array:
+        def begun(start: Mapping[str, float]) -> Array:
             return self._force(replace(model, values={**model.values, **start}), part)
 
-        load, stroke = float(np.mean(part.force[run.rest // 2 :])), float(np.ptp(run.x))
-        state = carrying_state(model.base_law, model.effects)
-        return start_under_load(state, load, stroke, resting)
+        if run.rest:
+            load = float(np.mean(part.force[run.rest // 2 :]))
+            return start_under_load(
+                carrying_state(model.base_law, model.effects), load, stroke, begun
+            )
+        states = remembering_states(model.base_law, model.effects)
+        force = part.force if part.measured is None else np.where(part.measured, part.force, np.nan)
+        return start_in_motion(states, force, stroke, begun) if states else {}
 
     def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, its states beginning as the model says."""
@@ -624,9 +661,10 @@ class Problem:
 
     @np.errstate(over="ignore", invalid="ignore")  # of a force that is not finite nothing is
     def _expected(self, model: Model, run: Run, draws: int) -> tuple[Array, Array, Array]:
-        middle = self.predict(model, run)
+        begun = self._begun(model, run)
+        middle = self._force(begun, run)
         spread = np.array(
-            [self.predict(model, run, d) - middle for d in range(min(draws, len(run.draws)))]
+            [self._force(begun, run, d) - middle for d in range(min(draws, len(run.draws)))]
         )
         if not len(spread):
             spread = np.zeros((1, len(middle)))

@@ -1,8 +1,8 @@
 """How a run begins: from which sample on it is judged, and which load its damper then holds.
 
 A run that begins in motion, or at rest under load, was cut out of a longer one. What its elastic
-parts hold is not known from the motion. At rest the measured force tells it: the state of the
-model that carries the force begins where it gives this force.
+parts hold is not known from the motion. The measured force tells it: the states of the model that
+carry a force begin where they give this one, as far as the damper remembers its start.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..core.text import quantity
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 
-SETTLING = 25
+SETTLING = 15
 """Samples at the start of a run that are not judged."""
 
 RESTS = 2e-3
@@ -47,6 +47,12 @@ CARRIED = 0.01
 TURNS = 4
 """Steps of the search for the state; the force of a bristle at rest is linear in it."""
 
+TURNS_IN_MOTION = 3
+"""Steps of the search for the states of a damper that begins in motion."""
+
+LEAST = 1e-6
+"""Share of the force's answer to all states below which nothing is told of a mixture of them."""
+
 NUDGE = 1e-3
 """The first step of that search, over the stroke for a state in m, else as it is."""
 
@@ -55,11 +61,13 @@ class RunStart(NamedTuple):
     """How a run begins.
 
     `first` is the first sample that is judged; `rest` the number of samples before it in which the
-    damper rests under load, 0 where it does not.
+    damper rests under load, 0 where it does not; `opening` that in which a damper that begins in
+    motion remembers what was before, 0 where it begins otherwise.
     """
 
     first: int
     rest: int = 0
+    opening: int = 0
 
 
 def start_of(x: Array, v: Array, force: Array, dt: float) -> RunStart:
@@ -86,7 +94,7 @@ def start_of(x: Array, v: Array, force: Array, dt: float) -> RunStart:
     passed = np.cumsum(np.abs(np.diff(x[::every]))) > FORGOTTEN * span
     first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
     first = min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
-    return RunStart(first, min(stands, first) if rests else 0)
+    return RunStart(first, min(stands, first)) if rests else RunStart(SETTLING, opening=first)
 
 
 def _none_at_first(y: Array) -> bool:
@@ -109,6 +117,61 @@ def carrying_state(law: str, effects: Sequence[str]) -> tuple[str, str]:
             for name, unit in EFFECTS[effect].states.items():
                 return f"{effect}.{name}", unit
     return "", ""
+
+
+def remembering_states(law: str, effects: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the states that carry a force from before a run, and their units.
+
+    Those of the law that begin with no signal of the run, and those of effects in the place of the
+    sign of the motion.
+    """
+    own = [(name, unit) for name, unit in LAWS[law].states.items() if name not in LAWS[law].starts]
+    signs = [name for name in effects if "yield_force" in EFFECTS[name].hooks()]
+    return own + [
+        (f"{name}.{k}", unit) for name in signs for k, unit in EFFECTS[name].states.items()
+    ]
+
+
+def start_in_motion(
+    states: Sequence[tuple[str, str]],
+    force: Array,
+    stroke: float,
+    opening: Callable[[Mapping[str, float]], Array],
+) -> dict[str, float]:
+    """Return the start values of states at which a model's force comes closest to the measured one.
+
+    Least squares over the samples that remember the start, in a few steps of Broyden's: forces of
+    elastic parts are nearly linear in what they hold at first. Nothing where that leads no closer.
+
+    Parameters
+    ----------
+    states : as `remembering_states` returns them
+    force : measured (n,) [N], NaN where it says nothing
+    stroke : of the run, peak to peak [m]
+    opening : the model's force (n,) [N], for start values by name
+    """
+    names = [f"{name}_0" for name, _ in states]
+    sizes = np.array([stroke if unit == "m" else 1.0 for _, unit in states])
+    known = np.isfinite(force)
+
+    def missed(at: Array) -> Array:
+        return (force - opening(dict(zip(names, (at * sizes).tolist(), strict=True))))[known]
+
+    at, left = np.zeros(len(names)), missed(np.zeros(len(names)))
+    first = float(left @ left)
+    slopes = np.column_stack([(left - missed(one)) / NUDGE for one in NUDGE * np.eye(len(names))])
+    for _ in range(TURNS_IN_MOTION):
+        square = slopes.T @ slopes
+        if not (np.isfinite(square).all() and square.any()):
+            return {}
+        square += LEAST * np.trace(square) * np.eye(len(names))
+        step = np.linalg.solve(square, slopes.T @ left)
+        at = at + step
+        after = missed(at)
+        slopes += np.outer(left - after - slopes @ step, step) / max(float(step @ step), 1e-300)
+        left = after
+    found = dict(zip(names, (at * sizes).tolist(), strict=True))
+    return found if float(left @ left) < first else {}
 
 
 def start_under_load(

@@ -80,7 +80,8 @@ class Search:
 
     def jacobian(self, theta: Array, r: Array) -> Array:
         """Return the derivatives (n, p) of the residuals at theta (p,), where they are `r`."""
-        return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
+        with self.problem.starts_held(self.at(theta)):
+            return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
 
     def sensitivities(self) -> Array:
         """Return how the normalised residuals change with the parameters (n, p), at the start."""

@@ -297,7 +297,7 @@ def under_load(at: SiteModel) -> list[str]:
         for problem in problems
         if problem is not None
         for run in problem.runs
-        if problem.carrying(at.model, run)
+        if run.rest and problem.carrying(at.model, run)
     }
     return [under_load_text(loads)] if loads else []
 
