@@ -529,10 +529,7 @@ def _behind_filter(
         long = is_smooth(channel) and gain < 1.0
         if not long or (now.colour not in KNOWN and found.colour in KNOWN):
             std = gain * found.std
-            if found.colour in (
-                "resting",
-                "slow",
-            ):  # low-passed before: the filter may leave all of it
+            if found.colour in {"resting", "slow"}:  # low-passed: the filter may leave all of it
                 std = max(std, min(found.std, quietest(parts[channel])[0]))
             noise[channel], facts[channel] = std, replace(found, std=std)
 

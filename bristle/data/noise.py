@@ -38,6 +38,7 @@ _KEPT = 0.97  # the share of blocks of white noise that the final threshold lets
 _FLAT = 1.12  # neighbouring bands whose levels differ by less are flat
 _RESTING = 0.03  # share of a channel's standard deviation below which it is at rest
 _PARTS, _SHORT = 8, 25  # of a stretch at rest: parts, and samples of one at the least
+_BENDS = 5  # degree of the curve that a slow motion follows over a stretch
 _STILL = 0.5  # share of a stretch's RMS that its parts have about their own lines, at rest
 _PERFECT = 1e-4  # no instrument's noise is a smaller share
 _ROUGH = 0.15  # a noise above this share of a channel's standard deviation may be its signal
@@ -55,8 +56,8 @@ class Noise:
     - "blue": it grows towards there, as after a numerical derivative; `std` is an upper limit for
       what lies below.
     - "resting": nowhere flat, as after a filter; `std` is that of the quietest stretch, at rest.
-    - "slow": nowhere flat and never at rest: it cannot be told from the signal; `std` is that of
-      the slowest stretch, with the signal's own part in it.
+    - "slow": nowhere flat and never at rest: it cannot be told from the signal; `std` is what the
+      slowest stretches have about smooth curves, with the rest of the signal in it.
     - "hidden": as "slow", and nowhere slow; `std` is a lower limit.
     - "rough": the signal itself changes that much from sample to sample; `std` is an upper limit.
     - "none": there is no noise.
@@ -123,27 +124,29 @@ def quietest(y: Array) -> tuple[float, bool]:
     """Return the RMS about a straight line in the quietest stretches, and whether they are at rest.
 
     A stretch is 2 % of a channel. At rest noise is as large about the lines of its short parts; a
-    slow motion is not.
+    slow motion is not: then the RMS is that about curves, or its bend would count as noise.
     """
     size = max(100, len(y) // 50)
     if len(y) < 2 * size:
         return float("inf"), False
     rows = np.lib.stride_tricks.sliding_window_view(y, size)[:: size // 2]
-    squares = _about_lines(rows)
+    squares = _about_curves(rows, 1)
     # The quietest of many is quiet by chance, too: those that are not much louder belong to it.
     quiet = squares <= 6.0 * squares.min()
     short = size // min(_PARTS, size // _SHORT)
     parts = rows[quiet][:, : size // short * short].reshape(-1, short)
     found = float(np.sqrt(np.mean(squares[quiet])))
-    return found, float(np.sqrt(np.mean(_about_lines(parts)))) >= _STILL * found
+    if float(np.sqrt(np.mean(_about_curves(parts, 1)))) >= _STILL * found:
+        return found, True
+    return float(np.sqrt(np.mean(_about_curves(rows[quiet], _BENDS)))), False
 
 
-def _about_lines(rows: Array) -> Array:
-    """Return the mean squares (m,) of rows (m, n) about a straight line of each."""
-    line = np.linspace(-1.0, 1.0, rows.shape[1])
-    rows = rows - rows.mean(axis=1, keepdims=True)
-    rows = rows - (rows @ line / (line @ line))[:, None] * line
-    return np.asarray(np.mean(rows**2, axis=1))
+def _about_curves(rows: Array, degree: int) -> Array:
+    """Return the variances (m,) of rows (m, n) about a polynomial of each."""
+    size = rows.shape[1]
+    basis, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1))
+    about = rows - (rows @ basis) @ basis.T
+    return np.asarray(np.sum(about**2, axis=1) / (size - degree - 1))
 
 
 def quantum(y: Array) -> float:

@@ -45,6 +45,9 @@ have none: least squares leave the one of n runs n - 1 times as much as each of 
 OF_FEW = 0.25
 """Share of these n - 1 times that is asked where it is less."""
 
+SMALL_ZERO = 0.01
+"""Share of the force's RMS up to which the zero of a run counts for nothing."""
+
 QUICK = 3
 """Jacobians of a first fit without a run, which shows where others are unexplained without it too;
 of one to a group of runs and one more."""
@@ -162,7 +165,7 @@ def other_zero(model: Model, one: Problem, rule: DecisionRule) -> str:
     """
     (run,) = one.runs
     zero, remaining = _amount(model, one, np.ones(len(run.force)))
-    if remaining > rule.misfit:
+    if remaining > rule.misfit or abs(zero) <= SMALL_ZERO * rms_of(run):
         return ""
     way = "more" if zero > 0.0 else "less"
     return (
@@ -170,6 +173,37 @@ def other_zero(model: Model, one: Problem, rule: DecisionRule) -> str:
         f"{len(run.force):,} samples, and nothing else is wrong there: its zero is another one. "
         "Set it right in study.toml: correct = "
         f'[{{channel = "force", fault = "bias", value = {zero:.3g}}}].'
+    )
+
+
+def rms_of(run: Run) -> float:
+    """Return the RMS [N] of a run's force."""
+    return float(np.sqrt(np.mean(run.force**2)))
+
+
+def small_zeros(model: Model, problems: Sequence[Problem], rule: DecisionRule) -> str:
+    """Return the sentence about zeros too small to count, "" where more than that is wrong.
+
+    Parameters
+    ----------
+    model : as fitted
+    problems : runs that it was fitted to, and the others
+    rule : the numbers that decide
+    """
+    share, largest = 0.0, ""
+    for one in (problem.of([run]) for problem in problems for run in problem.runs):
+        if robust_z(one, model) <= rule.misfit:
+            continue
+        (run,) = one.runs
+        zero, remaining = _amount(model, one, np.ones(len(run.force)))
+        if remaining > rule.misfit or abs(zero) > SMALL_ZERO * rms_of(run):
+            return ""
+        if abs(zero) / rms_of(run) >= share:
+            share = abs(zero) / rms_of(run)
+            largest = f"{plain(zero, 3)} N in {run.name}"
+    return (
+        f"The zero of the force is not quite the same in all runs ({largest}, {100 * share:.2g} % "
+        "of it): too little to count."
     )
 
 
@@ -231,7 +265,10 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
         return replace(found, kind=kind, reasons=(text,))
     if kind == found.kind:
         return found
-    text = inconsistent_runs(found.after.model, prepared.problem, *runs[1:], at_damper)
+    best = found.after.model
+    if at_damper and (text := small_zeros(best, (prepared.problem, runs[1]), rule)):
+        return replace(found, reasons=(*found.reasons, text))
+    text = inconsistent_runs(best, prepared.problem, *runs[1:], at_damper)
     return replace(found, kind=kind, reasons=(text,))
 
 

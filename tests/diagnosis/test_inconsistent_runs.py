@@ -144,6 +144,27 @@ def test_no_further_effect_is_named_for_one_odd_run():
     assert "gain" in told.reasons[0]
 
 
+@pytest.mark.parametrize(("share", "kind"), [(0.008, "none"), (0.05, "insufficient")])
+def test_a_zero_that_costs_nothing_takes_no_verdict_away(share, kind):
+    first, _, truth = true_case(5, "bingham")
+    runs = [replace(run, noise=run.noise / 3.0, force=run.force) for run in first.runs]
+    clean = [first.predict(truth, run) for run in runs]
+    runs = [
+        replace(run, force=f + (run.force - f) / 3.0) for run, f in zip(runs, clean, strict=True)
+    ]
+    size = share * float(np.sqrt(np.mean(runs[1].force ** 2)))
+    runs[1] = replace(runs[1], force=runs[1].force + size)
+    train, held_out = first.of(runs[:2]), first.of(runs[2:])
+    before = judge(truth, train, held_out)
+    found = SiteDiagnosis(
+        "damper", "none", (), before.z, before.z, 0.0, float("nan"), before=before, after=before,
+    )  # fmt: skip
+    told = contradicted(found, Prepared(before, train, held_out))
+    assert told.kind == kind
+    assert ("too little to count" in told.reasons[-1]) == (kind == "none")
+    assert runs[1].name in told.reasons[-1]
+
+
 def late(run, steps: float):
     """Return a run whose force was recorded so many steps late."""
     at = np.arange(len(run.force), dtype=float)

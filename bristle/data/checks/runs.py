@@ -259,17 +259,22 @@ def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
     top = max((abs(run.range[1]) for run in known), default=0.0)
     for run in known:
         alike = [
-            other.resisting
+            other
             for other in known
             if abs(_mean_level(other) - _mean_level(run)) <= 0.1 * top
             and 0.3 < other.speed / max(run.speed, 1e-12) < 3.0
         ]
         if len(alike) < 3:  # this run counts
             continue
-        usual = float(np.median([one for one in alike if one is not None]))
+        usual = float(np.median([one.resisting or 0.0 for one in alike]))
         own = float(run.resisting or 0.0)
         ratio = own / usual
-        if not 0.4 < ratio < 2.5:
+        # One damper resists as the square of its speed at the most, and less within its slip.
+        reach = [
+            getattr(run, name) / max(float(np.median([getattr(one, name) for one in alike])), 1e-12)
+            for name in ("speed", "stroke")
+        ]
+        if not 0.4 * min(1.0, *reach) ** 2 < ratio < 2.5 * max(1.0, *reach) ** 2:
             text = (
                 f"force resists with {quantity(own, 'N', 4, usual)} on average, and with "
                 f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like "
