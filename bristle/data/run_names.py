@@ -23,7 +23,7 @@ from .tone import Tone, amplitude_fits, amplitude_off, frequency_fits, frequency
 # stays open is not taken.
 
 _HARDLY = "kKvVcCoO"
-DOUBTFUL = f"_- xXdD'~=;#^:\u2013\u2014{_HARDLY}"
+DOUBTFUL = f"_- xXdD'~=;#^:\u2013\u2014\u00f7!$&@\u00a7`\u00b4\u2019\ufffd{_HARDLY}"
 """What may part two numbers, or be a decimal mark."""
 
 SPELLED = {
@@ -92,7 +92,7 @@ class Reading:
 def number_in(marks: Sequence[str] = ()) -> str:
     """Return the regular expression of a number in a name, with marks besides those of all."""
     more = re.escape("".join(mark for mark in marks if len(mark) == 1))
-    return rf"\d+(?:(?:{_SURE}{f'|[{more}]' if more else ''})\d+)?"
+    return rf"\d+(?:(?:{_SURE}{f'|[{more}]{{1,2}}' if more else ''})\d+)?"
 
 
 def value_of(text: str) -> float:

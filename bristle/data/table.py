@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.arrays import Array, Indices
+from ..core.arrays import Array, Flags, Indices
 from ..core.text import listed
 from ..errors import RecordError
 from .titles import Column, titles
@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 
 _CODE = -7999.0
 """A number that loggers write where nothing was measured, besides nines: -9999, 99999.99."""
+
+_LEAPS = 5.0
+"""Times as far outside of its neighbours as other samples are, 1 % aside, a mark is."""
+
+_SURE = 3
+"""Marks at the least that stand out like that; some stand where the column passes by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +80,7 @@ class Table:
 def without_codes(table: Table) -> Table:
     """Return a table without the numbers that a logger writes where nothing was measured.
 
-    Such as -9999: no other value of the column comes near it.
+    Such as -9999: no other value of the column comes near it, or it jumps there and back.
     """
     values, remarks = dict(table.values), list(table.remarks)
     for key, own in table.values.items():
@@ -84,16 +90,37 @@ def without_codes(table: Table) -> Table:
         able |= own == _CODE
         if not able.any():
             continue
-        code = own[able][np.argmax(size[able])]
+        met, often = np.unique(own[able], return_counts=True)
+        code = met[np.lexsort((np.abs(met), often))[-1]]
         is_code = own == code
         others = size[~is_code & np.isfinite(own)]
-        if others.size and float(others.max()) < 0.5 * abs(code):
+        if others.size < _SURE:
+            continue
+        if float(others.max()) < 0.5 * abs(code) or _jumps_to(is_code, own):
             values[key] = np.where(is_code, np.nan, own)
             remarks.append(
                 f'"{key}" is {code:g} in {is_code.sum()} places, and else within '
                 f"{others.max():.4g}: taken as missing there"
             )
     return replace(table, values=values, remarks=tuple(remarks))
+
+
+def _jumps_to(is_code: Flags, own: Array) -> bool:
+    """Return whether a column (n,) is far off where it has one value, and comes back at once.
+
+    As a mark within the range of what is measured does; a signal that passes through does not.
+    """
+    y = own[~is_code & np.isfinite(own)]
+    after = np.clip(np.cumsum(~is_code & np.isfinite(own))[is_code], 1, len(y) - 1)
+    beyond = _outside(own[is_code], y[after - 1], y[after])
+    usual = float(np.quantile(_outside(y[1:-1], y[:-2], y[2:]), 0.99))
+    return usual > 0.0 and int(np.count_nonzero(beyond > _LEAPS * usual)) >= _SURE
+
+
+def _outside(y: Array, before: Array, after: Array) -> Array:
+    """Return how far values (n,) are outside of those before and after them."""
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    return np.maximum(np.maximum(low - y, y - high), 0.0)
 
 
 def table_from_frame(frame: pd.DataFrame, name: str = "frame") -> Table:

@@ -571,21 +571,18 @@ class Problem:
 
     def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, or for one draw of its motion."""
-        return self._force(self._begun(model, run), run, draw)
-
-    def _begun(self, model: Model, run: Run) -> Model:
-        """Return the model with the start values that a run's force tells."""
-        start = self.carrying(model, run)
-        return replace(model, values={**model.values, **start}) if start else model
+        if carrying := self.carrying(model, run):
+            model = replace(model, values={**model.values, **carrying})
+        return self._force(model, run, draw)
 
     @contextmanager
-    def starts_held(self, model: Model) -> Iterator[None]:
+    def starts_held(self, model: Model, runs: Sequence[Run]) -> Iterator[None]:
         """Hold in this context what runs that begin in motion begin with, as it is for a model.
 
         For derivatives by the parameters: where the starts lower the error the most, it changes
         with them no further.
         """
-        starts = {id(run): self.carrying(model, run) for run in self.runs if run.opening}
+        starts = {id(run): self.carrying(model, run) for run in runs if run.opening}
         before = _held_starts.set(starts)
         try:
             yield
@@ -661,11 +658,11 @@ class Problem:
 
     @np.errstate(over="ignore", invalid="ignore")  # of a force that is not finite nothing is
     def _expected(self, model: Model, run: Run, draws: int) -> tuple[Array, Array, Array]:
-        begun = self._begun(model, run)
-        middle = self._force(begun, run)
-        spread = np.array(
-            [self._force(begun, run, d) - middle for d in range(min(draws, len(run.draws)))]
-        )
+        with self.starts_held(model, [run]):
+            middle = self.predict(model, run)
+            spread = np.array(
+                [self.predict(model, run, d) - middle for d in range(min(draws, len(run.draws)))]
+            )
         if not len(spread):
             spread = np.zeros((1, len(middle)))
         if run.force_draws is not None:

@@ -80,7 +80,7 @@ class Search:
 
     def jacobian(self, theta: Array, r: Array) -> Array:
         """Return the derivatives (n, p) of the residuals at theta (p,), where they are `r`."""
-        with self.problem.starts_held(self.at(theta)):
+        with self.problem.starts_held(self.at(theta), self.problem.runs):
             return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
 
     def sensitivities(self) -> Array:

@@ -414,7 +414,9 @@ def _refuse_incomplete(
                 break
         for text in free:
             own = table.find(text).stated
-            if own and any(_may_be(table, text, quantity) for quantity in what.split()):
+            if np.isnan(table.values[text]).all() and _may_be(table, text, what.split()[-1]):
+                way = f'"{text}" holds no number at all'
+            elif own and any(_may_be(table, text, quantity) for quantity in what.split()):
                 way = f'"{text}" is in {own}, which is no unit of it'
                 if own == "kg":
                     way += f'; a load cell shows kgf: --channel "force={text}@kgf"'

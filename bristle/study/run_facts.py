@@ -482,10 +482,13 @@ def _number_or_none(text: str) -> float | None:
 # What the runs of a new study are for: training, to be held out, or the test at the end.
 
 _WORDS = {
-    "train": "train training ident identification fit estimation est calibration cal",
-    "holdout": "valid validation val vali test holdout hold check verify verification",
+    "train": "train training ident identification fit estimation est calibration cal kalibrierung",
+    "holdout": "valid validation val vali test holdout hold check verify verification validierung "
+    "kontrolle kontrollmessung pruefung pruef pr\u00fcfung pr\u00fcf gegenprobe",
 }
 _TRAIN, _HOLDOUT = (frozenset(words.split()) for words in _WORDS.values())
+_ANY_RUN = frozenset({"test", "hold", "check", "pruefung", "pruef", "pr\u00fcfung", "pr\u00fcf"})
+"""Words by which any run may be called: they count beside names for training alone."""
 _WITH_NUMBER = re.compile(r"[^\W\d_]*\d+(?:[.,]\d+)?[^\W\d_]*")
 
 
@@ -551,7 +554,9 @@ def roles_by_name(names: list[str], *, added: bool = False) -> tuple[list[str], 
     added : whether they join runs that have roles: else names count where they give both
     """
     found = [_role_in(name) for name in names]
-    if any(found) if added else {*found} == {"train", "holdout"}:
+    held = [_words(name) for name, role in zip(names, found, strict=True) if role == "holdout"]
+    sure = "" not in found or all(words & (_HOLDOUT - _ANY_RUN) for words in held)
+    if any(found) if added else sure and 0 < len(held) < len(names):
         roles, note = [role or "train" for role in found], "roles follow the names of the files"
     elif len(names) == 1:
         alone = "there is one run: its last 30 % are held out, which is weaker than a separate run"
@@ -567,8 +572,12 @@ def roles_by_name(names: list[str], *, added: bool = False) -> tuple[list[str], 
 
 def _role_in(name: str) -> str:
     """Return the role that a file's name tells, "" where it tells none."""
-    words = set(re.split(r"[^a-z]+", name.lower()))
+    words = _words(name)
     return "holdout" if words & _HOLDOUT else "train" if words & _TRAIN else ""
+
+
+def _words(name: str) -> set[str]:
+    return {*re.split(r"[\W\d_]+", Path(name).stem.lower())}
 
 
 def a_third(names: Sequence[str]) -> tuple[set[int], str]:

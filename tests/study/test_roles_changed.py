@@ -16,7 +16,7 @@ from bristle.errors import StudyError
 from bristle.study import Study, create_study
 from bristle.study.history import EARLIER
 from bristle.study.identify import identify_study
-from bristle.study.run_facts import a_third
+from bristle.study.run_facts import a_third, roles_of
 
 
 @pytest.fixture
@@ -162,3 +162,17 @@ def test_no_level_of_a_campaign_is_wholly_held_out() -> None:
         assert sum(level in names[k] for k in held) == 1
     assert a_third([f"run_{k}.csv" for k in range(7)]) == ({1, 4}, "every third run")
     assert a_third(["sine_5mm.csv", "sine_8mm.csv"])[0] == {1}
+
+
+@pytest.mark.parametrize(
+    ("names", "held"),
+    [
+        (["Messung_1", "Messung_2", "Kontrolle_1"], ["Kontrolle_1"]),
+        (["train_1", "Prüfung_1"], ["Prüfung_1"]),
+        (["run_1", "test_2", "run_3"], ["test_2"]),  # the second of three as ever
+        (["test_1", "run_2", "run_3"], ["run_2"]),
+    ],
+)
+def test_names_tell_what_is_held_out_where_they_mean_it(names, held) -> None:
+    runs, _ = roles_of([f"{name}.csv" for name in names], [False] * len(names))
+    assert [Path(run.file).stem for run in runs if run.role == "holdout"] == held

@@ -32,6 +32,7 @@ _STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", 
 _RATES = (
     "fs", "rate", "samplerate", "sample_rate", "sampling_rate", "samplingrate", "fsample", "f_s",
     "samplefrequency", "sample_frequency", "samplingfrequency", "sampling_frequency", "samplefreq",
+    "sampling_freq", "sample_freq", "sampling", "abtastrate", "scan_rate", "scanrate",
 )  # fmt: skip
 _STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
 _SECOND, _HERTZ = parse_unit("s").dimension, parse_unit("Hz").dimension
@@ -287,7 +288,7 @@ def _by_steps(found: _Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
         place, short = key.rpartition(".")[0], _short(key)
         if short in _STARTS and np.isfinite(value):
             starts[place] = value
-        elif step := _step_in(key, value):
+        elif step := step_in(key, value):
             steps.setdefault(place, step)
     if len({(starts.get(place, 0.0), step) for place, step in steps.items()}) < 2:
         return []
@@ -322,7 +323,7 @@ def _without_time(found: _Found, name: str) -> Table:
     notes = []
     timed = any(_is_time_name(key) for key in data)
     for key, value in found.scalars.items():
-        if not timed and (step := _step_in(key, value)):
+        if not timed and (step := step_in(key, value)):
             data["time_s"] = np.arange(size) * step
             unit = {True: " s", False: " Hz"}[_short(key) in _STEPS] if _tells_time(key) else ""
             notes.append(f"the time is made from {key} = {value:g}{unit}")
@@ -379,7 +380,7 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
     for name in added:
         if (beside := own.get(len(found.loose[name]))) is not None:
             beside[name] = found.loose.pop(name)
-    timed = bool(own) or any(_step_in(one, value) for one, value in found.scalars.items())
+    timed = bool(own) or any(step_in(one, value) for one, value in found.scalars.items())
     for one, node in fields.items():
         if isinstance(node, Leaf) and one not in vectors and node.array.size > 1:
             _matrix(found, long[one], paths[one], node, fields, timed)
@@ -656,10 +657,10 @@ def _is_time_name(key: str) -> bool:
 
 
 def _short(key: str) -> str:
-    return key.rpartition(".")[2].lower()
+    return re.sub("[ -]", "_", key.rpartition(".")[2].lower())
 
 
-def _step_in(key: str, value: float) -> float:
+def step_in(key: str, value: float) -> float:
     """Return the step [s] that a number tells by its name, as dt, fs, dt_ms or fs_kHz; 0 if none.
 
     Parameters
@@ -672,7 +673,7 @@ def _step_in(key: str, value: float) -> float:
         named = title(0, key.rpartition(".")[2])
         if named.unit is None or named.unit.dimension not in (_SECOND, _HERTZ):
             return 0.0
-        name, factor = named.name.lower(), named.unit.factor
+        name, factor = re.sub("[ -]", "_", named.name.lower()), named.unit.factor
         quantity = "step" if named.unit.dimension == _SECOND else "rate"
     if not 0.0 < value < np.inf:
         return 0.0

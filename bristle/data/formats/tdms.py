@@ -6,8 +6,10 @@ No index file is needed.
 from __future__ import annotations
 
 import io
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -22,6 +24,7 @@ from ..table import Table, from_arrays
 from ..titles import unit_or_none
 from . import DAMAGED, library
 from ._one_time import SAME, AnyArray, Series, by_length, on_one_time, overlap, unset_step
+from ._tree import step_in
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
 _UNSET = np.datetime64("1904-01-02")
@@ -29,6 +32,10 @@ _UNSET = np.datetime64("1904-01-02")
 _SHARED = 0.5
 """Share of a group's time that another group has, at the least, to be read with it."""
 _RISING = 0.98  # share of the steps of a time that are positive, at least
+
+
+_STEP = "wf_increment"
+_TELLS_STEP = re.compile("rate|freq|sampl|^fs|^dt", re.IGNORECASE)
 
 
 def recognises(content: bytes, suffix: str) -> bool:
@@ -73,13 +80,17 @@ def read(content: bytes, name: str) -> Table:
 
 
 class _Channel(NamedTuple):
-    """Samples (n,), unit, and of the waveform its start, offset and step [s], 0 if not given."""
+    """Samples (n,), unit, and of the waveform its start, offset and step [s], 0 if not given.
+
+    `called` is the property that tells the step.
+    """
 
     array: AnyArray
     unit: str | None
     start: np.datetime64 | None
     offset: float
     step: float
+    called: str
 
 
 Channels = dict[str, _Channel]
@@ -110,11 +121,25 @@ def _channels(group: Any, of_file: Mapping[str, Any]) -> Channels:
         start = given.get("wf_start_time")
         known = isinstance(start, np.datetime64) and not np.isnat(start) and start > _UNSET
         step, offset = (_seconds(given, key) for key in ("wf_increment", "wf_start_offset"))
+        called = _STEP
+        if not step > 0.0:
+            step, called = _by_rate(given)
         out[channel.name] = _Channel(
-            array, None if unit is None else unit.name, start if known else None, offset,
-            step if step > 0.0 else 0.0,
+            array, None if unit is None else unit.name, start if known else None, offset, step,
+            called,
         )  # fmt: skip
     return out
+
+
+def _by_rate(given: Mapping[str, Any]) -> tuple[float, str]:
+    """Return the step [s] that the one property tells which is a rate or a step, and its name."""
+    found = {}
+    for key, value in given.items():
+        with suppress(TypeError, ValueError):
+            if _TELLS_STEP.search(key) and (step := step_in(key, float(value))) > 0.0:
+                found[step] = key
+    ((step, called),) = found.items() if len(found) == 1 else ((0.0, _STEP),)
+    return step, called
 
 
 def _seconds(given: Any, key: str) -> float:
@@ -329,8 +354,10 @@ def _table(
     if made:
         data, units["time"] = {"time": time, **data}, "s"
         if len(series) == 1:
-            notes.append(f"the time is made from wf_increment = {step:g} s")
-            remarks = [*unset_step("wf_increment", step), *remarks]
+            called = {one.called for one in every.values() if one.step}
+            told = f"the time is made from {listed(sorted(called))}: {step:g} s a sample"
+            (notes if called == {_STEP} else remarks).append(told)
+            remarks = [*unset_step(_STEP, step), *remarks]
     remarks = [*_another_length(untimed, len(time)), *remarks]
     return from_arrays(data, name, units, tuple(notes), tuple(remarks))
 

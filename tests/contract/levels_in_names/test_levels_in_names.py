@@ -50,7 +50,27 @@ CAMPAIGN = {
 
 @pytest.mark.parametrize(
     "mark",
-    ["_", "-", "x", "X", "d", "p", "P", "pt", ",", ".", "·", "point", " ", "komma", "k", "c", "#"],
+    [
+        "_",
+        "-",
+        "x",
+        "X",
+        "d",
+        "p",
+        "P",
+        "pt",
+        ",",
+        ".",
+        "·",
+        "point",
+        " ",
+        "komma",
+        "k",
+        "c",
+        "#",
+        "__",
+        "÷",
+    ],
 )
 def test_a_decimal_mark_is_settled_by_the_measured_frequency(tmp_path, mark) -> None:
     names = {f"run_{told(name, mark)}": value for name, value in CAMPAIGN.items()}

@@ -34,6 +34,28 @@ def test_what_is_missing_is_marked_and_said(tmp_path, capsys, word) -> None:
     assert any("3 samples (0.33 %) were missing" in note for note in run.notes)
 
 
+def test_a_mark_within_the_range_is_missing_where_the_signal_jumps_to_it(tmp_path, capsys) -> None:
+    newtons = 1e3 * F
+    marked = np.where(np.isin(np.arange(900), np.arange(40, 900, 45)), -999.25, newtons)
+    for name, y in (("marked", marked), ("passes", np.round(newtons * 4.0) / 4.0)):
+        file = tmp_path / f"{name}.csv"
+        rows = (f"{t:.4f},{x:.4f},{f:.6g}" for t, x, f in zip(T, X, y, strict=True))
+        file.write_text("\n".join(["Time [s],Disp [mm],Force [N]", *rows, ""]))
+        assert main(["study", "new", str(tmp_path / name), "--data", str(file)]) == 0
+        said = "is -999.25 in 20 places" in " ".join(capsys.readouterr().out.split())
+        assert said is (name == "marked")
+        (run,) = Study(tmp_path / name).read()
+        np.testing.assert_allclose(run["force"], newtons, atol=250.0)
+
+
+def test_a_force_without_a_number_is_named(tmp_path, capsys) -> None:
+    file = tmp_path / "run.csv"
+    rows = (f"{t:.4f},{x:.4f},nan" for t, x in zip(T, X, strict=True))
+    file.write_text("\n".join(["Time [s],Disp [mm],Force [kN]", *rows, ""]))
+    assert main(["study", "new", str(tmp_path / "rig"), "--data", str(file)]) == 2
+    assert '"Force [kN]" holds no number at all' in " ".join(capsys.readouterr().err.split())
+
+
 @pytest.mark.parametrize("word", ["---", "OVER", "OL", "#VALUE!", "9.9E+37"])
 def test_other_words_are_refused_with_their_line(tmp_path, capsys, word) -> None:
     assert main(made(tmp_path, word)) == 2

@@ -100,14 +100,26 @@ def test_another_rate_and_another_group(tmp_path: Path) -> None:
     measured(tdms(tmp_path / "half.tdms", MOTION, half), 5e-2)
 
 
-def test_increments_in_ms(tmp_path: Path) -> None:
-    ms = {"wf_xunit_string": "ms", "wf_increment": 2.0}
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"wf_xunit_string": "ms", "wf_increment": 2.0}, {"SampleRate": 500.0, "step": 3},
+        {"Sampling Rate [kHz]": "0.5"},
+    ],
+)  # fmt: skip
+def test_increments_in_ms_and_rates_of_loggers(tmp_path: Path, told) -> None:
     channels = [
         channel(n, f, u) for n, f, u in (("displacement", path, "mm"), ("force", force, "N"))
     ]
     for one in channels:
-        one.properties.update(ms)
-    assert measured(tdms(tmp_path / "run.tdms", *channels)).step == pytest.approx(0.002)
+        del one.properties["wf_increment"]
+        one.properties.update(told)
+    file = tdms(tmp_path / "run.tdms", *channels)
+    assert measured(file).step == pytest.approx(0.002)
+    said = " ".join(read_table(file).remarks)
+    assert (f"the time is made from {next(iter(told))}: 0.002 s" in said) is (
+        "wf_increment" not in told
+    )
 
 
 def test_a_group_of_another_run_is_named_and_not_read(tmp_path: Path) -> None:
