@@ -50,7 +50,7 @@ def open_archive(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
     ------
     FmuError
         If the file is missing, a folder, unreadable or no zip, or if a member is encrypted, a
-        link, too large, or named so that it would leave the folder it is unpacked into.
+        link, there twice, too large, or named so that it would leave the folder of its own.
     """
     if path.is_dir():
         raise FmuError(
@@ -257,8 +257,14 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
             f"{path}: unpacks to {total / 1024**3:.1f} GiB "
             f"(at most {MAX_TOTAL // 1024**3} GiB): refused."
         )
+    met: dict[str, int] = {}
     for info in members:
         _check_member(path, info)
+        if not info.is_dir() and met.setdefault(_name(info), info.CRC) != info.CRC:
+            raise FmuError(
+                f"{path}: it holds two members {_name(info)!r} that differ: refused, for nothing "
+                "says which one counts."
+            )
 
 
 def _check_member(path: Path, info: zipfile.ZipInfo) -> None:

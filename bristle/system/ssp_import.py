@@ -334,7 +334,7 @@ def _shown(port: Port) -> str:
 
 # An SSP package as a scenario with its FMUs beside it.
 
-FORM = 2
+FORM = 3
 """Version of what is written: another one unpacks packages anew."""
 USUAL_STOP = 1.0
 """Stop [s] where neither the package nor its FMUs name one."""

@@ -30,16 +30,19 @@ MAX_TEXT = 16 * 1024**2
 class Package:
     """An open package: its file, the archive, the names of its members.
 
-    `notes` collects what was left aside while it is read, or taken otherwise than it stands there.
+    `notes` collects what was left aside while it is read, or taken otherwise than it stands there,
+    `opened` the members of XML that were read.
     """
 
     path: Path
     archive: zipfile.ZipFile
     names: frozenset[str]
     notes: list[str] = field(default_factory=list)
+    opened: set[str] = field(default_factory=set)
 
     def xml(self, name: str, root: str) -> Element:
         """Return the root element of a member, which must be of that name but for its prefix."""
+        self.opened.add(name)
         data = read_member(self.path, self.archive, name, MAX_TEXT)
         found = parse_xml(data, f"{self.path}: {name}")
         if local(found) != root:
@@ -463,6 +466,9 @@ def read_structure(package: Package) -> SystemStructure:
         stop = number(experiment, "stopTime", 0.0, package, where) or None
     step, algorithm = _told(root, package)
     system = _read_file(root, package, STRUCTURE, ())
+    for one in sorted(package.names - package.opened):
+        if one.lower().endswith(".ssd") and "/" not in one:  # where variants stand
+            package.note(one, f"is another variant and not read; {STRUCTURE} is.")
     return SystemStructure(root.get("name", ""), system, stop, step, algorithm)
 
 

@@ -270,6 +270,18 @@ def test_encrypted_member_is_refused(write: Write) -> None:
         read_description(path)
 
 
+def test_a_member_that_is_there_twice_is_refused_where_the_two_differ(write: Write) -> None:
+    path = write(add={"resources/x": b"one"})
+    for content, refused in ((b"one", False), (b"other", True)):
+        with zipfile.ZipFile(path, "a") as archive, pytest.warns(UserWarning, match="Duplicate"):
+            archive.writestr("resources/x", content)
+        if refused:
+            with pytest.raises(FmuError, match=r"two members 'resources/x' that differ"):
+                read_description(path)
+        else:
+            read_description(path)
+
+
 def test_zip_bomb_is_refused_by_its_directory(write: Write, tmp_path: Path) -> None:
     path = write(add={"resources/zeros": bytes(80 * 1024**2)})
     assert path.stat().st_size < 1024**2

@@ -28,7 +28,11 @@ from ._one_time import Series, by_length, on_one_time
 
 AnyArray: TypeAlias = NDArray[Any]
 
-_STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step", "dx")
+_STEPS = (
+    "dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step", "dx",
+    "sampling_interval", "sample_interval", "sampleinterval", "sampling_period", "sample_period",
+    "sampling_time",
+)  # fmt: skip
 _RATES = (
     "fs", "rate", "samplerate", "sample_rate", "sampling_rate", "samplingrate", "fsample", "f_s",
     "samplefrequency", "sample_frequency", "samplingfrequency", "sampling_frequency", "samplefreq",

@@ -121,12 +121,12 @@ def _channels(group: Any, of_file: Mapping[str, Any]) -> Channels:
         start = given.get("wf_start_time")
         known = isinstance(start, np.datetime64) and not np.isnat(start) and start > _UNSET
         step, offset = (_seconds(given, key) for key in ("wf_increment", "wf_start_offset"))
-        called = _STEP
-        if not step > 0.0:
-            step, called = _by_rate(given)
+        called, (other, rate) = _STEP, _by_rate(given)
+        if other and (step <= 0.0 or step == 1.0):  # nobody set it, or left it at 1
+            step, called = other, rate
         out[channel.name] = _Channel(
-            array, None if unit is None else unit.name, start if known else None, offset, step,
-            called,
+            array, None if unit is None else unit.name, start if known else None, offset,
+            max(step, 0.0), called,
         )  # fmt: skip
     return out
 
@@ -135,8 +135,10 @@ def _by_rate(given: Mapping[str, Any]) -> tuple[float, str]:
     """Return the step [s] that the one property tells which is a rate or a step, and its name."""
     found = {}
     for key, value in given.items():
-        with suppress(TypeError, ValueError):
-            if _TELLS_STEP.search(key) and (step := step_in(key, float(value))) > 0.0:
+        number, _, unit = str(value).partition(" ")
+        with suppress(ValueError):
+            step = step_in(f"{key} [{unit}]" if unit else key, float(number))
+            if step > 0.0 and _TELLS_STEP.search(key):
                 found[step] = key
     ((step, called),) = found.items() if len(found) == 1 else ((0.0, _STEP),)
     return step, called

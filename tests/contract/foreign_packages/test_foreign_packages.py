@@ -50,6 +50,7 @@ NOTES = {
         "", "", STEP, ['calls the connector "u" output; in its FMU it is input.',
                        'calls the connector "u" Integer; in its FMU it is Real.'],
     ),
+    "another variant": ("", "", STEP, ["B.ssd: is another variant and not read; System"]),
     "another form of FMU": ("", "", STEP, ['asks for "ModelExchange", and is run as co-sim']),
     "no step": (value("gain"), "", STOP, ASSUMED),
     "no stop": ("", "", "", ["The package names no stop: 1 s", "names no step: 0.001 s is taken"]),
@@ -81,7 +82,8 @@ def test_run_check_and_import_say_the_same(
     body = f"<d:Elements>{component('g', inner)}</d:Elements>"
     if "form" in case:
         body = body.replace("<d:Component ", '<d:Component implementation="ModelExchange" ')
-    package = write_ssp(tmp_path / "my.ssp", body, {"g": gain}, more=experiment)
+    texts = {"B.ssd": "<a/>"} if "variant" in case else {}
+    package = write_ssp(tmp_path / "my.ssp", body, {"g": gain}, more=experiment, texts=texts)
     for _ in range(2):  # what is in the cache says it as well
         out = str(tmp_path / "run")
         assert main(["run", str(package), "--no-figure", "--out", out]) == 0
