@@ -2,8 +2,8 @@
 
 `left_out`: 50 smooth records without a fault, of 200 Hz to 5 kHz, as loggers filter them or not,
 with and without white noise: how many samples no error counts, and how many of them because a run
-settles at its start. These records begin in motion, so that nobody knows what an elastic part holds
-there; a Bouc-Wen force forgets it along a path. That costs a time, not a share of a record.
+settles at its start. These records begin in motion: what an elastic part holds there is told by the
+force.
 
 `fit`: each law on each measured set, by bristle's fit and by plain least squares.
 

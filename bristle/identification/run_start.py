@@ -17,8 +17,11 @@ from ..core.text import quantity
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 
-SETTLING = 15
-"""Samples at the start of a run that are not judged."""
+SETTLING = 25
+"""Samples at the start of a run that are not judged: at rest noise turns the sign of a speed."""
+
+MOVING = 15
+"""The same of a run that begins in motion: what is in series with the damper finds its load."""
 
 RESTS = 2e-3
 """Share of the stroke that a damper at rest moves by at most: noise."""
@@ -94,7 +97,7 @@ def start_of(x: Array, v: Array, force: Array, dt: float) -> RunStart:
     passed = np.cumsum(np.abs(np.diff(x[::every]))) > FORGOTTEN * span
     first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
     first = min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
-    return RunStart(first, min(stands, first)) if rests else RunStart(SETTLING, opening=first)
+    return RunStart(first, min(stands, first)) if rests else RunStart(MOVING, opening=first)
 
 
 def _none_at_first(y: Array) -> bool:

@@ -11,7 +11,7 @@ import pytest
 from bristle.data.measurement import measurements_of_frame
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem, Run
-from bristle.identification.run_start import SETTLING, under_load_text
+from bristle.identification.run_start import MOVING, SETTLING, under_load_text
 from bristle.model.model import Model
 
 DT, NOISE = 0.002, 0.02
@@ -135,7 +135,7 @@ def test_a_run_cut_out_of_a_motion_tells_what_the_damper_held(model, states):
     t = np.arange(4000) * DT
     x = 0.006 * np.sin(2.0 * np.pi * 1.1 * t) + 0.003 * np.sin(2.0 * np.pi * 2.9 * t + 1.0)
     run = recorded(x, begin=800, model=model)
-    assert (run.skip, run.rest) == (SETTLING, 0)
+    assert (run.skip, run.rest) == (MOVING, 0)
     remembers = slice(0, run.opening)
     forgetful = run.force - Problem([run]).predict(model, replace(run, opening=0))
     assert float(np.std(forgetful[remembers])) > 5.0 * NOISE
