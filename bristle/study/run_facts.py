@@ -554,9 +554,9 @@ def roles_by_name(names: list[str], *, added: bool = False) -> tuple[list[str], 
     added : whether they join runs that have roles: else names count where they give both
     """
     found = [_role_in(name) for name in names]
-    held = [_words(name) for name, role in zip(names, found, strict=True) if role == "holdout"]
-    sure = "" not in found or all(words & (_HOLDOUT - _ANY_RUN) for words in held)
-    if any(found) if added else sure and 0 < len(held) < len(names):
+    theirs = [_words(name) for name, role in zip(names, found, strict=True) if role == "holdout"]
+    sure = "" not in found or all(words & (_HOLDOUT - _ANY_RUN) for words in theirs)
+    if any(found) if added else sure and 0 < len(theirs) < len(names):
         roles, note = [role or "train" for role in found], "roles follow the names of the files"
     elif len(names) == 1:
         alone = "there is one run: its last 30 % are held out, which is weaker than a separate run"
