@@ -96,15 +96,14 @@ function laws(fit) {
   }
   const rows = answer.table ?? [];
   if (rows.length) {
-    const judged = rows.map((row) => ({ ...row, error: row.error?.rms ?? row.holdout ?? row.train }));
-    const low = rows.every((row) => row.error) ? "" : " below the cut-off"; // of an earlier version
+    const judged = rows.map((row) => ({ ...row, error: row.error.rms }));
     const best = Math.min(...judged.map((row) => row.error));
     parts.push(h("h2", {}, "The laws side by side"),
       bars("RMS error of each law", judged.map((row) => ({
         name: row.law, value: row.error, strong: row.law === fit.law, good: false,
         text: `${number(row.error, 4)} N${row.error === best ? " (least)" : ""}`,
       }))),
-      h("p", { class: "soft small" }, `RMS error of the force${low} on held-out runs, each law fitted without effects to the low-passed force. Blue: the model's.`));
+      h("p", { class: "soft small" }, `RMS error of the force on held-out runs, each law fitted without effects to the low-passed force. Blue: the model's.`));
   }
   for (const note of answer.notes) parts.push(h("p", { class: "soft" }, note));
   return parts;

@@ -52,8 +52,6 @@ function orders(page, found) {
     added ? h("a", { href: page.link("verdict") }, "The residual before and after") : null);
 }
 
-/** What the error of a step of an earlier version is of: its forces are low-passed. */
-
 /** The error of each model on held-out runs, on a logarithmic scale from the noise floor. */
 function staircase(found) {
   const known = found.steps.filter((step) => step.z !== null);
