@@ -357,7 +357,7 @@ def damper_run(
     """Return the damper's motion and force, measured or from equilibrium.
 
     Where a law's friction jumps with direction samples at which it may hold its ends together are
-    left out.
+    left out; so they are where the isolation layer, whose friction may do that, has a share.
 
     Parameters
     ----------
@@ -378,7 +378,8 @@ def damper_run(
         force, noise, drawn = found.force, found.noise, found.error
         if len(drawn):
             noise = found.white
-    keep = moving(v, std, error[:, :, 1]) if blind_at_rest(law) else None
+    shared = response.force is None and response.device.on_first and building.isolated
+    keep = moving(v, std, error[:, :, 1]) if shared or blind_at_rest(law) else None
     made = structure_run(
         response.name, response.dt, motion, force, noise, error, keep, drawn,
         _left_out_across(response), untold,
