@@ -10,7 +10,7 @@ from ..comparison.names import effect_name
 from ..core.finding import Finding
 from ..data.corrections import TIMING, Correction
 from ..identification.rig import DAMPER
-from ..physics.effect import EFFECTS, Effect, effects_of
+from ..physics.effect import EFFECTS, Effect, effects_of, plain_name
 from . import words
 from .decision import NOISE
 from .load_cell import FORCE_GAIN, low_pass_text
@@ -71,9 +71,11 @@ def conclude(findings: Mapping[str, SiteDiagnosis], context: VerdictContext) -> 
     for part in parts:
         twins = lookalikes(part.effects) if reconstructed and part.site == DAMPER else {}
         alike |= twins
-        # What is no effect, such as a mass of the base, is told in words: nobody can add it.
-        sure = part.kind == "effect" and not any(one in EFFECTS for one in twins)
-        known = [one for one in (*part.effects, *twins) if one in EFFECTS]
+        # What is no effect, such as a mass of the base, is told in words: nobody can add it. So is
+        # another place of the effect itself: what is missing has one name.
+        others = [one for one in twins if one in EFFECTS and plain_name(one) not in part.effects]
+        sure = part.kind == "effect" and not others
+        known = [*(one for one in part.effects if one in EFFECTS), *others]
         (named if sure else rivals).extend(known if part.kind != "unknown" else [])
         acting = [*part.effects, *known]
         sites.update({e: sites.get(e, _site_of(e, part.site)) for e in acting})
@@ -96,7 +98,7 @@ def conclude(findings: Mapping[str, SiteDiagnosis], context: VerdictContext) -> 
         kind, effects[: BENCH.most_alternatives] if kind == "ambiguous" else effects,
         tuple(reasons), findings, sensors, _untestable(findings, effects, reconstructed),
         unknown.coordinate if unknown else "", sites,
-        tuple(one for one in alike if one not in EFFECTS), context.force, context.noise,
+        tuple(one for one in alike if one not in effects), context.force, context.noise,
     )  # fmt: skip
 
 

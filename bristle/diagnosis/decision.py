@@ -107,14 +107,14 @@ def decide(
                     return again
         if pair is not None:
             return pair
-    if not _suffices(before, best, rule):
+    if not suffices(before, best, rule):
         return Decision(
             "unknown", (), before, explained, (in_part(_new(best, before)[0], best, explained),)
         )
     return _effect_or_ambiguous(before, best, ranked[1:], rule)
 
 
-def _suffices(before: Trial, best: Trial, rule: DecisionRule) -> bool:
+def suffices(before: Trial, best: Trial, rule: DecisionRule) -> bool:
     """Return whether one effect is enough, be its form another one."""
     explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
     return best.z <= rule.adequate or explained >= rule.share
@@ -205,7 +205,7 @@ def _pair(
 ) -> Decision | None:
     """Return the decision for two effects, None where two do not explain it much better."""
     best = ranked[0]
-    single = _suffices(before, best, rule)
+    single = suffices(before, best, rule)
     alone = {_new(trial, before)[0]: trial for trial in ranked}
     grown: list[Trial] = []
     for first in ranked[: 1 if single else 2]:
@@ -228,7 +228,7 @@ def _pair(
     closes = best.z > rule.clean and (pair.z <= rule.complete or nearly)
     if min(parts, default=0.0) < rule.pair_part and not closes:
         return None
-    if not _suffices(before, pair, rule):
+    if not suffices(before, pair, rule):
         return None
     return Decision(
         "effect", names, pair, explained,

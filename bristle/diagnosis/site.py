@@ -36,6 +36,7 @@ from .decision import (
     gained,
     in_part,
     missing,
+    suffices,
     unexplained,
 )
 from .prepared import IN_BUILDING, Prepared, Progress, of_layer, silent
@@ -529,7 +530,26 @@ def _decided(
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)
     grow, reduce = (made.grow, made.reduce) if pairs else (_no_pairs, None)
     where = force_in(prepared.held_out)
-    return made, decide(prepared.before, made.single, grow, organised, reduce, rule, where)
+    decision = decide(prepared.before, made.single, grow, organised, reduce, rule, where)
+    if prepared.problem.joined_with_layer:
+        decision = beside_yield(decision, prepared.before, made.single, rule)
+    return made, decision
+
+
+def beside_yield(
+    decision: Decision, before: Trial, trials: Sequence[Trial], rule: DecisionRule
+) -> Decision:
+    """Return a decision on a force of layer and damper, friction of the layer with its rivals.
+
+    The law's yield force absorbs such friction but for its form, and forms differ: whatever effect
+    suffices by itself is a rival.
+    """
+    if len(decision.effects) != 1 or not EFFECTS[decision.effects[0]].absorbed_by:
+        return decision
+    able = [one for one in trials if missing(before, one, rule) and suffices(before, one, rule)]
+    names = dict.fromkeys([*decision.effects, *(one.effects[-1] for one in able)])
+    kind = "ambiguous" if len(names) > 1 else decision.kind
+    return replace(decision, kind=kind, effects=tuple(names)[: rule.most_alternatives])
 
 
 def _no_pairs(_first: Trial) -> list[Trial]:

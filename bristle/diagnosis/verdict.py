@@ -114,7 +114,7 @@ class Diagnosis(Viewable):
     sites : mapping of str
         The site of each effect.
     alternatives : tuple of str
-        What is no effect and would look like one of them.
+        What would look like one of them: what is no effect, or the same one at another site.
     force : str
         "measured" or "reconstructed".
     noise : mapping of float

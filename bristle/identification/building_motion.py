@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import convolve1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
@@ -290,7 +291,7 @@ def corrected(
     dt : step [s]
     draws : how many draws, 0 for none
     seed : of the draws
-    sudden : whether forces that were not measured make the level's acceleration jump
+    sudden : whether forces on the level make its acceleration jump
     """
     state, r, have = level["state"] - level["forced"], level["r"], level["have"]
     n = len(state)
@@ -307,7 +308,10 @@ def corrected(
     passed = np.array([smoothed(one) for one in noise])
     if sudden:
         error = state - smoothed(state) - passed  # smoothing is linear
-        error[:, :, 2] = -passed[:, :, 2]
+        # When between two samples a measured force jumped nobody knows.
+        jump = np.sqrt(jumps(level["forced"][:, 2], dt) * dt)
+        late = jump * generator.uniform(-0.5, 0.5, (draws, n))
+        error[:, :, 2] = convolve1d(late, shown_pulse(level, dt), mode="nearest") - passed[:, :, 2]
     else:
         moving = MovingPart(passed[:, :, 2], dt)
         state = state - moving.still(state[:, 2], (2, 1, 0))
@@ -469,8 +473,7 @@ class Response:
     besides those that bristle knows. `known` says where all that was measured, and not filled in;
     `known_but` by reason where it would be, but for that one; `finer` is that of `Run`; `untold`
     names the channels whose noise cannot be told from their signal. `pulse` (2 k + 1,) is what is
-    shown of a pulse of the first level's acceleration where that is smoothed and the damper's force
-    was not measured, None elsewhere: so
+    shown of a pulse of the first level's acceleration where that is smoothed, None elsewhere: so
     equilibrium shows what acts on that level and was not measured.
     """
 
@@ -661,9 +664,8 @@ def responses(
     out = []
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
-        hidden = first and not levels[0]["have"][2] and not m.has("force")
         for i, one in enumerate(levels):
-            if not one["have"][2] and (i not in ends or (hidden and i == 0)):
+            if not one["have"][2] and (first or i not in ends):
                 levels[i], error = corrected(one, m.step, draws, seed + i, i == 0)
                 errors.append(error)
             else:
@@ -674,7 +676,7 @@ def responses(
             found, device=device, others=_loads(m, building, device), across=own,
             known=_known(m, building, device) if reasons else None,
             known_but={why: _known(m, building, device, why) for why in reasons},
-            pulse=shown_pulse(levels[0], m.step) if hidden else None,
+            pulse=shown_pulse(levels[0], m.step) if first and not levels[0]["have"][2] else None,
         )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
     return out

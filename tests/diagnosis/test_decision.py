@@ -9,6 +9,7 @@ import pytest
 
 from bristle.diagnosis.decision import decide, missing
 from bristle.diagnosis.rule import BENCH, INSIDE, RECONSTRUCTED
+from bristle.diagnosis.site import beside_yield
 from bristle.diagnosis.trials import Trial
 from bristle.model.model import Model
 
@@ -105,6 +106,20 @@ def test_a_wrong_form_must_stand_out_more_where_equilibrium_gives_the_force():
     assert decide(before, tried, no_more, rule=INSIDE).effects == ("base_friction",)
     found = decide(before, tried, no_more, rule=RECONSTRUCTED)
     assert (found.kind, found.effects) == ("ambiguous", ("base_friction", "stribeck"))
+
+
+def test_friction_that_the_layer_shares_has_what_suffices_for_a_rival():
+    def named(*tried):
+        before = trial(1.53)
+        found = decide(before, tried, no_more, rule=RECONSTRUCTED)
+        found = beside_yield(found, before, tried, RECONSTRUCTED)
+        return found.kind, *found.effects
+
+    friction, flattening = trial(1.03, "base_friction"), trial(1.4, "flattening")
+    both = ("ambiguous", "base_friction", "stribeck")
+    assert named(friction, trial(1.10, "stribeck"), flattening) == both
+    assert named(friction, flattening) == ("effect", "base_friction")
+    assert named(trial(1.03, "stribeck"), trial(1.10, "base_friction")) == ("effect", "stribeck")
 
 
 def test_three_alternatives_are_named_at_most():

@@ -239,6 +239,14 @@ def test_an_ambiguous_verdict_has_two_names_that_can_be_added(name):
     assert (both.kind, both.effects) == ("ambiguous", ("gas_spring", "duffing"))
 
 
+def test_an_effect_whose_place_no_load_cell_tells_is_named_all_the_same():
+    sites = {"damper": seen("damper", "effect", 7.41, "end_stop")}
+    found = conclude(sites, VerdictContext(force="reconstructed"))
+    assert (found.kind, found.effects) == ("effect", ("end_stop",))
+    assert found.alternatives == ("end_stop@damper",)
+    assert "a load cell at the damper would distinguish them" in found.words
+
+
 def test_each_run_has_the_noise_of_its_own_instruments():
     b = building(2, True, 6)
     runs = [measured(shake(b, 20 + i), i) for i in range(3)]

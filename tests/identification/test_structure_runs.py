@@ -133,6 +133,8 @@ def test_where_the_base_may_be_held_is_left_out(truth):
     assert len(run.whole.force) == len(moves)
     assert len(damper_run(response, b, "lugre").force) == len(moves)
     assert len(damper_run(response, b, "bingham").force) == len(run.force)
+    shared = damper_run(replace(response, force=None), b, "lugre")
+    assert len(shared.force) == len(run.force), "the layer may hold it, and no load cell tells"
 
 
 def test_a_run_in_which_the_base_is_held_throughout_is_left_out(truth):
