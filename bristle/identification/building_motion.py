@@ -308,9 +308,9 @@ def corrected(
     passed = np.array([smoothed(one) for one in noise])
     if sudden:
         error = state - smoothed(state) - passed  # smoothing is linear
-        # When between two samples a measured force jumped nobody knows.
-        jump = np.sqrt(jumps(level["forced"][:, 2], dt) * dt)
-        late = jump * generator.uniform(-0.5, 0.5, (draws, n))
+        # When between two samples a measured force changed nobody knows.
+        forced = level["forced"][:, 2]
+        late = np.diff(forced, append=forced[-1]) * generator.uniform(-0.5, 0.5, (draws, n))
         error[:, :, 2] = convolve1d(late, shown_pulse(level, dt), mode="nearest") - passed[:, :, 2]
     else:
         moving = MovingPart(passed[:, :, 2], dt)
