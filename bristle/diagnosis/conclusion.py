@@ -25,6 +25,7 @@ LAYER = "layer"
 """The site beside which a building's damper stands, as a rule."""
 
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
+WITHOUT_LOAD_CELL = "Without a measured force {}: a load cell at the damper would distinguish them."
 LITTLE = "Little beside what was found:"
 NOT_DRIVEN = "What nobody recorded, and what changed during the runs, would look like this."
 
@@ -90,7 +91,7 @@ def conclude(findings: Mapping[str, SiteDiagnosis], context: VerdictContext) -> 
         *filter(None, map(low_pass_text, parts)),
         *(text for part in parts for text in effect_words(part)),
         *context.notes,
-        *map(_without_load_cell, alike.values()),
+        *(WITHOUT_LOAD_CELL.format(why) for why in alike.values()),
     ]
     if kind == "unknown" and not context.driven:
         reasons.append(NOT_DRIVEN)
@@ -189,10 +190,6 @@ def _reasons(parts: Sequence[SiteDiagnosis], kind: str) -> list[str]:
         little = [part for part in in_words if part.reasons[0].startswith(LITTLE)]
         out, parts = [], [*(part for part in parts if part.kind != "none"), *little]
     return out + [words.sited(part.site, " ".join(part.reasons)) for part in parts if part.reasons]
-
-
-def _without_load_cell(reason: str) -> str:
-    return f"Without a measured force {reason}: a load cell at the damper would distinguish them."
 
 
 def _untestable(

@@ -528,7 +528,7 @@ def _decided(
     organised = rule.organised < 1.0 and bool(made.patterns)
     if organised:
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)
-    grow, reduce = (made.grow, made.reduce) if pairs else (_no_pairs, None)
+    grow, reduce = (made.grow, made.reduce) if pairs else (lambda _first: [], None)
     where = force_in(prepared.held_out)
     decision = decide(prepared.before, made.single, grow, organised, reduce, rule, where)
     if prepared.problem.joined_with_layer:
@@ -550,10 +550,6 @@ def beside_yield(
     names = dict.fromkeys([*decision.effects, *(one.effects[-1] for one in able)])
     kind = "ambiguous" if len(names) > 1 else decision.kind
     return replace(decision, kind=kind, effects=tuple(names)[: rule.most_alternatives])
-
-
-def _no_pairs(_first: Trial) -> list[Trial]:
-    return []
 
 
 def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:

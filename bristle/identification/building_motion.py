@@ -616,11 +616,6 @@ def _refuse_unmeasured(measurement: Measurement, building: Building) -> None:
     )
 
 
-def respond(measurement: Measurement, building: Building, draws: int = 12) -> Response:
-    """Return a measurement as a response; see `responses` for several of one rig."""
-    return responses([measurement], building, draws)[0]
-
-
 def responses(
     measurements: list[Measurement],
     building: Building,

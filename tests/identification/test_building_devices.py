@@ -10,7 +10,7 @@ import bristle
 from bristle.data.channels import at_device, channel_unit, no_device
 from bristle.errors import PhysicsError, RecordError, StudyError
 from bristle.identification.building_fit import building_text, identify_structure
-from bristle.identification.building_motion import respond
+from bristle.identification.building_motion import responses
 from bristle.identification.building_sites import motion_across, sliding, storey_run
 from bristle.identification.equilibrium import equations_of, reconstructed, stiffness_matrix
 from bristle.identification.rig import building_rig
@@ -112,7 +112,7 @@ def test_the_motion_across_a_storey_errs_as_much_as_it_says():
     b = with_damper(tower([STOREY]), "brace")
     clean = shake(b, 3, laws_of([STOREY]))
     (run,) = measurements([noisy(clean, 3)], building=b)
-    x, v, _, std, error = motion_across(respond(run, b))
+    x, v, _, std, error = motion_across(responses([run], b)[0])
     for k, (found, what) in enumerate(((x, "displacement"), (v, "velocity"))):
         left = (found - clean[f"floor2_{what}"] + clean[f"floor1_{what}"])[50:-50]
         assert 0.6 < np.std(left) / np.std(error[:, 50:-50, k]) < 1.25
@@ -126,7 +126,7 @@ def test_equilibrium_gives_the_force_and_its_noise(devices):
     b = with_damper(tower(devices), "brace")
     clean = shake(b, 4, laws_of(devices))
     (run,) = measurements([noisy(clean, 4, without=NO_CELL)], building=b)
-    found = reconstructed(respond(run, b), b)
+    found = reconstructed(responses([run], b)[0], b)
     error = (found.force - clean["brace_force"])[50:-50]
     assert np.std(error) == pytest.approx(found.noise, rel=0.3)
     assert np.std(error) < 0.05 * np.std(clean["brace_force"])
@@ -138,7 +138,7 @@ def test_forces_of_all_devices_are_taken_off_a_storeys_shear():
     b = with_damper(tower(devices), "brace")
     clean = shake(b, 5, laws_of(devices))
     (run,) = measurements([noisy(clean, 5, noise=1e-5)], building=b)
-    response = respond(run, b)
+    response = responses([run], b)[0]
     for level in range(3):
         below = clean[f"floor{level}_displacement"] if level else 0.0
         spring = b.stiffnesses[level] * (clean[f"floor{level + 1}_displacement"] - below)
@@ -264,10 +264,10 @@ def test_a_displacement_that_no_level_gives_is_refused():
         b, runs = runs_of([STOREY], [1], (*NO_CELL, *lost))
         (run,) = measurements(runs, building=b)
         if able:  # storey 3 has no device: floor 2 gives what is slow of floor 3
-            assert respond(run, b).x.shape[0] == 3
+            assert responses([run], b)[0].x.shape[0] == 3
             continue
         with pytest.raises(RecordError, match="floor2_displacement was not measured, and no other"):
-            respond(run, b)
+            responses([run], b)[0]
 
 
 def test_a_damper_that_stands_still_is_refused():
@@ -277,7 +277,7 @@ def test_a_damper_that_stands_still_is_refused():
     for what in ("displacement", "velocity", "acceleration_absolute"):
         noise = 1e-3 * np.std(still[f"floor1_{what}"]) * random.normal(size=len(still["time"]))
         still[f"floor2_{what}"] = still[f"floor1_{what}"] + noise
-    response = respond(measurements([still], building=b)[0], b)
+    response = responses([measurements([still], building=b)[0]], b)[0]
     assert sliding(response).any()
     rig = building_rig(measurements([still], building=b), [], b)
     with pytest.raises(RecordError, match="the damper does not move"):

@@ -12,7 +12,7 @@ from bristle.comparison.predictions import coordinates_of_run
 from bristle.data.extra_channels import Extra
 from bristle.diagnosis.site import shortened
 from bristle.errors import RecordError
-from bristle.identification.building_motion import jumps, respond, responses, shear
+from bristle.identification.building_motion import jumps, responses, shear
 from bristle.identification.building_sites import (
     StructureProblem,
     damper_run,
@@ -36,7 +36,7 @@ def truth():
     """Return a building, the clean channels of a run and its response, with the force."""
     b = building(2, True, 1)
     clean = shake(b, 11, friction, samples=8000)
-    return b, clean, respond(measured(clean, 11), b)
+    return b, clean, responses([measured(clean, 11)], b)[0]
 
 
 def test_smoothed_motion_errs_as_much_as_it_says(truth):
@@ -81,7 +81,7 @@ def test_a_jump_of_the_acceleration_is_no_noise():
 def test_accelerations_of_floors_without_accelerometers_err_as_much_as_they_say(truth):
     b, clean, _ = truth
     floors = ("floor1_acceleration_absolute", "floor2_acceleration_absolute")
-    response = respond(measured(clean, 11, without=floors), b)
+    response = responses([measured(clean, 11, without=floors)], b)[0]
     for i, channel in enumerate(floors, start=1):
         error = np.std((response.a[i] - clean[channel])[50:-50])
         # Friction kicks the floors, which a smooth motion does not hold whole.
@@ -210,7 +210,7 @@ def test_without_a_force_the_layer_is_the_dampers_and_said_so(truth):
     assert set(problems) == {"storey1", "storey2", "damper"}
     assert problems["damper"][0].reconstructed
     with pytest.raises(RecordError, match="force was not measured"):
-        layer_run(respond(run, b), b)
+        layer_run(responses([run], b)[0], b)
 
 
 def test_without_a_damper_the_layer_stands_alone():
@@ -232,7 +232,7 @@ CHANNELS = [
 @pytest.mark.parametrize("gone", CHANNELS)
 def test_motion_is_as_sure_as_it_says_without_any_one_channel(truth, gone):
     b, clean, _ = truth
-    response = respond(measured(clean, 11, without=(gone,)), b)
+    response = responses([measured(clean, 11, without=(gone,))], b)[0]
     for i, level in enumerate(b.levels()):
         for j, (what, found) in enumerate((("displacement", response.x), ("velocity", response.v))):
             error = (found[i] - clean[f"{level}_{what}"])[25:]
@@ -247,7 +247,7 @@ def test_motion_is_as_sure_as_it_says_without_any_one_channel(truth, gone):
 def test_a_displacement_alone_gives_a_motion(truth):
     b, clean, _ = truth
     without = ("floor1_velocity", "floor1_acceleration_absolute")
-    response = respond(measured(clean, 11, without=without), b)
+    response = responses([measured(clean, 11, without=without)], b)[0]
     assert np.std(response.x[1] - clean["floor1_displacement"]) < 0.01 * np.std(response.x[1])
     assert np.std(response.v[1] - clean["floor1_velocity"]) < 0.05 * np.std(response.v[1])
     assert not response.accelerometer[1]
@@ -258,7 +258,7 @@ def test_what_is_slow_in_an_integrated_velocity_is_taken_from_the_level_beside(t
     shifted = dict(clean)
     for level in b.levels():  # an isolation layer that comes to rest elsewhere takes all along
         shifted[f"{level}_displacement"] = clean[f"{level}_displacement"] + 2e-3
-    response = respond(measured(shifted, 11, without=("floor2_displacement",)), b)
+    response = responses([measured(shifted, 11, without=("floor2_displacement",))], b)[0]
     assert np.mean(response.x[2]) == pytest.approx(
         np.mean(shifted["floor2_displacement"]), rel=0.01
     )
