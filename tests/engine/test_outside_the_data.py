@@ -28,7 +28,7 @@ def expected(frame: pd.DataFrame) -> np.ndarray:
     [
         ("fmu", "python"),
         ("compiled", "python"),
-        pytest.param("fmu", "native", marks=pytest.mark.slow),
+        pytest.param("fmu", "native", marks=pytest.mark.slow),  # zig compiles a whole damper
     ],
 )
 def test_the_output_is_what_the_worst_of_motion_and_command_exceeds_its_range_by(

@@ -177,7 +177,7 @@ def run_in_node(folder: Path, changes: dict[str, float], times: int = 1) -> dict
     return found | {"columns": dict(zip([o["name"] for o in outputs], table, strict=True))}
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the same for every scenario of the library
 @needs_tools
 @pytest.mark.parametrize("name", [file.stem for file in stock_scenarios()])
 def test_rows_are_those_of_the_compiled_engine(name: str, tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_rows_are_those_of_the_compiled_engine(name: str, tmp_path: Path) -> Non
             assert abs(np.max(np.abs(column)) - peak) <= PEAKS * peak, port
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # zig compiles a module of a whole scenario, and a browser's engine runs it
 @needs_tools
 def test_so_is_how_far_a_damper_is_outside_of_its_data(tmp_path: Path) -> None:
     known = {"damper.range.speed": 0.08, "damper.range.command_high": 3.0}

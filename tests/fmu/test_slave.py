@@ -399,6 +399,7 @@ def replay(path: str, values: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("component", "effects"),
     [(c, c in SITES) for c in ONE_OF_EACH]
+    # Half a second each; one law and the building show by default that effects' states are kept.
     + [pytest.param(c, True, marks=pytest.mark.slow) for c in SITES if c not in ONE_OF_EACH],
 )
 def test_the_whole_state_can_be_kept_and_set(component: str, effects: bool) -> None:

@@ -154,7 +154,8 @@ def test_forces_of_all_devices_are_taken_off_a_storeys_shear():
     [
         ([STOREY], ()),
         ([STOREY], NO_CELL),
-        # By default the study of a brace beside a tie shows these (tests/contract/studies).
+        # A second each; by default the study of a brace beside a tie shows the first of them
+        # (tests/contract/studies).
         pytest.param([STOREY, TIE], (), marks=pytest.mark.slow),
         pytest.param([STOREY, TIE], NO_CELL, marks=pytest.mark.slow),
         pytest.param([TWO_STOREYS], (), marks=pytest.mark.slow),

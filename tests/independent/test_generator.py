@@ -53,6 +53,7 @@ def test_every_form_gives_its_parameters_on_every_rig_that_carries_it(name, bed)
 @pytest.mark.parametrize(
     ("name", "form", "law"),
     [
+        # Half a second each: the generator's other laws take the same form of the effect.
         pytest.param(n, f, law, marks=[] if law == one.laws[0] else pytest.mark.slow)
         for n in (*FURTHER, *CROSSED)
         for f, one in FORMS[n].items()

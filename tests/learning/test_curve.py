@@ -120,6 +120,7 @@ def test_a_formula_is_its_form_of_the_signal(along):
     assert found[moving] == pytest.approx(np.asarray(best.at(s))[moving], abs=0.003)
 
 
+# Each is examined for 2 to 4 s: that of a formula passes through the same file as that of a curve.
 @pytest.mark.parametrize("closed", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_learned_effect_conforms_as_any_other(closed):
     curve = curve_of("fluid", "displacement", 0.5)

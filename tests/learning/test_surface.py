@@ -60,6 +60,7 @@ def grid(f) -> Curve:
 
 @pytest.mark.parametrize(
     "hidden",
+    # More than a second each; two by default, one of them with a command.
     [one if k < 2 else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(HIDDEN)],
 )
 def test_the_surface_that_is_there_promises_most_and_more_than_any_curve(hidden):

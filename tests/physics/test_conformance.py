@@ -218,6 +218,7 @@ def test_a_building_at_rest_stays_at_rest(effect: type[Effect]) -> None:
 @pytest.mark.parametrize(
     ("effect", "law", "alone"),
     [
+        # A quarter of a second each, hundreds of pairs: by default each effect with its usual laws.
         pytest.param(
             effect, law, alone, id=f"{effect.name}-{law}-{'alone' if alone else 'with the law'}",
             marks=() if law in (_first(effect) if alone else _usual(effect)) else pytest.mark.slow,
@@ -333,6 +334,7 @@ def spelled(effects: list[type[Effect]]) -> str:
 @pytest.mark.parametrize(
     ("damper", "law"),
     [
+        # Up to a second each: the laws differ in nothing that a scenario says of effects.
         pytest.param(component_of_law(law), law, marks=() if law in USUAL else pytest.mark.slow)
         for law in LAWS
     ],

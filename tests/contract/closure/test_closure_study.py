@@ -65,7 +65,7 @@ def test_it_is_learned_and_called_no_effect(rig: Path, capsys: Capture) -> None:
     assert kept["sentences"] == found["sentences"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a closure is trained and compiled, then the diagnosis has to leave it out
 def test_a_verdict_is_on_the_model_without_it(tmp_path: Path, capsys: Capture) -> None:
     rig = made(tmp_path, 3)
     told(capsys, "identify", rig, "--no-table")
@@ -85,7 +85,7 @@ def test_a_single_run_that_hardly_turns_is_refused(tmp_path: Path, capsys: Captu
     assert not (rig / "effects" / "closure_1.py").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a building is identified, a closure trained and two responses predicted
 def test_in_a_building_the_response_is_nearer_with_it(tmp_path: Path, capsys: Capture) -> None:
     tower = tmp_path / "tower"
     told(capsys, "example", "building", tower, "--effect", "worn_bore", "--seed", "1")
@@ -102,7 +102,7 @@ def test_in_a_building_the_response_is_nearer_with_it(tmp_path: Path, capsys: Ca
         assert after < 0.5 * before, kind
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a building without load cell is identified before the refusal
 def test_in_a_building_whose_damper_has_no_load_cell_it_is_refused(
     tmp_path: Path, capsys: Capture
 ) -> None:

@@ -49,7 +49,7 @@ def checked(rig: Path) -> tuple[float, float]:
     ("rates", "law", "switched"),
     [
         ((500.0, 200.0, *[500.0] * 4), "bingham", False),
-        pytest.param((500.0,) * 3, "dahl", True, marks=pytest.mark.slow),
+        pytest.param((500.0,) * 3, "dahl", True, marks=pytest.mark.slow),  # 4 s
         ((3000.0,) * 3, "bingham", True),
     ],
 )
