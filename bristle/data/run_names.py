@@ -23,7 +23,7 @@ from .tone import Tone, amplitude_fits, amplitude_off, frequency_fits, frequency
 # stays open is not taken.
 
 _HARDLY = "kKvVcCoO"
-DOUBTFUL = f"_- xXdD'~=;#^:\u2013\u2014\u00f7!$&@\u00a7`\u00b4\u2019\ufffd{_HARDLY}"
+DOUBTFUL = f"_- xXdD'~=;#^:+\u2013\u2014\u00f7!$&@\u00a7`\u00b4\u2019\ufffd{_HARDLY}"
 """What may part two numbers, or be a decimal mark."""
 
 SPELLED = {
@@ -175,7 +175,9 @@ def reading_of(files: Sequence[Path], tones: Sequence[Tone | None]) -> Reading:
         for name in differ:
             if said[name] > 0 or (seen == 0 and said[name] == 0):
                 open_[name] = _open_text(name, plain, with_mark)
-    open_ |= _with_and_without([tokens_of(file, Reading(tuple(marks))) for file in files])
+    open_ |= _ranges(files, plain) | _with_and_without(
+        [tokens_of(file, Reading(tuple(marks))) for file in files]
+    )
     digits, by_digits, doubts = _digits(plain, tones) if not marks else ({}, [], {})
     return Reading(tuple(marks), digits, open_, doubts, (*why, *by_digits))
 
@@ -261,6 +263,22 @@ def _open_text(
         f'"{told.text}" and the like in the names may be {one} or {other}, and nothing settles '
         f"it: no {name} is taken. --runs FILE, a table with a row per file, says it"
     )
+
+
+def _ranges(files: Sequence[Path], plain: Sequence[Mapping[str, Token]]) -> dict[str, str]:
+    """Return what is said of quantities of which a name tells two: those of 0.5-1.5A."""
+    out = {}
+    for file, tokens in zip(files, plain, strict=True):
+        for name, one in tokens.items():
+            number = (
+                rf"\d+{_SURE}\d+ ?(?:[-\u2013\u2014]|\.\.|_?to_?|_?bis_?) ?{re.escape(one.text)}"
+            )
+            if found := re.search(number, file.stem):
+                out[name] = (
+                    f'"{found[0]}" in the names is a range: no {name} is taken. '
+                    "--runs FILE, a table with a row per file, says it"
+                )
+    return out
 
 
 def _with_and_without(tokens: Sequence[Mapping[str, Token]]) -> dict[str, str]:

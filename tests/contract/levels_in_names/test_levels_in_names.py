@@ -185,6 +185,16 @@ def test_two_names_of_one_level_that_may_be_two_are_not_taken(tmp_path, capsys) 
     assert {level for _, level in runs(tmp_path / "rig").values()} == {None}
 
 
+def test_a_range_in_a_name_is_no_level(tmp_path, capsys) -> None:
+    names = {f"{f}Hz_{i}-{i + 1.0}A": (f, None) for f in (0.5, 1.5) for i in (0.0, 0.5)}
+    sines = {name: (f, 0.5) for name, (f, _) in names.items()}
+    assert (
+        main(["study", "new", str(tmp_path / "rig"), "--data", made(tmp_path / "lab", sines)]) == 0
+    )
+    assert "is a range: no current is taken" in " ".join(capsys.readouterr().out.split())
+    assert runs(tmp_path / "rig") == names
+
+
 def test_levels_in_the_names_of_folders_are_read(tmp_path) -> None:
     for level in ("0.5", "1.0", "1.5"):
         made(tmp_path / f"{level}A", {f"{f}Hz_{level}A": (f, float(level)) for f in (1.0, 2.0)})
