@@ -36,7 +36,12 @@ STAGES = {
     "motion": ("diagnosis.runs_of_rig", "joint_search.runs_of_rig"),
     "law": ("rig_runs.fit_from_starts", "rig_runs.refine"),
     "law trials": ("joint_search.try_laws", "joint_search.fitted_anew", "diagnosis.try_laws"),
-    "effect trials": ("diagnosis.diagnose_damper", "joint_search.diagnose_damper"),
+    "effect trials": (
+        "diagnosis.diagnose_damper",
+        "joint_search.diagnose_damper",
+        "diagnosis.Trials",
+        "joint_search.Trials",
+    ),
     "runs that contradict": ("diagnosis.contradicted",),
     "limits": ("diagnosis.effect_limits", "diagnosis.untestable"),
     "intervals": ("diagnosis.multistart_refit", "diagnosis.intervals_of"),

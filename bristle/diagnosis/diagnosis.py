@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import inf
 
 from ..comparison.conditions import label_errors, label_sentence, with_levels
 from ..comparison.predictions import run_predictions
 from ..data.channels import Labels, varying
 from ..data.measurement import Measurement
 from ..identification.fit import intervals_of, multistart_refit
+from ..identification.histories import counted
 from ..identification.problem import Run
 from ..identification.rig import DAMPER
 from ..identification.start_grid import is_rough
 from ..model.model import Model
 from ..physics.building import Building
 from ..physics.effect import exclude
-from .by_label import with_labels
+from .by_label import confirmed, with_labels
 from .conclusion import conclude, insufficient
 from .effect_limits import EffectLimit, detectable, effect_limits, profiled, untestable
 from .experiments import separating
@@ -29,6 +31,12 @@ from .site import Trials, diagnose_damper, diagnose_line, joinable_at, noise_is_
 from .site_diagnosis import SiteDiagnosis
 from .trials import SHOWN, Trial, joinable, judge
 from .verdict import Diagnosis
+
+MOST_SPENT = 60e6
+"""Steps of dampers' forces, see `Effort`, from which on no two effects are tried beside those that
+a model has: most is decided by then."""
+
+NO_PAIRS = "Two effects at once were not tried beside those that the model has."
 
 NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the law."
 
@@ -184,6 +192,7 @@ def diagnose_rig(
     if prepared is None:
         return conclude(findings, runs.context(None))
     found, prepared = _at_damper(prepared, runs, say)
+    found = confirmed(found, prepared)
     say("whether runs contradict each other")
     found = settled(found, prepared, runs, findings)
     say(f"verdict {found.briefly}")
@@ -198,12 +207,19 @@ def _at_damper(prepared: Prepared, runs: RigRuns, say: Progress) -> tuple[SiteDi
 
     They are adjusted beside the best single effect: what a second one does they may do as well.
     """
-    if not prepared.problem.reconstructed or noise_is_all(prepared):
+    if noise_is_all(prepared):
         return diagnose_damper(prepared, say)
-    made = Trials(prepared, say)
-    single, _ = diagnose_damper(prepared, say, made, pairs=False, excess=0.0)
-    if not runs.suit(single):
-        return diagnose_damper(prepared, say, made)
+    with counted(MOST_SPENT if prepared.before.model.effects else inf) as effort:
+        made = Trials(prepared, say, effort=effort)
+        suits = False
+        if prepared.problem.reconstructed:
+            single, _ = diagnose_damper(prepared, say, made, pairs=False, excess=0.0)
+            suits = runs.suit(single)
+        if not suits:
+            found, prepared = diagnose_damper(prepared, say, made)
+            if found.kind == "unknown" and effort.spent and not made.pairs:
+                found = replace(found, reasons=(*found.reasons, NO_PAIRS))
+            return found, prepared
     again = runs.prepare(DAMPER)
     assert again is not None
     return diagnose_damper(again, say)

@@ -247,7 +247,7 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
         return found  # of no run can be said what its error is over noise
     # Whether noise is all that a model leaves of some of the runs.
     prepared = prepared.with_excess(0.0)
-    with counted() as effort:
+    with counted(MOST_SPENT) as effort:
         for apart in (_but_for_a_run, _but_for_clocks):
             odd = apart(found, prepared, effort)
             if odd is not found:
@@ -318,12 +318,9 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) ->
 
 
 def _affordable(model: Model, runs: tuple[Problem, Problem], effort: Effort) -> bool:
-    """Return whether a look at runs with a model leaves the effort within `MOST_SPENT`."""
-    with counted() as once:
-        for problem in runs:
-            for run in problem.runs:
-                problem.predict(model, run)
-    return effort.steps + LOOK * once.steps <= MOST_SPENT
+    """Return whether a look at runs with a model leaves the effort within what it may be."""
+    once = sum(problem.steps_of(model) for problem in runs)
+    return effort.steps + LOOK * once <= effort.most
 
 
 def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Trial, list[str]]]:
@@ -437,7 +434,7 @@ def groups(
         alone: rigs may differ in size
     """
     runs = [*train.runs, *held_out.runs]
-    with counted() as effort:
+    with counted(MOST_SPENT) as effort:
         every = train.of(runs)
         z = _z_of_runs(model, every, every.expectation(model))
         own = dict.fromkeys(range(len(runs)), model)
@@ -462,7 +459,7 @@ def groups(
                     return ""
                 found.append([run])
                 fitted.append(own[k])
-            if effort.steps > MOST_SPENT:
+            if effort.spent:
                 return ""
     if len(found) < 2 or min(len(group) for group in found) < 2:
         return ""

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..identification.histories import Effort, counted
 from ..identification.rig import DAMPER
+from ..identification.start_grid import is_rough
 from ..model.model import Model
 from ..physics.building import Building
-from .by_label import with_labels
+from .by_label import confirmed, with_labels
 from .conclusion import conclude, insufficient
 from .diagnosis import diagnose_lines, settled, with_evidence
 from .law_choice import (
@@ -28,7 +30,7 @@ from .prepared import Prepared, Progress, silent
 from .rig_runs import RigRuns, runs_of_rig
 from .rule import BENCH, DecisionRule
 from .site import Trials, diagnose_damper, noise_is_all, with_zero_free
-from .trials import Trial, missed_by
+from .trials import Trial, missed_by, promised
 from .verdict import Diagnosis
 
 
@@ -140,8 +142,8 @@ def _sought(
     The one that is chosen is looked at in full, on all runs: where it explains them no more, the
     next one is.
     """
-    with counted() as by_law.effort:
-        pairs = search(rows, by_law, rule, by_law.enough)
+    with counted(MOST_SPENT) as by_law.effort:
+        pairs = search(rows, by_law, rule, by_law.enough, by_law.promise)
         nearest = min(pairs, key=lambda pair: pair.reach(rule).z)
         assert nearest.prepared is not None
         assert by_law.runs.damper is not None
@@ -150,10 +152,13 @@ def _sought(
             say("what no law explains counts beside the noise: fitting the laws anew")
             train, held_out = (one.with_excess(by_law.excess) for one in by_law.runs.damper)
             rows = fitted_anew(rows, train, held_out)
-            pairs = search(by_law.left_of(rows, rule), by_law, rule, by_law.enough)
+            pairs = search(by_law.left_of(rows, pairs, rule), by_law, rule, by_law.enough)
     whole: dict[str, LawAndEffects] = {}
     while (found := choose(pairs, rule)).row.law not in whole:
-        chosen = whole[found.row.law] = by_law.settled(found, runs)
+        chosen = by_law.settled(found, runs)
+        assert chosen.prepared is not None
+        chosen = replace(chosen, finding=confirmed(chosen.finding, chosen.prepared))
+        whole[found.row.law] = chosen
         pairs = [chosen if pair is found else pair for pair in pairs]
         if chosen.explains or not found.explains:
             break
@@ -168,6 +173,10 @@ def _sought(
 MOST_SPENT = 250e6
 """Steps of dampers' forces, those of the laws alone not counted, from which on no further law is
 searched for its effects, and none for two: half a minute to a minute."""
+
+
+FAR = 1.4
+"""Multiple of the smallest z that a law reached from which on it is not looked at again then."""
 
 
 class TrialsByLaw:
@@ -190,26 +199,33 @@ class TrialsByLaw:
         self._two: set[str] = set()
         self._shortened: set[str] = set()
 
-    @property
-    def _spent(self) -> bool:
-        return self.effort.steps > MOST_SPENT
-
-    def left_of(self, rows: Sequence[LawTrial], rule: DecisionRule) -> Sequence[LawTrial]:
-        """Return the laws for a second search: those of the first where enough was spent on it."""
-        if not self._spent:
+    def left_of(
+        self, rows: Sequence[LawTrial], pairs: Sequence[LawAndEffects], rule: DecisionRule
+    ) -> Sequence[LawTrial]:
+        """Return the laws for a second search: where enough was spent, those that came near."""
+        if not self.effort.spent:
             return rows
         more = [row.law for row in survivors(rows, rule) if row.law not in self.made]
         self.not_tried |= dict.fromkeys(more, False)
         for made in self.made.values():
             made.closed = True
-        return [row for row in rows if row.law in self.made]
+        reached = {pair.row.law: pair.reach(rule).z for pair in pairs}
+        near = FAR * min(reached.values())
+        return [row for row in rows if reached.get(row.law, inf) <= near]
 
     def enough(self, row: LawTrial, pairs: bool) -> bool:
         """Return whether so much was spent that this is not tried of a law; see `search`."""
-        if not self._spent or row.law in (self._two if pairs else self.made):
+        if not self.effort.spent or row.law in (self._two if pairs else self.made):
             return False
         self.not_tried[row.law] = row.law in self.made
         return True
+
+    def promise(self, pair: LawAndEffects) -> float:
+        """Return the z that two effects may leave of a law; one where it takes long to tell."""
+        made, first = self.made.get(pair.row.law), pair.reach()
+        if made is None or first is pair.row.trial or is_rough(first.model):
+            return first.z
+        return promised(first, made.prepared.searched, made.prepared.shown)
 
     def __call__(self, row: LawTrial, pairs: bool) -> LawAndEffects:
         """Return what a law lacks: single effects alone, or pairs as well where none suffices."""

@@ -188,6 +188,7 @@ def search(
     lacking: Callable[[LawTrial, bool], LawAndEffects],
     rule: DecisionRule = BENCH,
     enough: Callable[[LawTrial, bool], bool] = lambda _row, _pairs: False,
+    promise: Callable[[LawAndEffects], float] = lambda pair: pair.reach().z,
 ) -> list[LawAndEffects]:
     """Return the pairs that decide; `lacking` searches the effects that a law lacks.
 
@@ -196,9 +197,9 @@ def search(
     first: a law is left out where the runs are explained already by no more parameters than it
     would have with the smallest effect that can join it. Where no law with a single effect explains
     the runs so well that none could be clearly better, the best law that was left out is looked at
-    as well, and after it two effects of each law: first of the one that a single effect brings
-    nearest; once two explain the runs, no more of laws that began too far from that one. A law that
-    a simpler one of its parts equals waits until effects nearly explain what that leaves.
+    as well, and after it two effects of each law, first of the one that promises most; once two
+    explain the runs, no more of laws that began too far from that one. A law that a simpler one of
+    its parts equals waits until effects nearly explain what that leaves.
 
     Parameters
     ----------
@@ -206,7 +207,8 @@ def search(
     lacking : called with a row, and whether to try two effects; returns what its law lacks
     rule : the numbers that decide
     enough : called as `lacking` is; returns whether so much was spent that this is not tried: what
-        the best law lacks always is, and two effects of the law that comes nearest
+        the best law lacks always is, and two effects of the law that promises most
+    promise : called with what a law lacks alone; returns the z that two effects may leave
     """
     first, begun = simplest(rows, rule), list[LawAndEffects]()
     if first.trial.z <= rule.complete:
@@ -234,7 +236,7 @@ def search(
     if _explained(single, rule):
         return single
     found, far = list(begun), float("inf")
-    for pair in sorted(single[len(begun) :], key=lambda pair: pair.reach(rule).z):
+    for pair in sorted(single[len(begun) :], key=promise):
         left = rule.excess(pair.reach(rule).z)
         able = left <= far and _could_be_simpler(pair.row, found, rule)
         if able and not (found and enough(pair.row, True)):

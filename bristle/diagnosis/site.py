@@ -16,6 +16,7 @@ from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit
+from ..identification.histories import Effort
 from ..identification.problem import Expected, Problem, Run, has_offset, zero_of
 from ..identification.rig import acts_at
 from ..identification.rig_fit import fit_damper, fit_line, joined
@@ -24,7 +25,7 @@ from ..identification.start_grid import refine
 from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
-from .by_label import confirmed, try_labels
+from .by_label import try_labels
 from .decision import (
     NOISE,
     OTHER_FORM,
@@ -208,6 +209,7 @@ class Trials:
     earlier : the same trials by other weights or of fewer runs, whose ends are where these begin
     free : those with the zero of the force fitted along, where they were made of fewer runs
     ends : where trials that are made from the very start are kept, and taken up
+    effort : once it is spent no pairs are tried any more
 
     Attributes
     ----------
@@ -221,6 +223,7 @@ class Trials:
         earlier: Trials | None = None,
         free: Trials | None = None,
         ends: KeptEnds | None = None,
+        effort: Effort | None = None,
     ) -> None:
         self.prepared, self.say = prepared, say
         self.before = prepared.before
@@ -230,6 +233,7 @@ class Trials:
         self._alone: dict[tuple[str, ...], list[Trial]] = {}
         self._earlier = earlier
         self._ends = ends
+        self._effort = effort
         self._begun_free = free or (earlier._freed if earlier else None)
         self._freed: Trials | None = None
         self._weighed: dict[float, Trials] = {}
@@ -257,7 +261,9 @@ class Trials:
         """The trials with the zero of the force fitted along, made once."""
         if self._freed is None:
             self.say("the zero of the force is fitted along with every effect")
-            self._freed = Trials(self.prepared.freed, self.say, self._begun_free)
+            self._freed = Trials(
+                self.prepared.freed, self.say, self._begun_free, effort=self._effort
+            )
         return self._freed
 
     @cached_property
@@ -291,7 +297,7 @@ class Trials:
         if known:
             self._noise  # noqa: B018  # before threads ask for it
             trials = in_threads(self._again, known)
-        elif most is not None and (self.closed or (self._earlier and self._earlier.closed)):
+        elif most is not None and self._ended:
             return []
         else:
             trials = try_all(
@@ -305,6 +311,12 @@ class Trials:
         if self._ends and not known:
             self._ends.keep(first.effects, trials)
         return [*trials]
+
+    @property
+    def _ended(self) -> bool:
+        """Whether no further pairs are tried."""
+        spent = self._effort is not None and self._effort.spent
+        return self.closed or spent or (self._earlier is not None and self._earlier._ended)
 
     def _known(self, first: Trial) -> Sequence[Trial | End]:
         """Return where the trials of effects beside a model ended before, none if they are new."""
@@ -506,7 +518,7 @@ def diagnose_damper(
     found = replace(found, sensors=sensors, together=best_pair)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
     found = replace(found, patterns=patterns, noise_known=prepared.held_out.noise_known)
-    return confirmed(found, prepared), prepared
+    return found, prepared
 
 
 def noise_is_all(prepared: Prepared) -> bool:

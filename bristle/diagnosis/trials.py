@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Protocol
 
 import numpy as np
@@ -29,10 +30,15 @@ from ..identification.start_grid import (
     is_rough,
     ranked_guesses,
     refine,
+    scored_guesses,
 )
 from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of, exclude
 from .rule import BENCH
+
+SCORED, ABLE = 0.04, 4
+"""Share of the best score from which on an effect is screened from all its starts, and how many are
+whatever they score; the others begin at their best start."""
 
 SCREENING = 3
 """Jacobians of the search that decides which effects could win, from the best start of each."""
@@ -178,13 +184,44 @@ def joinable(
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
 
-def screened(effect: str, context: SearchContext) -> list[Candidate]:
+def guesses_of(names: Sequence[str], context: SearchContext) -> dict[str, list[Candidate]]:
+    """Return the starts of effects, the best first, looked at the more the better they score."""
+    scores = dict(
+        zip(names, in_threads(lambda name: scored_guesses(name, context), names), strict=True)
+    )
+    ranked = sorted((score for score, _ in scores.values()), reverse=True)
+    least = min(SCORED * ranked[0], ranked[min(ABLE, len(ranked)) - 1]) if ranked else 0.0
+
+    def look(name: str) -> list[Candidate]:
+        score, starts = scores[name]
+        if score < least:
+            return ranked_guesses(name, context, starts[:1])
+        return screened(name, context, starts)
+
+    return dict(zip(names, in_threads(look, names), strict=True))
+
+
+def promised(first: Trial, train: Problem, shown: Sequence[str]) -> float:
+    """Return the z that one effect more may leave, as the score test tells it.
+
+    Parameters
+    ----------
+    first : the trial of the model that it joins
+    train, shown : as in `try_all`
+    """
+    context = SearchContext(first.model, train)
+    names = joinable(first.model, shown, train)
+    scores = in_threads(lambda name: scored_guesses(name, context)[0], names)
+    return first.z * sqrt(max(0.0, 1.0 - max(scores, default=0.0)))
+
+
+def screened(effect: str, context: SearchContext, starts: Sequence[Model]) -> list[Candidate]:
     """Return the starts of an effect; a very short search has begun at the best, which is first.
 
     One step is not enough where the present model's parameters hold each other: a fall with speed
     that went to its bound moves only together with what is to take its place.
     """
-    first, *others = ranked_guesses(effect, context)
+    first, *others = ranked_guesses(effect, context, starts)
     return [_searched(first, context.screening(effect), SCREENING), *others]
 
 
@@ -233,9 +270,10 @@ def try_all(
 ) -> list[Trial]:
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
-    A very short search shows which effects could win. These are searched shortly from their best
-    starts, those with a joint that hardly could from one; those that gain a fair share of what the
-    best one gains on the training runs are refined, where that is enough for a verdict.
+    A score test and a very short search show which effects could win. These are searched shortly
+    from their best starts, those with a joint that hardly could from one; those that gain a fair
+    share of what the best one gains on the training runs are refined, where that is enough for a
+    verdict.
 
     Parameters
     ----------
@@ -248,7 +286,7 @@ def try_all(
     context = SearchContext(base, train)
     there = held_out.expectation(base)
     names = joinable(base, shown, train)
-    guesses = dict(zip(names, in_threads(lambda name: screened(name, context), names), strict=True))
+    guesses = guesses_of(names, context)
     first = {
         name: 1.0 - own[0].cost / (context.screening(name).cost or 1.0)
         for name, own in guesses.items()

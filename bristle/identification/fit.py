@@ -94,6 +94,8 @@ def _lost(
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
 _FINAL_DRAWS = 24  # draws of the motion for bias and intervals of what is reported
 _ENDS = 6  # searches from beside the best point where the loss is rough
+_TURNS = 10  # Jacobians of such a search, about
+_MOST_SPENT = 100e6  # steps of dampers' forces, see `Effort`, that they take at the most
 _ASIDE = {"N/m": 0.4, "kg": 0.4}  # by what share, by unit: what a joint's spikes hardly tell
 _BESIDE = 0.01  # all others
 _AS_GOOD = 1.1  # times the least cost: ends that a rough loss does not tell apart
@@ -172,7 +174,9 @@ def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) 
     if not joints:
         return found
     generator = np.random.default_rng(len(found.std))  # fixed: a model has the same ends again
-    starts = [_beside(found.model, joints, generator) for _ in range(_ENDS)]
+    each = _TURNS * len(found.std) * problem.steps_of(found.model)
+    few = min(_ENDS, int(_MOST_SPENT / max(each, 1.0)))
+    starts = [_beside(found.model, joints, generator) for _ in range(few)]
     search = partial(fit, problem, expectation=expected, with_std=False)
     ends = [found, *in_threads(search, starts)]
     best = min(ends, key=lambda one: one.cost)
@@ -227,7 +231,7 @@ def fit_from_starts(problem: Problem, model: Model, starts: int = 4) -> Fit:
     problem : the runs
     model : with the values of its effects to begin with, and those of fixed parameters [SI]; an
         effect without values begins at the size of the rig
-    starts : how many starting points are tried
+    starts : how many starting points are tried; 0 for the model's own values
 
     Returns
     -------
@@ -245,7 +249,7 @@ def fit_from_starts(problem: Problem, model: Model, starts: int = 4) -> Fit:
     driven = LAWS[law].driven() if steady(problem) else ()
     silent = tuple(name for name in driven if name not in fixed)
     model = without(model, silent)
-    trials = start_models(problem, model, starts)
+    trials = start_models(problem, model, starts) if starts else [model]
     expected = problem.expectation(trials[0])
     count = Count(f"fitting {law}: start", len(trials))
 

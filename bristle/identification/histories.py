@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from threading import Lock
 from types import MappingProxyType
@@ -257,32 +257,46 @@ def keep(name: str, wanted: str) -> None:
 BESIDES = 1000
 """Steps that take about as long as what stands around a simulation."""
 
+ALONE, HEAVY = 0.4, 3.0
+"""What a step of a law without effects costs, and by how much one costs more of a law with several
+states, which finds them by trials: a step of a plain law with an effect costs 1."""
+
 
 class Effort:
-    """What a search has spent: `steps` of dampers' forces, which are as many on every machine."""
+    """What a search has spent: `steps` of dampers' forces, which are as many on every machine.
 
-    def __init__(self) -> None:
-        self.steps = 0
+    `most` is what it may spend.
+    """
+
+    def __init__(self, most: float = inf) -> None:
+        self.steps, self.most = 0.0, most
         self._lock = Lock()
 
-    def add(self, steps: int) -> None:
+    def add(self, steps: float) -> None:
         """Count more steps; from any thread."""
         with self._lock:
             self.steps += steps
+
+    @property
+    def spent(self) -> bool:
+        """Whether no more is to be begun."""
+        return self.steps > self.most
 
 
 _effort: ContextVar[Effort | None] = ContextVar("effort", default=None)
 
 
 @contextmanager
-def counted() -> Iterator[Effort]:
+def counted(most: float = inf) -> Iterator[Effort]:
     """Count the steps of all dampers' forces in this context, and in threads begun in it."""
-    effort = Effort()
-    before = _effort.set(effort)
+    effort, outer = Effort(most), _effort.get()
+    token = _effort.set(effort)
     try:
         yield effort
     finally:
-        _effort.reset(before)
+        _effort.reset(token)
+        if outer is not None:
+            outer.add(effort.steps)
 
 
 class DamperForces:
@@ -317,6 +331,7 @@ class DamperForces:
         ]
         self._states, self._work = slots.z_size, room(slots.z_size)
         self._joint = any(one.joint for one in slots.effects if one.name in effects)
+        self._dear = HEAVY if len(LAWS[law].states) > 1 else 1.0 if effects else ALONE
 
     def force(
         self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float],
@@ -335,7 +350,7 @@ class DamperForces:
         """
         if (effort := _effort.get()) is not None:
             substeps = ceil(dt / IMPLICIT_STEP) if self._joint else 1
-            effort.add(len(x) * substeps + BESIDES)
+            effort.add(self._dear * len(x) * substeps + BESIDES)
         p, z = self._plain.copy(), np.zeros(self._states)
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
         for slot, signal in self._begins:

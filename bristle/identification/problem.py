@@ -25,7 +25,7 @@ from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of
 from ..physics.laws import LAWS, base_and_variant
 from ..user_code.conformance import shown
-from .histories import DamperForces
+from .histories import DamperForces, counted
 from .run_start import carrying_state, remembering_states, start_in_motion, start_under_load
 from .search import HUBER, z_scale
 
@@ -574,6 +574,13 @@ class Problem:
         if carrying := self.carrying(model, run):
             model = replace(model, values={**model.values, **carrying})
         return self._force(model, run, draw)
+
+    def steps_of(self, model: Model) -> float:
+        """Return the steps of one simulation of all runs, see `histories.Effort`."""
+        with counted() as once:
+            for run in self.runs:
+                self.predict(model, run)
+        return once.steps
 
     @contextmanager
     def starts_held(self, model: Model, runs: Sequence[Run]) -> Iterator[None]:

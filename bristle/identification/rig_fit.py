@@ -135,7 +135,7 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
     ----------
     model : the damper's law with the effects of all sites
     site, sites : the one to fit, and all sites that the runs show
-    count : how many starting points are tried for the damper's law
+    count : how many starting points are tried for the damper's law, 0 for none beside `also`
     also : values in SI by name from which one more fit begins; the better one counts
     """
     own, train = at_site(model, site.name, sites), site.train
@@ -181,8 +181,16 @@ def _in_place_of(searched: Fit, other: Fit) -> Fit:
 
 
 def _fit_law(own: Model, train: Problem, count: int, also: Values) -> Fit:
-    """Return the damper's law fitted from several starts, and from the values in `also`."""
+    """Return the damper's law fitted from several starts, and from the values in `also`.
+
+    From these alone where no start is asked for and they are all that a test bench needs.
+    """
     inside = isinstance(train, StructureProblem)
+    there = {name: value for name, value in also.items() if _belongs(name, own)}
+    begin = replace(own, values={**own.values, **there})
+    if not count and not inside and {*begin.free()} <= {*there}:
+        return fit_from_starts(train, begin, 0)
+    count = count or MORE
     layer = [name for name in own.effects if inside and EFFECTS[name].site == "structure"]
     if not layer:
         found = fit_from_starts(train, own, count)
@@ -194,7 +202,6 @@ def _fit_law(own: Model, train: Problem, count: int, also: Values) -> Fit:
     else:  # of a reconstructed force the layer's effects are a part
         found = _fit_grown(own, layer, train)
     if also:
-        there = {name: value for name, value in also.items() if _belongs(name, own)}
         values = {**found.model.values, **there}
         other = fit(train, replace(found.model, values=values))
         if other.cost < found.cost:
@@ -414,7 +421,7 @@ def fit_rig(
     ----------
     rig : the sites with their runs
     model : the damper's law with the effects of all sites
-    starts : how many starting points are tried for the damper's law
+    starts : how many starting points are tried for the damper's law, 0 for none beside `also`
     also : values in SI by name from which one more fit begins at each site; the better one counts
 
     Raises

@@ -123,11 +123,14 @@ JOINT_LASTS = 30.0
 """Seconds, over all runs, that suffice for a search where the model has a joint: each is integrated
 in the same short steps, however few samples it has."""
 
-KEPT = {"none": 24, "memory": 2, "joint": 6}
+KEPT = {"none": 8, "memory": 2, "joint": 6}
 """From how many starts a search is made, by what the model has that makes it dear."""
 
-LOOKED = {"none": 24, "memory": 4, "joint": 6}
+LOOKED = {"none": 8, "memory": 4, "joint": 6}
 """From how many of those that promise most a linear step is made."""
+
+ABSORBED = 1e-6
+"""Share of a column that others must leave for it to be one of its own."""
 
 FARTHEST = 10.0
 """Multiple of a start's own size at which its effect is looked at, at the most."""
@@ -271,6 +274,22 @@ class ScreeningData:
         size = float(np.clip(along / square, -FARTHEST, FARTHEST)) if square > 0.0 else 0.0
         return max(2.0 * size * along - size**2 * square, 2.0 * along - square)
 
+    def score(self, here: Array, slopes: Array) -> float:
+        """Return the share of the squares that an effect takes, refitted linearly from a start.
+
+        Parameters
+        ----------
+        here, slopes : the residuals (n,) there, and how they change with the effect's parameters
+            (n, p)
+        """
+        columns = np.array([self._beyond(one) for one in (here - self.left, *slopes.T)])
+        lengths = np.linalg.norm(columns, axis=1)
+        basis, rest = np.linalg.qr((columns[lengths > 0.0] / lengths[lengths > 0.0, None]).T)
+        own = basis[:, np.abs(np.diag(rest)) > ABSORBED]
+        whole = float(np.sum((self._weight * self.left) ** 2))
+        taken = own.T @ self._beyond(self.left)
+        return float(taken @ taken) / whole if whole > 0.0 else 0.0
+
 
 class SearchContext:
     """A model that effects are to join, on its training runs: what all their searches share."""
@@ -345,17 +364,42 @@ class Candidate:
     moves: bool = True
 
 
-def ranked_guesses(effect: str, context: SearchContext) -> list[Candidate]:
-    """Return an effect's best starts after one linear step of all parameters, the best first.
+def scored_guesses(effect: str, context: SearchContext) -> tuple[float, list[Model]]:
+    """Return what an effect promises at its best start, and its starts, the best first.
 
-    Those from which nothing moves, as a softening spring where there is none to soften, are left
-    out: they would cost no more than the law alone, and so come before starts that are too large.
+    See `ScreeningData.score` and `promise`.
     """
     screening = context.screening(effect)
     guesses = initial_guesses(effect, context.base, context.train)
-    if len(guesses) > screening.looked:
-        guesses = sorted(guesses, key=screening.promise, reverse=True)[: screening.looked]
-    found = [_stepped(guess, effect, screening) for guess in guesses]
+    if len(guesses) > 1:
+        guesses.sort(key=screening.promise, reverse=True)
+    own = _own_search(effect, guesses[0], screening)
+    here = own.residuals(own.start)
+    return screening.score(here, own.jacobian(own.start, here)), guesses
+
+
+def _own_search(effect: str, start: Model, screening: ScreeningData) -> Search:
+    """Return the search for an effect's own parameters."""
+    added = [name for name in start.free() if name.startswith(f"{effect}.")]
+    return Search(screening.problem, start, screening.expected, added)
+
+
+def ranked_guesses(
+    effect: str, context: SearchContext, starts: Sequence[Model] | None = None
+) -> list[Candidate]:
+    """Return an effect's starts after one linear step of all parameters, the best first.
+
+    Those from which nothing moves, as a softening spring where there is none to soften, are left
+    out: they would cost no more than the law alone, and so come before starts that are too large.
+
+    Parameters
+    ----------
+    effect, context : the effect, and what it is to join
+    starts : the best first; None for all
+    """
+    screening = context.screening(effect)
+    starts = scored_guesses(effect, context)[1] if starts is None else starts
+    found = [_stepped(start, effect, screening) for start in starts[: screening.looked]]
     moving = [one for one in found if one.moves]
     return sorted(moving or found, key=lambda one: one.cost)
 
@@ -365,11 +409,10 @@ def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
 
     The base model's own sensitivities are taken as they are without the effect.
     """
-    base = [name for name in start.free() if not name.startswith(f"{effect}.")]
-    added = [name for name in start.free() if name.startswith(f"{effect}.")]
-    own = Search(screening.problem, start, screening.expected, added)
+    own = _own_search(effect, start, screening)
+    added, base = own.names, [name for name in start.free() if name not in own.names]
     here = own.residuals(own.start)
-    slopes = own.jacobian(own.start, here) if added else np.zeros((len(here), 0))
+    slopes = own.jacobian(own.start, here)
     moves = not added or bool(slopes.any())
     J = np.hstack([screening.known, slopes])
     weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
@@ -395,5 +438,4 @@ def _moves(model: Model, effect: str, screening: ScreeningData) -> bool:
     with_it, bare = (residuals(problem, one, expected) for one in (model, without))
     if not np.array_equal(with_it, bare):
         return True
-    added = [name for name in model.free() if name.startswith(f"{effect}.")]
-    return bool(Search(problem, model, expected, added).sensitivities().any())
+    return bool(_own_search(effect, model, screening).sensitivities().any())

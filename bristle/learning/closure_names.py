@@ -12,7 +12,7 @@ from ..core.arrays import Array
 from ..core.progress import tell
 from ..core.text import percent, quantity
 from ..diagnosis.prepared import Prepared
-from ..diagnosis.trials import Trial, joinable, judge, screened, short_search
+from ..diagnosis.trials import Trial, guesses_of, joinable, judge, short_search
 from ..identification.problem import Problem
 from ..identification.search import in_threads
 from ..identification.start_grid import SearchContext, refine
@@ -91,7 +91,7 @@ def nearest_effect(
     names = joinable(base, prepared.shown, told)
     if not names or alone <= 0.0:
         return None
-    guesses = dict(zip(names, in_threads(lambda name: screened(name, context), names), strict=True))
+    guesses = guesses_of(names, context)
     able = sorted(names, key=lambda name: guesses[name][0].cost)[:LOOKED]
     ends = in_threads(lambda name: short_search(name, context, guesses[name], True).model, able)
     left = [_left(told, end) for end in ends]

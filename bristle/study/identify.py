@@ -475,7 +475,7 @@ def identify_study(
     model = _of_law(model or present, law)
     compile_ahead(model.law, model.effects)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    task = FitTask(cutoff, 1 if begin else starts, table, begin=begin or {}, command=command)
+    task = FitTask(cutoff, 0 if begin else starts, table, begin=begin or {}, command=command)
     # Before is what the study had: at its defaults another law would be nobody's model.
     other = present.law != model.law
     task = replace(task, laws=all_of_them, present=present if other else None)
@@ -494,10 +494,10 @@ class FitTask:
     """How a model is to be identified.
 
     `cutoff` [Hz] of the low-pass for the table of errors; `starts` how many starting points are
-    tried; `table` whether to compare the laws; `present` the model whose errors are those before,
-    None for the one that is identified; `command` the form or forms of the command, None for the
-    model's; `laws` whether every law is tried as well; `begin` values in SI by name from which one
-    more fit begins, the better one counts.
+    tried, 0 for none beside `begin`; `table` whether to compare the laws; `present` the model whose
+    errors are those before, None for the one that is identified; `command` the form or forms of the
+    command, None for the model's; `laws` whether every law is tried as well; `begin` values in SI
+    by name from which one more fit begins, the better one counts.
     """
 
     cutoff: float
@@ -611,7 +611,7 @@ def _table(at: SiteModel, task: FitTask) -> list[LawError]:
         return []
     return error_table(
         site.train, site.holdout, task.cutoff, laws=_tabled(at.model.law, site.train),
-        starts=min(task.starts, _TABLE_STARTS),
+        starts=min(task.starts, _TABLE_STARTS) or 1,
     )  # fmt: skip
 
 

@@ -303,7 +303,7 @@ def identify_with(
     known = {**(present.values if alone else {}), **begin}
     start = {k: v for k, v in known.items() if k in model.values}
     # With the new effects at their defaults it would be nobody's model: before is the one without.
-    starts = 1 if alone or begin else FitTask.starts
+    starts = 0 if alone or begin else FitTask.starts
     task = FitTask(study.settings.cut_off, starts, table=False, present=present, begin=start)
     return identify_model(study, model, task)
 

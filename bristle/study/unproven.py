@@ -71,7 +71,7 @@ def unproven(
     laws : all laws, fitted, where another one may be taken
     most : how many effects a model has at the most
     """
-    with counted() as effort:
+    with counted(MOST_SPENT) as effort:
         return _chosen(prepared, trials, laws, most, effort)
 
 
@@ -102,9 +102,10 @@ def _chosen(
         nonlocal best, errors
         able: list[tuple[float, int, Model, list[Array]]] = []
         for k, one in enumerate(candidates):  # one by one, so that what is spent is told alike
-            if effort.steps > MOST_SPENT:
-                break
             with defined({name: text for name, text in one.written.items() if name not in EFFECTS}):
+                look = 2 * SWEEPS * len(one.model.free()) * problem.steps_of(one.model)
+                if effort.steps + look > effort.most:
+                    continue  # nor could its fit be afforded
                 model = refine(one.model, problem, sweeps) if sweeps else one.model
                 found = left_out_errors(model, problem)
             if lowers(errors, found, GAIN, BEYOND):
@@ -119,7 +120,7 @@ def _chosen(
 
     with ExitStack() as stay:
         gains(_other_laws(laws, best.model, problem), LONG)
-        while len(best.model.effects) < most and effort.steps <= MOST_SPENT:
+        while len(best.model.effects) < most and not effort.spent:
             texts = {one.name: one.text for one in promising(problem, best.model)}
             with defined(texts):
                 able = [] if texts else [one for one in trials if _joins(one, best.model)]
