@@ -33,9 +33,8 @@ def test_what_each_effect_leaves_of_the_cost_is_told(monkeypatch: pytest.MonkeyP
     )
     for name, made in {
         "SearchContext": lambda *_: context, "joinable": lambda *_: list(COSTS),
-        "screened": lambda *_: [SimpleNamespace(cost=1.0)], "short_search": searched,
-        "judge": judged,
-        "refine": lambda model, *_: model,
+        "guesses_of": lambda names, _: {own: [SimpleNamespace(cost=1.0)] for own in names},
+        "short_search": searched, "judge": judged, "refine": lambda model, *_: model,
     }.items():  # fmt: skip
         monkeypatch.setattr(trials, name, made)
     said: list[str] = []
