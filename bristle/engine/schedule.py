@@ -30,6 +30,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ..component import HELD, LINEAR, SAMPLED
+from ..core.graph import loop_in, path_between, reached
 from ..fmu.description import Description, Value, Variable
 from ..system.parameters import as_told, told_over_step
 
@@ -267,32 +268,9 @@ def signal_graph(nodes: Sequence[Node], only_declared: bool = False) -> dict[Por
     return graph
 
 
-def path_between(graph: Mapping[Port, Sequence[Port]], start: Port, goal: Port) -> list[Port]:
-    """Return a path from `start` to `goal` with at least one edge, or an empty list."""
-    before: dict[Port, Port] = {}
-    queue = [start]
-    while queue:
-        port = queue.pop()
-        for after in graph[port]:
-            if after not in before:
-                before[after] = port
-                queue.append(after)
-    if goal not in before:
-        return []
-    path = [goal, before[goal]]
-    while path[-1] != start:
-        path.append(before[path[-1]])
-    return path[::-1]
-
-
 def find_loop(nodes: Sequence[Node]) -> list[Port]:
     """Return the ports of one algebraic loop that the FMUs declare, or an empty list."""
-    graph = signal_graph(nodes, only_declared=True)
-    for start in graph:
-        found = path_between(graph, start, start)
-        if found:
-            return found
-    return []
+    return loop_in(signal_graph(nodes, only_declared=True))
 
 
 def find_late(nodes: Sequence[Node], graph: Mapping[Port, Sequence[Port]]) -> Refresh:
@@ -377,18 +355,9 @@ def loop_members(nodes: Sequence[Node]) -> tuple[list[int], list[int]]:
     for c, node in enumerate(nodes):
         for d, _ in node.sources.values():
             feeds[d].add(c)
-    reached = {}
-    for c in feeds:
-        queue, seen = list(feeds[c]), set()
-        while queue:
-            target = queue.pop()
-            if target not in seen:
-                seen.add(target)
-                queue += feeds[target]
-        reached[c] = seen
-    inside = [c for c in reached if c in reached[c]]
-    behind = {target for c in inside for target in reached[c]} - set(inside)
-    return inside, sorted(behind)
+    fed = {c: reached(feeds, c) for c in feeds}
+    inside = [c for c in fed if c in fed[c]]
+    return inside, sorted(set[int]().union(*(fed[c] for c in inside)) - {*inside})
 
 
 # Components that step one after another: Gauss-Seidel, midpoint, midpoint with one rollback.
@@ -597,19 +566,14 @@ class _Plan:
         They follow a discrete signal, as a damper's force does the voltage of a controller that has
         stepped after it.
         """
-        queue = [
+        discrete = [
             (c, name)
             for c, node in enumerate(self.nodes)
             for name, (d, output) in node.sources.items()
             if d >= c and not is_continuous(self.nodes[d].outputs[output])
         ]
-        reached: set[Port] = set()
-        while queue:
-            port = queue.pop()
-            if port not in reached:
-                reached.add(port)
-                queue += self.graph[port]
-        return {port for port in self.kept if port in reached and port[1] in self.early[port[0]]}
+        moved = reached(self.graph, *discrete)
+        return {port for port in self.kept & moved if port[1] in self.early[port[0]]}
 
 
 def _stands(output: Variable) -> bool:

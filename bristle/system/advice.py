@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from math import sqrt
 
 from ..core.config import Document
+from ..core.graph import loop_in, reached
 from ..errors import BristleError, PhysicsError
 from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
@@ -216,14 +217,8 @@ def _rollback(run: RunSettings, network: Network, document: Document) -> None:
     for part in network.parts.values():
         if part.file is None or part.description is None:
             continue  # the built-in components can
-        reached, queue = set[str](), list(feeds[part.name])
-        while queue:
-            name = queue.pop()
-            if name not in reached:
-                reached.add(name)
-                queue += feeds[name]
         able = part.description.capabilities.get("canGetAndSetFMUstate")
-        if part.name in reached and able not in ("true", "1"):
+        if part.name in reached(feeds, part.name) and able not in ("true", "1"):
             document.error(
                 ("run", "algorithm"),
                 f"[run] algorithm: midpoint-iterated lets the components of a loop step twice, and "
@@ -244,9 +239,8 @@ def _loops(network: Network, document: Document) -> None:
                     if (part.name, name) in network.feeding
                 ]
                 follows[part.name, output.name] = [(wire.source, wire.output) for wire in wires]
-    cycle = _cycle(follows)
-    if cycle:
-        words = " <- ".join(f"{part}.{port}" for part, port in [*cycle, cycle[0]])
+    if cycle := loop_in(follows):
+        words = " <- ".join(f"{part}.{port}" for part, port in cycle)
         document.note(
             network.parts[cycle[0][0]].path,
             f"algebraic loop {words}: each follows the next without delay. Nothing iterates; the "
@@ -270,25 +264,6 @@ def _designs(network: Network, library: Library, document: Document) -> None:
         except BristleError as error:
             path = (*part.path, "controller") if part.controller else part.path
             document.error(path, f"[components.{part.name}]: {error}")
-
-
-def _cycle(follows: Mapping[tuple[str, str], list[tuple[str, str]]]) -> list[tuple[str, str]]:
-    """Return one cycle of a graph, or nothing."""
-    done: set[tuple[str, str]] = set()
-    for start in follows:
-        trail: list[tuple[str, str]] = []
-        waiting = [(start, 0)]
-        while waiting:
-            node, depth = waiting.pop()
-            del trail[depth:]
-            if node in trail:
-                return trail[trail.index(node) :]
-            if node in done and depth:
-                continue
-            trail.append(node)
-            done.add(node)
-            waiting += [(following, depth + 1) for following in follows.get(node, ())]
-    return []
 
 
 def _holding(damper: Part, network: Network, document: Document) -> None:
