@@ -131,7 +131,7 @@ def missing(before: Trial, after: Trial, rule: DecisionRule = BENCH) -> bool:
     larger = after.rms > rule.most_rms * before.rms
     if larger and not after.rms_bulk <= rule.most_rms * before.rms_bulk:
         return False
-    return paired(before.losses, after.losses, rule.chance).low > 0.0
+    return paired(before.losses, after.losses, rule.chance) > 0.0
 
 
 def _without_effect(
@@ -273,7 +273,7 @@ def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
         return True
     if other.z > rule.adequate:
         return False
-    return paired(other.losses, best.losses, rule.chance).low <= 0.0
+    return paired(other.losses, best.losses, rule.chance) <= 0.0
 
 
 def _same(name: str, other: Trial, before: Trial) -> bool:
@@ -366,11 +366,11 @@ def _gains(before: Trial, after: Trial, rule: DecisionRule) -> bool:
     """Return whether an effect lowers the held-out error by enough, and beyond chance."""
     if after.rms > (1.0 - rule.gain) * before.rms:
         return False
-    return paired(before.losses, after.losses, rule.chance).low > 0.0
+    return paired(before.losses, after.losses, rule.chance) > 0.0
 
 
 def _equals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
     """Return whether the runs cannot distinguish another effect from the best one."""
     if other.rms <= (1.0 + rule.close) * best.rms:
         return True
-    return paired(other.losses, best.losses, rule.chance).low <= 0.0
+    return paired(other.losses, best.losses, rule.chance) <= 0.0

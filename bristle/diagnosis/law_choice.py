@@ -18,7 +18,7 @@ from .law_trials import LawTrial
 from .prepared import Prepared
 from .rule import BENCH, DecisionRule
 from .site_diagnosis import SiteDiagnosis
-from .trials import Difference, Trial, joinable, paired
+from .trials import Trial, joinable, paired
 
 HIDDEN = 0.03
 """Share of a law's excess that an effect leaves at most where what is left may be the part that a
@@ -67,11 +67,10 @@ class LawAndEffects:
         return self.fitted, len(self.finding.effects), self.after.z
 
 
-def compared(first: Trial, second: Trial, rule: DecisionRule = BENCH) -> Difference | None:
-    """Return by how much the loss of one model is above another's, None for other samples."""
-    if len(first.losses) != len(second.losses):
-        return None
-    return paired(first.losses, second.losses, rule.chance)
+def _apart(first: Trial, second: Trial, rule: DecisionRule) -> bool:
+    """Return whether one model's loss is above another's beyond chance, or of other samples."""
+    alike = len(first.losses) == len(second.losses)
+    return not alike or paired(first.losses, second.losses, rule.chance) > 0.0
 
 
 def serves_rest(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
@@ -88,8 +87,7 @@ def clearly_worse(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool
         return True
     if other.z <= best.z * (1.0 + rule.law_gain):
         return False
-    apart = compared(other, best, rule)
-    return apart is None or apart.low > 0.0
+    return _apart(other, best, rule)
 
 
 def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
@@ -98,8 +96,7 @@ def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
         return False
     if other.z <= best.z * (1.0 + rule.close):
         return True
-    apart = compared(other, best, rule)
-    return apart is not None and apart.low <= 0.0
+    return not _apart(other, best, rule)
 
 
 def best_of(trials: Sequence[Trial], rule: DecisionRule = BENCH) -> Trial:

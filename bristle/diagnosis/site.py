@@ -186,7 +186,7 @@ def better(first: Trial, second: Trial, rule: DecisionRule = SITE) -> bool:
 
     A site's noise is white, so where the second model is adequate its gain in likelihood counts.
     """
-    if paired(first.losses, second.losses, rule.chance).low > 0.0:
+    if paired(first.losses, second.losses, rule.chance) > 0.0:
         return True
     gain = float(np.sum(first.losses - second.losses))
     return second.z <= rule.clean and gain > rule.likelihood

@@ -11,7 +11,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .. import units
 from ..core.config import toml_content
 from ..core.files import cache_folder, components_folder, reading, write_whole
 from ..core.text import unknown
@@ -337,8 +336,3 @@ def describe(
         variables=variables,
         capabilities={},
     )
-
-
-def unit_of(variable: Variable) -> units.Unit | None:
-    """Return the parsed unit of a variable, None where it has none."""
-    return units.parse(variable.unit) if variable.unit else None

@@ -18,7 +18,6 @@ from ..data.corrections import jumps
 from ..data.decimate import Finer, between
 from ..data.extra_channels import Extra
 from ..data.left_out import any_of
-from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..model.model import Model, parameter
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
@@ -164,28 +163,6 @@ def taken_back(effect: type[Effect], values: dict[str, float], reading: Array, d
     spectrum = np.fft.rfft(padded, size) * inverse
     back: Array = np.fft.irfft(spectrum, size)[lead : lead + n]
     return back
-
-
-def corrected(
-    measurement: Measurement, effects: tuple[str, ...], values: dict[str, float]
-) -> Measurement:
-    """Return a measurement whose velocity channel is freed of its instrument's effects.
-
-    For `prepare`, which then joins it with the displacement; noise is carried through by its gain.
-    """
-    known = sensors(effects, "velocity")
-    if not known or not measurement.has("velocity"):
-        return measurement
-    channels, noise = dict(measurement.channels), dict(measurement.noise)
-    for effect in known:
-        before = channels["velocity"]
-        after = taken_back(effect, own(effect, values), before, measurement.step)
-        channels["velocity"] = after
-        if "velocity" in noise:
-            white = np.random.default_rng(0).standard_normal(len(before))
-            gain = taken_back(effect, own(effect, values), white, measurement.step).std()
-            noise["velocity"] *= float(gain)
-    return replace(measurement, channels=channels, noise=noise)
 
 
 # Parameters of effects that are known of each run: its temperature, a pressure at each sample.

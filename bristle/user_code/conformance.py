@@ -217,20 +217,19 @@ def _rests(effect: type[Effect]) -> Check:
 def _cycle(
     law: str, effects: list[str], values: dict[str, float], amplitude: float, frequency: float,
     V: Callable[[float], float] | float,
-) -> tuple[list[float], list[float], list[float]]:  # fmt: skip
-    """Return times, velocities and forces of three cycles."""
+) -> tuple[list[float], list[float]]:  # fmt: skip
+    """Return velocities and forces of three cycles."""
     model = DamperModel(law, values, effects)
     voltage = V if callable(V) else lambda _t: V
     w, before = 2.0 * pi * frequency, 2.0 * pi * frequency * amplitude
-    times, speeds, forces = [], [], []
+    speeds, forces = [], []
     for k in range(1, round(3.0 / frequency / STEP) + 1):
         t = k * STEP
         x, v = amplitude * sin(w * t), amplitude * w * cos(w * t)
         forces.append(model.step(x, v, (v - before) / STEP, voltage(t), STEP, 0.0, 0.0, False))
-        times.append(t)
         speeds.append(v)
         before = v
-    return times, speeds, forces
+    return speeds, forces
 
 
 def _matters(effect: type[Effect]) -> Check:
@@ -238,7 +237,7 @@ def _matters(effect: type[Effect]) -> Check:
     # A stop may not be met by the smaller motion.
     for law, amplitude in product(laws_joined(effect), (0.01, 0.03)):
         rows = [
-            np.array(_cycle(law, on, {}, amplitude, 2.0, lambda t: 4.0 + 3.0 * sin(9.0 * t))[2])
+            np.array(_cycle(law, on, {}, amplitude, 2.0, lambda t: 4.0 + 3.0 * sin(9.0 * t))[1])
             for on in ([], [effect.name])
         ]
         change = float(np.sqrt(np.mean((rows[1] - rows[0]) ** 2) / np.mean(rows[0] ** 2)))
@@ -250,7 +249,7 @@ def _matters(effect: type[Effect]) -> Check:
 def _bounds(effect: type[Effect]) -> Check:
     for law in laws_joined(effect):
         for values in _corners(effect):
-            forces = _cycle(law, [effect.name], values, 0.01, 3.0, 8.0)[2]
+            forces = _cycle(law, [effect.name], values, 0.01, 3.0, 8.0)[1]
             if not all(isfinite(force) for force in forces):
                 return Check("it can be simulated at every bound", False, f"{law}, {values}")
     return Check("it can be simulated at every bound", True)
@@ -265,7 +264,7 @@ def _energy(effect: type[Effect]) -> Check:
             for values in _corners(effect):
                 cycle = _cycle(law, [effect.name], values, amplitude, frequency, V)
                 last = round(1.0 / frequency / STEP)
-                v, force = np.array(cycle[1][-last:]), np.array(cycle[2][-last:])
+                v, force = (np.array(one[-last:]) for one in cycle)
                 work = float(STEP * np.sum(v * force))
                 scale = amplitude * max(1e-9, float(np.abs(force).max()))
                 if work < -1e-3 * scale:
