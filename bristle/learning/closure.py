@@ -80,8 +80,10 @@ MOST = 40_000
 AS_GOOD = 1.02
 """Loss of a smaller network, by the least, at which it is taken."""
 
-WORTH = 0.97
-"""Largest error on left-out folds, by that without a closure, of a closure that is tried."""
+WORTH = 1.0
+"""Largest error on left-out folds, by that without a closure, of a closure that held-out runs judge.
+
+What is left out is often outermost, so that few folds promise less than all runs then give."""
 
 MARGIN = 0.15
 """Share of an input's range over which a closure fades beyond it."""
@@ -442,8 +444,7 @@ def inputs_of(runs: Sequence[Run], position: bool) -> tuple[Input, ...]:
     v, V = (np.concatenate([getattr(run, name) for run in runs]) for name in ("v", "V"))
     way, speed, top = float(np.std(x)), float(np.std(v)), float(np.max(np.abs(V)))
     step, time = max(run.dt for run in runs), _time(runs)
-    times = [share * time for share in SPREAD if share * time >= 2.0 * step]
-    times = rounded(np.array(times)).tolist()
+    times = rounded(np.unique(np.maximum(time * np.array(SPREAD), 2.0 * step))).tolist()
     travels, (slow,) = rounded(way * np.array(TRAVELS)).tolist(), rounded(SLOW * np.array([speed]))
     out = [Input("v", 0.0)]
     if position:
@@ -510,12 +511,12 @@ def _history(one: Input, x: Array, v: Array, V: Array, held: Array, dt: float) -
     if one.kind in ("v", "x", "V"):
         return {"v": v, "x": x, "V": V}[one.kind]
     if one.kind == "recent_v":
-        return faded(v, dt, one.over, float(v[0]))
+        return v - faded(v, dt, one.over, float(v[0]))
     keep = np.exp(-dt / one.over) if one.kind == "recent_V" else 0.0
     if one.kind == "recent_V":
         middle = 0.5 * (V[:-1] + held[1:])
         late = lfilter([1.0 - keep], [1.0, -keep], middle, zi=[keep * V[0]])[0]
-        return np.append(V[:1], late)
+        return V - np.append(V[:1], late)
     middle = 0.5 * (v[1:] + v[:-1])
     kept, to = np.exp(-np.abs(middle) * dt / one.over).tolist(), np.tanh(middle / one.slow).tolist()
     out, now = [0.0], 0.0

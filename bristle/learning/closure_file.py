@@ -33,8 +33,9 @@ _DIGITS = 9
 class Input:
     """An input of the network: a signal now, or a trace of it.
 
-    `kind` is "v", "x" or "V"; "recent_v" or "recent_V" behind a first-order lag of `over` [s]; or
-    "way", the direction of motion, tanh(v/slow), fading over a travel of `over` [m].
+    `kind` is "v", "x" or "V"; "recent_v" or "recent_V", the change from what is behind a first-order
+    lag of `over` [s]: beside the signal its trace would tell too little that is new; or "way", the
+    direction of motion, tanh(v/slow), fading over a travel of `over` [m].
     """
 
     kind: str
@@ -259,6 +260,8 @@ def _unit(one: Input, drive: str) -> str:
 
 
 def _signal(k: int, one: Input) -> str:
+    if one.kind.startswith("recent"):
+        return f"(q.{one.kind[-1]} - z.s{k})"
     return f"z.s{k}" if one.over else f"q.{one.kind}"
 
 
