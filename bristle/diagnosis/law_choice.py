@@ -313,15 +313,20 @@ def choose(pairs: Sequence[LawAndEffects], rule: DecisionRule = BENCH) -> LawAnd
 
 
 def _nearest(pairs: Sequence[LawAndEffects], rule: DecisionRule) -> LawAndEffects:
-    """Return the pair that comes nearest to the runs, the simplest of those that hardly differ."""
+    """Return the pair that comes nearest to the runs, the simplest of those that hardly differ.
+
+    Where all leave many times the noise, effects that a simpler law needs to come as near are no
+    less of a guess than the parts of a law that does so by itself: that one is taken.
+    """
     reached = [pair.reach(rule) for pair in pairs]
     least = best_of(reached, rule)
+    far = least.z > rule.coarse
     alike = [
-        (len(one.model.free()), one.z, k)
+        (far * len(one.effects), len(one.model.free()), one.z, k)
         for k, one in enumerate(reached)
         if one.z <= (1.0 + rule.law_gain) * least.z and not serves_rest(one, least, rule)
     ]
-    return pairs[min(alike)[2]]
+    return pairs[min(alike)[-1]]
 
 
 def equivalents(

@@ -80,11 +80,6 @@ MOST = 40_000
 AS_GOOD = 1.02
 """Loss of a smaller network, by the least, at which it is taken."""
 
-WORTH = 1.0
-"""Largest error on left-out folds, by that without a closure, of a closure that held-out runs judge.
-
-What is left out is often outermost, so that few folds promise less than all runs then give."""
-
 MARGIN = 0.15
 """Share of an input's range over which a closure fades beyond it."""
 
@@ -411,7 +406,7 @@ def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None
     else:
         tried = [*(one for _, drawn in grids for one in drawn), *map(grid.trained, DECAYS)]
     least = min(loss for loss, _, _ in tried)
-    if least > WORTH**2 * without:
+    if least > without:  # few folds promise less than all runs give: what is left out is outermost
         return None
     able = [one for one in tried if one[0] <= AS_GOOD * least]
     loss, _, closure = min(able, key=lambda one: one[:2][::-1])
@@ -446,7 +441,7 @@ def inputs_of(runs: Sequence[Run], position: bool) -> tuple[Input, ...]:
     step, time = max(run.dt for run in runs), _time(runs)
     times = rounded(np.unique(np.maximum(time * np.array(SPREAD), 2.0 * step))).tolist()
     travels, (slow,) = rounded(way * np.array(TRAVELS)).tolist(), rounded(SLOW * np.array([speed]))
-    out = [Input("v", 0.0)]
+    out = [Input("v", 0.0), Input("direction", 0.0, float(slow))]
     if position:
         out.append(Input("x", 0.0))
     out += [Input("recent_v", tau) for tau in times]
@@ -510,13 +505,15 @@ def _history(one: Input, x: Array, v: Array, V: Array, held: Array, dt: float) -
     """Return an input (m,) along a motion and command that are linear between the samples."""
     if one.kind in ("v", "x", "V"):
         return {"v": v, "x": x, "V": V}[one.kind]
+    if one.kind == "direction":
+        return np.asarray(np.tanh(v / one.slow))
     if one.kind == "recent_v":
         return v - faded(v, dt, one.over, float(v[0]))
     keep = np.exp(-dt / one.over) if one.kind == "recent_V" else 0.0
     if one.kind == "recent_V":
         middle = 0.5 * (V[:-1] + held[1:])
         late = lfilter([1.0 - keep], [1.0, -keep], middle, zi=[keep * V[0]])[0]
-        return V - np.append(V[:1], late)
+        return np.asarray(V - np.append(V[:1], late))
     middle = 0.5 * (v[1:] + v[:-1])
     kept, to = np.exp(-np.abs(middle) * dt / one.over).tolist(), np.tanh(middle / one.slow).tolist()
     out, now = [0.0], 0.0

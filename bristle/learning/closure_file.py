@@ -33,9 +33,9 @@ _DIGITS = 9
 class Input:
     """An input of the network: a signal now, or a trace of it.
 
-    `kind` is "v", "x" or "V"; "recent_v" or "recent_V", the change from what is behind a first-order
-    lag of `over` [s]: beside the signal its trace would tell too little that is new; or "way", the
-    direction of motion, tanh(v/slow), fading over a travel of `over` [m].
+    `kind` is "v", "x" or "V"; "direction", tanh(v/slow); "way", the same fading over a travel of
+    `over` [m]; "recent_v" or "recent_V", by how much the signal has left its trace behind a lag of
+    `over` [s]: beside the signal the trace itself tells little that is new.
     """
 
     kind: str
@@ -46,7 +46,7 @@ class Input:
     def words(self) -> str:
         """The group of inputs that it belongs to, for a sentence."""
         return {
-            "v": "velocity", "x": "displacement", "V": "the command",
+            "v": "velocity", "direction": "velocity", "x": "displacement", "V": "the command",
             "recent_v": "the past of the velocity", "recent_V": "the past of the command",
             "way": "the way since the last reversals",
         }[self.kind]  # fmt: skip
@@ -262,6 +262,8 @@ def _unit(one: Input, drive: str) -> str:
 def _signal(k: int, one: Input) -> str:
     if one.kind.startswith("recent"):
         return f"(q.{one.kind[-1]} - z.s{k})"
+    if one.kind == "direction":
+        return f"tanh(q.v / {_n(one.slow)})"
     return f"z.s{k}" if one.over else f"q.{one.kind}"
 
 

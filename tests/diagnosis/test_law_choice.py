@@ -232,6 +232,15 @@ def test_where_none_explains_the_runs_the_law_that_comes_nearest_with_an_effect_
     assert choose([rich, alone]) is alone  # that hardly differs, with fewer parameters
 
 
+def test_where_all_leave_many_times_the_noise_a_law_leads_that_comes_nearest_by_itself():
+    alone, other = pair("modified_bouc_wen", 7.1, "unknown"), pair("dahl", 28.0, "unknown")
+    two = trial(7.0, "dahl", ("gas_spring", "flattening"))
+    other = replace(other, finding=replace(other.finding, trials=(two,)))
+    assert choose([other, alone]) is alone
+    near = replace(other, finding=replace(other.finding, trials=(replace(two, z=6.0),)))
+    assert choose([near, alone]) is near
+
+
 def test_most_of_a_large_error_is_no_explanation_where_a_simpler_law_comes_as_near():
     """Two effects explain most of what one law leaves, and leave as much as another with one."""
     mimic = pair("bingham", 10.9, "effect", ("presliding", "gas_spring"), 3.7)

@@ -147,6 +147,9 @@ def test_folds_of_the_training_runs_choose_what_lowers_their_error(bench_study):
     assert (found.model.effects, found.law) == (("gas_spring",), "")
     known = replace(opened, before=judge(found.model, opened.problem, opened.held_out))
     assert unproven(known, (), (), 2).model.effects == ("gas_spring",), "nothing else is missing"
+    stood_in = judge(opened.before.model.with_effect("duffing"), opened.problem, opened.held_out)
+    found = unproven(opened, (stood_in,), (), 2)
+    assert found.model.effects == ("gas_spring",), "what came first has nothing left to do"
 
 
 def test_in_a_building_identify_alone_refuses_all_laws():
