@@ -33,7 +33,7 @@ from ..identification.start_grid import (
     scored_guesses,
 )
 from ..model.model import Model
-from ..physics.effect import EFFECTS, effects_of, exclude
+from ..physics.effect import CLOSURE, EFFECTS, effects_of, exclude
 from .rule import BENCH
 
 SCORED, ABLE = 0.04, 4
@@ -180,6 +180,7 @@ def joinable(
         for name in (*(problem or Problem([])).damper_effects(base.law), *instruments)
         if name not in base.effects and not any(exclude(name, one) for one in base.effects)
         if EFFECTS[name].changes.rpartition(".")[0] in ("", *base.effects)
+        if EFFECTS[name].kind != CLOSURE  # no effect of physics, which alone a verdict names
     ]
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
