@@ -743,7 +743,7 @@ def other_data(study: Study) -> str:
         return f"{len(files)} {what} added after the present model was identified: {new}."
     numbers = study.history.numbers()
     known = study.history.noted(numbers[-1], "data") if len(numbers) > 1 else ""
-    other = other_than(known, study.data)
+    other = other_than(known, study.data) if known else ""
     if not other:
         return ""
     return (
