@@ -276,7 +276,7 @@ def test_python_consents_by_an_argument_or_a_context(mailed: Path, marker: Path)
     with pytest.raises(TrustError):
         add_effects(study, ["stribeck"])
     assert not marker.exists()
-    assert "seal" in Study.open(mailed, trust=True).model().effects
+    assert "seal" in Study(mailed, trust=True).model().effects
     assert marker.exists()
 
 
