@@ -136,8 +136,9 @@ def quietest(y: Array) -> tuple[float, bool]:
     short = size // min(_PARTS, size // _SHORT)
     parts = rows[quiet][:, : size // short * short].reshape(-1, short)
     found = float(np.sqrt(np.mean(squares[quiet])))
-    if float(np.sqrt(np.mean(_about_curves(parts, 1)))) >= _STILL * found:
-        return found, True
+    at_rest = float(np.sqrt(np.mean(_about_curves(parts, 1)))) >= _STILL * found
+    if at_rest or found >= _RESTING * float(np.std(y)):
+        return found, at_rest
     return float(np.sqrt(np.mean(_about_curves(rows[quiet], _BENDS)))), False
 
 

@@ -555,6 +555,12 @@ def beside_yield(
 
     The law's yield force absorbs such friction but for its form, and forms differ: whatever effect
     suffices by itself is a rival.
+
+    Parameters
+    ----------
+    decision : what the trials lead to
+    before, trials : the model without an effect, and with each one
+    rule : the numbers that decide
     """
     if len(decision.effects) != 1 or not EFFECTS[decision.effects[0]].absorbed_by:
         return decision

@@ -459,7 +459,7 @@ class Study(Viewable):
     def stale(self, verdict: Mapping[str, Any]) -> str:
         """Return how data or model are others than a verdict's, and what to do; "" if not."""
         known = str(verdict.get("data", ""))
-        other = other_than(known, self.data)
+        other = other_than(known, self.data) if known else ""
         if other:
             text = f"{other[:1].upper()}{other[1:]} are no longer those of this verdict."
         elif self.history.is_edited():
@@ -672,7 +672,13 @@ def noted(path: Path, key: str, damaged: str) -> tuple[Note, ...]:
 
 
 def note(study: Study, path: Path, key: str, before: Sequence[Note], files: Sequence[str]) -> None:
-    """Write a note of now, on the present model, behind others; the caller holds the lock."""
+    """Write a note of now, on the present model, behind others; the caller holds the lock.
+
+    Parameters
+    ----------
+    study, path, key : the folder, opened; the file; where its notes are
+    before, files : the notes that it has; the files that the new one is about
+    """
     numbers = study.history.numbers()
     now = datetime.now(UTC).isoformat(timespec="seconds")
     made = Note(now, numbers[-1] if numbers else 0, tuple(files))

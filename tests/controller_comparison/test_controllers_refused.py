@@ -107,7 +107,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["--motions", MOTION, "--controller", "Skyhook", "--step", "0"], "a time above 0 s"),
         (["--motions", MOTION, "--controller", "Skyhook", "--grid", "1"], "3 to 1000"),
         (["--motions", MOTION, "--controller", "Skyhook", "--ensemble", "1"], "2 or more members"),
-        (["--motions", MOTION, "--controller", "Skyhook", "--spread", "wide"], "10% or 0.1"),
+        (["--motions", MOTION, "--controller", "Skyhook", "--spread", "wide"], "0.2% or 0.002"),
     ],
 )  # fmt: skip
 def test_one_message_says_what_is_right(

@@ -101,7 +101,7 @@ def test_the_model_before_the_last_step_stands_beside_it(found: ClosedLoop) -> N
 def test_the_band_is_that_of_the_drag(made: Path, found: ClosedLoop) -> None:
     study = Study(made)
     wide = study.model()
-    errors = {"z_holdout": 3.5, "share_holdout": 0.01}
+    errors = {"z_holdout": 3.5, "error_share_holdout": 0.01}
     study.add_step("less sure", "to see", damper(wide, DRAG, spread=0.2), after=errors)
     try:
         other = closed_loop(study, draws=12)

@@ -23,7 +23,7 @@ def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):
     model = study.model().with_effect("duffing")
     found = identify_study(study, model=model, table=False, starts=1, write=False)
     assert found.before == {}  # of the law at its defaults nobody asks
-    layer = next(note for note in found.notes if note.startswith("layer"))
+    layer = next(note for note in found.notes if "layer: " in note)
     k = float(layer.split("k = ")[1].split()[0])
     assert k == pytest.approx(building(1, True, 6).stiffnesses[0], rel=0.03)
     assert json.dumps(found.as_dict())
