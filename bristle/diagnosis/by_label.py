@@ -304,7 +304,7 @@ def promising(problem: Problem, model: Model) -> list[Dependence]:
         gains = [
             (*fits.gain(j, (numbers - middle)[:, None]), j)
             for j, name in enumerate(fits.names)
-            if "_by_" not in name
+            if not _labels(name.rpartition(".")[0])
         ]
         gain, size, j = max(gains, key=lambda one: one[0])
         name = fits.names[j]

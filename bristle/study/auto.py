@@ -30,6 +30,9 @@ from .study import Study, other_data
 from .study_file import ALL
 from .unproven import unproven
 
+LEFT = 0.5
+"""Share of the error on held-out runs that a step leaves at most for a verdict to be made anew."""
+
 MOST_EFFECTS = 4
 """Effects that `complete` adds at the most: a model that asks for more is the wrong model."""
 
@@ -146,9 +149,9 @@ def _open(found: Diagnosis) -> bool:
 
 
 def halves(step: Step) -> bool:
-    """Return whether a step takes half of the error on held-out runs: the verdict is made anew."""
+    """Return whether a step halves the error on held-out runs: the verdict is made anew."""
     before, after = (one.get("error_share_holdout") for one in (step.before, step.after))
-    return bool(before and after and after <= 0.5 * before)
+    return bool(before and after and after <= LEFT * before)
 
 
 def _gained(
