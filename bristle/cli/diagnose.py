@@ -17,10 +17,6 @@ def add_arguments(parser: Parser) -> None:
         "if no law was chosen); the model's law: keep it"
     )
     parser.add_argument("--law", help=text)
-    text = (
-        "refit the model at the limit of every effect: exact also if the model is far from linear"
-    )
-    parser.flag("--limits", text)
     parser.add_dry_run()
     parser.add_trust()
     parser.add_details()
@@ -36,9 +32,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.view import diagnosed_view
 
     study = Study(arguments.folder)
-    found = diagnose_study(
-        study, law=arguments.law, profile=arguments.limits, write=not arguments.dry_run
-    )
+    found = diagnose_study(study, law=arguments.law, write=not arguments.dry_run)
     verdict = verdict_of(study, found)
     picture = None
     if not arguments.dry_run:

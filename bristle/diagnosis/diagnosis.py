@@ -20,7 +20,7 @@ from ..physics.building import Building
 from ..physics.effect import exclude
 from .by_label import confirmed, with_labels
 from .conclusion import conclude, insufficient
-from .effect_limits import EffectLimit, detectable, effect_limits, profiled, untestable
+from .effect_limits import EffectLimit, detectable, effect_limits, untestable
 from .experiments import separating
 from .inconsistent_runs import contradicted
 from .law_trials import OtherLaw, better_law, try_laws
@@ -46,18 +46,15 @@ NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the la
 # organised, how well parameters are known, and which run would distinguish alternatives.
 
 
-def with_evidence(
-    found: SiteDiagnosis, prepared: Prepared, *, profile: bool = False
-) -> SiteDiagnosis:
+def with_evidence(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a site's finding with limits, patterns, intervals and, where asked for, a next run.
 
     Parameters
     ----------
     found : what the site lacks
     prepared : its runs and its model
-    profile : whether the model is fitted again at every limit, see `profiled_limits`
     """
-    found = _with_limits(found, prepared, profile)
+    found = _with_limits(found, prepared)
     found = _with_intervals(_with_patterns(found, prepared), prepared)
     return _with_labels(found, prepared)
 
@@ -79,7 +76,7 @@ def _known(runs: Sequence[Run]) -> list[Labels]:
     return with_levels(runs[0].drive, [run.V for run in runs], [run.labels for run in runs])
 
 
-def _with_limits(found: SiteDiagnosis, prepared: Prepared, profile: bool) -> SiteDiagnosis:
+def _with_limits(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding with what the data could not show, and what would tell more."""
     problem, model, rule = prepared.searched, prepared.before.model, prepared.rule
     expected = problem.expectation(model)
@@ -91,22 +88,20 @@ def _with_limits(found: SiteDiagnosis, prepared: Prepared, profile: bool) -> Sit
         experiment = separating(members, prepared.problem)
     least = visible if found.noise_known else float("nan")
     found = replace(found, detectable=least, untestable=tuple(hidden), experiment=experiment)
-    return replace(found, limits=_limits(found, prepared, profile))
+    return replace(found, limits=_limits(found, prepared))
 
 
-def _limits(found: SiteDiagnosis, prepared: Prepared, profile: bool) -> tuple[EffectLimit, ...]:
+def _limits(found: SiteDiagnosis, prepared: Prepared) -> tuple[EffectLimit, ...]:
     """Return how large each further effect may be beside the model that a finding names."""
     if found.kind == "insufficient" or found.after is None or not found.noise_known:
         return ()
     model = (found.after if found.kind == "effect" else prepared.before).model
-    known = prepared.known(model)
     able = [
         name
         for name in _able(found, prepared)
         if not any(name == one or exclude(name, one) for one in model.effects)
     ]
-    limits = effect_limits(known, able, found.untestable)
-    return profiled(known, limits) if profile else limits
+    return effect_limits(prepared.known(model), able, found.untestable)
 
 
 def _able(found: SiteDiagnosis, prepared: Prepared) -> list[str]:
@@ -161,7 +156,6 @@ def diagnose_rig(
     building: Building | None = None,
     *,
     identified: bool = False,
-    profile: bool = False,
     say: Progress = silent,
 ) -> Diagnosis:
     """Return what a rig's model is missing, and at which of its sites.
@@ -174,7 +168,6 @@ def diagnose_rig(
         known, stiffnesses and damping are fitted anew
     identified : whether the law was fitted on this bench before: it is then refined, not sought
         anew; in a building it always is
-    profile : whether the model is fitted again at every limit of an effect
     say : called with a few words at each stage
 
     Raises
@@ -186,7 +179,7 @@ def diagnose_rig(
     runs = runs_of_rig(train, holdout, present, building, identified=identified, say=say)
     if runs.lacking is not None:
         return insufficient(runs.lacking)
-    findings = diagnose_lines(runs, say, profile=profile)
+    findings = diagnose_lines(runs, say)
     runs.correct(findings)
     prepared = runs.prepare(DAMPER)
     if prepared is None:
@@ -198,7 +191,7 @@ def diagnose_rig(
     say(f"verdict {found.briefly}")
     if prepared.scope.any_law:
         found = _beside_other_laws(found, prepared, runs.bends, say)
-    findings[DAMPER] = with_evidence(found, prepared, profile=profile)
+    findings[DAMPER] = with_evidence(found, prepared)
     return conclude(findings, runs.context(prepared))
 
 
@@ -225,9 +218,7 @@ def _at_damper(prepared: Prepared, runs: RigRuns, say: Progress) -> tuple[SiteDi
     return diagnose_damper(again, say)
 
 
-def diagnose_lines(
-    runs: RigRuns, say: Progress = silent, *, profile: bool = False
-) -> dict[str, SiteDiagnosis]:
+def diagnose_lines(runs: RigRuns, say: Progress = silent) -> dict[str, SiteDiagnosis]:
     """Return what the isolation layer and the storeys lack, by site; nothing on a bench."""
     findings: dict[str, SiteDiagnosis] = {}
     for site in runs.lines():
@@ -235,7 +226,7 @@ def diagnose_lines(
         prepared = runs.prepare(site)
         assert prepared is not None
         found = settled(diagnose_line(site, prepared), prepared, runs, findings)
-        findings[site] = with_evidence(found, prepared, profile=profile)
+        findings[site] = with_evidence(found, prepared)
     return findings
 
 

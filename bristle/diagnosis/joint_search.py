@@ -42,7 +42,6 @@ def diagnose_laws(
     building: Building | None = None,
     *,
     named: str = "",
-    profile: bool = False,
     kept: KeptFits | None = None,
     say: Progress = silent,
     rule: DecisionRule = BENCH,
@@ -55,7 +54,6 @@ def diagnose_laws(
     present : the model as it is; laws have those of its effects that can join them
     building : the building that the damper is in, None for a test bench
     named : the present law with its variant, "" where nobody chose one
-    profile : whether the model is fitted again at every limit of an effect
     kept : fits of laws that are known already, and where those that are made go
     say : called with a few words at each stage
     rule : the numbers that decide
@@ -73,7 +71,7 @@ def diagnose_laws(
             "no law of a damper can be sought: the runs have neither its force nor its command."
         )
     present, bends = runs.part(DAMPER), runs.bends
-    findings = diagnose_lines(runs, say, profile=profile)
+    findings = diagnose_lines(runs, say)
     if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law at hand
         say("trying every law, with the building as its file has it")
         first = try_laws(*runs.damper, present, bends=bends)
@@ -98,7 +96,7 @@ def diagnose_laws(
     say("whether runs contradict each other")
     found = settled(sought.chosen.finding, prepared, runs, findings)
     say(f"verdict on {sought.chosen.row.law}, {found.briefly}")
-    findings[DAMPER] = with_evidence(found, prepared, profile=profile)
+    findings[DAMPER] = with_evidence(found, prepared)
     laws = sought.verdict(named, present)
     return replace(conclude(findings, runs.context(prepared)), laws=laws)
 

@@ -234,7 +234,6 @@ def diagnose(
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
     device: str | None = None,
-    profile: bool = False,
     write: bool = True,
 ) -> Diagnosis:
     """Find the effects that a model misses, how sure that is, and what else it could be.
@@ -258,9 +257,6 @@ def diagnose(
         As in `bristle.identify`.
     device : str, optional
         As in `bristle.identify`.
-    profile : bool
-        Whether the model is fitted again at the limit of every effect: exact where it is far from
-        linear, and slower.
     write : bool
         Of a study: whether verdict.json is written.
 
@@ -300,7 +296,7 @@ def diagnose(
         _refuse_of_study(holdout=holdout, channels=channels, building=building, device=device)
         if (model is None or _is_all(model)) and not effects:
             law = ALL if _is_all(model) else None
-            return diagnose_study(given, law=law, profile=profile, write=write)
+            return diagnose_study(given, law=law, write=write)
         raise StudyError(
             "diagnose uses the present model of a study: identify the other one first, with "
             "bristle.identification(study, ...)."
@@ -311,9 +307,9 @@ def diagnose(
     compile_ahead()
     runs = _runs(given, holdout, channels, house)
     if free:
-        return diagnose_laws(runs.train, runs.holdout, chosen, house, profile=profile)
+        return diagnose_laws(runs.train, runs.holdout, chosen, house)
     known = is_identified(chosen)
-    found = diagnose_rig(runs.train, runs.holdout, chosen, house, identified=known, profile=profile)
+    found = diagnose_rig(runs.train, runs.holdout, chosen, house, identified=known)
     if not known:
         return found
     return replace(found, error=force_errors(site_models(_rig(runs, house), chosen)))

@@ -65,7 +65,6 @@ def diagnose_study(
     study: Study,
     *,
     law: str | None = None,
-    profile: bool = False,
     write: bool = True,
     say: Say = tell,
 ) -> Diagnosis:
@@ -79,7 +78,6 @@ def diagnose_study(
     study : the folder, opened
     law : "all" seeks the law together with its effects, the model's own keeps it; None seeks it
         where nobody chose one (`laws.law_or_all`)
-    profile : whether the model is fitted again at every limit of an effect
     write : whether to write verdict.json
     say : called with a few words at each stage
 
@@ -110,10 +108,10 @@ def diagnose_study(
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
             kept = LawFits(study, physics) if write else None
-            found = diagnose_laws(*known, named=model.law, profile=profile, kept=kept, say=say)
+            found = diagnose_laws(*known, named=model.law, kept=kept, say=say)
         else:
             fitted = is_identified(model) and not networks
-            found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
+            found = diagnose_rig(*known, identified=fitted, say=say)
     if is_identified(model):
         rig = rig_of(study, model, runs)
         found = replace(found, error=force_errors(site_models(rig, model)))
