@@ -25,8 +25,6 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("scenario", metavar="SCENARIO", help=text)
     text = "file of the package; an older one is replaced; else NAME.ssp in the current folder"
     parser.add_out(text, "FILE.ssp")
-    text = "also write OspSystemStructure.xml with the FMUs beside it"
-    parser.option("--osp", "FOLDER", text, type=Path)
     parser.add_overrides()
     text = "do not estimate the coupling error in other tools (runs nothing)"
     parser.flag("--no-coupling-error", text)
@@ -36,22 +34,19 @@ def add_arguments(parser: Parser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Export; print the files, what is otherwise elsewhere, and the error to expect there."""
-    from ..errors import ScenarioError
+    """Export; print the file, what is otherwise elsewhere, and the error to expect there."""
     from ..system.library import run_name
     from ..system.overrides import parse_overrides
     from ..system.scenario import load_scenario, resolve_scenario
     from ..system.ssp_write import export_ssp
 
-    if arguments.osp is not None and arguments.fmi != 2:
-        raise ScenarioError("--osp goes with FMI 2.0: tools of OSP know no FMUs of FMI 3.0.")
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.scenario)
     scenario = load_scenario(file, overrides)
     target = arguments.out or Path(f"{run_name(file, overrides)}.ssp")
-    exported = export_ssp(scenario, target, arguments.osp, builder(arguments))
+    exported = export_ssp(scenario, target, builder(arguments))
     if not arguments.json:  # at once: the error below takes a while
-        print("\n".join([*map(str, exported.files), *exported.notes]), flush=True)
+        print("\n".join([str(exported.file), *exported.notes]), flush=True)
     expected: tuple[Expected, ...] = ()
     if not arguments.no_coupling_error:
         from ..core.progress import tell
@@ -73,7 +68,7 @@ def _print_json(exported: ExportedPackage, expected: tuple[Expected, ...]) -> No
     from dataclasses import asdict
 
     answer = {
-        "files": [str(file.absolute()) for file in exported.files],
+        "files": [str(exported.file.absolute())],
         "notes": list(exported.notes),
         "coupling_error": [asdict(one) for one in expected],
     }

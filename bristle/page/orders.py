@@ -460,7 +460,7 @@ COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "check": _plain("study", "check", flags=("mask", "correct")),
     "controllers": _controllers,
     "design": _design,
-    "diagnose": _plain("diagnose", words=("law",), flags=("limits",)),
+    "diagnose": _plain("diagnose", words=("law",)),
     "example": _example,
     "export": _plain("export"),
     "export_ssp": _export_ssp,

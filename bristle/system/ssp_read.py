@@ -229,7 +229,6 @@ OMS = "org.openmodelica"
 OWN = "bristle"
 OWN_TYPE = "bristle.run"
 """Type of the annotation that tells the algorithm of a run."""
-OSP_SYSTEM = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
 _SSP = "http://ssp-standard.org/SSP1/SystemStructure"
 NAMESPACES = (

@@ -1,4 +1,4 @@
-"""A scenario as the files of other tools: SystemStructure.ssd and OspSystemStructure.xml."""
+"""A scenario as an SSP package, for other tools."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..fmu.build import BuildPlan, build, plan
 from ..fmu.description import Value, Variable
 from ..units import DIMENSIONS, Unit, alike
 from .model import FILE_PARAMETERS, Component, Connection, System
-from .ssp_read import FMU_TYPE, NAMESPACES, OMS, OSP, OSP_SYSTEM, OWN, OWN_TYPE, STRUCTURE
+from .ssp_read import FMU_TYPE, NAMESPACES, OMS, OSP, OWN, OWN_TYPE, STRUCTURE
 from .toml import signal_file
 
 Element = ElementTree.Element
@@ -189,61 +189,6 @@ def _annotation(parent: Element, kind: str) -> Element:
     return _add(_add(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
 
 
-def osp_text(system: System, sources: Sources) -> str:
-    """Return the text of OspSystemStructure.xml."""
-    root = Element("OspSystemStructure", {"xmlns": OSP_SYSTEM, "version": "0.1"})
-    for name, text in (
-        ("StartTime", "0.0"),
-        ("EndTime", repr(system.stop)),
-        ("BaseStepSize", repr(system.step)),
-        ("Algorithm", "fixedStep"),
-    ):
-        _add(root, name).text = text
-    simulators = _add(root, "Simulators")
-    for component in system.components.values():
-        source = sources[component.name]
-        simulator = _add(simulators, "Simulator", name=component.name, source=source)
-        if component.step is not None:
-            simulator.set("stepSize", repr(component.step))
-        if values := _values(component):
-            initials = _add(simulator, "InitialValues")
-            for variable, value in values:
-                initial = _add(initials, "InitialValue", variable=variable.name)
-                _add(initial, _kind(variable), value=_written(value))
-    changed = [one for one in system.wires if one.changes]
-    if changed:
-        functions = _add(root, "Functions")
-        for one in changed:
-            _add(
-                functions, "LinearTransformation", name=_function(one), factor=repr(one.factor),
-                offset=repr(one.offset),
-            )  # fmt: skip
-    if system.wires:
-        connections = _add(root, "Connections")
-        for one in system.wires:
-            _osp_connection(connections, one)
-    return _text(root)
-
-
-def _function(connection: Connection) -> str:
-    # A dot, which no component has in its name: d_x.in and d.x_in are two.
-    return f"{connection.target}.{connection.input}"
-
-
-def _osp_connection(connections: Element, one: Connection) -> None:
-    if not one.changes:
-        joined = _add(connections, "VariableConnection")
-        _add(joined, "Variable", simulator=one.source, name=one.output)
-        _add(joined, "Variable", simulator=one.target, name=one.input)
-        return
-    into = _add(connections, "SignalConnection")
-    _add(into, "Variable", simulator=one.source, name=one.output)
-    _add(into, "Signal", function=_function(one), name="in")
-    out = _add(connections, "SignalConnection")
-    _add(out, "Signal", function=_function(one), name="out")
-    _add(out, "Variable", simulator=one.target, name=one.input)
-
-
 def _written(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
@@ -258,8 +203,6 @@ def _text(root: Element) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
 
 
-# A scenario as an SSP package, or as a folder with OspSystemStructure.xml, for other tools.
-#
 # What a component is made from (building, controller, record, own effects) is inside its FMU, and
 # so are its values: tools differ in what they make of a package's own.
 
@@ -270,16 +213,14 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 @dataclass(frozen=True)
 class ExportedPackage:
-    """The files that were written, and what is otherwise in other tools, a text each."""
+    """The file that was written, and what is otherwise in other tools, a text each."""
 
-    files: tuple[Path, ...]
+    file: Path
     notes: tuple[str, ...]
 
 
-def export_ssp(
-    scenario: System, file: Path, osp: Path | None = None, build: Build = build
-) -> ExportedPackage:
-    """Write a scenario as an SSP package, and its parts into a folder for OSP.
+def export_ssp(scenario: System, file: Path, build: Build = build) -> ExportedPackage:
+    """Write a scenario as an SSP package.
 
     Parameters
     ----------
@@ -287,15 +228,13 @@ def export_ssp(
         A checked scenario.
     file : Path
         FILE.ssp, in place of an older one.
-    osp : Path, optional
-        Folder that takes OspSystemStructure.xml with the FMUs beside it.
     build : callable
         Builds a planned FMU into a folder and returns its path.
 
     Raises
     ------
     ScenarioError
-        If a file cannot be written.
+        If the file cannot be written.
     BuildError, RecordError
         If an FMU cannot be built.
     """
@@ -306,11 +245,7 @@ def export_ssp(
         inside = {name: f"{RESOURCES}/{fmu.name}" for name, fmu in fmus.items()}
         with writing(file, ScenarioError):
             _pack(file, ssd_text(scenario, inside), list(fmus.values()))
-        written = [file]
-        if osp is not None:
-            with writing(osp, ScenarioError):
-                written += _lay_out(osp, scenario, fmus)
-    return ExportedPackage(tuple(written), tuple(_notes(scenario)))
+    return ExportedPackage(file, tuple(_notes(scenario)))
 
 
 def _fmus(scenario: System, folder: Path, build: Build) -> dict[str, Path]:
@@ -406,13 +341,3 @@ def _write(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     entry.compress_type = zipfile.ZIP_DEFLATED
     entry.external_attr = 0o644 << 16
     archive.writestr(entry, data)
-
-
-def _lay_out(folder: Path, scenario: System, fmus: Mapping[str, Path]) -> list[Path]:
-    folder.mkdir(parents=True, exist_ok=True)
-    structure = folder / "OspSystemStructure.xml"
-    for fmu in fmus.values():
-        (folder / fmu.name).write_bytes(fmu.read_bytes())
-    beside = {name: fmu.name for name, fmu in fmus.items()}
-    structure.write_text(osp_text(scenario, beside), encoding="utf-8")
-    return [structure]

@@ -1,10 +1,9 @@
-"""Scenarios as SSP and OSP packages: valid, whole, and the same rows in libcosim and Ecos."""
+"""Scenarios as SSP packages: valid, whole, and the same rows in libcosim and Ecos."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
-import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -21,9 +20,9 @@ from bristle.engine.cosimulation import Cosimulation, ignore
 from bristle.engine.coupling_error import again_by, expect
 from bristle.errors import ScenarioError
 from bristle.fmu.description import read_description
-from bristle.system.model import Connection, System
+from bristle.system.model import System
 from bristle.system.scenario import load_scenario
-from bristle.system.ssp_write import export_ssp, osp_text
+from bristle.system.ssp_write import export_ssp
 
 AGAIN = again_by(Cosimulation(listen=ignore))
 
@@ -103,7 +102,7 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def package(scenario: Path) -> Path:
     file = scenario.with_name("bench.ssp")
-    assert export_ssp(load_scenario(scenario), file, scenario.with_name("osp")).files[0] == file
+    assert export_ssp(load_scenario(scenario), file).file == file
     return file
 
 
@@ -114,11 +113,11 @@ def rows(scenario: Path) -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the package of a building with damper and controller, closed, beside osp/."""
+    """Return the package of a building with damper and controller, closed."""
     file = tmp_path_factory.mktemp("loop") / "loop.toml"
     file.write_text(LOOP)
     package = file.with_suffix(".ssp")
-    export_ssp(load_scenario(file), package, file.with_name("osp"))
+    export_ssp(load_scenario(file), package)
     return package
 
 
@@ -181,9 +180,8 @@ LIBCOSIM = """
 import json, os, sys
 from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimObserver import CosimObserver
-kind, path, watched, steps = json.loads(sys.argv[1])
-make = {"ssp": CosimExecution.from_ssp_file, "osp": CosimExecution.from_osp_config_file}[kind]
-execution = make(path)
+path, watched, steps = json.loads(sys.argv[1])
+execution = CosimExecution.from_ssp_file(path)
 observer = CosimObserver.create_last_value()
 assert execution.add_observer(observer)
 at = []
@@ -210,15 +208,12 @@ def elsewhere(script: str, *job: Any) -> str:
     return next(line.removeprefix("rows ") for line in lines if line.startswith("rows "))
 
 
-def hold_against_libcosim(
-    kind: str, package: Path, rows: pd.DataFrame, watched: tuple[str, ...]
-) -> None:
+def hold_against_libcosim(package: Path, rows: pd.DataFrame, watched: tuple[str, ...]) -> None:
     """Hold outputs to 1e-9 of their peaks; none that follow an input, which it reads too early.
 
     Nor energy: it ends at the motion that a master shows behind a step, and this one shows none.
     """
-    path = package if kind == "ssp" else package.with_name("osp")
-    found = np.array(json.loads(elsewhere(LIBCOSIM, kind, str(path), watched, len(rows) - 1)))
+    found = np.array(json.loads(elsewhere(LIBCOSIM, str(package), watched, len(rows) - 1)))
     same_rows(found, rows, watched)
 
 
@@ -228,18 +223,14 @@ def same_rows(found: np.ndarray, rows: pd.DataFrame, watched: tuple[str, ...]) -
     assert (np.abs(found - wanted).max(axis=0) <= 1e-9 * np.abs(wanted).max(axis=0)).all()
 
 
-@pytest.mark.parametrize("kind", ["ssp", "osp"])
-def test_libcosim_gives_the_same_rows(kind: str, package: Path, rows: pd.DataFrame) -> None:
+def test_libcosim_gives_the_same_rows(package: Path, rows: pd.DataFrame) -> None:
     need("libcosimpy")
-    hold_against_libcosim(kind, package, rows, WATCHED[2:])
+    hold_against_libcosim(package, rows, WATCHED[2:])
 
 
-@pytest.mark.parametrize("kind", ["ssp", "osp"])
-def test_libcosim_gives_the_same_rows_of_a_closed_loop(
-    kind: str, loop: Path, loop_rows: pd.DataFrame
-) -> None:
+def test_libcosim_gives_the_same_rows_of_a_closed_loop(loop: Path, loop_rows: pd.DataFrame) -> None:
     need("libcosimpy")
-    hold_against_libcosim(kind, loop, loop_rows, MOVED)
+    hold_against_libcosim(loop, loop_rows, MOVED)
 
 
 ECOS = """
@@ -363,10 +354,3 @@ def test_the_package_runs_here_as_the_scenario_does(package: Path, rows: pd.Data
     wanted = rows.select_dtypes("float").to_numpy()
     found = again.select_dtypes("float").to_numpy()
     assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
-
-
-def test_functions_of_osp_have_names_of_their_own() -> None:
-    ends = (("d", "x_in"), ("d_x", "in"))
-    wires = tuple(Connection(*end, "a", "y", 2.0, 0.0, True) for end in ends)
-    text = osp_text(System("t", 1.0, 0.1, "jacobi", {}, wires), {})
-    assert len(set(re.findall(r'<LinearTransformation name="([^"]*)"', text))) == len(ends)

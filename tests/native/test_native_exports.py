@@ -57,8 +57,6 @@ def test_a_package_of_fmi_3_gives_the_rows_of_the_scenario(
 
 def test_what_knows_no_fmi_3_is_refused(scenario: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = ["export-ssp", str(scenario), "-o", "two.ssp"]
-    assert main([*given, "--osp", "osp", *NATIVE]) == 2
-    assert "--osp goes with FMI 2.0" in capsys.readouterr().err
     assert main([*given, "--fmi", "3"]) == 2
     assert "--fmi 3 goes with --native" in capsys.readouterr().err
     assert not Path("two.ssp").exists()
