@@ -170,7 +170,6 @@ def _progress(arguments: argparse.Namespace) -> Iterator[None]:
 
     Where the answer is JSON, a terminal and a program that asks for lines want to: no other pipe.
     """
-    from ..core import progress as snapshots
     from ..core.progress import telling, wants_lines
     from ._line import ProgressLine
 
@@ -179,9 +178,8 @@ def _progress(arguments: argparse.Namespace) -> Iterator[None]:
         with telling(None):
             yield
         return
-    take = snapshots.write if snapshots.wanted() else None
     line = ProgressLine(f"bristle {arguments.command}")
-    with line, telling(line.say), snapshots.watched_by(take):
+    with line, telling(line.say):
         yield
 
 

@@ -16,7 +16,6 @@ from ..identification.problem import Problem, steady, suited, without
 from ..identification.search import in_threads, z_scale
 from ..identification.start_grid import Search, refine
 from ..identification.starts import start_models
-from ..identification.watch import LAW, series
 from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
@@ -126,9 +125,8 @@ def try_laws(
     known: dict[str, float] = {}
 
     def tried(name: str) -> list[LawTrial]:
-        with series(LAW, name):
-            fitted = _fitted(name, train, present, bends, kept)
-            found = [_row(law, one, train, held_out) for law, one in fitted]
+        fitted = _fitted(name, train, present, bends, kept)
+        found = [_row(law, one, train, held_out) for law, one in fitted]
         known.update({row.law: row.trial.z for row in found})
         best = min(dict(known), key=lambda law: known[law])
         count.done(name, f"best so far {best}, z {short_z(known[best])} on held-out runs")

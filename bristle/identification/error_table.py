@@ -26,7 +26,6 @@ from .problem import Problem, Run, steady, suited, without
 from .search import descend, in_threads
 from .start_grid import Search
 from .starts import start_models
-from .watch import LAW, series, watched
 
 CUTOFF = 18.0
 """Hz, of the paper's low-pass (section III-C)."""
@@ -159,8 +158,7 @@ def error_table(
     count = Count("law of the table", len(laws))
 
     def error(law: str) -> LawError:
-        with series(LAW, law):
-            found = _law_error(train, holdout, cutoff, law, starts)
+        found = _law_error(train, holdout, cutoff, law, starts)
         count.done(law)
         return found
 
@@ -176,9 +174,8 @@ def _law_error(
     if steady(train):
         model = without(model, base.driven())
     few = _thinned(train, cutoff) if base.exact() else train
-    whole = None if few is train else train
     begins = start_models(few, model, starts)
-    ends = in_threads(lambda one: _fit_filtered(few, one, cutoff, whole), begins)
+    ends = in_threads(lambda one: _fit_filtered(few, one, cutoff, few is train), begins)
     ends = sorted(ends, key=lambda end: end[1])
     tried, cost = len(ends), ends[0][1]
     agreed = sum(end[1] <= cost * (1.0 + _ALIKE) for end in ends)
@@ -248,7 +245,7 @@ def _rms(parts: list[Array]) -> float:
 
 
 def _fit_filtered(
-    problem: Problem, model: Model, cutoff: float, shown: Problem | None = None
+    problem: Problem, model: Model, cutoff: float, whole: bool = True
 ) -> tuple[Model, float]:
     """Return the least-squares fit of the low-passed force from one start, and its RMS error.
 
@@ -257,7 +254,7 @@ def _fit_filtered(
     problem : the runs
     model : where the search begins
     cutoff : Hz
-    shown : what whoever watches is shown, where `problem` has a part of its samples alone
+    whole : whether the problem has all samples, not a part of them
     """
     none = [(np.zeros(1), np.ones(1), np.zeros((1, 1))) for _ in problem.runs]
     scaled = Search(problem, model, none, model.free(), logarithms=False)
@@ -267,15 +264,8 @@ def _fit_filtered(
         errors = filtered_errors(problem, scaled.at(theta), cutoff)
         return np.nan_to_num(np.concatenate(errors) / unit, nan=1e3, posinf=1e3, neginf=-1e3)
 
-    def share(r: Array) -> float:
-        return _QUADRATIC * _rms([r])
-
-    whole = shown is None
-    with watched(shown or problem, scaled.at, share, last=whole) as accepted:
-        found = descend(
-            residuals, scaled.start, scaled.low, scaled.high, 12,
-            tolerance=_LAST if whole else _FIRST, accepted=accepted,
-        )  # fmt: skip
+    tolerance = _LAST if whole else _FIRST
+    found = descend(residuals, scaled.start, scaled.low, scaled.high, 12, tolerance)
     best = scaled.at(found.theta)
     return replace(best, values=dict(best.values)), error_rms(problem, best, cutoff)
 

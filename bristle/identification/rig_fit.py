@@ -23,7 +23,6 @@ from .fit import Fit, fit, fit_from_starts
 from .problem import Problem, Run, excess_of, z_if_known
 from .rig import DAMPER, ROLES, Rig, Site, at_site
 from .start_grid import initial_guesses, refine
-from .watch import MODEL, series
 
 # The linear law of a layer or storey fitted to its runs, in closed form.
 
@@ -145,11 +144,10 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
             return _fit_line(own, problem, also)
         return _fit_law(own, problem, MORE * count if problem.excess else count, also)
 
-    with series(MODEL, site.shown):
-        found = search(train)
-        if site.is_line and not own.effects:
-            return found  # a line's weights follow its error by themselves
-        return _beside_excess(found, train, search)
+    found = search(train)
+    if site.is_line and not own.effects:
+        return found  # a line's weights follow its error by themselves
+    return _beside_excess(found, train, search)
 
 
 def _beside_excess(found: Fit, problem: Problem, search: Callable[[Problem], Fit]) -> Fit:

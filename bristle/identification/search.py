@@ -17,9 +17,6 @@ import numpy as np
 
 from ..core.arrays import Array
 
-Accepted = Callable[[Array, Array, float], None]
-"""Is told of a step that a search keeps: theta (p,), residuals (n,), cost; it may change none."""
-
 HUBER = 2.0
 """Normalised residual beyond which the loss grows linearly."""
 
@@ -105,7 +102,6 @@ def descend(
     sweeps: int = 20,
     tolerance: float = 1e-4,
     rough: bool = False,
-    accepted: Accepted | None = None,
 ) -> Descent:
     """Minimise the mean robust loss of `residuals` from `theta` within bounds.
 
@@ -117,7 +113,6 @@ def descend(
     sweeps : most Jacobians
     tolerance : relative decrease of the cost below which the search ends
     rough : whether events such as impacts make the residuals jump; see `jacobian`
-    accepted : is told where the search begins and of each step that lowers the cost
 
     Notes
     -----
@@ -130,8 +125,6 @@ def descend(
     r = residuals(theta)
     judged = max(1, int(np.count_nonzero(r)))
     cost = float(np.sum(loss(r))) / judged
-    if accepted:
-        accepted(theta, r, cost)
     if not len(theta):
         return Descent(theta, cost, np.zeros((0, 0)), 0)
     damping, small, sweep, secants = 1e-3, 0, 1, 0
@@ -145,8 +138,6 @@ def descend(
         )
         damping = tried.damping
         if tried.moved:
-            if accepted:
-                accepted(tried.theta, tried.r, tried.cost)
             gain, promised = cost - tried.cost, tried.promised / judged
             change = tried.theta - theta
             slow = gain < tolerance * cost
@@ -257,7 +248,7 @@ Found = TypeVar("Found")
 def in_threads(work: Callable[[Given], Found], items: Sequence[Given]) -> list[Found]:
     """Return what a function makes of each item, in their order, on as many threads as cores.
 
-    Each thread tells and is watched as the one that calls.
+    Each thread tells as the one that calls.
 
     Parameters
     ----------

@@ -17,7 +17,6 @@ from ..physics.effect import EFFECTS, Sizes
 from ..physics.laws import LAWS
 from .problem import Expected, Problem, residuals
 from .search import HUBER, Descent, descend, jacobian, loss, mean_loss
-from .watch import watched
 
 # A model's parameters as a search sees them: numbers of order one, and the residuals over them.
 
@@ -89,11 +88,9 @@ class Search:
 
     def run(self, sweeps: int, tolerance: float = 1e-4) -> tuple[Model, Descent]:
         """Search from the model's own values."""
-        with watched(self.problem, self.at, expected=self.expected) as accepted:
-            found = descend(
-                self.residuals, self.start, self.low, self.high, sweeps, tolerance, self.rough,
-                accepted,
-            )  # fmt: skip
+        found = descend(
+            self.residuals, self.start, self.low, self.high, sweeps, tolerance, self.rough
+        )
         return self.at(found.theta), found
 
 

@@ -22,13 +22,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from itertools import count
 from pathlib import Path
 from types import FrameType
 from typing import IO, Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from ..core import progress
 from ..core.config import Document, toml_content
 from ..core.files import state_folder
 from ..core.interrupt import INTERRUPTED
@@ -60,8 +58,6 @@ from .view_cache import Compiling, ViewCache, fingerprint
 KEPT_LINES = 500
 """Lines of progress that are kept of a job."""
 KEPT_JOBS = 50
-KEPT_SERIES = 60
-"""Series of snapshots of a job; there are some ten laws, and as many sites of a building."""
 LONGEST_ANSWER = 32 * 1024**2
 """Bytes of a command's output that are kept."""
 AGAIN = 3.0
@@ -78,8 +74,6 @@ class Job:
 
     `state` is "running", "cancelling", "done", "failed" or "cancelled"; `lines` what it told on its
     way, `first` the number of the oldest that is kept; `error` why it failed, `output` its answer.
-    `fits` holds the last snapshot of each series of fits, with a number that grows from one to the
-    next of all jobs; none is kept of a job that is done, or was before another one of its study.
     """
 
     number: int
@@ -92,7 +86,6 @@ class Job:
     ended: float | None = None
     error: str = ""
     output: bytes = b""
-    fits: dict[str, tuple[int, dict[str, Any]]] = field(default_factory=dict, repr=False)
     watching: threading.Thread | None = field(default=None, repr=False)
 
     @property
@@ -105,29 +98,15 @@ class Job:
         self.first += len(self.lines) == KEPT_LINES
         self.lines.append(text)
 
-    def showed(self, snapshot: dict[str, Any], number: int) -> None:
-        """Keep a snapshot of a fit in place of the one before of its series."""
-        name = str(snapshot.get("series", ""))
-        if name in self.fits or len(self.fits) < KEPT_SERIES:
-            self.fits[name] = number, snapshot
-
-    def as_dict(self, since: int = 0, after: int = 0) -> dict[str, Any]:
-        """Return what a page shows of it.
-
-        Parameters
-        ----------
-        since : the lines from this number on are among it
-        after : so are the snapshots of fits that are later than this one
-        """
+    def as_dict(self, since: int = 0) -> dict[str, Any]:
+        """Return what a page shows of it, with the lines from a number on."""
         lines = list(self.lines)
-        fits = [{**one, "number": number} for number, one in list(self.fits.values())]
         end = self.ended or time.monotonic()
         return {
             "number": self.number, "study": self.order.study, "what": self.order.what,
             "command": self.order.shown, "state": self.state, "error": self.error,
             "seconds": round(end - self.began, 1), "next": self.first + len(lines),
             "lines": lines[max(0, since - self.first) :], "now": lines[-1] if lines else "",
-            "fits": [one for one in fits if one["number"] > after],
         }  # fmt: skip
 
     def answer(self) -> Any:
@@ -153,7 +132,6 @@ class Jobs:
         self._jobs: dict[int, Job] = {}
         self._lock = threading.Lock()
         self._count = 0
-        self._snapshots = count(1)
 
     def start(self, order: Order) -> Job:
         """Start a command; return its job.
@@ -170,13 +148,11 @@ class Jobs:
                         f"{order.study}: `{one.order.shown}` is at work. Wait for it, or cancel "
                         "it.", HTTPStatus.CONFLICT,
                     )  # fmt: skip
-                if one.order.study == order.study:
-                    one.fits = {}
             self._count += 1
             process = subprocess.Popen(
                 program(order), cwd=self._folder, stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                env={**os.environ, LINES: "lines", progress.VARIABLE: "lines"}, **_own_group(),
+                env={**os.environ, LINES: "lines"}, **_own_group(),
             )  # fmt: skip
             job = Job(self._count, order, process, time.monotonic())
             self._jobs[job.number] = job
@@ -241,14 +217,10 @@ class Jobs:
             job.state = "cancelled" if asked else ENDED.get(code, "failed")
             if job.state == "failed":
                 job.error = "\n".join(wrong) or f"the process ended with code {code}."
-            if job.state == "done":
-                job.fits = {}
 
     def _sort(self, text: str, job: Job, wrong: list[str]) -> None:
-        """Keep snapshots, and progress, which ends in dots, apart from what is wrong."""
-        if (snapshot := progress.read(text)) is not None:
-            job.showed(snapshot, next(self._snapshots))
-        elif text.endswith(" ..."):
+        """Keep progress, which ends in dots, apart from what is wrong."""
+        if text.endswith(" ..."):
             job.told(text.removesuffix(" ..."))
         elif text.strip():
             wrong.append(text)
@@ -403,8 +375,7 @@ class App:
         name = request.query.get("study", "")
         known = bool(name) and _is_study(self.home / file_name(name, "the study"))
         since = _whole(request.query.get("since", "0"))
-        after = _whole(request.query.get("after", "0"))
-        jobs = [job.as_dict(since if job.at_work else 0, after) for job in self.jobs.all()]
+        jobs = [job.as_dict(since if job.at_work else 0) for job in self.jobs.all()]
         return as_json({"jobs": jobs, "stamp": fingerprint(self.home / name) if known else ""})
 
     def _view(self, request: Request) -> Answer:

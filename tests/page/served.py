@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import http.client
 import json
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -12,10 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from bristle.core import progress
-from bristle.page import app
 from bristle.page.app import App, PageServer, serving
 
 
@@ -99,36 +94,3 @@ def page_on(folder: Path, start: bool = True) -> Iterator[Client]:
         app.start = lambda: None  # type: ignore[method-assign]
     with serving(app) as server:
         yield Client(server)
-
-
-def fit_told(step: int, kind: str = "model", **more: Any) -> dict[str, Any]:
-    """Return a snapshot of a fit whose error is 1/2, 1/3, 1/4 ... of the force, step by step."""
-    name = "" if kind == "model" else "tanh"
-    loop = {
-        "run": "run_1", "level": 2.0, "unit": "V", "displacement": [-0.01, 0.0, 0.01, 0.0],
-        "velocity": [0.0, 0.1, 0.0, -0.1], "measured": [-1.0, 5.0, 1.0, -5.0],
-        "model": [-0.5, 4.0, None, -4.0],
-    }  # fmt: skip
-    shares = [1.0 / (2 + k) for k in range(step + 1)]
-    return {
-        "series": f"{kind} {name}".strip(), "kind": kind, "name": name, "law": name or "bingham",
-        "effects": [], "search": 1, "step": step, "share": shares[-1],
-        "z": 30.0 * shares[-1] if kind == "model" else None,
-        "errors": [[30.0 * one for one in shares] if kind == "model" else shares],
-        "parameters": [["f_c", 1.5, "N"]], "loops": [loop], **more,
-    }  # fmt: skip
-
-
-def commands_that_tell(
-    monkeypatch: pytest.MonkeyPatch, told: list[dict[str, Any]], then: str = "time.sleep(60)"
-) -> None:
-    """Let the page start, in place of a command, what tells of a fit and then does more."""
-    lines = [progress.SEPARATOR + json.dumps(one) for one in told]
-    code = f"""
-import os, sys, time
-assert os.environ[{progress.VARIABLE!r}] == "lines"
-for text in ["fitting bingham: start 1 of 4 ...", *{lines!r}]:
-    print(text, file=sys.stderr, flush=True)
-{then}
-"""
-    monkeypatch.setattr(app, "program", lambda order: [sys.executable, "-c", code])

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from made import write_runs
 from page.browsing import Watched, expect, needs_browser, shots
-from page.served import commands_that_tell, fit_told, page_on
+from page.served import page_on
 
 from bristle.examples.make import Choice, make_bench
 from bristle.study import Study, create_study
@@ -73,43 +73,6 @@ def test_the_residual_is_drawn_without_and_with_what_was_found(tmp_path: Path) -
         expect(page.locator("main canvas")).to_have_count(4)
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
         assert not seen.errors
-
-
-@pytest.mark.slow
-def test_a_fit_is_shown_while_it_is_at_work_and_after_it_was_cancelled(
-    browsed: Watched, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page = browsed.page
-    browsed.open("rig", "fit")
-    page.get_by_role("heading", name="No fit yet").wait_for()
-    commands_that_tell(monkeypatch, [fit_told(0), fit_told(3), fit_told(1, "law")])
-    browsed.press("Identify")
-    page.get_by_role("heading", name="The fit at work").wait_for()
-    fits = page.locator("section.fits")
-    fits.get_by_text(
-        "search 1, step 3, RMS error 20.0 % of the force, z = 6.00", exact=True
-    ).wait_for()
-    page.get_by_role("heading", name="No fit yet").wait_for(state="hidden")
-    expect(fits.get_by_text("fitting bingham: start 1 of 4")).to_have_count(1)
-    expect(fits.get_by_role("img", name=re.compile("force over .*RMS error"))).to_have_count(3)
-    expect(fits.get_by_role("list", name="least RMS error of each law so far")).to_have_count(1)
-    expect(fits.get_by_role("status")).to_contain_text("RMS error")
-    assert page.evaluate("document.documentElement.scrollWidth") <= 400
-    page.reload()  # in the middle of it
-    fits.get_by_text("step 3").first.wait_for()
-    browsed.press("Cancel")
-    page.get_by_role("heading", name="The fit was cancelled").wait_for()
-    fits.get_by_text("step 3").first.wait_for()
-    page.get_by_role("heading", name="No fit yet").wait_for()
-    browsed.press("Close")
-    fits.wait_for(state="hidden")
-    commands_that_tell(
-        monkeypatch, [], "print('StudyError: no force.', file=sys.stderr); sys.exit(2)"
-    )
-    browsed.press("Identify")
-    page.get_by_role("heading", name="The fit failed").wait_for()
-    expect(fits.get_by_text("StudyError: no force.")).to_have_count(1)
-    assert not browsed.errors
 
 
 @pytest.mark.slow
@@ -206,12 +169,6 @@ def test_the_hour_on_an_example_from_its_making_to_a_running_fmu(tmp_path: Path)
         page.get_by_role("link", name="Next: fit the model").click()
         page.get_by_role("heading", name="Not identified yet").wait_for()
         seen.press("Identify")
-        page.get_by_role("heading", name="The fit at work").wait_for(timeout=300_000)
-        page.locator("section.fits canvas").nth(3).wait_for(timeout=300_000)
-        for theme in ("light", "dark"):
-            if found := findings(page, source):
-                faults[f"fit at work, {theme}"] = found
-            page.locator("#theme").click()
         page.get_by_role("heading", name="Not identified yet").wait_for(
             state="detached", timeout=300_000
         )

@@ -14,12 +14,11 @@ import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from made import bench_run, write, write_runs
-from page.served import Client, commands_that_tell, fit_told, page_on
+from page.served import Client, page_on
 
 from bristle import trust
 from bristle.cli import main
@@ -247,69 +246,6 @@ def test_one_command_of_a_study_at_a_time_and_cancel_leaves_the_study_as_it_was(
     assert job["state"] == "cancelled"
     assert (home / "rig" / "model.toml").read_bytes() == before
     assert not (home / "rig" / "verdict.json").exists()
-
-
-def told_fits(client: Client, after: int = 0, least: int = 1) -> list[dict[str, Any]]:
-    """Return the fits that the newest job tells of, once it tells of some."""
-    limit = time.monotonic() + 30.0
-    while time.monotonic() < limit:
-        found = client.get(f"/api/state?study=rig&after={after}").json["jobs"][-1]["fits"]
-        if len(found) >= least:
-            return list(found)
-        time.sleep(0.05)
-    raise AssertionError(f"less than {least} fits were told of")
-
-
-def test_a_poll_tells_how_far_a_fit_is_and_tells_it_once(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told = [fit_told(0), fit_told(1), fit_told(2), fit_told(0, "law")]
-    with page_on(home, start=False) as own:
-        commands_that_tell(monkeypatch, told)
-        order = {"what": "identify", "study": "rig", "options": {}}
-        number = own.post("/api/jobs", order).json["number"]
-        model, law = told_fits(own, least=2)  # the last of each series
-        assert model == {**fit_told(2), "number": model["number"]}
-        assert law == {**fit_told(0, "law"), "number": law["number"]}
-        assert own.get(f"/api/state?study=rig&after={law['number']}").json["jobs"][-1]["fits"] == []
-        assert [one["fits"] for one in own.get("/api/home").json["jobs"]] == [[model, law]]
-        assert own.get(f"/api/jobs/{number}").json["now"] == "fitting bingham: start 1 of 4"
-        own.post(f"/api/jobs/{number}/cancel", {})
-        job = own.ended(number, 20.0)
-        assert (job["state"], job["fits"]) == ("cancelled", [model, law])  # how far it came
-        commands_that_tell(monkeypatch, [fit_told(4)], "sys.exit(0)")
-        done = own.ended(own.post("/api/jobs", order).json["number"], 20.0)
-        assert (done["state"], done["fits"]) == ("done", [])
-        assert own.get(f"/api/jobs/{number}").json["fits"] == []
-
-
-def test_a_line_that_is_no_snapshot_is_an_error_of_the_command(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with page_on(home, start=False) as own:
-        commands_that_tell(monkeypatch, [], "print('\\x1e{', file=sys.stderr); sys.exit(1)")
-        job = own.run("identify", "rig", 20.0)
-    assert (job["state"], job["error"], job["fits"]) == ("failed", "\x1e{", [])
-
-
-@pytest.mark.slow
-def test_a_fit_tells_on_its_way_what_its_answer_has_in_the_end(client: Client, home: Path) -> None:
-    order = {"what": "identify", "study": "rig", "options": {"law": "bingham"}}
-    number = client.post("/api/jobs", order).json["number"]
-    seen: dict[str, dict[str, Any]] = {}
-    while client.get(f"/api/jobs/{number}").json["state"] == "running":
-        for one in client.get("/api/state?study=rig").json["jobs"][-1]["fits"]:
-            seen[one["series"]] = one
-        time.sleep(0.05)
-    assert client.get(f"/api/jobs/{number}").json["state"] == "done"
-    answer = json.loads((home / "rig" / "reports" / "identify.json").read_text())
-    values = {name: value for name, value, _ in seen["model"]["parameters"]}
-    assert values == {
-        name: pytest.approx(row["value"], rel=1e-6)
-        for name, row in answer["parameters"].items() if name in values
-    }  # fmt: skip
-    rows = {row["law"]: row for row in answer["table"]}
-    assert {f"law {name}" for name in rows} == set(seen) - {"model"}
 
 
 @pytest.mark.parametrize("after", [0.0, 0.2, 0.5])

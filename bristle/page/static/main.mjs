@@ -2,7 +2,6 @@
 
 import { ServerError, get, post } from "./api.mjs";
 import { commandLine, h, say, seconds, wrong } from "./dom.mjs";
-import { Fits } from "./fits.mjs";
 import { newColours, redraw } from "./plot.mjs";
 import { consentPanel } from "./consent.mjs";
 
@@ -18,7 +17,7 @@ const VIEWS = [
   ["controllers", "Compare controllers"],
 ];
 const AT_WORK = ["running", "cancelling"];
-const [LIVE, OFTEN, SELDOM] = [250, 600, 4000]; // ms between two looks: at a fit, at other work, else
+const [OFTEN, SELDOM] = [600, 4000]; // ms between two looks: while there is work, else
 
 const part = (id) => document.getElementById(id);
 
@@ -31,7 +30,6 @@ class Page {
     this.jobs = [];
     this.lines = new Map(); // of jobs that this page has seen at work
     this.seen = new Map(); // number of a job to its last state
-    this.fits = new Fits();
     this.turn = 0;
     this.listeners = new Set();
     window.addEventListener("hashchange", () => this.open());
@@ -47,7 +45,7 @@ class Page {
     } catch (error) {
       return this.fail(error);
     }
-    this.jobs = this.fits.take(this.home.jobs);
+    this.jobs = this.home.jobs;
     for (const job of this.jobs) this.seen.set(job.number, job.state);
     const place = location.hash.replace(/^#\/?/, "");
     if (!place && this.home.first) {
@@ -173,8 +171,8 @@ class Page {
     clearTimeout(this.timer);
     let busy = false;
     try {
-      const state = await get(`state?after=${this.fits.last}&study=${encodeURIComponent(this.study)}`);
-      this.jobs = this.fits.take(state.jobs);
+      const state = await get(`state?study=${encodeURIComponent(this.study)}`);
+      this.jobs = state.jobs;
       let ended = false;
       for (const job of state.jobs) {
         if (job.lines.length) this.lines.set(job.number, job.lines);
@@ -196,7 +194,7 @@ class Page {
       if (!this.lost) this.fail(error);
       this.lost = true;
     }
-    const pause = busy ? (this.view === "fit" ? LIVE : OFTEN) : SELDOM;
+    const pause = busy ? OFTEN : SELDOM;
     if (!document.hidden) this.timer = setTimeout(() => this.look(), pause);
   }
 

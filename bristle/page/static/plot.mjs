@@ -143,7 +143,7 @@ export class Plot {
   }
 
   /** Draws a line through points; fx and fy bring them into the units of the axes. */
-  line(x, y, name, { width = 1.2, fx = 1, fy = 1, from = 0, to = x.length, breaks = null, dash = null } = {}) {
+  line(x, y, name, { width = 1.2, fx = 1, fy = 1, from = 0, to = x.length, dash = null } = {}) {
     this.clipped((c) => {
       c.strokeStyle = colour(name);
       c.lineWidth = width;
@@ -151,16 +151,7 @@ export class Plot {
       if (dash) c.setLineDash(dash);
       c.beginPath();
       const [sx, ox, sy, oy] = this.scales(fx, fy);
-      let pen = false;
-      for (let k = from; k < to; k++) {
-        if (breaks && breaks(k)) {
-          pen = false;
-          continue;
-        }
-        if (pen) c.lineTo(sx * x[k] + ox, sy * y[k] + oy);
-        else c.moveTo(sx * x[k] + ox, sy * y[k] + oy);
-        pen = true;
-      }
+      for (let k = from; k < to; k++) c.lineTo(sx * x[k] + ox, sy * y[k] + oy);
       c.stroke();
     });
   }

@@ -3,7 +3,6 @@
 import { packed } from "../api.mjs";
 import { consentPanel } from "../consent.mjs";
 import { bars, empty, h, key, number, percent, shown, table, z } from "../dom.mjs";
-import { atWork, fitsAtWork, fitting } from "../fits.mjs";
 import { Plot, extent } from "../plot.mjs";
 
 export async function show(page) {
@@ -20,17 +19,14 @@ export async function show(page) {
   }
   const before = fit.identified ? loops : empty("No fit yet",
     "Identify finds the parameters of the law on the training runs, with intervals, and says what the data do not identify.");
-  const lawsBefore = h("div", {}, laws(fit));
-  page.onJobs(() => (before.hidden = lawsBefore.hidden = atWork(fitting(page))));
   return [
     h("h1", {}, fit.identified ? `The model: ${name}` : `Not identified yet: ${name}`),
     fit.waiting.length ? consentPanel(page, { error: "" }) : null,
     fit.other_data ? h("ul", { class: "findings" }, h("li", {}, h("span", { class: "level-warning" }, "Warning: "), fit.other_data)) : null,
     orders(page, fit),
-    fitsAtWork(page),
     before,
     parameters(fit),
-    lawsBefore,
+    h("div", {}, laws(fit)),
     h("h2", {}, "Equations of the model"),
     fit.about.map((one) => h("div", {}, h("h3", {}, `${one.kind === "law" ? "Law" : "Effect"}: ${one.name}`),
       h("pre", { tabindex: "0" }, one.text), h("p", { class: "soft small" }, one.source))),
