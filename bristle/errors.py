@@ -63,7 +63,7 @@ class DesignError(BristleError):
 
 
 class EnsembleError(BristleError):
-    """An ensemble that cannot be run: its file, its folder or its cluster is wrong."""
+    """An ensemble that cannot be run: its file or its folder is wrong."""
 
 
 class RunError(BristleError):

@@ -31,8 +31,6 @@ BENCH = (
     Shown("identify my_rig", "my_rig/reports/identify.png", "gallery-identify"),
     Shown("compare my_rig", "my_rig/reports/compare.png", "gallery-compare"),
     Shown("diagnose my_rig", "my_rig/reports/diagnose.png", "gallery-diagnose"),
-    Shown("add my_rig gas_spring", "", ""),
-    Shown("identify my_rig --no-table", "my_rig/reports/force_budget.png", "gallery-force-budget"),
 )
 BUILDING = (
     Shown("example building house", "", ""),

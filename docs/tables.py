@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
-
-from bristle.model.equations import formulas
-from bristle.view.formula import formula as formula_html
 
 
 def table(titles: list[str], rows: list[list[str]]) -> str:
@@ -17,28 +13,14 @@ def table(titles: list[str], rows: list[list[str]]) -> str:
 
 
 def formula(text: str) -> str:
-    """Return a docstring's text as Markdown, its formulas set by the browser (MathML)."""
+    """Return a docstring's text as Markdown: its indented formulas are a block of code."""
     first, _, rest = text.strip("\n").partition("\n")
     if first.startswith(" "):  # an effect's text, which begins with its formula
         first, rest = "", text.strip("\n")
-    lines = [first, *textwrap.dedent(rest).splitlines()]
     about, _, equation = first.partition(": ")
     if "=" in equation:
-        set_ = [formula_html(one) for one in formulas(first)]
-        lines[:1] = [f"{about}:", "", *set_, ""]
-    block = [k for k, line in enumerate(lines) if line.startswith("    ")]
-    if block and any("=" in lines[k] for k in block):
-        told = [piece for k in block for piece in _pieces(lines[k].strip())]
-        lines[block[0] : block[-1] + 1] = told
-    return "\n".join(lines).strip("\n")
-
-
-def _pieces(line: str) -> list[str]:
-    """Return the formulas of a line of a docstring set, and the prose between them, a line each."""
-    return [
-        f"{formula_html(one)}\n" if "=" in one else f"{one}\n"
-        for one in re.split(r"[,;]\s{2,}", line)
-    ]
+        first = f"{about}:\n\n    {equation}\n"
+    return f"{first}\n{textwrap.dedent(rest)}".strip("\n")
 
 
 def unit(name: str | None) -> str:

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "compatibility.md").read_text(encoding="utf-8")
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS: dict[str, list[str]] = PROJECT["project"]["optional-dependencies"]
-OF_USERS = ("design", "formats", "records", "native", "cluster")
+OF_USERS = ("design", "formats", "records", "native")
 
 
 def parts(requirement: str) -> tuple[str, dict[str, str]]:

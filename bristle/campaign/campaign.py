@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import queue
 import signal
 import sys
-import time
 from collections import deque
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from math import isfinite, nan
+from math import isfinite
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple, Protocol
 
-from ..core.text import install
 from ..engine import Engine
 from ..engine.results import Array, RunTable, statistic_of
-from ..errors import BristleError, EnsembleError, RunError, ScenarioError
+from ..errors import BristleError, ScenarioError
 from ..fmu.description import Value
-from ..model.draws import in_short
 from ..system.model import Signal, System
 from ..system.overrides import FILES
 from ..system.scenario import load_scenario
-from ..version import __version__
 
 STATISTICS = ("peak", "rms", "max", "min", "mean", "last")
 """What `statistic_of` knows."""
@@ -65,22 +60,17 @@ class Draws(Protocol):
     def values(self, run: int) -> Mapping[str, Value]:
         """Return the values of a run."""
 
-    def with_effect(self, run: int, values: Mapping[str, Value]) -> Mapping[str, Value] | None:
-        """Return those of its second time, with an effect that joins it; None: it is made once."""
-
 
 @dataclass(frozen=True)
 class RunOutcome:
     """What became of a run: the kept `numbers`, all rows in a `table`, or why there are none.
 
-    `reason` is "" for a run that is done. `lost` says of such a run why it could not be simulated
-    with the effect that joins it.
+    `reason` is "" for a run that is done.
     """
 
     run: int = 0
     numbers: tuple[float, ...] = ()
     reason: str = ""
-    lost: str = ""
     table: RunTable | None = None
 
 
@@ -157,31 +147,15 @@ class Campaign:
     def outcome(self, run: int) -> RunOutcome:
         """Return what became of a run of the draws; a failure is an outcome as well."""
         assert self.draws is not None
-        more, lost = tuple[float, ...](), ""
         try:
-            values = self.draws.values(run)
-            numbers = self._numbers(values)
-            joined = self.draws.with_effect(run, values)
-            if joined is not None:
-                more, lost = self._with_effect(joined)
+            numbers = self._numbers(self.draws.values(run))
         except BristleError as error:
             return RunOutcome(run, reason=_one_line(error))
         except Exception as error:  # whatever a user's effect or a foreign FMU raises, runs go on
             return RunOutcome(run, reason=f"{type(error).__name__}: {_one_line(error)}")
         if wrong := self._not_finite(numbers):
             return RunOutcome(run, reason=f"RunError: {wrong}.")
-        return RunOutcome(run, (*numbers, *more), lost=lost)
-
-    def _with_effect(self, values: Mapping[str, Value]) -> tuple[tuple[float, ...], str]:
-        """Return the numbers of a run with the effect that joins it, or NaN and why not."""
-        try:
-            found = self._numbers(values)
-            lost = self._not_finite(found)
-        except BristleError as error:
-            lost = in_short(error)
-        except Exception as error:  # what a user's effect raises costs the second run alone
-            lost = f"{type(error).__name__}: {_one_line(error)}"
-        return (found, "") if not lost else ((nan,) * len(self.keep or ()), lost)
+        return RunOutcome(run, numbers)
 
     def _numbers(self, values: Mapping[str, Value | Signal]) -> tuple[float, ...]:
         table = self.engine.run(self.varied(values))
@@ -205,7 +179,7 @@ def _one_line(error: Exception) -> str:
     return kind + " ".join(str(error).split())
 
 
-# Runs on the cores of this machine, one process each, or on a cluster.
+# Runs on the cores of this machine, one process each.
 
 AHEAD = 2
 """Runs that a process has been given and not yet answered: it never waits for the next."""
@@ -319,157 +293,3 @@ def _end(processes: list[_Process]) -> None:
             p.process.terminate()
     for p in processes:
         p.process.join()
-
-
-# Runs on a Dask cluster; the library is needed, and imported, with --cluster only.
-#
-# A worker that is lost costs the runs that it was at: the scheduler gives them to another one. What
-# has come back is kept on this side. The scheduler cannot tell which of the runs that a lost worker
-# had been given has killed it: so runs that have lost several workers are run again at the end, one
-# alone at a time, and once more in the opposite order, for a worker is seen to be dead only a
-# moment after it has died. One that kills then as well has failed.
-
-CONNECT = 10.0
-"""Seconds in which a scheduler must answer."""
-PATIENCE = 300.0
-"""Seconds for which a cluster may be without any worker before the ensemble gives up."""
-SETTLE = 3.0
-"""Seconds in which the scheduler sees that a worker is dead."""
-_LOOK = 2.0
-"""Seconds without a result after which the workers are looked at."""
-_PER_THREAD = 4
-"""Runs under way per thread of the cluster."""
-_KILLED = "KilledWorker: "
-
-
-def run_cluster(
-    campaign: Campaign, runs: Iterable[int], address: str
-) -> Generator[RunOutcome, None, None]:
-    """Yield what becomes of runs as they end, in whatever order.
-
-    Scenario, records and components are read by the workers: they must see the same files.
-
-    Raises
-    ------
-    EnsembleError
-        If Dask is not installed, nothing answers at the address, the cluster has no worker, or one
-        has another version of bristle.
-    RunError
-        If the scheduler or all workers are lost on the way.
-    """
-    client = _connected(address)
-    try:
-        threads = _threads(client, address)
-        shared = client.scatter(campaign, broadcast=True)
-        waiting, at_once = deque(runs), _PER_THREAD * threads
-        for last in (False, False, True):
-            suspects: deque[int] = deque()
-            for outcome in _gather(client, shared, waiting, at_once):
-                killed = outcome.reason.startswith(_KILLED)
-                if killed and at_once == 1:
-                    time.sleep(SETTLE)  # else the next one goes to a worker that is dead
-                if killed and not last:
-                    suspects.appendleft(outcome.run)
-                else:
-                    yield outcome
-            waiting, at_once = suspects, 1
-            if suspects:
-                time.sleep(SETTLE)
-    finally:
-        client.close(timeout=CONNECT)
-
-
-def _connected(address: str) -> Any:
-    try:
-        from distributed import Client
-    except ImportError:
-        raise EnsembleError(
-            f"--cluster needs Dask's scheduler, which is not installed:  {install('cluster')}"
-        ) from None
-    connect: Any = Client  # only partly typed
-    try:
-        return connect(address, timeout=CONNECT, set_as_default=False)
-    except (OSError, ValueError, RuntimeError) as error:
-        text = " ".join(str(error).split()) or type(error).__name__
-        raise EnsembleError(
-            f"--cluster {address}: no Dask scheduler answers ({text}). "
-            "An address such as tcp://host:8786 is right."
-        ) from None
-
-
-def _threads(client: Any, address: str) -> int:
-    """Return the cluster's number of threads, once its workers have been looked at."""
-    try:
-        client.wait_for_workers(1, timeout=CONNECT)
-    except TimeoutError:
-        raise EnsembleError(
-            f"--cluster {address}: the cluster has no worker. Start one or more."
-        ) from None
-    workers = client.scheduler_info(n_workers=-1)["workers"]
-    try:
-        versions = client.run(_version)
-    except Exception as error:  # whatever a worker answers that cannot load this module
-        text = " ".join(str(error).split()) or type(error).__name__
-        raise EnsembleError(
-            f"--cluster {address}: a worker cannot run bristle ({text}). Install bristle "
-            f"{__version__} there."
-        ) from error
-    for name, version in versions.items():
-        if version != __version__:
-            raise EnsembleError(
-                f"--cluster {address}: the worker {name} has bristle {version}, here is "
-                f"{__version__}. Install the same version there."
-            )
-    return sum(int(worker["nthreads"]) for worker in workers.values())
-
-
-def _version() -> str:
-    """Return the version of bristle where this is called."""
-    return __version__
-
-
-def _gather(
-    client: Any, shared: Any, waiting: deque[int], at_once: int
-) -> Generator[RunOutcome, None, None]:
-    ended: queue.Queue[Any] = queue.Queue()
-    under_way: dict[Any, int] = {}
-    alone = 0.0
-    while waiting or under_way:
-        while waiting and len(under_way) < at_once:
-            run = waiting.popleft()
-            future = client.submit(outcome_of, shared, run, pure=False)
-            under_way[future.key] = run
-            future.add_done_callback(ended.put)
-        try:
-            future = ended.get(timeout=_LOOK)
-        except queue.Empty:
-            alone = 0.0 if _alive(client) else alone + _LOOK
-            if alone >= PATIENCE:
-                raise RunError(f"the cluster has had no worker for {PATIENCE:g} s.") from None
-            continue
-        yield _outcome(under_way.pop(future.key), future)
-
-
-def outcome_of(campaign: Campaign, run: int) -> RunOutcome:
-    """Return what becomes of a run where this is called."""
-    return campaign.outcome(run)
-
-
-def _alive(client: Any) -> bool:
-    if client.status != "running":
-        raise RunError("the connection to the cluster's scheduler is lost.")
-    return bool(client.scheduler_info(n_workers=-1)["workers"])
-
-
-def _outcome(run: int, future: Any) -> RunOutcome:
-    """Return a future's outcome: what the run says of itself, or why it never could."""
-    if future.status == "finished":
-        outcome: RunOutcome = future.result()
-        return outcome
-    if future.status == "cancelled":
-        raise RunError("the connection to the cluster's scheduler is lost.")
-    error = future.exception()
-    if type(error).__name__ == "KilledWorker":
-        return RunOutcome(run, reason=f"{_KILLED}the workers that ran it have died.")
-    text = " ".join(str(error).split())
-    return RunOutcome(run, reason=f"{type(error).__name__}: {text}")

@@ -1,10 +1,10 @@
-"""Runs an ensemble: what is left of it, in processes or on a cluster, kept as it comes."""
+"""Runs an ensemble: what is left of it, in processes, kept as it comes."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +14,9 @@ from ..core.progress import Progress
 from ..core.text import written
 from ..errors import EnsembleError, RunError
 from ..view import Viewable
-from .campaign import Campaign, RunOutcome, run_cluster, run_local
+from .campaign import run_local
 from .ensemble_file import EnsemblePlan, read_ensemble
-from .table import NAME, Failure, RunsTable, failures, notes, parts, quantiles
+from .table import NAME, Failure, RunsTable, failures, quantiles
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,16 +58,6 @@ class Ensemble(Viewable):
     continued: int
     wall_time: float
 
-    @property
-    def parts(self) -> dict[str, dict[str, float]]:
-        """By output, which share of its variance is from what; empty without limits."""
-        return parts(self.plan, self.runs)
-
-    @property
-    def notes(self) -> list[str]:
-        """What is left out of the quantiles that limits leave open, and why; empty without."""
-        return notes(self.plan, self.runs)
-
 
 def ensemble(
     file: str | Path,
@@ -75,15 +65,13 @@ def ensemble(
     out: str | Path | None = None,
     runs: int | None = None,
     workers: int | None = None,
-    cluster: str | None = None,
     fresh: bool = False,
     retry: bool = False,
-    with_limits: bool = False,
     progress: bool = False,
 ) -> Ensemble:
     """Run an ensemble, or what is left of it, and return tables of runs and quantiles.
 
-    Run i has the same values and numbers whatever the order, the number of processes or cluster.
+    Run i has the same values and numbers whatever the order and the number of processes.
 
     Parameters
     ----------
@@ -96,15 +84,10 @@ def ensemble(
         In place of the file's number; more runs continue an ensemble.
     workers : int, optional
         Processes on this machine; else as many as it has cores.
-    cluster : str, optional
-        Address of a Dask scheduler, "tcp://host:8786": its workers run in place of processes here.
     fresh : bool
         Start anew in a folder that holds runs.
     retry : bool
         Run again what failed.
-    with_limits : bool
-        Make each run once more with an effect that the verdict of the file's `[identified]` does
-        not exclude: quantiles have it, and `parts` tells the share of each.
     progress : bool
         Show a progress bar, on a terminal only.
 
@@ -118,7 +101,7 @@ def ensemble(
     EnsembleError, ScenarioError
         The input is wrong, or the folder holds runs of another ensemble; nothing was run.
     RunError
-        The disk is full, or the cluster is lost; what is done is kept.
+        The disk is full; what is done is kept.
     KeyboardInterrupt
         Ctrl-C; what is done is kept.
 
@@ -133,7 +116,7 @@ def ensemble(
     """
     began = time.perf_counter()
     _refuse_types(file, runs=runs, workers=workers)
-    plan = read_ensemble(file, runs, with_limits=with_limits)
+    plan = read_ensemble(file, runs)
     if workers is not None and workers < 1:
         raise EnsembleError(f"--workers {workers}: 1 or more is right.")
     folder = None if out is None else Path(out)
@@ -144,9 +127,7 @@ def ensemble(
         continued = sum(run < plan.runs for run in table.outcomes)
         try:
             with Progress(plan.title, plan.runs, progress and bool(table.left)) as bar:
-                run_left(
-                    plan, table, workers or cores(), lambda: bar.show(len(table.outcomes)), cluster
-                )
+                run_left(plan, table, workers or cores(), lambda: bar.show(len(table.outcomes)))
         except RunError as error:
             raise RunError(f"{error} {_what_is_kept(table)}") from error
         except KeyboardInterrupt:
@@ -171,46 +152,23 @@ def _refuse_types(file: object, **numbers: object) -> None:
             raise EnsembleError(f"{name} is {written(value)}; a whole number from 1 is right.")
 
 
-def run_left(
-    plan: EnsemblePlan,
-    table: RunsTable,
-    workers: int,
-    done: Callable[[], None],
-    cluster: str | None = None,
-) -> None:
-    """Make the runs that a table lacks, here or on a cluster, and keep each in it as it ends.
+def run_left(plan: EnsemblePlan, table: RunsTable, workers: int, done: Callable[[], None]) -> None:
+    """Make the runs that a table lacks, and keep each in it as it ends.
 
     Parameters
     ----------
     plan, table : what is run, and what there is
     workers : processes on this machine
     done : called after each run
-    cluster : address of a scheduler whose workers run in place of processes here
     """
     if not table.left:
         return
-    with closing(run_all(plan.campaign(), table.left, workers, cluster)) as outcomes:
+    campaign = plan.campaign()
+    campaign.prepare()
+    with closing(run_local(campaign, table.left, min(workers, len(table.left)))) as outcomes:
         for outcome in outcomes:
             table.add(outcome)
             done()
-
-
-def run_all(
-    campaign: Campaign, runs: list[int], workers: int = 1, cluster: str | None = None
-) -> Generator[RunOutcome, None, None]:
-    """Yield what becomes of runs of a campaign's draws as they end, in whatever order.
-
-    Parameters
-    ----------
-    campaign : the system, and what is drawn for each run
-    runs : numbers of the draws
-    workers : how many processes run them here
-    cluster : address of a scheduler that runs them in their place
-    """
-    if cluster is not None:
-        return run_cluster(campaign, runs, cluster)
-    campaign.prepare()
-    return run_local(campaign, runs, min(workers, len(runs)))
 
 
 def cores() -> int:

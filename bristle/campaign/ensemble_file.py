@@ -42,14 +42,13 @@ import numpy as np
 
 from ..core import files
 from ..core.config import ANY, Document, Key, Spec
-from ..core.files import read_json
 from ..core.text import command, did_you_mean, unknown, written
 from ..core.toml_lines import KeyPath
 from ..engine.cosimulation import FORMS
 from ..engine.results import make_columns
 from ..engine.run import engine_of
 from ..errors import BristleError, EnsembleError, TrustError
-from ..model.draws import OpenEffect, has_covariance, joint_errors, left_open
+from ..model.draws import has_covariance, joint_errors
 from ..model.model import Model
 from ..model.model_file import read_model
 from ..physics.effect import EFFECTS, plain_name
@@ -190,10 +189,6 @@ def _is_number(value: object) -> bool:
 MOST_RUNS = 10_000_000
 
 
-LEAST_RUNS = 4
-"""Runs per effect that --with-limits needs at least."""
-
-
 @dataclass(frozen=True)
 class EnsemblePlan:
     """A checked ensemble.
@@ -228,32 +223,9 @@ class EnsemblePlan:
     identified: IdentifiedDraws | None = None
     fmus: str = "python"
 
-    @property
-    def left(self) -> bool:
-        """Whether each run is made twice, the second time with an effect that is left open."""
-        return self.identified is not None and bool(self.identified.left)
-
-    @property
-    def columns(self) -> list[str]:
-        """The names of the numbers that are kept of each run."""
-        own = [output.name for output in self.outputs]
-        return [*own, *(f"{name} with it" for name in own)] if self.left else own
-
-    def effect(self, run: int) -> tuple[str, float]:
-        """Return the effect that joins a run, and its size over the limit."""
-        assert self.identified is not None
-        effect, part = self.identified.open_at(self.seed, run)
-        return effect.label, part
-
     def campaign(self) -> Campaign:
         """Return what makes its runs."""
         return Campaign(self.system, engine_of(self.engine, self.fmus), self.outputs, self)
-
-    def with_effect(self, run: int, values: Mapping[str, Value]) -> dict[str, Value] | None:
-        """Return the values of a run with the effect that joins it, None where none does."""
-        if self.identified is None or not self.left:
-            return None
-        return {**values, **self.identified.with_effect(values, self.seed, run)}
 
     def values(self, run: int) -> dict[str, Value]:
         """Return what the varied names are in a run; it depends on seed, run and name alone."""
@@ -358,16 +330,13 @@ def resolve_ensemble(name: str | Path) -> Path:
     )
 
 
-def read_ensemble(
-    name: str | Path, runs: int | None = None, *, with_limits: bool = False
-) -> EnsemblePlan:
+def read_ensemble(name: str | Path, runs: int | None = None) -> EnsemblePlan:
     """Return the checked plan of an ensemble file; `runs` takes the place of the file's number.
 
     Parameters
     ----------
     name : the file, or the name of a stock ensemble
     runs : in place of the file's number
-    with_limits : whether effects that the verdict of its `[identified]` does not exclude are drawn
 
     Raises
     ------
@@ -377,7 +346,7 @@ def read_ensemble(
         If the base scenario is wrong.
     """
     path = resolve_ensemble(name)
-    return _Ensemble(path).plan(runs, with_limits)
+    return _Ensemble(path).plan(runs)
 
 
 class _Ensemble:
@@ -389,7 +358,7 @@ class _Ensemble:
         self.error = self.document.error
         self.given = self.document.read(_SPEC)
 
-    def plan(self, runs: int | None, with_limits: bool = False) -> EnsemblePlan:
+    def plan(self, runs: int | None) -> EnsemblePlan:
         given, engine = self.given, str(self.given["engine"])
         if given["fmus"] == "native" and engine != "fmu":
             self.error(("fmus",), 'fmus = "native" needs engine = "fmu": no other steps FMUs.')
@@ -399,7 +368,7 @@ class _Ensemble:
         if given["scenario"] is None:
             self.document.check()
         base = self._scenario(fixed)
-        identified = self._identified(base, with_limits)
+        identified = self._identified(base)
         if identified is not None:
             fixed = {**identified.fixed, **fixed}
             base = self._scenario(fixed)
@@ -416,29 +385,18 @@ class _Ensemble:
         content = hashlib.sha256(scenario_text(base).encode())
         for file in _files_read(base, varied):
             content.update(file.read_bytes())
-        plan = EnsemblePlan(
+        return EnsemblePlan(
             self.path, given["title"] or base.title, base, engine, runs or given["runs"],
             given["seed"], varied, outputs, content.hexdigest()[:16], identified,
             given["fmus"],
         )  # fmt: skip
-        _refuse_few(plan)
-        return plan
 
-    def _identified(self, base: System, with_limits: bool) -> IdentifiedDraws | None:
+    def _identified(self, base: System) -> IdentifiedDraws | None:
         """Return what `[identified]` says, None where there is none or it is wrong."""
-        if "identified" not in self.document.data:
-            if with_limits:
-                raise EnsembleError(
-                    f"{self.path}: --with-limits needs [identified], with the study whose verdict "
-                    "has the limits."
-                )
-            return None
-        if self.document.found:
+        if "identified" not in self.document.data or self.document.found:
             return None
         try:
-            return read_identified(
-                self.given["identified"], self.path.parent, base, with_limits=with_limits
-            )
+            return read_identified(self.given["identified"], self.path.parent, base)
         except EnsembleError as error:
             self.error(("identified",), f"[identified]: {error}")
             return None
@@ -544,16 +502,6 @@ class _Ensemble:
         return tuple(dict.fromkeys(outputs))
 
 
-def _refuse_few(plan: EnsemblePlan) -> None:
-    """Refuse an ensemble with fewer runs than its effects need."""
-    effects = len(plan.identified.left) if plan.identified is not None else 0
-    if plan.runs < LEAST_RUNS * effects:
-        raise EnsembleError(
-            f"--with-limits draws {effects} effects in turn: {LEAST_RUNS * effects} runs or more "
-            f"are right, and {plan.runs} are asked for."
-        )
-
-
 def place_of(name: str, base: System, engine: str) -> str:
     """Return where the value of a name goes; see `Varied`.
 
@@ -637,7 +585,7 @@ def _files_read(base: System, varied: tuple[Varied, ...]) -> list[Path]:
 
 # A damper in an ensemble as a study has identified it: its parameters are drawn together.
 
-_DRAW, _JOINT = "left open", "identified"
+_JOINT = "identified"
 
 
 @dataclass(frozen=True)
@@ -690,13 +638,11 @@ class Places:
 
 @dataclass(frozen=True)
 class IdentifiedDraws:
-    """The parameters of a component that are drawn together, and what limits leave open.
+    """The parameters of a component that are drawn together.
 
     `names` of the scenario ("damper.sigma_a") with their values `centre` and bounds `low`, `high`
     in SI; `root` rows that make their errors of independent standard normal numbers; `fixed` what
-    the model sets besides; `places` of its parameters in the scenario; `left` effects that the
-    study's runs do not exclude, drawn in turn; `notes` on effects that are not; `folder` of the
-    study.
+    the model sets besides.
     """
 
     names: tuple[str, ...]
@@ -705,10 +651,6 @@ class IdentifiedDraws:
     high: tuple[float, ...]
     root: tuple[tuple[float, ...], ...]
     fixed: Mapping[str, Value]
-    places: Places
-    folder: str
-    left: tuple[OpenEffect, ...] = ()
-    notes: tuple[str, ...] = ()
 
     def draw(self, seed: int, run: int) -> dict[str, float]:
         """Return the values of a run, from its number and the seed alone."""
@@ -728,38 +670,8 @@ class IdentifiedDraws:
             )
         )
 
-    def open_at(self, seed: int, run: int) -> tuple[OpenEffect, float]:
-        """Return the effect of a run, and its size over the limit."""
-        effect = self.left[run % len(self.left)]
-        return effect, effect.part(share(seed, run, _DRAW))
 
-    def with_effect(self, values: Mapping[str, Value], seed: int, run: int) -> dict[str, Value]:
-        """Return what a run's effect changes of the scenario's values.
-
-        Parameters
-        ----------
-        values : drawn, by the names of the scenario
-        seed, run : which tell the effect and its size
-        """
-        effect, part = self.open_at(seed, run)
-        present = {**self.fixed, **values}
-        bounds = dict(zip(self.names, zip(self.low, self.high, strict=True), strict=True))
-        found: dict[str, Value] = {}
-        for name, by in effect.moved.items():
-            full = self.places.of(name)
-            if full in bounds:
-                low, high = bounds[full]
-                found[full] = min(max(float(present[full]) + by * part, low), high)
-        own = {f"{effect.name}.{name}": value for name, value in effect.own(part).items()}
-        for full, value in self.places.of_effect(effect.name, own).items():
-            added = full == self.places.mass and not isinstance(value, bool)
-            found[full] = value + float(present.get(full, 0.0)) if added else value
-        return found
-
-
-def read_identified(
-    table: Mapping[str, Any], beside: Path, base: System, *, with_limits: bool
-) -> IdentifiedDraws:
+def read_identified(table: Mapping[str, Any], beside: Path, base: System) -> IdentifiedDraws:
     """Return what `[identified]` of an ensemble file says.
 
     Parameters
@@ -767,14 +679,13 @@ def read_identified(
     table : as read
     beside : folder of the ensemble file
     base : its scenario
-    with_limits : whether effects that the study's verdict does not exclude are drawn as well
 
     Raises
     ------
     EnsembleError
         If a key is wrong, the model has no covariance, or the component lacks its parameters.
     StudyError
-        If the model, or its verdict, cannot be read.
+        If the model cannot be read.
     """
     folder, model = _model_of(table, beside)
     damper, structure = table["component"], table["structure"]
@@ -788,7 +699,6 @@ def read_identified(
             f"{folder}: its model has no covariance of the parameters to draw from. Identify it "
             f"again:  {command('identify', folder)}"
         )
-    left, notes = _left(folder, model) if with_limits else ([], [])
     errors = joint_errors(model)
     names = [places.of(name) for name in errors.names]
     keep = [k for k, name in enumerate(names) if name]
@@ -798,10 +708,7 @@ def read_identified(
         tuple(float(values[k]) for k in keep) for values in (errors.centre, errors.low, errors.high)
     )
     root = tuple(tuple(map(float, errors.root[k])) for k in keep)
-    return IdentifiedDraws(
-        tuple(names[k] for k in keep), centre, low, high, root, fixed, places, str(folder),
-        tuple(left), tuple(notes),
-    )  # fmt: skip
+    return IdentifiedDraws(tuple(names[k] for k in keep), centre, low, high, root, fixed)
 
 
 def _model_of(table: Mapping[str, Any], beside: Path) -> tuple[Path, Model]:
@@ -840,9 +747,3 @@ def _refuse_others(fixed: Mapping[str, Value], base: System, model: Model) -> No
                 f"the model's law is {model.law}, and {name} ({there[name].kind}) of the scenario "
                 f"has no parameter {rest}. A scenario with a damper of that law is right."
             )
-
-
-def _left(folder: Path, model: Model) -> tuple[list[OpenEffect], list[str]]:
-    """Return what the verdict beside a model does not exclude."""
-    path = folder / "verdict.json"
-    return left_open(read_json(path) if path.is_file() else None, model, folder)

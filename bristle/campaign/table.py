@@ -14,15 +14,12 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.arrays import Array
 from ..core.files import replaced_by, writing
 from ..errors import EnsembleError, RunError
-from ..model.draws import POINT, reach, simulated_whole
 from .campaign import RunOutcome
 from .ensemble_file import EnsemblePlan
 
@@ -34,8 +31,6 @@ NAME = "runs.csv"
 _KIND = "# bristle ensemble"
 _DIGEST = "# digest: "
 DONE, FAILED = "done", "failed"
-EFFECT = ("effect left open", "its size over the limit")
-"""Columns of the effect that joins a run the second time it is made."""
 
 
 class RunsTable:
@@ -68,8 +63,8 @@ class RunsTable:
         return [run for run in range(self.plan.runs) if run not in self.outcomes]
 
     def forget_failures(self) -> None:
-        """Take runs that failed, alone or with an effect, as not yet run."""
-        kept = (one for one in self.outcomes.values() if not (one.reason or one.lost))
+        """Take runs that failed as not yet run."""
+        kept = (one for one in self.outcomes.values() if not one.reason)
         self.outcomes = {one.run: one for one in kept}
         self._rewrite()
 
@@ -113,7 +108,7 @@ class RunsTable:
         rows = [_row(self.plan, self.outcomes[run])[1:] for run in runs]
         index = pd.Index(runs, name="run")
         frame = pd.DataFrame(rows, index=index, columns=columns(self.plan)[1:])
-        for name in self.plan.columns:
+        for name in (output.name for output in self.plan.outputs):
             frame[name] = frame[name].astype("float64")
         frame.attrs["units"] = _units(self.plan)
         return frame
@@ -132,20 +127,18 @@ class RunsTable:
 def columns(plan: EnsemblePlan) -> list[str]:
     """Return the names of the table's columns."""
     varied = [one.name for one in plan.varied]
-    return ["run", "status", "reason", *varied, *(EFFECT if plan.left else ()), *plan.columns]
+    return ["run", "status", "reason", *varied, *(output.name for output in plan.outputs)]
 
 
 def _units(plan: EnsemblePlan) -> dict[str, str]:
     """Return the unit of each number that is kept."""
-    own = [output.unit for output in plan.outputs]
-    return dict(zip(plan.columns, 2 * own if plan.left else own, strict=True))
+    return {output.name: output.unit for output in plan.outputs}
 
 
 def _row(plan: EnsemblePlan, outcome: RunOutcome) -> list[Any]:
     status = FAILED if outcome.reason else DONE
-    numbers = outcome.numbers or (None,) * len(plan.columns)
-    drawn = [*plan.values(outcome.run).values(), *(plan.effect(outcome.run) if plan.left else ())]
-    return [outcome.run, status, outcome.reason or outcome.lost, *drawn, *numbers]
+    numbers = outcome.numbers or (None,) * len(plan.outputs)
+    return [outcome.run, status, outcome.reason, *plan.values(outcome.run).values(), *numbers]
 
 
 def _line(plan: EnsemblePlan, outcome: RunOutcome) -> bytes:
@@ -193,11 +186,11 @@ def _read(plan: EnsemblePlan, path: Path) -> dict[int, RunOutcome]:
     try:
         for row in rows:
             run, status, reason = int(row[0]), row[1], row[2]
-            numbers = row[len(row) - len(plan.columns) :]
+            numbers = row[len(row) - len(plan.outputs) :]
             if status == FAILED:
                 outcomes[run] = RunOutcome(run, reason=reason)
             else:
-                outcomes[run] = RunOutcome(run, tuple(map(float, numbers)), lost=reason)
+                outcomes[run] = RunOutcome(run, tuple(map(float, numbers)))
     except (ValueError, IndexError, csv.Error) as error:
         raise EnsembleError(
             f"{path}: damaged ({error}). Use --fresh to start again, or another folder."
@@ -208,7 +201,6 @@ def _read(plan: EnsemblePlan, path: Path) -> dict[int, RunOutcome]:
 # What an ensemble says: quantiles of each output, and failures by their reason.
 
 
-VARIES = "all that varies"
 """What the ensemble draws, beside effects that are left open."""
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?([eE][-+]?\d+)?")
@@ -226,8 +218,7 @@ class Failure:
 def quantiles(plan: EnsemblePlan, frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per output: unit, quantiles of the runs that are done, their number.
 
-    Quantiles are linear between order statistics; without a run they are NaN. Effects that are
-    left open take those below the median down and those above it up.
+    Quantiles are linear between order statistics; without a run they are NaN.
     """
     import pandas as pd
 
@@ -236,68 +227,10 @@ def quantiles(plan: EnsemblePlan, frame: pd.DataFrame) -> pd.DataFrame:
     for output in plan.outputs:
         values = done[output.name].to_numpy()
         found = np.quantile(values, LEVELS) if len(values) else np.full(len(LEVELS), np.nan)
-        if plan.left and len(values):
-            found = _widened(found, [*_reaches(plan, done, output.name).values()])
         rows.append([output.unit, *map(float, found), len(values), len(frame) - len(values)])
     titles = ["unit", *(f"{100 * level:g} %" for level in LEVELS), "done", "failed"]
     index = pd.Index([output.name for output in plan.outputs], name="output")
     return pd.DataFrame(rows, index=index, columns=titles)
-
-
-def parts(plan: EnsemblePlan, frame: pd.DataFrame) -> dict[str, dict[str, float]]:
-    """Return by output which share of the variance is from what, the largest first.
-
-    "all that varies" is what the ensemble draws; the others are effects that are left open.
-    """
-    done = frame[frame["status"] == "done"]
-    found = {}
-    for output in plan.outputs if plan.left and len(done) > 1 else ():
-        ends = _reaches(plan, done, output.name)
-        power = {name: 0.5 * (low**2 + high**2) / POINT**2 for name, (low, high) in ends.items()}
-        power[VARIES] = float(np.var(done[output.name].to_numpy(), ddof=1))
-        whole = sum(power.values())
-        order = sorted((name for name in power if power[name] > 0.0), key=lambda n: -power[n])
-        found[output.name] = {name: power[name] / whole for name in order}
-    return found
-
-
-def notes(plan: EnsemblePlan, frame: pd.DataFrame) -> list[str]:
-    """Return what is said of effects that the quantiles do not have."""
-    if plan.identified is None:
-        return []
-    lost = _simulated(plan, frame[frame["status"] == "done"])[1] if plan.left else {}
-    return [
-        *(f"with {name} not every run could be made ({why}): the quantiles are without it"
-          for name, why in lost.items()),
-        *plan.identified.notes,
-    ]  # fmt: skip
-
-
-def _simulated(
-    plan: EnsemblePlan, done: pd.DataFrame
-) -> tuple[dict[str, list[int]], dict[str, str]]:
-    """Return the runs of each effect, and of others why they could not all be made with it."""
-    tried: dict[str, list[int | str]] = {}
-    made = done[plan.columns[-1]].notna()
-    for run, name, why in zip(done.index, done[EFFECT[0]], done["reason"], strict=True):
-        tried.setdefault(str(name), []).append(int(run) if made[run] else str(why))
-    return simulated_whole(tried)
-
-
-def _reaches(plan: EnsemblePlan, done: pd.DataFrame, output: str) -> dict[str, tuple[float, float]]:
-    """Return by effect how far it takes an output down, and up, at 95 %."""
-    changes = done[f"{output} with it"] - done[output]
-    whole, _ = _simulated(plan, done)
-    return {name: reach(changes[runs].to_numpy()) for name, runs in whole.items()}
-
-
-def _widened(found: Array, reaches: list[tuple[float, float]]) -> Array:
-    """Return quantiles at `LEVELS` with the reach of effects below and above the median."""
-    below, above = (np.sqrt(sum(ends[side] ** 2 for ends in reaches)) / POINT for side in (0, 1))
-    away = np.array([NormalDist().inv_cdf(level) for level in LEVELS])
-    middle = found[LEVELS.index(0.5)]
-    more = np.abs(away) * np.where(away < 0.0, below, above)
-    return np.asarray(middle + np.sign(away) * np.hypot(found - middle, more))
 
 
 def failures(outcomes: Iterable[RunOutcome]) -> list[Failure]:

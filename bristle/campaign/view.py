@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.text import command, percent, plain
-from ..model.draws import widest
-from ..view.blocks import Block, Figure, Next, Table, Text, View, view_of
+from ..core.text import plain
+from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import BLUE, GREY, INK, PALE, VERMILION, Page, label, look, ramp
 from .best_constant import Passive
 from .ensemble import Ensemble
-from .table import VARIES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +28,7 @@ _SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (
 
 @view_of(Ensemble)
 def ensemble_view(found: Ensemble) -> View:
-    """Return the view of an ensemble: its quantiles, what widens them, and what failed."""
+    """Return the view of an ensemble: its quantiles, and what failed."""
     done = int((found.runs["status"] == "done").sum())
     before = f", {found.continued} of them from before" if found.continued else ""
     table = found.quantiles
@@ -55,31 +53,11 @@ def ensemble_view(found: Ensemble) -> View:
         title,
         (
             Table(("output", *columns), rows, range(1, len(columns) + 1)),
-            *_limits(found),
             Text(f"{len(found.runs)} runs{before} in {found.wall_time:.1f} s"),
-            *(Text(note, "note") for note in (*found.notes, *failures)),
+            *(Text(note, "note") for note in failures),
         ),
         figure,
     )  # fmt: skip
-
-
-def _limits(found: Ensemble) -> list[Block]:
-    """Return what of each output's variance is from effects that are left open; none without."""
-    plan, parts = found.plan, found.parts
-    if plan.identified is None or not parts:
-        return []
-    rows = [
-        [output, ", ".join(f"{name} {percent(part, 0)}" for name, part in [*own.items()][:3])]
-        for output, own in parts.items()
-    ]
-    table = Table(("output", "of its variance"), rows)
-    most, _ = widest([*parts.values()], (VARIES,))
-    if not most:
-        return [table, Text("No effect that the runs do not exclude widens them by much.")]
-    name = most.partition(" ")[0]
-    see = command("plan", plan.identified.folder, "--see", name)
-    told = f"{name} widens them most, which the runs do not exclude."
-    return [table, Text(told), Next(see, "plans a test that shows it")]
 
 
 @view_of(Passive)

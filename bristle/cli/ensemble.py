@@ -19,23 +19,14 @@ def add_arguments(parser: Parser) -> None:
     """Add the arguments of `bristle ensemble`."""
     parser.add_argument("file", metavar="FILE", help="ensemble file, or name of a stock ensemble")
     parser.option("--runs", "N", "number of runs, instead of the file's", type=int)
-    where = parser.add_mutually_exclusive_group()
-    text = "number of processes; else one per core"
-    where.add_argument("--workers", type=int, metavar="N", help=text)
-    text = "run on a Dask cluster, e.g. tcp://host:8786"
-    where.add_argument("--cluster", metavar="ADDRESS", help=text)
+    parser.option("--workers", "N", "number of processes; else one per core", type=int)
     text = (
         "folder of runs, quantiles and figure; a stopped ensemble continues there; else "
         "results/NAME/"
     )
     parser.add_out(text)
     parser.flag("--fresh", "start again and replace earlier runs")
-    parser.flag("--retry", "repeat runs that failed, alone or with an effect")
-    text = (
-        "widen the quantiles by the effects that the verdict of [identified] does not "
-        "exclude, and list the part of each in the variance"
-    )
-    parser.flag("--with-limits", text)
+    parser.flag("--retry", "repeat runs that failed")
     parser.add_no_figure()
     parser.add_trust()
     parser.add_json()
@@ -54,10 +45,8 @@ def main(arguments: argparse.Namespace) -> int:
             out=folder,
             runs=arguments.runs,
             workers=arguments.workers,
-            cluster=arguments.cluster,
             fresh=arguments.fresh,
             retry=arguments.retry,
-            with_limits=arguments.with_limits,
             progress=True,
         )
     except EnsembleInterrupted as stopped:
@@ -102,8 +91,6 @@ def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
         "continued": found.continued,
         "wall_time": round(found.wall_time, 3),
         "quantiles": table[["unit", *levels]].reset_index().to_dict("records"),
-        "parts": found.parts,
-        "notes": found.notes,
         "failures": [asdict(failure) for failure in found.failures],
         "files": {name: str(path.absolute()) for name, path in files.items()},
     }

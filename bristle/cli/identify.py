@@ -68,20 +68,16 @@ def main(arguments: argparse.Namespace) -> int:
     )
     tell("drawing")
     if not arguments.dry_run:
-        keeps("The new step is kept in the study's history; its pictures were not all drawn.")
-    picture = parts = None
+        keeps("The new step is kept in the study's history; its picture was not drawn.")
+    picture = None
     if not arguments.dry_run:
-        from ..study.pictures import draw_budget
         from ..study.view import draw_identified
         from ..view.style import png
 
         picture = study.write_report("identify.png", png(draw_identified(found), 110))
-        budget = draw_budget(found.holdout or found.train, found.at.model)
-        if budget is not None:
-            parts = study.write_report("force_budget.png", png(budget, 110))
         study.write_report("identify.json", json_text(found.as_dict()) + "\n")
     answer = {**found.as_dict(), "picture": str(picture.absolute()) if picture else None}
-    print_study_answer(arguments, answer, identified_with_next(found, study.folder), picture, parts)
+    print_study_answer(arguments, answer, identified_with_next(found, study.folder), picture)
     return 0
 
 

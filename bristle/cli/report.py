@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 
 from ._options import Parser, print_json
 
@@ -28,7 +27,6 @@ def main(arguments: argparse.Namespace) -> int:
     """Write the report; print where it is."""
     from ..core.files import write_whole
     from ..core.progress import tell
-    from ..page.embedded import linked_section
     from ..report.study_page import gather, render
     from ..study.study import Study
     from ..study.view import steps_table
@@ -36,8 +34,6 @@ def main(arguments: argparse.Namespace) -> int:
 
     study = Study(arguments.folder)
     content = gather(study, open_test=not arguments.keep_test_closed, what_if=arguments.what_if)
-    if content.now is not None:
-        content = replace(content, linked=linked_section(content.now))
     tell("drawing")
     page = render(content)
     if arguments.out is None:

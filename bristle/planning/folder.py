@@ -497,12 +497,6 @@ def planned_for(runs: Sequence[Measurement], plan: PlanFolder) -> list[PlannedRu
     return found
 
 
-def shows(run: Measurement, planned: PlannedRun, motion: str) -> bool:
-    """Return whether a measured run's motion is that of a planned one; see `compared`."""
-    shown = _shown(run, motion)
-    return run.has(shown) and _aligned(run, planned, motion, shown)[0] >= ALIKE
-
-
 def compared(run: Measurement, planned: PlannedRun, motion: str) -> Pair:
     """Return how a measured run differs from the planned one.
 

@@ -31,16 +31,13 @@ from ..model.equations import equations
 from ..physics.drive import DRIVES
 from ..physics.forms import shown_law, split_form
 from ..physics.laws import LAWS
-from ..planning.folder import FILE, PlanFolder, read_plan, shows
-from ..planning.plan import OUTCOMES
 from ..prediction.export import write_editable
 from ..study.history import HistoryStep, history_steps
-from ..study.pictures import budgets, draw_budget, sentence, staircase_page
 from ..study.read_again import devices_of
 from ..study.runs import names_of_runs, place_of_run
 from ..study.steps import NOT_PROVEN
 from ..study.study_file import TEST
-from ..study.view import channel_table, or_nothing, steps_table, story_view
+from ..study.view import budget_text, channel_table, steps_table, story_view
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
@@ -256,9 +253,8 @@ class Content:
 
     `now` is the present model on held-out runs, `before` the model before the last effect that was
     added, `test` the present one on the test runs; None where there is none. `trouble` says why the
-    model could not be compared. `what_if` is the section with sliders and `linked` that of
-    pictures in which samples can be chosen, "" without; `damper` the damper with what predicts it,
-    None where the model could not be compared.
+    model could not be compared. `what_if` is the section with sliders, "" without; `damper` the
+    damper with what predicts it, None where the model could not be compared.
     """
 
     study: Study
@@ -273,7 +269,6 @@ class Content:
     trouble: str
     test: Comparison | None = None
     what_if: str = ""
-    linked: str = ""
     damper: SiteModel | None = None
 
 
@@ -317,8 +312,12 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
 
 
 def model_section(content: Content) -> str:
-    """Return the section: equations with intervals, the force budget; "" where there is neither."""
-    parts = [*_equations(content), *_budget(content)]
+    """Return the section: equations with intervals, and what makes the force; "" without both."""
+    parts = _equations(content)
+    if content.damper is not None:
+        site = content.damper.site
+        said = budget_text(site.holdout or site.train, content.damper.model)
+        parts += [html.paragraphs(said)] if said else []
     return html.section("The model", *parts) if parts else ""
 
 
@@ -339,82 +338,6 @@ def _equations(content: Content) -> list[str]:
         "95 % intervals; a number without one was held, or these data do not identify it."
     )
     return [*parts, html.paragraphs(note, kind="soft")]
-
-
-def _budget(content: Content) -> list[str]:
-    at = content.damper
-    if at is None:
-        return []
-
-    problem = at.site.holdout or at.site.train
-    page, said = draw_budget(problem, at.model), sentence(budgets(problem, at.model))
-    if page is None or not said:
-        return []
-    caption = (
-        "The parts of the model's force in single cycles, stacked: what resists above and below "
-        "zero, their sum the line. An effect's part is what the force loses without it."
-    )
-    return [
-        "<h3>The force budget</h3>",
-        html.paragraphs(said),
-        html.figure(png(page), said, caption),
-    ]
-
-
-# The newest plan of a study in its report: the next tests, and what they will show.
-
-
-def plan_section(study: Study) -> str:
-    """Return the section of the newest plan in a study's folder, "" where there is none."""
-    folders = sorted(study.folder.glob(f"plan*/{FILE}"), key=lambda file: file.stat().st_mtime)
-    if not folders:
-        return ""
-    folder = folders[-1].parent
-    try:
-        plan = read_plan(folder)
-        told = json.loads((folder / OUTCOMES).read_text(encoding="utf-8"))
-        header, rows = told["header"], told["rows"]
-    except (BristleError, OSError, ValueError, KeyError, TypeError) as error:
-        return html.section("Next tests", html.paragraphs(f"{folder.name} cannot be read: {error}"))
-    performed = _performed(study, plan, others=len(folders) > 1)
-    lead = (
-        f"The tests of {folder.name} are measured: their runs are in this study."
-        if performed
-        else f"{folder.name} holds tests for the rig's controller, one file each."
-    )
-    runs = [[run.name, run.purpose, run.about] for run in plan.runs]
-    return html.section(
-        "Planned tests" if performed else "Next tests",
-        html.paragraphs(lead, kind="lead"),
-        html.table(["run", "for", "what"], runs),
-        html.table(header, rows, numbers=(2, 3)),
-        *(() if performed else _pictures(folder, plan)),
-    )
-
-
-def _performed(study: Study, plan: PlanFolder, others: bool) -> bool:
-    """Return whether the runs of a plan are in a study.
-
-    Where there are `others`, names are not enough: plans that are made before any is measured call
-    their runs alike.
-    """
-    there = {Path(run.file).stem for run in study.settings.runs}
-    if not others or not all(run.name in there for run in plan.runs):
-        return all(run.name in there for run in plan.runs)
-    measured = [(Path(run.source).stem, run) for run in study.read()]
-    return all(
-        any(name == planned.name and shows(run, planned, plan.motion) for name, run in measured)
-        for planned in plan.runs
-    )
-
-
-def _pictures(folder: Path, plan: PlanFolder) -> list[str]:
-    found = []
-    for run in plan.runs:
-        file = folder / f"{run.name}.png"
-        if file.is_file():
-            found.append(html.figure(file.read_bytes(), run.about, f"{run.name}: {run.about}."))
-    return found
 
 
 def study_report(study: Study) -> str:
@@ -449,7 +372,6 @@ def render(content: Content) -> str:
         curves_section(study, content.model.effects),
         content.what_if,
         _where(content),
-        content.linked,
         _on_test_runs(content),
         model_section(content),
         _parameters(content),
@@ -457,7 +379,6 @@ def render(content: Content) -> str:
         html.section("The verdict in detail", html.blocks(verdict.details))
         if verdict.details
         else "",
-        plan_section(study),
         _reproduce(content),
     ]
     foot = (
@@ -533,21 +454,10 @@ def _on_test_runs(content: Content) -> str:
 
 
 def _history(content: Content) -> str:
-    with_z = [one for one in content.history_steps if one.z is not None]
     table = steps_table(content.history_steps)
     rows = [[*row, step.why] for row, step in zip(table.rows, content.steps, strict=True)]
     table = table._replace(header=[*table.header, "why"], rows=rows)
-    picture = ""
-    if with_z:
-        fall = " → ".join(or_nothing(one.z) for one in with_z)
-        picture = html.figure(
-            png(staircase_page(with_z)),
-            f"The staircase of the history: z on held-out runs {fall}",
-            "The error of each model of the history over the noise, on runs that no fit has seen "
-            "(blue) and on those that it was fitted to (grey); in words the error on the first. "
-            "These data cannot distinguish a model at the green line from a true one.",
-        )  # fmt: skip
-    return html.section("How the error fell", picture, html.blocks((table,)))
+    return html.section("How the error fell", html.blocks((table,)))
 
 
 def _before_after(content: Content) -> str:

@@ -213,10 +213,7 @@ def _learned(study: Path) -> Iterator[Path]:
                 yield file
 
 
-OF_MODEL = (
-    "identify.png", "identify.json", "force_budget.png", "compare.png", "diagnose.png",
-    "report.html",
-)  # fmt: skip
+OF_MODEL = ("identify.png", "identify.json", "compare.png", "diagnose.png", "report.html")
 """Reports that show a model: its step keeps them when another becomes the present one."""
 
 EARLIER = "verdict_before_runs.json"

@@ -55,8 +55,6 @@ from .study import Study, behind_data
 from .study_file import ALL
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..diagnosis.law_trials import LawTrial
 
 
@@ -173,21 +171,6 @@ class Identified(Viewable):
     def unidentified(self) -> tuple[str, ...]:
         """Names of the parameters that the data do not identify."""
         return tuple(name for name in self.fit.unidentified if name not in self.idle)
-
-    def plot_budget(self) -> Figure:
-        """Return the figure of the force budget: what the law's parts and the effects make of it.
-
-        Raises
-        ------
-        StudyError
-            If the site that is shown is no damper.
-        """
-        from .pictures import draw_budget
-
-        page = draw_budget(self.holdout or self.train, self.at.model)
-        if page is None:
-            raise StudyError(f"{self.at.site.name}: only a damper has a force budget.")
-        return page.figure
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""

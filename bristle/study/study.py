@@ -95,7 +95,7 @@ class Study(Viewable):
     >>> study = bristle.Study.create(folder / "my_rig", [folder / "run.csv"], law="bingham")
     >>> study.model().law, [step.what for step in study.steps()]
     ('bingham', ['begin with bingham'])
-    >>> figure = study.plot()  # the run; after an identification how the error fell
+    >>> figure = study.plot()  # its first run
     """
 
     def __init__(self, folder: Path | str, *, trust: bool = False) -> None:

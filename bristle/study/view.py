@@ -39,6 +39,7 @@ from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, verdict_view
 from ..diagnosis.view import error_text as verdict_error
 from ..errors import RecordError
+from ..identification.error_table import force_budget
 from ..identification.rig import DAMPER, ROLES
 from ..learning.closure import LearnedClosure
 from ..learning.closure_names import NEAR
@@ -48,7 +49,7 @@ from ..model.model import Model
 from ..physics.drive import DRIVES
 from ..physics.effect import closures
 from ..physics.forms import joined_form, shown_law, split_form
-from ..physics.laws import base_and_variant
+from ..physics.laws import LAWS, base_and_variant
 from ..view.blocks import Block, Figure, Formula, Next, Table, Text, View, view_of
 from ..view.style import Page, look
 from .auto import Completed, halves
@@ -56,12 +57,13 @@ from .data_check import DataCheck
 from .forms import law_command
 from .history import HistoryStep, Step, history_steps
 from .identify import Identified
-from .pictures import draw_data_check, staircase_page
+from .pictures import draw_data_check
 from .steps import NOT_PROVEN, Added, Created, IdentifiedBuilding, unproven_of
 from .study import Study
 from .study_file import TEST
 
 if TYPE_CHECKING:
+    from ..identification.problem import Problem
     from ..identification.rig_fit import RigErrors
 
 _RUNS = 6
@@ -253,6 +255,20 @@ def law_errors(found: Identified) -> Table:
     return Table(header, rows, range(1, 6), "Laws", note=" ".join(notes))
 
 
+def budget_text(problem: Problem, model: Model) -> str:
+    """Return the parts of a damper's force with their shares, the largest first; "" for others."""
+    if LAWS[model.law].site != "damper":
+        return ""
+    runs = [force_budget(problem, model, run) for run in problem.runs[:_RUNS]]
+    powers: dict[str, float] = {}
+    for part in (part for parts in runs for part in parts):
+        powers[part.name] = powers.get(part.name, 0.0) + float(np.sum(part.force**2))
+    whole = sum(float(np.sum(np.sum([one.force for one in parts], axis=0) ** 2)) for parts in runs)
+    order = sorted(powers, key=lambda name: -powers[name]) if whole > 0.0 else []
+    told = (f"{effect_name(name)} {percent(np.sqrt(powers[name] / whole), 0)}" for name in order)
+    return f"The force consists of (RMS over that of the force): {', '.join(told)}." * bool(order)
+
+
 def draw_identified(found: Identified) -> Page:
     """Return the figure of the judged runs, drawn and not yet written.
 
@@ -308,7 +324,10 @@ def identified_with_next(found: Identified, folder: Path) -> View:
     answer = [error_text(found), z_text(found)]
     said = [one for one in view.blocks if isinstance(one, Text) and one.text in answer]
     rest = [one for one in view.blocks if one not in said]
-    return view._replace(blocks=(*said, *better, *rest, *_next(found, folder)))
+    budget = Text(budget_text(found.holdout or found.train, found.at.model))
+    return view._replace(
+        blocks=(*said, *better, *rest, *_next(found, folder)), details=(budget, *view.details)
+    )
 
 
 def _better(found: Identified, folder: Path) -> list[Block]:
@@ -556,7 +575,7 @@ def _column(one: Guess) -> str:
 
 @view_of(Study)
 def study_view(study: Study) -> View:
-    """Return the view of a study: its runs, verdict and history, and how the error fell."""
+    """Return the view of a study: its runs, verdict and history, and its first run."""
     settings = study.settings
     roles = [run.role for run in settings.runs]
     held_out, test = roles.count("holdout"), roles.count(TEST)
@@ -573,22 +592,19 @@ def study_view(study: Study) -> View:
             Text(f"Verdict: {verdict.get('words')}" if verdict else ""),
             Text(study.stale(verdict) if verdict else ""),
             steps_table(history_steps(study.steps())),
-            Figure(lambda: study_page(study), settings.title),
+            Figure(lambda: first_run_page(study), settings.title),
         ),
     )  # fmt: skip
 
 
-def study_page(study: Study) -> Page:
-    """Return the figure of a study: how the error fell, or its first run before any fit.
+def first_run_page(study: Study) -> Page:
+    """Return the figure of a study's first run.
 
     Raises
     ------
     RecordError, StudyError
-        If nothing was identified, and the runs cannot be read.
+        If the runs cannot be read.
     """
-    steps = history_steps(study.steps())
-    if any(step.z is not None for step in steps):
-        return staircase_page(steps)
     runs = study.read("train") or study.read("holdout")
     if not runs:
         raise RecordError(f"{study.folder}: there is no run to draw.")

@@ -14,7 +14,6 @@ import numpy as np
 
 from ..core.files import as_json
 from .blocks import Block, Figure, Formula, Table, Text, View
-from .formula import formula as formula
 
 CSS = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 
@@ -84,6 +83,11 @@ def _block(block: Block, dpi: int) -> str:
 
         return figure(png(block.draw(), dpi), block.alt, block.caption)
     return ""
+
+
+def formula(text: str) -> str:
+    """Return an equation, as it is typed."""
+    return f'<div class="formula"><code>{escape(text)}</code></div>'
 
 
 def page(title: str, body: Iterable[str], foot: str) -> str:

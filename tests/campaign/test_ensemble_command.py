@@ -103,12 +103,6 @@ def test_bad_input_is_one_message(
     assert error.count("\n") == 1
 
 
-def test_workers_and_a_cluster_are_not_both_given(write: Write) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(["ensemble", str(write()), "--workers", "2", "--cluster", "tcp://127.0.0.1:1"])
-    assert caught.value.code == 2
-
-
 def test_correlations_name_what_moves_an_output(write: Write) -> None:
     found = bristle.ensemble(write(("runs = 12", "runs = 40")))
     names = varying_numbers(found.plan, found.runs)

@@ -1,6 +1,6 @@
 """The force budget: its parts sum up to the force, and each is what the model's own law gives."""
 
-from itertools import pairwise
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from bristle.identification.error_table import force_budget
 from bristle.identification.problem import Problem, Run
 from bristle.model.model import Model
 from bristle.physics.laws import laws_of
-from bristle.study.pictures import draw_budget
+from bristle.study.view import budget_text
 
 DT = 0.002
 T = np.arange(0.0, 3.0, DT)
@@ -66,25 +66,9 @@ def test_a_model_without_force_has_no_part_of_the_law():
     assert budget(Model("bingham", (), silent))[0] == []
 
 
-def test_the_budget_of_a_table_is_headed_without_its_knots_and_its_times_stay_apart():
-    dt = 0.01  # cycles of 20 s
-    t = dt * np.arange(6001)
-    w = 2.0 * np.pi * 0.05
-    x, v, a = 0.01 * np.sin(w * t), 0.01 * w * np.cos(w * t), -0.01 * w**2 * np.sin(w * t)
-    runs = []
-    for name, level in (("low", 0.0), ("middle", 0.5), ("high", 1.5)):
-        V = np.full_like(t, level)
-        draws = np.zeros((1, len(t), 4))
-        runs.append(Run(name, dt, x, v, a, V, np.sign(v) * (1.0 + level), 0.01, draws, 0))
-    page = draw_budget(Problem(runs), Model("dahl[table 0 0.5 1.5]"))
-    assert page is not None
-    texts = [one.get_text() for one in page.figure.texts]
-    assert any("dahl[table]: the parts" in text for text in texts)
-    page.figure.canvas.draw()
-    panels = page.figure.axes[:-1]
-    assert len(panels) == 3
-    boxes = [
-        [label.get_window_extent() for label in axes.get_xticklabels() if label.get_text()]
-        for axes in panels
-    ]
-    assert all(one[-1].x1 + 4.0 < other[0].x0 for one, other in pairwise(boxes))
+def test_the_parts_are_told_with_their_shares_the_largest_first():
+    problem = Problem([run(), replace(run(), name="again")])
+    said = budget_text(problem, Model("bingham", ("gas_spring",), {"gas_spring.k": 10.0}))
+    shares = [int(part.split()[-2]) for part in said.partition("): ")[2].split(", ")]
+    assert "gas spring" in said
+    assert shares == sorted(shares, reverse=True)

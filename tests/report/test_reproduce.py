@@ -162,8 +162,8 @@ def test_pictures_of_an_undone_step_stay_when_another_has_its_number(tmp_path: P
     undone = study.history.folder / "undone"
     for effect in (b"stribeck", b"gas_spring", b"stribeck"):
         study.add_step("add", "to see", study.model().with_effect(effect.decode()))
-        study.write_report("force_budget.png", effect)
+        study.write_report("compare.png", effect)
         study.undo()
     study.add_step("add", "to see", study.model().with_effect("stribeck"))
-    kept = [undone / name / "force_budget.png" for name in ("001", "001_2", "001_3")]
+    kept = [undone / name / "compare.png" for name in ("001", "001_2", "001_3")]
     assert [file.read_bytes() for file in kept] == [b"stribeck", b"gas_spring", b"stribeck"]

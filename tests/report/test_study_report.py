@@ -112,7 +112,7 @@ def test_the_page_is_well_formed_and_needs_nothing_else(page):
     assert "@import" not in page
     assert "url(" not in page
     images = re.findall(r"<img [^>]+>", page)
-    assert len(images) == 5  # evidence, history, loops, error, force budget
+    assert len(images) == 3  # evidence, loops, error
     assert all(re.search(r'alt="[^"]{10,}"', image) for image in images)
 
 
