@@ -47,8 +47,9 @@ _UNITS_IN_NAMES = "|".join(
         *_OF_LABELS.values(),
     ]
 )
-SIGN = r"(?:(?<![^_= ])-)?"
-"""T=-10C and cold_-10C have one; in run-10C the minus parts words."""
+SIGN = r"(?:(?<![^_= ])-|(?<![A-Za-z])(?:minus|neg)[ _-]?)?"
+"""T=-10C, cold_-10C and minus10C have one; in run-10C the minus parts words."""
+_DOUBLED = "--"  # the mark of a minus behind one that parts words: run--10C beside run-10C
 _APART = r"(?:[ ]?|[_-](?=psi|PSI|bar|kPa|MPa))"  # 50_psi; but 3_A parts words
 _SPEED = r"(?<=m)[_-](?:s|sec|min)(?![A-Za-z0-9])"  # 100mm_s is one, and 10mm_s1 is none
 _AFTER_UNIT = re.compile(
@@ -97,7 +98,7 @@ def number_in(marks: Sequence[str] = ()) -> str:
 
 def value_of(text: str) -> float:
     """Return the number that a text in a name spells, whatever its decimal mark."""
-    minus = text.startswith("-")
+    minus = text.startswith(("-", "minus", "neg"))
     whole, *rest = re.findall(r"\d+", text)
     value = float(f"{whole}.{rest[0]}" if rest else whole)
     return -value if minus else value
@@ -109,8 +110,9 @@ def tokens_of(file: Path, reading: Reading | None = None) -> dict[str, Token]:
     out: dict[str, Token] = {}
     twice = set()
     number = number_in(reading.marks)
+    sign = f"(?:(?<=-)-|{SIGN})" if _DOUBLED in reading.marks else SIGN
     wanted = re.compile(
-        rf"{_NO_DECIMALS}{_NO_POWER}({SIGN}{number}){_APART}({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
+        rf"{_NO_DECIMALS}{_NO_POWER}({sign}{number}){_APART}({_UNITS_IN_NAMES})(?![A-Za-z]|{_SPEED})"
     )
     stem = file.stem
     found = [(match.start(), match[1], match[2], match[0]) for match in wanted.finditer(stem)]
@@ -156,7 +158,7 @@ def reading_of(files: Sequence[Path], tones: Sequence[Tone | None]) -> Reading:
     """
     plain = [tokens_of(file) for file in files]
     marks, why, open_ = [], [], {}
-    for mark in (*DOUBTFUL, _UNIT):
+    for mark in (*DOUBTFUL, _UNIT, _DOUBLED):
         with_mark = [tokens_of(file, Reading((mark,))) for file in files]
         differ = sorted(
             {n for a, b in zip(plain, with_mark, strict=True) for n in {*a, *b}
@@ -165,18 +167,26 @@ def reading_of(files: Sequence[Path], tones: Sequence[Tone | None]) -> Reading:
         if not differ:
             continue
         seen = _by_motion(plain, with_mark, tones)
-        said = {name: _by_names(mark, name, plain, with_mark) for name in differ}
+        said = {
+            name: _doubled_is_minus(name, files)
+            if mark == _DOUBLED
+            else _by_names(mark, name, plain, with_mark)
+            for name in differ
+        }
         if seen > 0 or (seen == 0 and all(one > 0 for one in said.values())):
             marks.append(mark)
             what = f'"{mark}"' if mark != _UNIT else "a unit between digits"
             by = "the measured motion" if seen > 0 else "all names together"
-            why.append(f"{what} in the names is a decimal mark, by {by}")
+            of = "has a minus" if mark == _DOUBLED else "is a decimal mark"
+            why.append(f"{what} in the names {of}, by {by}")
             continue
         for name in differ:
             if said[name] > 0 or (seen == 0 and said[name] == 0):
                 open_[name] = _open_text(name, plain, with_mark)
-    open_ |= _ranges(files, plain) | _with_and_without(
-        [tokens_of(file, Reading(tuple(marks))) for file in files]
+    open_ |= (
+        _ranges(files, plain)
+        | _below_zero(files, plain)
+        | _with_and_without([tokens_of(file, Reading(tuple(marks))) for file in files])
     )
     digits, by_digits, doubts = _digits(plain, tones) if not marks else ({}, [], {})
     return Reading(tuple(marks), digits, open_, doubts, (*why, *by_digits))
@@ -251,6 +261,16 @@ def _by_names(
     return -1 if counting or len({*heads}) == 1 else 0
 
 
+def _doubled_is_minus(name: str, files: Sequence[Path]) -> int:
+    """Return 1 where a minus in "--" is the number's, -1 where the two part words, else 0."""
+    stems = [file.stem for file in files]
+    if any(stem.count(_DOUBLED) > 1 for stem in stems):
+        return -1
+    if any(re.search(r"(?<![-_= ])-(?!-)", stem.lstrip("-")) for stem in stems):
+        return 1  # one alone parts words: run--10C beside run-10C
+    return 0 if name == "temperature" else -1
+
+
 def _open_text(
     name: str, plain: Sequence[Mapping[str, Token]], with_mark: Sequence[Mapping[str, Token]]
 ) -> str:
@@ -279,6 +299,18 @@ def _ranges(files: Sequence[Path], plain: Sequence[Mapping[str, Token]]) -> dict
                     "--runs FILE, a table with a row per file, says it"
                 )
     return out
+
+
+def _below_zero(files: Sequence[Path], plain: Sequence[Mapping[str, Token]]) -> dict[str, str]:
+    """Return what is said of temperatures such as m10C, whose letter may stand for a minus."""
+    for file, tokens in zip(files, plain, strict=True):
+        one = tokens.get("temperature")
+        if one and re.search(rf"(?<![A-Za-z])[mMnN]{re.escape(one.number)}", file.stem):
+            return {
+                "temperature": f'"{one.text}" in the names may lie below zero: no temperature is '
+                "taken. --runs FILE, a table with a row per file, says it"
+            }
+    return {}
 
 
 def _with_and_without(tokens: Sequence[Mapping[str, Token]]) -> dict[str, str]:

@@ -160,11 +160,16 @@ def test_a_table_beside_the_files_gives_level_role_and_labels(lab, tmp_path) -> 
         (["cold_-10C", "warm 40C"], [-10.0, 40.0]),
         (["-1p5C", "a -5 C"], [-1.5, -5.0]),
         (["run-10C", "run_1-20C"], [10.0, 20.0]),
+        (["LRB--10C-2MPa", "LRB-10C-2MPa"], [-10.0, 10.0]),
+        (["oil--10C--2A", "oil--20C--2A"], [10.0, 20.0]),
+        (["oil_minus10C", "oil_neg_5C"], [-10.0, -5.0]),
+        (["oil--10C", "oil--20C"], [None, None]),
+        (["oil_m10C", "oil_10C"], [None, None]),
     ],
 )
 def test_a_minus_in_a_name_is_a_sign_where_no_word_stands_before_it(names, values) -> None:
     found, _ = facts_of([Path(f"{name}.csv") for name in names], RunChoices(), commanded=True)
-    assert [one.labels["temperature"] for one in found] == values
+    assert [one.labels.get("temperature") for one in found] == values
 
 
 @pytest.mark.parametrize(
