@@ -725,9 +725,10 @@ def draw_loops(
             if number == 0:
                 panel.set_title(one.text, fontsize=9.5)
                 begin = one.prediction.time[one.part.start]
-                panel.set_title(
-                    f"{one.prediction.name}, {begin:.3g} s", loc="right", fontsize=7, color=GREY
-                )
+                panel.text(
+                    0.97, 0.03, f"{one.prediction.name}\n{begin:.3g} s", ha="right", fontsize=6.5,
+                    color=GREY, transform=panel.transAxes,
+                )  # fmt: skip
         _alike(panels)
 
 

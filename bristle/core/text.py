@@ -113,7 +113,7 @@ def scale(unit: str, size: float, fine: bool = False) -> tuple[float, str]:
 def quantity(
     value: float, unit: str, digits: int = 3, size: float | None = None, fine: bool = False
 ) -> str:
-    """Return a value with its unit: "220 N", "1.3 kN", "110 mm/s".
+    """Return a value with its unit: "220 N", "1.3 kN", "110 mm/s", "2.5 × 10⁶ N/m3".
 
     Parameters
     ----------
@@ -129,7 +129,10 @@ def quantity(
         As in `scale`.
     """
     factor, shown = scale(unit, value if size is None else size, fine)
-    return f"{plain(factor * value, digits)} {'' if shown == '1' else shown}".rstrip()
+    value *= factor
+    power = 3 * floor(log10(abs(value)) / 3.0) if 1e6 <= abs(value) < 1e15 else 0
+    number = plain(value / 10.0**power, digits) + (times_ten(power) if power else "")
+    return f"{number} {'' if shown == '1' else shown}".rstrip()
 
 
 def percent(share: float, digits: int = 1) -> str:

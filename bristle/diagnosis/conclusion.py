@@ -27,7 +27,7 @@ LAYER = "layer"
 ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
 WITHOUT_LOAD_CELL = "Without a measured force {}: a load cell at the damper would distinguish them."
 LITTLE = "Little beside what was found:"
-NOT_DRIVEN = "What nobody recorded, and what changed during the runs, would look like this."
+NOT_DRIVEN = "Something that changed during the runs, and was not recorded, would look like this."
 
 
 @dataclass(frozen=True)

@@ -287,12 +287,12 @@ def draw_verdict(verdict: Verdict) -> Page:
         rows.sort(key=lambda row: row[1])
         without = "the present model"
         if verdict.get("laws"):
-            without = f"{law_name(verdict)}, the law of this verdict, without the effect"
-        where = f" at the {at['site']}" if at.get("site") else ""
+            without = f"{law_name(verdict)}, the law of this verdict, alone"
+        if at.get("site") not in (None, "damper"):
+            without += f" at {site_name(at['site'])}"
         page = Page(
             7.6, ROW * len(rows) + 1.0, headline(verdict),
-            f"Dashed: {without}{where}. Each bar: the model with that effect, fitted again. "
-            "Green: the noise floor.",
+            "Each bar: the model with that effect, fitted again. Green: the noise floor.",
         )  # fmt: skip
         grid = page.grid(1, 1, top=0.3, bottom=0.5, left=1.9, right=0.7)
         axes = page.figure.add_subplot(grid[0, 0])

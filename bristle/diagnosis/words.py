@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..comparison.names import effect_name, effect_names, name_of, site_name
+from ..comparison.words import capitalised
 from ..core.text import joined, quantity, short_z
 from ..identification.error import ForceError
 from ..identification.rig import DAMPER
@@ -210,7 +211,8 @@ def _gains(verdict: Verdict) -> list[str]:
         each = ", each added alone" if others else ""
         out.append(f"What lowers the error most: {joined(texts)}{each}.")
     out += [
-        f"{effect_names(row['effects'])} together lower it by {100.0 * row['gain']:.0f} %."
+        f"{capitalised(effect_names(row['effects']))} together lower it by "
+        f"{100.0 * row['gain']:.0f} %."
         for row in rows
         if len(row["effects"]) > 1
     ]

@@ -120,8 +120,8 @@ def parameter_table(model: Model, drive: str) -> tuple[list[str], list[list[str]
     for name, value in flat.items():
         text, half = with_interval(value.value, value.std)
         origin = value.origin if value.free else f"{value.origin}, held"
-        rows.append([name, text, half, "" if value.unit == "1" else value.unit, origin,
-                     model.declared(name).text])  # fmt: skip
+        half, unit = half if value.std else "", value.unit if value.unit != "1" else ""
+        rows.append([name, text, half, unit, origin, model.declared(name).text])
         if value.free and value.std is not None and _at_bound(value):
             edges.append(name)
     notes = [

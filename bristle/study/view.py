@@ -635,17 +635,21 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     model = study.model(to_show=True)
     gains = verdict.get("gains") or []
     new = [row for row in gains if not set(row["effects"]) <= set(model.effects)]
-    # Beside another law than the verdict's its effects are not advised.
+    doubtful = [one for one in study.steps() if one.why.endswith(NOT_PROVEN)]
+    # Beside another model than the verdict's its effects are not advised.
     other = verdict.get("law", model.law) not in (model.law, split_form(model.law)[0])
+    advised = [] if other or (doubtful and not halves(doubtful[0])) else new
     known = verdict["effects"] if other else model.effects
-    view = diagnosed_view({**verdict, "gains": new}, study.folder, known)
+    view = verdict_view({**verdict, "gains": new})
+    then = next_steps({**verdict, "gains": advised}, study.folder, known)
+    view = view._replace(blocks=(*view.blocks, *then))
     steps = history_steps(study.steps())
     judged = [one for one in steps if one.rms is not None]
     if not judged:
         return view
     began = study.model_of(steps[0].number, to_show=True)
-    doubtful = [one for step in study.steps() for one in unproven_of(study, step)]
-    known = (*began.effects, *closures(model.effects), *doubtful)
+    guessed = [name for one in doubtful for name in unproven_of(study, one)]
+    known = (*began.effects, *closures(model.effects), *guessed)
     added = [name for name in model.effects if name not in known]
     if not added:
         return view
@@ -825,7 +829,7 @@ def _then(verdict: Mapping[str, Any], folder: Path, known: Sequence[str]) -> lis
         left = (verdict.get("not_tried") or {}).get("two_effects", ())
         cut = [*dict.fromkeys(split_form(law)[0] for law in left)][:2]
         pairs = [
-            Next(command("study", "auto", folder, "--law", law), "tries two effects of it at once")
+            Next(command("study", "auto", folder, "--law", law), "tries two effects with this law")
             for law in cut
         ]
         return [

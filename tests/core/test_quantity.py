@@ -37,6 +37,7 @@ def test_the_rigs_size_decides_on_the_unit() -> None:
     assert quantity(1340.0, "N", 2) == "1300 N"
     assert quantity(220.0, "N", 2, 5e4) == "0.22 kN"
     assert quantity(5.2e4, "N") == "52 kN"
+    assert quantity(2.5e6, "N/m3") == "2.5 × 10⁶ N/m3"  # noqa: RUF001
     assert scale("N", -5.2e4) == scale("N", 5.2e4) == (1e-3, "kN")
     assert quantity(0.11, "m/s", 2) == "110 mm/s"
     assert quantity(0.3, "1") == "0.3"

@@ -25,7 +25,7 @@ PAIR: dict[str, Any] = {
 @pytest.mark.parametrize(
     ("laws", "words"),
     [
-        (LAWS, "dahl with a quadratic command, the law of this verdict, without the effect"),
+        (LAWS, "dahl with a quadratic command, the law of this verdict, alone"),
         ({}, "the present model"),
     ],
 )

@@ -107,4 +107,4 @@ def test_nothing_is_named_where_there_is_no_place(rings):
 def test_a_drive_that_nobody_recorded_leaves_a_doubt(driven, kind, doubted):
     shown = SiteDiagnosis("damper", kind, (), 2.0, 2.0, 0.0, 0.01, reasons=("Something.",))
     found = conclude({"damper": shown}, VerdictContext(driven=driven))
-    assert ("What nobody recorded" in found.words) is doubted
+    assert ("changed during the runs, and was not recorded" in found.words) is doubted

@@ -59,6 +59,13 @@ def test_what_a_further_effect_gains_is_told():
     assert "with Duffing spring 0.25 N (2.5 %)" in " ".join(told(FULL, **EFFECT).split())
 
 
+def test_no_effect_is_advised_beside_a_model_that_the_verdict_did_not_see():
+    lower = {"effects": [], "gains": [{"effects": ["stribeck"], "gain": 0.5}]}
+    shown = told(FULL, kind="unknown", law="lugre", **lower)
+    assert "bristle compare rig" in shown
+    assert "bristle add" not in shown
+
+
 def test_a_law_that_explains_what_is_named_is_told_whatever_the_length():
     other = OtherLaw("tanh[quadratic]", 0.96, 0.998)
     found = {**FOUND, "other_law": other.as_dict()}
