@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..core.text import listed
+from ..core.text import in_one_line, listed
 from ..fmu.archive import library_member
 from ..fmu.description import Description, Value, Variable
 from ..fmu.library import (
@@ -33,7 +33,6 @@ from ..units import Unit
 
 _MOST_MESSAGES = 1000
 _LAST = 3  # messages that are told of a failure
-_MOST_SAID = 270  # characters: a report says them twice
 
 
 @dataclass
@@ -124,13 +123,6 @@ def _description(raw: dict[str, Any]) -> Description:
     return Description(**{**raw, "variables": variables})
 
 
-def told(text: str) -> str:
-    """Return what an FMU said in one line, cut to a length that a row holds."""
-    text = " ".join(text.split())
-    rest = len(text) - _MOST_SAID
-    return f"{text[:_MOST_SAID]} ... and {rest:,} more characters" if rest > 0 else text
-
-
 class BlackBox:
     """Remembers the call under way, and what the FMU says in it, where it outlives a crash.
 
@@ -162,7 +154,7 @@ class BlackBox:
 
     def hear(self, text: str) -> None:
         """Write what the FMU says meanwhile."""
-        said = told(text).encode()[: self.SAID].ljust(self.SAID, b"\0")
+        said = in_one_line(text).encode()[: self.SAID].ljust(self.SAID, b"\0")
         self._map[self.SIZE + self.COUNT :] = said
         self._heard = True
 
@@ -313,7 +305,7 @@ class Bench:
     def said(self) -> str:
         """Return what the FMU said of its failure, "" for nothing."""
         texts = () if self._library is None else self._library.said()
-        return told(" / ".join(texts))
+        return in_one_line(" / ".join(texts))
 
     def entered(self, instance: Handle | None = None, stop: float | None = None) -> Handle:
         """Return an instance in initialisation mode, a new one unless one is given; `stop` in s."""

@@ -239,6 +239,16 @@ def cut_short(text: str, beside: Sequence[str] = (), way: str = "") -> str:
     return "\n".join([*kept, *told])
 
 
+_MOST_SAID = 270  # characters of what an FMU said: a report says them twice
+
+
+def in_one_line(text: str) -> str:
+    """Return a text of others in one line, cut to a length that a row holds."""
+    text = " ".join(text.split())
+    rest = len(text) - _MOST_SAID
+    return f"{text[:_MOST_SAID]} ... and {rest:,} more characters" if rest > 0 else text
+
+
 def unknown(what: str, name: str, names: Iterable[str], more: str = "") -> str:
     """Return the words for a name that is not there, with what would be right.
 

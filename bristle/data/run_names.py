@@ -227,11 +227,12 @@ def _by_names(
     with_mark: Sequence[Mapping[str, Token]],
 ) -> int:
     """Return 1 where the names say that a mark is a decimal mark, -1 that it is none, else 0."""
-    used = [
-        re.findall(r"\d+", b[name].number)
+    told = [
+        b[name]
         for a, b in zip(plain, with_mark, strict=True)
         if name in b and _values(a, name) != _values(b, name)
     ]
+    used = [re.findall(r"\d+", one.number) for one in told]
     if any(len(one) != 2 for one in used) or not used:
         return 0
     heads, tails = [one[0] for one in used], [one[1] for one in used]
@@ -244,6 +245,12 @@ def _by_names(
         return 1 if {*tails} <= _DIGITS and {*tails} != {"0"} and "0" in heads else 0
     if any(len(head) > 1 and head[0] == "0" for head in heads):  # of a date, or a counter
         return -1
+    words = {one.text.partition(one.number)[0] for one in told}
+    words = {word for word in words if word and not re.fullmatch(_UNITS_IN_NAMES, word)}
+    if words and not {*tails} <= _DIGITS:  # oil100_10C: the number of the letters before it
+        return -1
+    if words and all(name.startswith(word.lower()) or word == "I" for word in words):
+        return 1  # I0_5A, temp20_5C
     if len({len(tail) for tail in tails}) > 1 and any(
         len(tail) > 1 and tail.endswith("0") for tail in tails
     ):  # no decimals: 1_5A and 1_10A

@@ -223,8 +223,10 @@ def evenly(time: Array, channels: dict[str, Array], lines: Indices, name: str, p
     notes += _grid_notes(made, time, sampling)
     pieces = [piece for one in made for piece in _pieces(one, name, notes)]
     if not pieces:
+        missing, scarce = max((np.isnan(y).mean(), channel) for channel, y in channels.items())
         raise RecordError(
-            f"{name}: values are missing so often that no {SHORTEST} samples in a row are left."
+            f"{name}: {scarce} has no value in {missing:.0%} of the samples, so that no {SHORTEST} "
+            "in a row are left. Record without gaps, or leave the run out."
         )
     kept = sum(len(piece[0]) for piece in pieces)
     filled = sum(int((~good).sum()) for _, _, good in pieces)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.interrupt import Interrupt
-from ..core.text import listed
+from ..core.text import in_one_line, listed
 from ..errors import FmuError, RunError
 from ..fmu import binary
 from ..fmu.archive import extract, library_member, platform_folder
@@ -366,7 +366,8 @@ class Instance:
 
     def said(self) -> str:
         """Return the FMU's last messages as lines for an error's text."""
-        return "".join(f"\n  It said: {text}" for text in self._last or self._refused[-3:])
+        texts = dict.fromkeys(map(in_one_line, self._last or self._refused[-3:]))
+        return "".join(f"\n  It said: {text}" for text in texts)
 
     def fail(self, function: str, status: int) -> NoReturn:
         """Raise RunError for a call that did not answer OK or Warning."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.text import percent, plain
+from ..core.text import listed, percent, plain
 from ..data.cycles import largest
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
@@ -73,6 +73,10 @@ def run_view(frame: pd.DataFrame) -> View:
         f"Stepping part by part adds {100 * share:.2g} % to the energy through {name}."
         for name, share in energy.items()
     )
+    known = {n: np.isfinite(frame[n].to_numpy(dtype=float)) for n in frame.columns}
+    if broken := [n for n, there in known.items() if not there.all()]:
+        since = float(frame.index[min(int(np.argmin(known[n])) for n in broken)])
+        said += f" Not finite from {since:g} s on: {listed(broken)}."
     return View(
         title,
         (

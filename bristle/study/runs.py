@@ -19,6 +19,7 @@ from ..data.sampling import LOST
 from ..data.table import Table
 from ..errors import StudyError
 from ..identification.prepare import SHORTEST
+from ..identification.run_start import MOVING
 from .study_file import RunFile, Settings
 
 SPLIT = 0.7
@@ -92,7 +93,9 @@ def split_in_time(pieces: list[Measurement]) -> Runs:
         else:
             share = left / size
             train.append(piece.part(0, left, f"{piece.name}, first {share:.0%}"))
-            holdout.append(piece.part(left, size, f"{piece.name}, last {1.0 - share:.0%}"))
+            # What is not judged of a run in motion is the end of the first part: none is lost.
+            begin, name = max(left - MOVING, 0), f"{piece.name}, last {1.0 - share:.0%}"
+            holdout.append(piece.part(begin, size, name))
         left -= size
     rest = 100.0 * (1.0 - cut / sum(sizes))
     note = (

@@ -414,7 +414,8 @@ def typed(variable: Variable, value: object) -> Value | Wrong:
         return _text(variable, value)
     if variable.kind in ("Integer", "Enumeration"):
         if isinstance(value, bool) or not isinstance(value, int):
-            return Wrong(f"is {written(value)}; a whole number is right.")
+            right = f"{shown_items(variable)} are" if variable.items else "a whole number is"
+            return Wrong(f"is {written(value)}; {right} right.")
         least, most = _INTEGER_RANGE
         if not least <= value <= most:
             return Wrong(f"is {written(value)}; FMI holds whole numbers from {least} to {most}.")

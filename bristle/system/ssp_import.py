@@ -580,7 +580,8 @@ def _times(
                 Finding("stop", "note", f"The package names no stop: {stop:g} s is taken.")
             )
         if step is None:
-            step = min(filter(None, steps), default=stop / USUAL_STEPS)
+            able = (one for one in steps if one is not None and one <= stop)
+            step = min(able, default=stop / USUAL_STEPS)
             notes.append(
                 Finding("step", "note", f"The package names no step: {step:g} s is taken.")
             )

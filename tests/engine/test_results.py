@@ -22,6 +22,7 @@ from bristle.engine.results import (
     write_csv,
     write_parquet,
 )
+from bristle.engine.view import run_view
 from bristle.errors import RunError
 
 MADE: dict[str, Any] = {
@@ -61,6 +62,10 @@ def test_read_gives_back_what_was_written_to_the_last_bit(
     assert np.signbit(read["damper.force"].iloc[1])
     assert read.attrs == frame.attrs
     assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_a_column_that_is_not_finite_is_told(frame: pd.DataFrame) -> None:
+    assert "Not finite from 0.4 s on: damper.force." in str(run_view(frame.iloc[4:5]))
 
 
 def test_folder_is_read_by_its_results(frame: pd.DataFrame, tmp_path: Path) -> None:

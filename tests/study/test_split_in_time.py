@@ -27,9 +27,9 @@ def study_of(folder: Path, samples: int, gaps: Sequence[tuple[int, int]] = ()) -
     [
         (1446, [(1000, 1006)], [1000], [440]),  # 70 % is 8 samples behind the gap
         (1446, [(1015, 1021)], [1015], [425]),  # and here 7 before it
-        (1000, [(300, 306)], [300, 396], [298]),
-        (500, [], [300], [200]),
-        (1000, [], [700], [300]),
+        (1000, [(300, 306)], [300, 396], [313]),
+        (500, [], [300], [215]),
+        (1000, [], [700], [315]),
     ],
 )
 def test_no_part_is_too_short_for_a_fit(tmp_path: Path, samples, gaps, train, holdout):
@@ -46,5 +46,12 @@ def test_the_share_that_is_held_out_is_told(tmp_path: Path):
     assert "the last 40 % held out" in runs.notes[0]
 
 
+def test_the_end_of_the_first_part_leads_into_what_is_held_out(tmp_path: Path):
+    train, holdout = study_of(tmp_path, 1000).runs().all
+    lead = prepare(holdout).skip
+    np.testing.assert_array_equal(holdout["force"][:lead], train["force"][-lead:])
+    assert holdout.time[lead] - train.time[-1] == pytest.approx(train.step)
+
+
 def test_a_run_that_is_too_short_for_both_is_cut_at_70_percent(tmp_path: Path):
-    assert [len(run.time) for run in study_of(tmp_path, 300).runs().all] == [210, 90]
+    assert [len(run.time) for run in study_of(tmp_path, 300).runs().all] == [210, 105]

@@ -78,7 +78,7 @@ def test_one_run_beside_test_runs_is_split_in_time(tmp_path: Path) -> None:
     files = write_runs(tmp_path, 2, seconds=2.0)
     study = create_study(tmp_path / "rig", files, runs=RunChoices(test=[files[0]])).study
     runs = study.runs()
-    assert [len(run.time) for run in runs.all] == [700, 300]
+    assert [len(run.time) for run in runs.all] == [700, 315]
     assert runs.holdout[0].source.endswith("run_2.csv")
 
 

@@ -38,10 +38,10 @@ _BOTH_BEFORE = re.compile(rf"^\s*{_WHOLE}\s+{_NUMBER}\s+NPTS\b.*\bDT\b{_SPELLED}
 _SIGN_INSIDE = re.compile(r"(?<=[0-9.])(?=[-+])")
 """Where a column ends and the next begins, in rows of a fixed width that leaves no blank."""
 _VALUE = re.compile(r"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:E[-+]?[0-9]+)?")
-_UNITS = re.compile(
-    r"UNITS?\s*(?:OF|[:=])\s*\(?([A-Z/0-9^*.]+(?:\s*[X*/]\s*[0-9.^]+)?)", re.IGNORECASE
-)
-"""With a factor behind it, as in G x 1000."""
+_UNITS = re.compile(r"(?:UNITS?\s*(?:OF|[:=])|\bACC\w*\s+IN\b)\s*([^,;]*)", re.IGNORECASE)
+_TIMES = re.compile(r"\W*x?\W*\d", re.IGNORECASE)
+_SCALED = re.compile(r"\b(?:SCAL|FACTOR|MULTIPL)[A-Z ]*\W{0,3}[0-9.]+", re.IGNORECASE)
+"""What may have been done to the values, and nothing tells whether it was."""
 _PAIR = re.compile(r"\s*([A-Z][A-Z0-9_/^]*):\s*(.*?)\s*")
 _COSMOS_DATA = re.compile(
     r"\s*(?P<count>\d+)\s+(?P<what>[a-z]+)\w*\s+(?:data\s+)?pts?\b.*?approx\.?\s+(?P<long>[\d.]+)\s*"
@@ -160,8 +160,13 @@ def _fields(row: str) -> Iterator[str]:
         yield from parts if all(map(_VALUE.fullmatch, parts)) else (whole,)
 
 
-def _factor(spelled: str, where: str) -> float:
-    """Return how many m/s2 one in a unit is, spelled as it should be, or in capitals."""
+def _factor(text: str, where: str) -> float:
+    """Return how many m/s2 one in a unit is, spelled as it should be, or in capitals.
+
+    Words may stand behind it, but no factor, as in G (X 1000).
+    """
+    first, _, rest = text.strip().partition(" ")
+    spelled = (text if _TIMES.match(rest) else first).strip("()[]. ")
     found = map(unit_or_none, (spelled, spelled.lower(), spelled.capitalize()))
     if (unit := next(filter(None, found), None)) is None:
         raise PhysicsError(f'{where}: the unit "{spelled}" is not known. G or CM/S2 is right.')
@@ -216,12 +221,19 @@ def _at2(lines: Sequence[str], name: str) -> _Record:
     if points != int(points):
         raise PhysicsError(f"{where}: NPTS = {whole}; a whole number is right.")
     for line, title in enumerate(lines[: last + 1], 1):
+        if (found := _SCALED.search(title)) is not None:
+            raise PhysicsError(
+                f'{name}, line {line}: "{shortened(found[0])}", and nothing tells whether the '
+                "values were multiplied by it. Write the unit that they are in, such as UNITS OF "
+                "G, and no factor."
+            )
+    for line, title in enumerate(lines[: last + 1], 1):
         if found := _UNITS.search(title):
             here = f"{name}, line {line}"
-            factor = _factor(found[1].rstrip("."), here)
+            factor = _factor(found[1], here)
             other = re.search("VELOCITY|DISPLACEMENT", title.upper())
             if other and "ACC" not in title.upper():
-                raise _not_accelerations(f"{other[0].lower()} in {found[1]}", here)
+                raise _not_accelerations(f"{other[0].lower()} in {found[1].strip()}", here)
             return _Record(int(points), spacing, factor, last + 1, last + 1)
     raise PhysicsError(
         f"{name}, lines 1 to {last + 1}: the title lines name no unit. AT2 says, for example, "

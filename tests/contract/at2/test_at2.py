@@ -94,6 +94,8 @@ def test_the_advice_for_several_columns_keeps_their_unit(tmp_path: Path) -> None
         ("ACCELERATION TIME SERIES IN UNITS OF G x 1000", 'the unit "G x 1000" is not known'),
         ("ACCELERATION TIME SERIES IN UNITS OF G*1000", r'the unit "G\*1000" is not known'),
         ("ACCELERATION TIME SERIES IN UNITS OF G / 10", 'the unit "G / 10" is not known'),
+        ("ACCELERATION IN G (X 1000)", r'the unit "G \(X 1000" is not known'),
+        ("ACCELERATION IN G; SCALE FACTOR = 100", '"SCALE FACTOR = 100", and nothing tells'),
         ("VELOCITY TIME SERIES IN UNITS OF G", "the values are a velocity in G"),
     ],
 )

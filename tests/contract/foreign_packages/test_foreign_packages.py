@@ -119,6 +119,14 @@ def test_what_an_override_sets_is_not_assumed(
     assert 'nothing is called "gian"' in said
 
 
+def test_a_step_of_an_fmu_that_is_longer_than_the_run_is_not_taken(tmp_path: Path, capsys) -> None:
+    fmu = write_fmu(tmp_path / "a.fmu", port(0, "y", "output"), experiment='stepSize="0.5"')
+    body = f"<d:Elements>{component('a')}</d:Elements>"
+    package = write_ssp(tmp_path / "my.ssp", body, {"a": fmu}, more=STOP.replace("0.5", "0.02"))
+    assert main(["import-ssp", str(package), "-o", str(tmp_path / "out")]) == 0
+    assert "names no step: 2e-05 s is taken" in capsys.readouterr().out
+
+
 def test_a_text_that_nothing_feeds_is_held_at_its_start(
     toys: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -176,6 +176,9 @@ def test_values_of_an_enumeration_are_items(
         found = told(file, capsys, 0 if right else 2)
         wrong = f"a.speed_in is {value}, which is no item; slow = 2, fast = 5 are right."
         assert found == ([] if right else [("error", wrong)])
+    named = write_scenario(tmp_path / "my.toml", {"a": (fmu, values.replace("= -5", '= "fast"'))})
+    right = 'a.speed_in is the text "fast"; slow = 2, fast = 5 are right.'
+    assert told(named, capsys, 2) == [("error", right)]
 
 
 def test_items_that_an_enumeration_does_not_know_are_a_warning(
