@@ -86,10 +86,10 @@ class ForceError:
         Parameters
         ----------
         unit : that of the output
-        size : how large such values are on this rig, which decides between N and kN
+        size : which decides between N and kN; that of the error itself by default
         """
         rms, share = self.headline
-        size = size if size is not None else self.signal_all
+        size = size if size is not None else rms
         relative = f" ({percent(share)})" if isfinite(share) else ""
         return f"{quantity(rms, unit, 4, size)}{relative}"
 
@@ -103,25 +103,24 @@ class ForceError:
         why = ", ".join(r if one else f"{self.left_out[r]:,} {r}" for r in ordered)
         return f"{out:,} of {self.total:,} samples ({_few(self.share_left_out)}) left out: {why}"
 
-    def beside(self, unit: str = "N", size: float | None = None) -> list[str]:
+    def beside(self, unit: str = "N") -> list[str]:
         """Return what is told beside the error: what is left out, the other error, the way out.
 
         Parameters
         ----------
-        unit, size : as of `text`
+        unit : that of the output
         """
         text = self.counted()
         every = "all samples" if self.valued == self.total else "all that hold a value"
         if not text or self.share_left_out <= MENTIONED:
             return [f"{text}."] if text else []
         most = max(self.left_out, key=lambda reason: self.left_out[reason])
-        size = size if size is not None else self.signal_all
         if self.over_all:
-            few = f"{quantity(self.rms, unit, 4, size)} ({percent(self.share)})"
+            few = f"{quantity(self.rms, unit, 4)} ({percent(self.share)})"
             text += f". So the error is that over {every}; over the {self.samples:,} that are left "
             text += f"it is {few if self.samples else 'unknown'}"
         elif self.valued > self.samples:
-            over = f"{quantity(self.rms_all, unit, 4, size)} ({percent(self.share_all)})"
+            over = f"{quantity(self.rms_all, unit, 4)} ({percent(self.share_all)})"
             text += f". Over {every} the error is {over}"
         if self.share_left_out > TOO_MANY:
             return [f"Warning: {text}. To change it: {WAYS_OUT[most]}."]

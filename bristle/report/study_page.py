@@ -23,7 +23,7 @@ from ..comparison.view import (
     under,
 )
 from ..core.progress import tell
-from ..core.text import command, plain, short_z
+from ..core.text import command, percent, plain, short_z
 from ..core.text import with_interval as with_interval
 from ..data.channels import label_text
 from ..errors import BristleError
@@ -33,6 +33,7 @@ from ..physics.forms import shown_law, split_form
 from ..physics.laws import LAWS
 from ..prediction.export import write_editable
 from ..study.history import HistoryStep, history_steps
+from ..study.pictures import draw_staircase
 from ..study.read_again import devices_of
 from ..study.runs import names_of_runs, place_of_run
 from ..study.steps import NOT_PROVEN
@@ -457,7 +458,15 @@ def _history(content: Content) -> str:
     table = steps_table(content.history_steps)
     rows = [[*row, step.why] for row, step in zip(table.rows, content.steps, strict=True)]
     table = table._replace(header=[*table.header, "why"], rows=rows)
-    return html.section("How the error fell", html.blocks((table,)))
+    picture = ""
+    if (page := draw_staircase(content.history_steps)) is not None:
+        caption = (
+            "The error of each model of the history on runs that no fit has seen, over the RMS of "
+            "their force. The green lines are what noise alone leaves."
+        )
+        fall = " \u2192 ".join(percent(one.share) for one in content.history_steps if one.share)
+        picture = html.figure(png(page), f"Error on held-out runs: {fall} of the force", caption)
+    return html.section("How the error fell", picture, html.blocks((table,)))
 
 
 def _before_after(content: Content) -> str:

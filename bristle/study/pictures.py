@@ -1,19 +1,24 @@
-"""The picture of a study's data."""
+"""The pictures of a study: its data, and how the error fell."""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.text import percent
 from ..data.channels import DRIVE
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
-from ..view.style import BLUE, GREY, VERMILION, Page, look
+from ..view.style import BLUE, GREEN, GREY, VERMILION, Page, label, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from .history import HistoryStep
 
 _SCALES = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
 _SHOWN = 12000  # samples per line: more are not seen
@@ -147,3 +152,30 @@ def _gathered(runs: list[Measurement], level: str, over: str) -> tuple[Array, Ar
     empty = np.zeros(0)
     join = [np.concatenate(parts) if parts else empty for parts in (xs, forces, drives)]
     return join[0], join[1], join[2]
+
+
+def draw_staircase(history_steps: Sequence[HistoryStep]) -> Page | None:
+    """Return the picture of how the held-out error fell; None with fewer than two errors."""
+    steps = [one for one in history_steps if one.share]
+    if len(steps) < 2:
+        return None
+    shares = [100.0 * (one.share or 0.0) for one in steps]
+    with look():
+        page = Page(9.2, 2.9, "")
+        grid = page.grid(1, 1, top=0.25, bottom=0.4, left=0.6, right=0.9)
+        axes = page.figure.add_subplot(grid[0, 0])
+        axes.stairs(shares, np.arange(len(steps) + 1) - 0.5, baseline=None, color=BLUE, lw=2.6)
+        for k, (one, share) in enumerate(zip(steps, shares, strict=True)):
+            told = percent(share / 100.0)
+            label(axes, told, k, share, BLUE, xytext=(0, 5), ha="center", va="bottom")
+            if one.z:
+                axes.hlines(share / one.z, k - 0.5, k + 0.5, color=GREEN, lw=1.3)
+        if last := steps[-1].z:
+            label(axes, "noise", len(steps) - 0.5, shares[-1] / last, GREEN, xytext=(5, 0))
+        axes.set(xlim=(-0.5, len(steps) - 0.5), ylim=(0.0, 1.2 * max(shares)))
+        named = [textwrap.fill(f"{one.number}  {one.what}", 92 // len(steps)) for one in steps]
+        axes.set_xticks(range(len(steps)), named)
+        axes.tick_params(axis="x", length=0)
+        axes.grid(visible=False, axis="x")
+        axes.set_title("error on held-out runs [% of the force]")
+    return page

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -81,22 +79,3 @@ def test_a_jump_that_moves_by_a_sample_does_not_outweigh_the_curve():
     assert np.abs(plain[:, 1]).max() > 1e4  # the spike of the one sample that the jump has left
     assert np.abs(cut[:, 1]).max() < 1e-6
     np.testing.assert_allclose(cut[:, 0], plain[:, 0], rtol=1e-6)
-
-
-def test_accepted_steps_are_told_with_a_cost_that_falls_to_that_of_the_end():
-    told = []
-
-    def accepted(theta, r, cost):
-        told.append((theta, cost))
-        assert np.array_equal(r, decay(theta))
-
-    start = np.array([1.0, 1.0, 0.0])
-    found = descend(decay, start, WIDE, -WIDE, 40, accepted=accepted)
-    alone = descend(decay, start, WIDE, -WIDE, 40)
-    assert np.array_equal(found.theta, alone.theta)
-    assert found.cost == alone.cost
-    assert np.array_equal(told[0][0], start)
-    costs = [cost for _, cost in told]
-    assert all(after < before for before, after in pairwise(costs))
-    assert np.array_equal(told[-1][0], found.theta)
-    assert costs[-1] == found.cost

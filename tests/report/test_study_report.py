@@ -80,12 +80,12 @@ def folder(tmp_path_factory) -> Path:
     model = study.model().with_values(VALUES, {"f_c": 0.01, "c_0": 0.2})
     study.add_step(
         "identify bingham", "fit to 3 training runs", model, {"z_holdout": 90.0},
-        {"z_train": 4.1, "z_holdout": 4.3, "error_holdout": 0.4},
+        {"z_train": 4.1, "z_holdout": 4.3, "error_holdout": 0.4, "error_share_holdout": 0.08},
     )  # fmt: skip
     more = model.with_effect("gas_spring").with_values({"gas_spring.k": 1.0}, {"gas_spring.k": 0.5})
     study.add_step(
         "add gas_spring", "verdict: effect", more, {"z_holdout": 4.3},
-        {"z_train": 1.5, "z_holdout": 1.6, "error_holdout": 0.2},
+        {"z_train": 1.5, "z_holdout": 1.6, "error_holdout": 0.2, "error_share_holdout": 0.04},
     )  # fmt: skip
     study.write_verdict(VERDICT)
     return study.folder
@@ -112,7 +112,8 @@ def test_the_page_is_well_formed_and_needs_nothing_else(page):
     assert "@import" not in page
     assert "url(" not in page
     images = re.findall(r"<img [^>]+>", page)
-    assert len(images) == 3  # evidence, loops, error
+    assert len(images) == 4  # evidence, staircase, loops, error
+    assert any("8.0 % \u2192 4.0 %" in image for image in images)
     assert all(re.search(r'alt="[^"]{10,}"', image) for image in images)
 
 
