@@ -242,12 +242,20 @@ def bristles_of_the_sine() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return times, solution.y[0], velocity(times)
 
 
+def forces_of(law: str, z: np.ndarray, v: np.ndarray, V: float) -> np.ndarray:
+    """Return a law's forces [N] at bristle deflections and velocities, one model for all."""
+    model, forces = Bench(law).model, []
+    for deflection, velocity in zip(z.tolist(), v.tolist(), strict=True):
+        model.z[0] = deflection
+        forces.append(model.force(0.0, velocity, 0.0, V, inf, 0.0, 0.0, False))
+    return np.array(forces)
+
+
 @pytest.mark.parametrize("row", MODEL["sine_loop"]["rows"], ids=lambda row: f"{row[0]:g} V")
 def test_sine_loop_of_the_laws(row: list[float]) -> None:
     V, lugre_max, at_v_max, lugre_energy, at_rest, bingham_max, bingham_energy = row
     times, z, v = bristles_of_the_sine()
-    lugre = np.array([force_at("lugre", v=b, V=V, z=a) for a, b in zip(z, v, strict=True)])
-    bingham = np.array([force_at("bingham", v=b, V=V) for b in v])
+    lugre, bingham = forces_of("lugre", z, v, V), forces_of("bingham", z, v, V)
     dt = times[1] - times[0]
     assert z[-1] == pytest.approx(MODEL["sine_loop"]["z_at_v_max"], abs=5e-10)
     assert lugre.max() == pytest.approx(lugre_max, abs=2e-6)
