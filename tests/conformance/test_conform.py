@@ -456,7 +456,7 @@ def test_built_in_fmu_conforms(name: str) -> None:
         assert report.row(probe).verdict == "pass"
 
 
-@pytest.mark.parametrize("name", _slow_but("Structure", "LuGreDamper"), ids=str)
+@pytest.mark.parametrize("name", _slow_but("Structure"), ids=str)
 def test_what_a_component_computes_conforms(name: str) -> None:
     assert tried(name, OWN).row("bare interpreter").verdict == "pass"
 

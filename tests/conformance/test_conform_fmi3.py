@@ -140,16 +140,8 @@ def test_a_native_fmu_conforms_and_keeps_the_rules_for_faults() -> None:
 
 
 @pytest.mark.skipif(not REFERENCE.exists(), reason="the Reference-FMUs are not at hand")
-@pytest.mark.parametrize(
-    "name",
-    [
-        "Stair",
-        *(
-            pytest.param(one, marks=pytest.mark.slow)
-            for one in ("BouncingBall", "Dahlquist", "Feedthrough", "VanDerPol")
-        ),
-    ],
-)
+@pytest.mark.slow  # 2 to 10 s each: the toy passes every probe, and FMI 2.0 has one by default
+@pytest.mark.parametrize("name", ["Stair", "BouncingBall", "Dahlquist", "Feedthrough", "VanDerPol"])
 def test_the_reference_fmus_violate_nothing_but_lack_robustness(name: str) -> None:
     report = conform(REFERENCE / f"{name}.fmu", timeout=2.0)
     assert report.conforms, repr(report)

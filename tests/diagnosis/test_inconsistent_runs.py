@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -105,6 +106,7 @@ def test_a_run_beyond_all_others_is_not_called_odd():
     assert odd_run(fit(train, truth, with_std=False).model, train, first.of([])) == ""
 
 
+@cache
 def sprung_finding(place: int, gain: float) -> tuple[SiteDiagnosis, Prepared]:
     """Return what is found on a damper beside a spring, with one run whose force is scaled."""
     first, second, truth = true_case(5, "bingham")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -56,6 +57,7 @@ def runs_of(hidden, seed=20, damper=friction, count=3):
     return b, [measured(shake(b, seed + i, damper, hidden), i) for i in range(count)]
 
 
+@cache
 def findings(hidden):
     b, runs = runs_of(hidden)
     found = responses(runs, b)

@@ -191,7 +191,7 @@ def test_stock_scenarios_give_the_published_peaks(law: str, peak: float) -> None
     assert found == pytest.approx(peak, rel=0.03 if law == "clipped" else 0.01)
 
 
-@pytest.mark.parametrize("law", ["hinf", "lpv"])
+@pytest.mark.parametrize("law", [pytest.param("hinf", marks=pytest.mark.slow), "lpv"])  # 2 s each
 def test_coupled_and_stepped_runs_agree_at_small_steps(law: str) -> None:
     """FMUs exchange values every 0.25 ms, the coupled engine has no such error."""
     overrides = {"run.stop": 3.0, "run.step": 2.5e-4}

@@ -22,7 +22,7 @@ from bristle.fmu.description import Description, read_description
 SOURCE = Path(__file__).with_name("host.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 STEPS, STEP = 40, 0.002
-BY_DEFAULT = ("Structure", "LuGreDamper", "Sensors", "Skyhook")
+BY_DEFAULT = ("LuGreDamper", "Skyhook")
 MOTION = {"V": (4.0, 3.0), "m": (0.0, 5e-3), "m/s": (0.0, 0.1), "m/s2": (0.0, 2.0), "N": (0.0, 1.0)}
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from built import COMPONENTS, DAMPERS, SITES, built, lively
 from fmpy import read_model_description
-from fmpy.validation import validate_fmu
 from fresh import fresh
 from kinds import ONE_OF_EACH
 
@@ -109,7 +108,9 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 
 @cache
 def description_of(component: str) -> Any:
-    return read_model_description(str(built(component)))
+    """Return what fmpy reads, which raises an error for all that its validator finds."""
+    whole = {"validate_variable_names": True, "validate_model_structure": True}
+    return read_model_description(str(built(component)), **whole)
 
 
 def variables(component: str) -> dict[str, Any]:
@@ -118,11 +119,6 @@ def variables(component: str) -> dict[str, Any]:
 
 def test_the_components_are_those_listed() -> None:
     assert set(COMPONENTS) == set(INPUTS) == set(OUTPUTS)
-
-
-@each_component
-def test_the_validator_finds_nothing(component: str) -> None:
-    assert validate_fmu(str(built(component))) == []
 
 
 @each_component
@@ -239,7 +235,16 @@ def follow(path: str, cases: list[dict[str, Any]]) -> list[tuple[str, str]]:
     return sorted(moved)
 
 
-@pytest.mark.parametrize("component", ["Structure", *DAMPERS])
+@pytest.mark.parametrize(
+    "component",
+    [
+        # Half a second each: a building, laws with and without states, and one without a command.
+        name
+        if name in ("Structure", "BinghamDamper", "LuGreDamper", "FluidViscousDamper")
+        else pytest.param(name, marks=pytest.mark.slow)
+        for name in ("Structure", *DAMPERS)
+    ],
+)
 def test_dependencies_are_what_is_seen(component: str) -> None:
     description = description_of(component)
     said = {(u.variable.name, v.name) for u in description.outputs for v in u.dependencies}
@@ -907,26 +912,3 @@ def test_half_sine_peaks_by_gauss_seidel_at_half_a_millisecond() -> None:
     assert peak(drift) == pytest.approx(0.005340066, rel=6e-3)
     assert peak(y) == pytest.approx(3.3272810, rel=6e-3)
     assert peak(force) == pytest.approx(5.8066298, rel=6e-3)
-
-
-def rattling(force: tuple[float, ...]) -> float:
-    """Return how far the force still swings in the last tenth of the run [N]."""
-    tail = force[-(len(force) // 10) :]
-    return max(tail) - min(tail)
-
-
-def test_gauss_seidel_is_stable_at_ten_milliseconds() -> None:
-    drift, y, force = pulse(8.0, 0.01, 10.0, "gauss-seidel")
-    assert peak(drift) == pytest.approx(0.002921468, rel=0.02)
-    assert peak(y) == pytest.approx(3.5646118, rel=0.02)
-    assert rattling(force) < 0.01
-
-
-@pytest.mark.parametrize(("h", "stable"), [(0.006, True), (0.010, False)])
-def test_jacobi_has_a_limit_between_six_and_ten_milliseconds(h: float, stable: bool) -> None:
-    # One step's delay of the force: stable below about base mass/(c_0 + c_v V) = 7.6 ms at 8 V.
-    _, _, force = pulse(8.0, h, 10.0, "jacobi")
-    if stable:
-        assert rattling(force) < 0.01
-    else:
-        assert rattling(force) > 5.0

@@ -57,13 +57,14 @@ def held(errors, most=5.0, share=0.75):
 @pytest.mark.parametrize(
     ("devices", "without", "told"),
     [
+        # Half a second each: by default with a load cell, beside a tie, and over two storeys.
         ([STOREY], (), (0, 1, 2)),
-        ([STOREY], NO_CELL, (0, 2)),
+        pytest.param([STOREY], NO_CELL, (0, 2), marks=pytest.mark.slow),
         ([STOREY, TIE], NO_CELL, (0, 2)),
         pytest.param([STOREY, TIE], (), (0, 1, 2), marks=pytest.mark.slow),
         pytest.param([TWO_STOREYS], (), (0, 1, 2), marks=pytest.mark.slow),
         ([TWO_STOREYS], NO_CELL, (0, 1, 2)),  # the level between has no unknown force
-        ([FROM_GROUND], NO_CELL, (0, 1, 2)),
+        pytest.param([FROM_GROUND], NO_CELL, (0, 1, 2), marks=pytest.mark.slow),
     ],
 )
 def test_stiffnesses_come_back_within_their_intervals(devices, without, told):
@@ -152,10 +153,10 @@ def test_forces_of_all_devices_are_taken_off_a_storeys_shear():
 @pytest.mark.parametrize(
     ("devices", "without"),
     [
-        ([STOREY], ()),
-        ([STOREY], NO_CELL),
-        # A second each; by default the study of a brace beside a tie shows the first of them
+        # A second each; by default the study of a brace beside a tie shows those with a load cell
         # (tests/contract/studies).
+        pytest.param([STOREY], (), marks=pytest.mark.slow),
+        ([STOREY], NO_CELL),
         pytest.param([STOREY, TIE], (), marks=pytest.mark.slow),
         pytest.param([STOREY, TIE], NO_CELL, marks=pytest.mark.slow),
         pytest.param([TWO_STOREYS], (), marks=pytest.mark.slow),
@@ -198,7 +199,9 @@ def test_sites_are_those_that_forces_part():
     assert shown([storey1], NO_CELL, floors=2, isolated=True) == ["storey2", "layer", "damper"]
 
 
-@pytest.mark.parametrize("without", [(), ("force", "iso_force")])
+@pytest.mark.parametrize(
+    "without", [(), pytest.param(("force", "iso_force"), marks=pytest.mark.slow)]
+)
 def test_a_device_on_the_first_level_is_the_damper_of_before(without):
     named = tower([{"name": "iso", "at": "isolation"}], floors=2, isolated=True)
     plain = tower([], floors=2, isolated=True)

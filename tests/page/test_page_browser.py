@@ -42,6 +42,7 @@ def browsed(home: Path) -> Iterator[Watched]:
         yield Watched(page, client)
 
 
+@pytest.mark.slow  # 7 s, a browser: by default test_embedded.py opens one
 def test_views_open_on_a_narrow_screen_without_an_error_or_a_foreign_request(
     browsed: Watched,
 ) -> None:

@@ -242,7 +242,9 @@ def test_in_the_layer_and_in_the_damper_a_building_moves_alike(
     assert float(np.sqrt(np.mean((plain - layer) ** 2))) > least * size
 
 
-@pytest.mark.parametrize("damper", ["LuGreDamper", "BinghamDamper"])
+@pytest.mark.parametrize(
+    "damper", ["LuGreDamper", pytest.param("BinghamDamper", marks=pytest.mark.slow)]
+)
 def test_fmu_and_coupled_engine_agree(tmp_path, damper: str) -> None:
     inside = f'{STOP}, {RUBS}, "duffing.on" = true'
     found = [

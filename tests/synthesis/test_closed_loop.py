@@ -23,6 +23,10 @@ from loop import (
 from bristle.component.controller_file import Controller
 from bristle.synthesis import DesignResult
 
+# 12 s, two thirds to compile this Runge-Kutta: by default tests/benchmarks/test_comparison.py has
+# El Centro and Newhall of the same table through the coupled engine.
+pytestmark = pytest.mark.slow
+
 EL_CENTRO, SYLMAR = "el_centro_1940_ns", "northridge_1994_sylmar_360"
 NEWHALL = "northridge_1994_newhall_360_peer_rsn1044.csv"
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "ground_motion"

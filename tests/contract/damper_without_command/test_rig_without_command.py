@@ -54,7 +54,7 @@ def test_it_is_said_once_and_then_no_more(rig: Path, capsys: pytest.CaptureFixtu
     said = said_by(capsys, "study", "new", str(rig.parent / "again"), "--data", *files)
     assert "no command was recorded" in " ".join(said.lower().split())
     check = said_by(capsys, "study", "check", str(rig))
-    fit = said_by(capsys, "identify", str(rig), "--law", "modified_bouc_wen", "--starts", "1")
+    fit = said_by(capsys, "identify", str(rig), "--law", "bingham", "--starts", "1")
     assert not WORDS.findall(check), check
     assert not WORDS.findall(fit), fit
 
