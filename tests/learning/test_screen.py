@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from bristle.physics.effect import EFFECTS
 from bristle.user_code.load import defined
 
 
+@cache
 def first_of(hidden):
     problem = runs(hidden)
     base = fit(problem, Model("bingham", (), VALUES), with_std=False).model

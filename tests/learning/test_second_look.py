@@ -69,7 +69,7 @@ def test_beside_a_curve_the_law_is_nearer_and_so_is_the_scan():
     assert second.loss == pytest.approx(1.0, abs=0.08)
 
 
-@pytest.mark.parametrize("pitch", [1.8e-3, 2.5e-3])
+@pytest.mark.parametrize("pitch", [pytest.param(1.8e-3, marks=pytest.mark.slow), 2.5e-3])  # 1 s
 def test_a_ripple_of_a_dozen_periods_in_the_stroke_is_found_with_its_pitch(pitch):
     problem = sweeps(lambda x, F: F + 0.9 * np.sin(2.0 * np.pi * x / pitch))
     best = promises(residual_of(problem, fitted_alone(problem)))[0].curve

@@ -92,7 +92,11 @@ def new_study(folder, file, runs):
 
 @pytest.mark.parametrize(
     ("floors", "base", "samples", "within"),
-    [(1, "fixed", 4000, 0.01), (2, "isolated", 5000, 0.01), (20, "fixed", 6000, 0.03)],
+    [
+        (1, "fixed", 4000, 0.01),
+        (2, "isolated", 5000, 0.01),
+        pytest.param(20, "fixed", 6000, 0.03, marks=pytest.mark.slow),  # 2 s: every floor's spring
+    ],
 )
 def test_a_building_comes_back_as_a_file(tmp_path, capsys, floors, base, samples, within):
     random = np.random.default_rng(floors)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,9 +20,27 @@ from bristle.study.identify import identify_study
 from bristle.study.run_facts import a_third, roles_of
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a study that tests take a copy of."""
+    folder = tmp_path_factory.mktemp("made")
+    return create_study(folder / "rig", write_runs(folder / "lab", 4), law="bingham").study.folder
+
+
+@pytest.fixture(scope="module")
+def made_and_judged(made: Path) -> Path:
+    """Return the same with an identified model and a verdict on it."""
+    return judged(Study(shutil.copytree(made, made.parent / "judged" / "rig"))).folder
+
+
 @pytest.fixture
-def study(tmp_path: Path) -> Study:
-    return create_study(tmp_path / "rig", write_runs(tmp_path / "lab", 4), law="bingham").study
+def study(made: Path, tmp_path: Path) -> Study:
+    return Study(shutil.copytree(made, tmp_path / "rig"))
+
+
+@pytest.fixture
+def known(made_and_judged: Path, tmp_path: Path) -> Study:
+    return Study(shutil.copytree(made_and_judged, tmp_path / "known" / "rig"))
 
 
 def test_roles_are_changed_and_all_else_stays(
@@ -101,17 +120,16 @@ def notes(study: Study) -> str:
     ],
 )
 def test_other_data_set_the_verdict_aside_and_say_that_the_model_is_of_others(
-    study: Study, change: Callable[[Study], Study]
+    known: Study, change: Callable[[Study], Study]
 ) -> None:
-    study = judged(study)
-    assert "no longer" not in notes(study)
-    then = change(study)
+    assert "no longer" not in notes(known)
+    then = change(known)
     assert not (then.folder / "verdict.json").is_file()
     assert json.loads((then.folder / "history/001" / EARLIER).read_text())["kind"] == "none"
     assert "no longer those that the present model was identified with" in notes(then)
     assert "bristle identify" in notes(then)
     identify_study(then, table=False)
-    assert "no longer" not in notes(Study(study.folder))
+    assert "no longer" not in notes(Study(known.folder))
 
 
 def test_what_study_toml_cannot_hold_is_not_written(study: Study) -> None:
@@ -131,19 +149,17 @@ def test_what_no_fit_and_no_judge_sees_leaves_verdict_and_model(study: Study) ->
     assert "no longer" not in notes(then)
 
 
-def test_a_step_that_is_undone_brings_back_the_data_of_the_one_before(study: Study) -> None:
-    study = judged(study)
-    then = study.with_roles({"run_3": "holdout"})
+def test_a_step_that_is_undone_brings_back_the_data_of_the_one_before(known: Study) -> None:
+    then = known.with_roles({"run_3": "holdout"})
     identify_study(then, table=False)
-    Study(study.folder).undo()
-    assert "no longer" in notes(Study(study.folder))
-    back = Study(study.folder).with_roles({"run_3": "train"})
+    Study(known.folder).undo()
+    assert "no longer" in notes(Study(known.folder))
+    back = Study(known.folder).with_roles({"run_3": "train"})
     assert "no longer" not in notes(back)
 
 
-def test_the_command_says_what_to_do_next(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
-    judged(study)
-    assert main(["study", "roles", str(study.folder), "--holdout", "run_3"]) == 0
+def test_the_command_says_what_to_do_next(known: Study, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "roles", str(known.folder), "--holdout", "run_3"]) == 0
     assert "Identify it again:  bristle identify" in capsys.readouterr().out
 
 

@@ -94,6 +94,7 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
     assert f"Force error: {text} on the held-out runs" in printed
     assert error.counted() in printed
     assert "3 missing" in error.counted()
+    assert "below 18 Hz, held-out runs" in printed
 
     compared = " ".join(run(["compare", folder], capsys).split())
     assert f"misses the force by {text}, " in compared
@@ -136,11 +137,3 @@ def test_a_first_fit_shows_no_start_as_progress(rig: Path, capsys):
     assert first["after"]["error_holdout"] > 0.0
     lines = run(["report", str(rig)], capsys)
     assert "0 begin with bingham  not judged" in lines
-
-
-def test_the_low_passed_error_has_a_name_of_its_own(rig: Path, capsys):
-    printed = run(
-        ["identify", str(rig), "--no-table", "--starts", "1", "--dry-run", "--details"], capsys
-    )
-    assert "below 18 Hz, held-out runs" in printed
-    assert "force error" in printed

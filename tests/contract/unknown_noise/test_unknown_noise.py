@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,14 +39,34 @@ def write_runs(folder: Path, hard: float, filtered: tuple[int, ...] = (1, 2, 3))
         np.savetxt(path, rows[::OVER], delimiter=",", header=title, comments="", fmt="%.9g")
 
 
-def study_of(folder: Path, hard: float, capsys: pytest.CaptureFixture[str]) -> Path:
-    """Return a study of such runs, its model identified."""
-    write_runs(folder, hard)
-    study = folder / "rig"
-    assert main(["study", "new", str(study), "--data", str(folder / "*.csv"), "--law", "tanh"]) == 0
-    assert main(["identify", str(study), "--no-table", "--starts", "2", "--details"]) == 0
-    assert "z, held-out runs" in capsys.readouterr().out
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[float], Path]:
+    """Return a function that makes a study of such runs, its model identified, once of each."""
+
+    @cache
+    def study(hard: float) -> Path:
+        folder = tmp_path_factory.mktemp("made")
+        write_runs(folder, hard)
+        rig, data = str(folder / "rig"), str(folder / "*.csv")
+        assert main(["study", "new", rig, "--data", data, "--law", "tanh"]) == 0
+        assert main(["identify", rig, "--no-table", "--starts", "2"]) == 0
+        return folder / "rig"
+
     return study
+
+
+@pytest.fixture
+def study_of(
+    made: Callable[[float], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> Callable[[float], Path]:
+    """Return a function that returns a copy of such a study."""
+
+    def copy(hard: float) -> Path:
+        kept = made(hard)
+        capsys.readouterr()
+        return Path(shutil.copytree(kept, tmp_path / "rig"))
+
+    return copy
 
 
 def test_a_held_out_run_of_unknown_noise_explains_nothing(
@@ -68,8 +91,10 @@ def numbers_of_z(value: Any, key: str = "") -> list[Any]:
     return [value] if key == "z" or key.startswith("z_") else []
 
 
-def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    study = study_of(tmp_path, 0.0, capsys)
+def test_identify_and_compare_tell_no_z(
+    study_of: Callable[[float], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = study_of(0.0)
     assert main(["identify", str(study), "--no-table", "--dry-run", "--details"]) == 0
     told = capsys.readouterr().out
     rows = [line for line in told.splitlines() if line.startswith("  z, ")]
@@ -106,9 +131,9 @@ def test_identify_and_compare_tell_no_z(tmp_path: Path, capsys: pytest.CaptureFi
 
 @pytest.mark.slow
 def test_no_effect_that_lowers_the_error_is_no_proof_that_none_is_missing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    study_of: Callable[[float], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    study = study_of(tmp_path, 0.0, capsys)
+    study = study_of(0.0)
     assert main(["diagnose", str(study), "--json"]) == 0
     verdict = json.loads(capsys.readouterr().out)
     assert verdict["kind"] == "insufficient"
@@ -121,9 +146,9 @@ def test_no_effect_that_lowers_the_error_is_no_proof_that_none_is_missing(
 
 
 def test_an_effect_is_named_for_the_error_that_it_takes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    study_of: Callable[[float], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    study = study_of(tmp_path, HARD, capsys)
+    study = study_of(HARD)
     assert main(["diagnose", str(study)]) == 0
     told = capsys.readouterr().out
     assert told.startswith("Missing from the model: Duffing spring")
@@ -137,9 +162,9 @@ def test_an_effect_is_named_for_the_error_that_it_takes(
 
 
 def test_noise_that_the_user_states_is_known(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    study_of: Callable[[float], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    study = study_of(tmp_path, 0.0, capsys)
+    study = study_of(0.0)
     settings = study / "study.toml"
     text = settings.read_text(encoding="utf-8")
     settings.write_text(text.replace("[channels.force]\n", "[channels.force]\nnoise = 0.3\n"))
