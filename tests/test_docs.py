@@ -103,7 +103,7 @@ def test_a_page_is_brought_up_to_date(tmp_path: Path) -> None:
     assert snippets.run_page(page) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # all pages by mkdocs
 def test_the_site_renders_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs")
     pytest.importorskip("material")

@@ -59,7 +59,7 @@ def test_a_notebook_is_whole_and_holds_no_output(path: Path) -> None:
             assert cell["execution_count"] is None
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a notebook's cells, with runs and fits
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_cells_of_a_notebook_run_and_what_they_show_is_drawn(
     path: Path, tmp_path: Path

@@ -147,6 +147,7 @@ SEARCHES = {"Comparison", "Diagnosis", "Identified", "Plan", "Study", "diagnose"
     "names",
     [
         pytest.param([name for name in NAMES if name not in SEARCHES], id="quick"),
+        # A search each: examples of docstrings.
         *(pytest.param([name], id=name, marks=pytest.mark.slow) for name in sorted(SEARCHES)),
     ],
 )

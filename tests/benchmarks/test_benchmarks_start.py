@@ -20,7 +20,7 @@ AT_WORK = 120.0
 """Seconds after which a benchmark counts as started: many take hours, and have no small case."""
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a process a benchmark: it starts and is at work
 @pytest.mark.parametrize("name", NAMES)
 def test_a_benchmark_starts(name: str) -> None:
     command = [sys.executable, "-m", "benchmarks", name, "--json"]
@@ -39,7 +39,7 @@ def test_a_benchmark_starts(name: str) -> None:
     assert json.loads(done.stdout)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a process a command: each has a help
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_of_the_benchmarks_says_what_it_does(name: str) -> None:
     command = [sys.executable, "-m", "benchmarks", name, "--help"]

@@ -331,7 +331,7 @@ def test_rows_of_buildings_are_counted_apart_from_the_bench():
     assert not any(row.group == "buildings" for row in table.figures([]))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # buildings are simulated: task, file and truth agree
 def test_a_building_is_recorded_as_its_task_says_and_its_file_is_the_drawing(monkeypatch, tmp_path):
     monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path))
     for late in (False, True):

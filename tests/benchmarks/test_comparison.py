@@ -165,7 +165,7 @@ def test_a_folder_that_is_a_file_is_refused(
     assert "is a file" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a design is made and fails: the page says so
 def test_a_design_that_fails_is_said_with_its_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -182,7 +182,7 @@ def test_a_design_that_fails_is_said_with_its_words(
     assert not list((tmp_path / "out").glob("*.html"))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two fits: the paper's statement on laws
 def test_lugre_fits_a_lugre_damper_to_the_noise_and_bingham_does_not(report: Report) -> None:
     found = report.numbers.fits
     for specimen, part in found.groupby("specimen"):
@@ -210,7 +210,7 @@ def written(report: Report) -> Path:
     return report.folder
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the whole comparison is made: its files
 def test_everything_is_written(written: Path) -> None:
     names = {path.name for path in written.iterdir()}
     tables = {"table4.csv", "comparison.csv", "ledger.csv", "report.html", "hinf.json", "lpv.json"}
@@ -222,7 +222,7 @@ def test_everything_is_written(written: Path) -> None:
     assert "summary.png" in figures
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # of the whole comparison: its page
 def test_the_page_needs_no_network_and_holds_every_statement(written: Path) -> None:
     text = (written / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", text)
@@ -238,7 +238,7 @@ def test_the_page_needs_no_network_and_holds_every_statement(written: Path) -> N
         assert words in text
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # of the whole comparison: its ledger
 def test_the_ledger_file_agrees_with_the_page(written: Path) -> None:
     ledger = pd.read_csv(written / "ledger.csv", comment="#")
     assert list(ledger["number"]) == list(range(1, 22))
@@ -248,7 +248,7 @@ def test_the_ledger_file_agrees_with_the_page(written: Path) -> None:
     assert set(shown) <= {"reproduced", "not reproduced", "undecidable"}
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # of the whole comparison: its tables
 def test_table_iv_holds_the_peaks_and_table_v_the_rms_of_all_motions(written: Path) -> None:
     peaks, rms = (pd.read_csv(written / f"table{n}.csv", comment="#") for n in (4, 5))
     cases = 4 + 2 * (len(at_hand()) - 1)
@@ -260,7 +260,7 @@ def test_table_iv_holds_the_peaks_and_table_v_the_rms_of_all_motions(written: Pa
         assert table[f"{kind}floor 2 acceleration [m/s2]"].notna().all()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # of the whole comparison: strokes that are left
 def test_runs_beyond_the_stroke_are_told_in_table_and_text(
     report: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -293,7 +293,7 @@ def test_a_drift_within_the_stroke_or_without_damper_is_not_beyond_it() -> None:
     assert measured(pd.DataFrame(drift), motion, 1.0, NONE)[BEYOND] == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # of the whole comparison: its figures
 def test_figures_14_to_17_show_what_the_papers_show(report: Report) -> None:
     comparison = report.comparison
     if len(comparison.motions) == 1:
@@ -327,7 +327,7 @@ def test_figures_14_to_17_show_what_the_papers_show(report: Report) -> None:
             assert any(title.startswith(panel) for title in titles), panel
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # of the whole comparison: what is printed
 def test_what_is_printed_holds_the_verdicts(
     report: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -337,7 +337,7 @@ def test_what_is_printed_holds_the_verdicts(
     assert max(map(len, said.splitlines())) < 400
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # another whole comparison: a record lacks
 def test_without_northridge_the_rest_is_done_and_the_gap_is_said(
     report: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -114,7 +114,7 @@ def test_how_scripts_ended_is_counted() -> None:
     assert str(ends[2]) == "script 2: hung, without a word"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a process a way to end: exit codes where FMUs are loaded
 @linux
 @compiles
 def test_scripts_of_users_end_with_0() -> None:

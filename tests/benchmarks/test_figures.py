@@ -262,7 +262,7 @@ def test_loops_have_the_force_and_energy_of_the_reference(
     assert energy == pytest.approx(per_cycle, rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # FMUs are stepped over many cycles: the figure by them
 def test_loops_over_frequency_by_fmus_agree_with_the_law(tmp_path: Path) -> None:
     image, csv = make("loops-frequency", tmp_path, engine="fmu", format="svg")
     assert image.name == "loops-frequency.svg"

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.paper.figures import make
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every law is fitted: the order of the paper's text
 def test_laws_are_in_the_order_that_the_text_gives(tmp_path: Path) -> None:
     image, table, loops = make("identification", tmp_path)
     assert image.stat().st_size > 50_000

@@ -96,7 +96,7 @@ def test_a_training_that_cannot_be_is_refused_before_it_begins(
     assert not (tmp_path / "mine.json").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the loop is differentiated: against differences
 @pytest.mark.parametrize("law", ["lugre", "bingham"])
 def test_the_derivative_is_that_of_the_response(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[tuple[Loop, list[Run]]] = []
@@ -126,7 +126,7 @@ def test_the_derivative_is_that_of_the_response(law: str, monkeypatch: pytest.Mo
         assert slope @ along == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=2e-2)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a policy is trained: it serves
 def test_a_short_training_beats_clipped_optimal_control_on_motions_held_out() -> None:
     task = PolicyTask(
         damper=DesignDamper("lugre"), motions=Training(synthetic=24, rounds=30, hidden=6)

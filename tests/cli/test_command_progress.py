@@ -124,7 +124,9 @@ def words(of: list[str], rig: Path, tmp_path: Path) -> list[str]:
 
 @needs_terminal
 @pytest.mark.parametrize(
-    "what", [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
+    # A process of seconds each: the others of the same list show the kind.
+    "what",
+    [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)],
 )
 def test_a_terminal_shows_what_a_command_does_and_its_answer_does_not(
     what: str, rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
@@ -211,7 +213,7 @@ STOPPED = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a process a command, each stopped at work
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process")
 @pytest.mark.parametrize("what", STOPPED)
 def test_ctrl_c_amid_the_work_is_one_line_and_leaves_all_whole(

@@ -27,11 +27,12 @@ def found(held):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # hundreds of comparisons: the rate of false alarms
 @pytest.mark.parametrize(
     ("kind", "phi"),
     [
         ("sine", 0.9),
+        # Two seconds each: other noise and motion, the first is by default.
         pytest.param("random", 0.9, marks=pytest.mark.slow),
         pytest.param("sine", 0.0, marks=pytest.mark.slow),
         pytest.param("random", 0.0, marks=pytest.mark.slow),

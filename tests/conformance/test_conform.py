@@ -435,6 +435,7 @@ OWN = (
 def _slow_but(*names: str) -> list[Any]:
     """Return all components: those of these names by default, the others among slow tests."""
     return [
+        # 2 to 7 s each: what is left are siblings of those by default.
         name if name in names else pytest.param(name, marks=pytest.mark.slow)
         for name in catalogue.component_names()
     ]

@@ -199,7 +199,7 @@ def test_stock_designs_stay_on_the_building_they_were_made_for() -> None:
     assert found.setting.folder is None
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an own FMU in every case
 def test_a_controller_of_ones_own_is_stepped_as_an_fmu(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -225,7 +225,7 @@ def test_a_controller_of_ones_own_is_stepped_as_an_fmu(
     assert again.value(again.motions[0], "again", name) == own[name]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an own FMU in every case: whose building counts
 def test_an_fmu_with_a_design_keeps_the_building_for_all(tmp_path: Path) -> None:
     fmu = build(plan("LqgClipped", name="MyLqg"), tmp_path)
     found = compare_controllers(
@@ -271,7 +271,7 @@ def test_a_damper_in_a_storey_of_a_fixed_building(tmp_path: Path) -> None:
     assert found.setting.judged.name == "rms structure.floor2_acceleration_absolute"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the limit is computed for each motion
 def test_the_limit_is_below_every_controller_and_is_kept() -> None:
     given = {"grid": 5, "limit": True, "workers": 1}
     motion = "el_centro_1940_ns,peak=0.4g,factor=0.45,stop=3"

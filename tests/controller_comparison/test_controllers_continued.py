@@ -25,7 +25,7 @@ def compared(out: Path) -> Any:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two comparisons: the second goes on
 def test_an_interrupted_comparison_makes_no_run_of_its_ensembles_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -70,13 +70,14 @@ def run(script: str, module: str) -> list[str]:
 
 @pytest.mark.parametrize(
     "module",
+    # A compiling process each: other moments of an interruption.
     [pytest.param(one, marks=pytest.mark.slow) if one in DURING[1:3] else one for one in DURING],
 )
 def test_numba_is_whole_behind_it(module: str) -> None:
     assert run(SCRIPT, module) == ["interrupted True", "42.0"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the engine is compiled in a process, interrupted beside
 @pytest.mark.parametrize("module", DURING)
 def test_the_compiled_engine_runs_behind_it(module: str) -> None:
     head = SCRIPT.partition("def twice")[0]

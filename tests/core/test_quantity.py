@@ -71,6 +71,7 @@ def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
         "study check",
         "compare",
         "identify --starts 1 --no-table",
+        # A report of very large and very small forces.
         pytest.param("report", marks=pytest.mark.slow),
     ],
 )
@@ -88,7 +89,7 @@ def test_no_command_prints_a_power_of_ten(
         assert [text[m.start() - 30 : m.end() + 10] for m in POWER.finditer(text)] == []
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # all commands of a study, a diagnosis among them
 def test_nor_does_a_diagnosis(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for line in ("identify", "diagnose", "add", "compare", "report"):
         words = [line, str(rig), *(["stribeck"] if line == "add" else [])]

@@ -22,6 +22,7 @@ from tests.identification.truths import hidden_case, true_case
 
 @pytest.mark.parametrize(
     ("law", "other"),
+    # Compiled and fitted: another law and size.
     [("bingham", "bench_2kN"), pytest.param("lugre", "bench_10N", marks=pytest.mark.slow)],
 )
 def test_runs_of_two_rigs_are_named(law, other):
@@ -173,6 +174,7 @@ def late(run, steps: float):
     return replace(run, force=np.interp(at - steps, at, run.force))
 
 
+# Two seconds: where nothing was named.
 @pytest.mark.parametrize("named", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_logger_that_began_apart_is_told_beside_a_missing_effect(named):
     """The late run alone leaves more than noise, and is no other form of the spring."""

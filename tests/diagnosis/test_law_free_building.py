@@ -55,7 +55,7 @@ def test_all_laws_are_held_against_the_samples_that_every_law_tells():
     assert np.min(np.abs(sought.v)) > np.min(np.abs(known.v))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a building, law free
 def test_a_stiffness_that_the_file_has_wrong_is_no_effect_of_the_law_that_is_found(few):
     file = moved(HOUSE, np.array([1.0, 0.0, 0.0, 0.0]))
     hidden = runs({"voltage": np.full(1500, 2.0)}, without=("force",))

@@ -116,7 +116,7 @@ def test_two_levels_or_a_command_that_was_not_measured_tell_no_bend(runs):
     assert not tells_a_bend(measurements([two]))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # law free, pairs
 def test_effects_that_leave_an_error_are_not_named_where_another_law_explains_the_runs_alone():
     runs = [_of_tanh(k) for k in range(3)]
     found = diagnose_rig(runs[:2], runs[2:], Model("bingham"))

@@ -14,6 +14,7 @@ from bristle.identification.building_motion import responses
 
 DOUBTS = (
     [0.02, -0.03, 0.025],
+    # Two seconds each: other masses that are off.
     *(pytest.param(d, marks=pytest.mark.slow) for d in ([-0.04, 0.01, 0.03], [0.0, 0.05, -0.02])),
 )
 

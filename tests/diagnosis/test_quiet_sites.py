@@ -62,7 +62,7 @@ def test_masses_that_are_off_are_found_beside_an_effect(hidden, name, at):
     assert np.diag(masses.M)[1:] == pytest.approx(np.diag(b.M)[1:], rel=6e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # one more building
 @pytest.mark.parametrize("level", ["base", "floor1"])
 def test_the_noise_of_an_acceleration_that_was_not_measured_is_known(level):
     b, runs = recorded(without=(f"{level}_acceleration_absolute",), stride=2, samples=10_000)
@@ -71,7 +71,7 @@ def test_the_noise_of_an_acceleration_that_was_not_measured_is_known(level):
     assert (layer.kind, layer.effects) == ("none", ())
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # one more building, diagnosed whole
 def test_noise_that_is_stated_too_small_is_a_finding():
     b, runs = recorded()
     loud = [

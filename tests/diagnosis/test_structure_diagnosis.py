@@ -87,7 +87,7 @@ def test_nothing_is_found_where_nothing_is_hidden():
     assert [f.kind for f in found.values()] == ["none"] * 3
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every effect of a building is tried in vain
 def test_a_force_of_no_effect_is_unknown_and_its_coordinate_named():
     def ripple(x, v):
         return [0.4 * np.sin(2.0 * np.pi * x[0] / 0.002), 0.0, 0.0]

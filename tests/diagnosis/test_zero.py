@@ -132,7 +132,7 @@ def test_a_zero_that_was_found_first_is_renewed_beside_an_effect():
     assert renewed_zero(freed, of("effect", freed, fitted(freed, ("gas_spring",)))) == ()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a diagnosis beside a zero
 def test_an_effect_is_named_alone_and_the_zero_told():
     found, _ = of_damper.diagnose_damper(opened(**HIDDEN))
     assert (found.kind, found.effects) == ("effect", ("stribeck",))

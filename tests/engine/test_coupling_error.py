@@ -276,7 +276,7 @@ def test_the_command_line_prints_the_error(
     [
         ("gauss-seidel", 1.7, 2.3),
         ("midpoint", 3.3, 4.7),
-        pytest.param("jacobi", 1.7, 2.3, marks=pytest.mark.slow),
+        pytest.param("jacobi", 1.7, 2.3, marks=pytest.mark.slow),  # two runs: the third algorithm
     ],
 )
 def test_the_energy_that_the_coupling_makes_is_in_every_results_file(

@@ -116,6 +116,7 @@ def apart(file: Path, step: float) -> pd.Series[float]:
 
 @pytest.mark.parametrize(
     "name",
+    # A tall building by FMUs at two steps.
     [pytest.param(n, marks=pytest.mark.slow) if n == "twenty floors" else n for n in BUILDINGS],
 )
 def test_any_building_runs_and_fmus_come_nearer_with_the_step(name: str, tmp_path: Path) -> None:

@@ -319,7 +319,7 @@ def test_a_small_error_needs_no_shorter_step(scenario: Path) -> None:
         assert one.output == "damper.force"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # runs at ever finer steps: the promise is kept
 def test_the_step_that_is_told_keeps_the_error_of_a_closed_loop(loop: Path) -> None:
     file = loop.with_suffix(".toml")
     found = expect(load_scenario(file), AGAIN)

@@ -309,7 +309,7 @@ def test_one_rollback_is_better_still_and_repeats_nothing_of_the_first_pass() ->
     assert all(iterated[name] < 0.5 * plain[name] for name in plain)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # runs at several steps
 def test_a_switching_controller_is_no_worse_than_with_gauss_seidel() -> None:
     short = {"run__step": 0.0005, "run__stop": 6.0}
     found = errors("el_centro_0p6g_clipped", **short)
@@ -324,7 +324,7 @@ def test_an_end_stop_is_no_worse_than_with_gauss_seidel() -> None:
     assert all(found[name] <= 1.1 * plain[name] for name in plain)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # runs at several steps
 def test_dry_friction_is_never_worse_than_with_gauss_seidel() -> None:
     sliding = {"damper__fmu": "BinghamDamper"}
     assert errors("half_sine_pulse", **sliding) == errors(

@@ -84,7 +84,10 @@ def test_what_is_held_stays_and_so_does_what_has_no_newer_value(scenario_of: Mak
 
 
 @pytest.mark.parametrize(
-    "text", [FREE, pytest.param(SENSORS, marks=pytest.mark.slow)], ids=["structure", "sensors"]
+    # Runs at ever finer steps: sensors beside a building.
+    "text",
+    [FREE, pytest.param(SENSORS, marks=pytest.mark.slow)],
+    ids=["structure", "sensors"],
 )
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", "midpoint"])
 def test_substeps_of_our_components_are_as_good_as_one_step(

@@ -271,7 +271,7 @@ def test_noise_is_of_the_size_that_was_asked_for(tmp_path: Path) -> None:
     assert np.std(noisy - clean) == pytest.approx(0.03 * np.sqrt(np.mean(clean**2)), rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # the README's diagnosis; a contract study has one by default
 def test_the_example_of_the_first_page_is_found(rig: Path) -> None:
     assert main(["study", "auto", str(rig)]) == 0
     study = make.Study(rig)

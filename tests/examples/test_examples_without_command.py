@@ -55,7 +55,7 @@ def test_what_it_can_hide_changes_its_force_and_is_an_effect_that_joins(law: str
         assert HIDDEN[name].outside or EFFECTS[name].joins(LAWS[law])
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an example is made with a law that nothing commands
 def test_its_files_and_words_have_no_voltage(tmp_path: Path) -> None:
     folder = tmp_path / "rig"
     make_bench(folder, Choice(law="fluid_viscous", noise=0.01))

@@ -203,7 +203,7 @@ def test_so_is_how_far_a_damper_is_outside_of_its_data(tmp_path: Path) -> None:
     assert right.min() == pytest.approx(1.0 / 3.0)  # 4 V of 3 V
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a scenario is compiled to WebAssembly
 @needs_tools
 def test_a_moved_slider_gives_the_run_with_that_value(tmp_path: Path) -> None:
     files = export_web(PASSIVE, tmp_path, {"voltage.level": (0.0, 8.0)})
@@ -247,7 +247,7 @@ def stepped_in_python(
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a component is compiled to WebAssembly
 @needs_tools
 def test_a_component_takes_a_long_text_after_its_parameters_were_read(tmp_path: Path) -> None:
     export_component("SignalSource", tmp_path)
@@ -276,7 +276,7 @@ def motion(count: int) -> list[dict[str, float]]:
     return [{"dt": 1e-3, "displacement": a, "velocity": b, "voltage": c} for a, b, c in rows]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # components are compiled to WebAssembly: their numbers
 @needs_tools
 @pytest.mark.parametrize(
     "parameters", [{}, {"stribeck.on": True, "coil_lag.on": True, "coil_lag.tau": 0.02}]
@@ -290,7 +290,7 @@ def test_a_component_steps_as_its_python_form(parameters: dict[str, Any], tmp_pa
     assert np.max(np.abs(np.subtract(found["values"], right))) <= AGREE * np.max(np.abs(right))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a component is compiled to WebAssembly: its faults
 @needs_tools
 @pytest.mark.parametrize(
     ("row", "parameters", "said"),

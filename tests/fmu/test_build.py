@@ -91,6 +91,7 @@ def python(folder: Path, *arguments: str, **environment: str) -> str:
 
 @pytest.mark.parametrize(
     "names",
+    # All 21 components built a second time.
     [["Structure", "LuGreDamper", "GroundMotion"], pytest.param([], marks=pytest.mark.slow)],
     ids=["three", "all"],
 )
@@ -665,8 +666,9 @@ def alone(component: str, python: str) -> dict[str, Any]:
 @pytest.mark.parametrize(
     "component",
     [
+        # Half a second each: one component of each other kind.
         one if one in ("Structure", "LuGreDamper") else pytest.param(one, marks=pytest.mark.slow)
-        for one in ONE_OF_EACH  # half a second each
+        for one in ONE_OF_EACH
     ],
 )
 def test_an_fmu_runs_on_other_pythons(component: str, version: str) -> None:

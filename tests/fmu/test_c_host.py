@@ -101,6 +101,7 @@ def _in_python(about: Description, folder: Path) -> list[float]:
 @pytest.mark.parametrize(
     ("name", "count"),
     [
+        # Two seconds each: all components, and 20 times over.
         pytest.param(n, c, marks=() if c == 8 and n in BY_DEFAULT else pytest.mark.slow)
         for n in catalogue.component_names()
         for c in (8, 20)

@@ -52,7 +52,7 @@ each_form = pytest.mark.parametrize(
         pytest.param(
             built_native,
             marks=[
-                pytest.mark.slow,
+                pytest.mark.slow,  # a building and a damper are compiled
                 pytest.mark.skipif(
                     importlib.util.find_spec("ziglang") is None,
                     reason="ziglang compiles native FMUs, not there",

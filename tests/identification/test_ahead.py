@@ -43,7 +43,7 @@ def test_strided_motions_take_the_same_machine_code(monkeypatch: pytest.MonkeyPa
     assert all(np.asarray(one).flags.c_contiguous for one in seen[0][:4])
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two processes compile: the second reads
 def test_another_process_keeps_what_fits_need(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,6 +62,7 @@ def held(errors, most=5.0, share=0.75):
         pytest.param([STOREY], NO_CELL, (0, 2), marks=pytest.mark.slow),
         ([STOREY, TIE], NO_CELL, (0, 2)),
         pytest.param([STOREY, TIE], (), (0, 1, 2), marks=pytest.mark.slow),
+        # Half a second each: other places of a device.
         pytest.param([TWO_STOREYS], (), (0, 1, 2), marks=pytest.mark.slow),
         ([TWO_STOREYS], NO_CELL, (0, 1, 2)),  # the level between has no unknown force
         pytest.param([FROM_GROUND], NO_CELL, (0, 1, 2), marks=pytest.mark.slow),
@@ -159,6 +160,7 @@ def test_forces_of_all_devices_are_taken_off_a_storeys_shear():
         ([STOREY], NO_CELL),
         pytest.param([STOREY, TIE], (), marks=pytest.mark.slow),
         pytest.param([STOREY, TIE], NO_CELL, marks=pytest.mark.slow),
+        # A second each: other places of a device.
         pytest.param([TWO_STOREYS], (), marks=pytest.mark.slow),
         ([TWO_STOREYS], NO_CELL),
     ],
@@ -200,7 +202,9 @@ def test_sites_are_those_that_forces_part():
 
 
 @pytest.mark.parametrize(
-    "without", [(), pytest.param(("force", "iso_force"), marks=pytest.mark.slow)]
+    # Two seconds: the force computed.
+    "without",
+    [(), pytest.param(("force", "iso_force"), marks=pytest.mark.slow)],
 )
 def test_a_device_on_the_first_level_is_the_damper_of_before(without):
     named = tower([{"name": "iso", "at": "isolation"}], floors=2, isolated=True)

@@ -40,7 +40,7 @@ def test_truth_within_its_intervals(law, rig, noise):
     assert 0.9 < z < 1.1
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # many fits: intervals
 def test_a_rough_loss_widens_its_intervals_by_the_spread_of_its_ends():
     """Impacts leave a loss of many dents, each far narrower than the errors are."""
     train, truth = hidden_case(21, "backlash", "rigid", 0.15, "bench_10N", "lugre")
@@ -61,7 +61,7 @@ def test_a_rough_loss_widens_its_intervals_by_the_spread_of_its_ends():
     assert multistart_refit(train, smooth.model).std == pytest.approx(smooth.std, rel=0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # many fits: 95 % of the intervals hold
 def test_intervals_cover_and_z_of_the_truth_is_one():
     """Of 40 cases, both laws and rigs, 1 and 3 % noise: 90 to 99 % of the parameters covered."""
     cases = [

@@ -114,7 +114,7 @@ def test_of_a_single_run_it_says_that_it_knows_no_other() -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a closure is trained and effects fitted beside
 def test_the_effect_that_it_stands_for_is_named_and_tried() -> None:
     def hidden(x, v, V, F):
         lag = {**VALUES, "coil_lag.tau": 0.08}

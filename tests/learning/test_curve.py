@@ -136,7 +136,7 @@ def test_a_learned_effect_conforms_as_any_other(closed):
     assert failed == []
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # 3 s: examined as any effect, by default a curve is
 def test_elastic_slip_elements_conform():
     with defined({"learned_9": effect_text("learned_9", slip_of(), "made for a test, 2026")}):
         assert [check for check in examine(EFFECTS["learned_9"]) if not check.holds] == []

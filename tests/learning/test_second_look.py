@@ -80,7 +80,7 @@ def test_a_ripple_of_a_dozen_periods_in_the_stroke_is_found_with_its_pitch(pitch
     assert form.values[2] == pytest.approx(pitch, rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an effect is compiled
 def test_a_fit_that_the_second_scan_misleads_begins_from_the_present_model(monkeypatch):
     problem = sweeps(lambda x, F: F)
     present = Model("bingham", (), VALUES)

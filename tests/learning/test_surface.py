@@ -158,7 +158,7 @@ def test_a_surface_has_no_closed_form():
     assert closed_forms(grid(lambda x, V: float(np.tanh(500.0 * x - V + 3.0))), [0.1] * 20) == []
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a study learns a surface, by default a curve
 def test_a_study_learns_a_surface_draws_it_and_takes_it(tmp_path, capsys):
     folder = tmp_path / "rig"
     assert main(["example", "bench", str(folder), "--quiet"]) == 0

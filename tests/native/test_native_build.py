@@ -62,7 +62,7 @@ def test_it_conforms_with_the_rules_for_faults() -> None:
     assert [tried[f"fault: {kind}"] for kind in ("input", "step", "order")] == ["pass"] * 3
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two builds for two platforms, nothing kept
 def test_two_builds_are_identical_whatever_the_cache(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,7 +69,7 @@ def test_a_sampled_input_is_taken_at_the_end_of_the_step(values: bool) -> None:
     follows(LIGHT, values)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # heavy components are compiled
 @pytest.mark.parametrize("values", [True, False], ids=["with values", "derivatives alone"])
 @pytest.mark.parametrize("component", ["LuGreDamper", "Structure", "Sensors"])
 def test_held_inputs_have_the_middle_of_the_step_and_others_its_end(

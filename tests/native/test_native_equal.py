@@ -80,7 +80,7 @@ def test_sources_and_controllers_give_the_same_numbers(
     equal(component, values)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # all dampers are compiled with all effects
 @pytest.mark.parametrize(("component", "values"), HEAVY, ids=lambda value: str(value))
 def test_every_effect_of_every_component_gives_the_same_numbers(
     component: str, values: dict[str, Any]
@@ -88,7 +88,7 @@ def test_every_effect_of_every_component_gives_the_same_numbers(
     equal(component, values)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # of all dampers compiled: no law is left out
 def test_every_law_of_the_library_is_among_them() -> None:
     assert set(DAMPERS.values()) == {law for law in LAWS if LAWS[law] in laws_of("damper")}
 
@@ -190,7 +190,7 @@ def test_a_parameter_is_refused_in_the_same_words(
     pair.end()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # one more damper is compiled
 def test_an_input_that_the_build_sets_counts_as_set_after_a_reset_too() -> None:
     starts = {"fluid_inertia.on": True, "fluid_inertia.m_f": 2.0, "acceleration": 3.0}
     what = plan("LuGreDamper", name="Accelerated", starts=starts)

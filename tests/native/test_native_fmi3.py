@@ -202,19 +202,19 @@ def test_the_command_builds_it(
 # -- all of it, slowly
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every component is compiled
 @pytest.mark.parametrize("component", catalogue.component_names())
 def test_every_component_has_this_form(component: str) -> None:
     described_alike(component)
     assert largest_difference(component, steps=60) == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a damper with all effects is compiled
 def test_booleans_switch_effects() -> None:
     assert largest_difference("BinghamDamper", **{"stribeck.on": True}) == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # libraries of five platforms
 def test_every_platform_has_a_library_of_its_own() -> None:
     path = build(plan("ConstantVoltage"), folder() / "fmi3_all", list(PLATFORMS.values()), fmi=3)
     with zipfile.ZipFile(path) as archive:

@@ -82,7 +82,7 @@ def test_a_host_without_python_runs_them_in_fmi_3(component: str) -> None:
     assert np.ptp(found, axis=0).max() > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # valgrind, fifty times slower
 @pytest.mark.skipif(VALGRIND is None, reason="valgrind checks memory, not there")
 @pytest.mark.parametrize("component", catalogue.component_names())
 def test_a_memory_checker_finds_nothing_in_fmi_3(component: str) -> None:
@@ -90,7 +90,7 @@ def test_a_memory_checker_finds_nothing_in_fmi_3(component: str) -> None:
     rows(component, here(), str(VALGRIND), "-q", "--leak-check=full", leaks, "--error-exitcode=9")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # libraries of other platforms, emulated
 @pytest.mark.parametrize("platform", FAR)
 @pytest.mark.parametrize("component", [*LIGHT, "Structure"])
 def test_other_platforms_give_the_same_rows_in_fmi_3(component: str, platform: str) -> None:

@@ -79,7 +79,7 @@ def test_a_host_in_c_times_steps(tmp_path: Path) -> None:
         _hosts.times_of_steps(program, path, [], steps=0, passes=2)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # valgrind, fifty times slower
 @pytest.mark.skipif(VALGRIND is None, reason="valgrind checks memory, not there")
 @pytest.mark.parametrize("name", catalogue.component_names())
 def test_a_memory_checker_finds_nothing(name: str, host: Path, tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from tests.learning.test_curve import curve_of, slip_of
 from tests.learning.test_line_curves import LAYER, STOREY
 from tests.learning.test_line_curves import curve_of as line_curve_of
 
-pytestmark = [needs_zig, pytest.mark.slow]
+pytestmark = [needs_zig, pytest.mark.slow]  # dampers with learned curves are compiled
 
 EQUAL = 1e-12
 STEP = 0.002  # s

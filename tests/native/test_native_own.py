@@ -14,7 +14,7 @@ from bristle.native.entrance import component_of, prepare
 from bristle.native.zig import here
 from bristle.user_code.load import load_file
 
-pytestmark = [needs_zig, pytest.mark.slow]
+pytestmark = [needs_zig, pytest.mark.slow]  # dampers with own laws and effects are compiled
 
 
 def difference(what: BuildPlan, **values: object) -> float:

@@ -28,7 +28,7 @@ def difference(one: pd.DataFrame, other: pd.DataFrame) -> float:
     return float(((one - other).abs().max() / peaks).max())
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every component is compiled: all stock scenarios
 @pytest.mark.parametrize("scenario", sorted(stock_scenarios()), ids=lambda path: path.stem)
 def test_every_stock_scenario_gives_the_same_rows(scenario: Path) -> None:
     stop = {"run.stop": LONGEST} if "el_centro" in scenario.stem else {}
@@ -37,7 +37,7 @@ def test_every_stock_scenario_gives_the_same_rows(scenario: Path) -> None:
     assert np.isfinite(native.to_numpy()).all()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a building and damper are compiled
 def test_a_run_in_python_takes_them_and_so_do_the_runs_of_its_coupling_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -44,6 +44,7 @@ def same(fmu: Path, again: Path, **given: Any) -> bool:
 
 
 @needs_compiler
+# Another compiler: FMI 3.0 beside 2.0.
 @pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_another_compiler_makes_the_same_fmu(fmi: int, tmp_path: Path) -> None:
     fmu = build(plan("SignalSource"), tmp_path, [here()], fmi, sources=True)
@@ -52,7 +53,7 @@ def test_another_compiler_makes_the_same_fmu(fmi: int, tmp_path: Path) -> None:
     assert same(fmu, again, start_values={"kind": "sine", "amplitude": 2.0, "frequency": 1.3})
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a damper is compiled by another compiler
 @needs_compiler
 def test_a_damper_too(tmp_path: Path) -> None:
     fmu = build(plan("LuGreDamper"), tmp_path, [here()], sources=True)

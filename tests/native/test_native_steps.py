@@ -77,7 +77,7 @@ def test_a_step_asks_for_nothing(name: str, host: Path) -> None:
     assert during == 0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a damper with all effects is compiled
 @pytest.mark.parametrize("name", catalogue.component_names())
 def test_nor_does_one_with_all_effects_that_go_together(name: str, host: Path) -> None:
     assert counted(host, name, [])[1] == 0

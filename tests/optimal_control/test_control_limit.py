@@ -200,7 +200,7 @@ def test_what_a_limit_is_refused_for(
     assert "Traceback" not in said
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an optimal control is computed
 def test_without_the_solver_there_is_a_limit_and_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cvxpy", None)
     found = limit(PULSE, {"run.stop": 0.3}, previews=(), starts=1)
@@ -220,7 +220,7 @@ def pulse(tmp_path_factory: pytest.TempPathFactory) -> tuple[Limit, Path]:
     return limit(PULSE, {"run.stop": 1.5}, out=folder), folder
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an optimal control, and many others
 def test_nothing_comes_below_the_limit_and_the_limit_not_below_the_bound(
     pulse: tuple[Limit, Path],
 ) -> None:
@@ -234,7 +234,7 @@ def test_nothing_comes_below_the_limit_and_the_limit_not_below_the_bound(
     assert found.previews[0.0] > found.previews[0.1]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an optimal control, played through FMUs
 def test_the_voltage_reaches_the_limit_through_fmus(pulse: tuple[Limit, Path]) -> None:
     found, folder = pulse
     frame = bristle.run(folder / "limit.toml")
@@ -247,7 +247,7 @@ def test_the_voltage_reaches_the_limit_through_fmus(pulse: tuple[Limit, Path]) -
     assert "data:image/png;base64," in shown
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an optimal control beside a controller
 def test_a_controller_does_not_come_below_the_limit() -> None:
     values = {"run.stop": 6.0}
     found = limit("el_centro_0p6g_clipped", values, previews=(), starts=1)
@@ -256,7 +256,7 @@ def test_a_controller_does_not_come_below_the_limit() -> None:
     assert found.value < float(np.abs(lpv).max())
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two optimal controls
 def test_friction_that_sticks_and_effects_are_confirmed_by_the_coupled_engine() -> None:
     more = {"damper.fmu": "BinghamDamper"}
     assert limit(PULSE, {"run.stop": 1.0, **more}, previews=(), starts=2).sure
@@ -266,7 +266,7 @@ def test_friction_that_sticks_and_effects_are_confirmed_by_the_coupled_engine() 
     assert found.bound is None
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an optimal control by the command
 def test_the_command_writes_what_it_says(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

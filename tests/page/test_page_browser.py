@@ -58,7 +58,7 @@ def test_views_open_on_a_narrow_screen_without_an_error_or_a_foreign_request(
     assert not browsed.elsewhere
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser
 def test_the_residual_is_drawn_without_and_with_what_was_found(tmp_path: Path) -> None:
     files = write_runs(tmp_path / "lab", 3, seconds=3.0)
     study = create_study(tmp_path / "home" / "rig", files, law="bingham").study
@@ -76,7 +76,7 @@ def test_the_residual_is_drawn_without_and_with_what_was_found(tmp_path: Path) -
         assert not seen.errors
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser
 def test_a_unit_and_a_sign_are_corrected_by_menus(tmp_path: Path) -> None:
     files = write_runs(tmp_path / "lab", 3, seconds=2.0)
     folder = create_study(tmp_path / "home" / "rig", files, law="bingham").study.folder
@@ -136,7 +136,7 @@ def findings(page: Any, source: str) -> list[str]:
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser, and a diagnosis
 def test_files_that_are_clean_have_their_verdict_after_five_clicks(tmp_path: Path) -> None:
     make_bench(tmp_path / "lab", Choice(nothing=True, law="bingham", seed=4))
     files = sorted((tmp_path / "lab" / "data").glob("*.csv"))
@@ -155,7 +155,7 @@ def test_files_that_are_clean_have_their_verdict_after_five_clicks(tmp_path: Pat
         assert 0 < page.evaluate("window.clicks") <= 5
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser: all steps of a study
 def test_the_hour_on_an_example_from_its_making_to_a_running_fmu(tmp_path: Path) -> None:
     """Look, fit, see where it fails, diagnose, add, hand on: with a reload, two tabs, a cancel."""
     source = axe(tmp_path)

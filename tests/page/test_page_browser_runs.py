@@ -62,7 +62,7 @@ def simulation(page: Any, seen: Watched) -> Any:
     return page.locator(r"#slider-voltage\.level")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser
 def test_a_slider_moves_the_building_and_two_settings_are_compared(home: Path) -> None:
     with page_on(home) as client, shots.chromium(1280) as page:
         seen = Watched(page, client)
@@ -89,7 +89,7 @@ def test_a_slider_moves_the_building_and_two_settings_are_compared(home: Path) -
         assert not seen.errors
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser
 def test_a_record_is_dropped_onto_the_simulation(home: Path) -> None:
     rows = "".join(f"{0.02 * k:.2f},{np.sin(0.12 * k):.6f}\n" for k in range(500))
     with page_on(home) as client, shots.chromium(400) as page:
@@ -108,7 +108,7 @@ def test_a_record_is_dropped_onto_the_simulation(home: Path) -> None:
         assert [text for text in seen.errors if "422" not in text] == []
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser: its numbers are the engine's
 @pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="needs bristle[native]")
 def test_the_page_and_the_server_compute_the_same(home: Path) -> None:
     with page_on(home) as client, shots.chromium(1280) as page:
@@ -124,7 +124,7 @@ def test_the_page_and_the_server_compute_the_same(home: Path) -> None:
         assert not seen.errors
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser, and designs
 def test_weights_are_moved_solved_and_the_closed_loop_is_drawn(home: Path) -> None:
     with page_on(home) as client, shots.chromium(400) as page:
         seen = Watched(page, client)
@@ -151,7 +151,7 @@ def test_weights_are_moved_solved_and_the_closed_loop_is_drawn(home: Path) -> No
         assert not seen.errors
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a browser, and comparisons
 def test_controllers_are_compared_and_a_comparison_is_cancelled(home: Path) -> None:
     with page_on(home) as client, shots.chromium(400) as page:
         seen = Watched(page, client)

@@ -86,7 +86,7 @@ def test_what_cannot_be_compared_is_refused(wrong: dict[str, Any], words: str) -
         order_of("controllers", "rig", ASKED | wrong)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a whole comparison of controllers by the page
 def test_a_comparison_is_run_and_shown(home: Path) -> None:
     with page_on(home, start=False) as client:
         assert client.ask("PUT", "/api/uploads/record-1/shake.csv", SHORT.encode()).status == 201

@@ -224,7 +224,7 @@ def test_voltages_that_are_wrong_say_so(tmp_path: Path) -> None:
             control_views._best(tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # designs and runs by page and command
 @pytest.mark.parametrize("kind", ["hinf", "lpv"])
 def test_a_solve_acts_in_the_building_as_the_command_says(
     home: Path, kind: str, monkeypatch: pytest.MonkeyPatch

@@ -169,6 +169,7 @@ def test_files_are_dropped_looked_at_and_made_a_study(client: Client, home: Path
     [
         ("words.csv", b"a,b\nx,y\n", "words.csv"),
         ("book.xlsx", b"PK\x03\x04nothing", "book.xlsx"),
+        # A worker process each: other damaged files.
         pytest.param("cut.parquet", b"PAR1nothing", "cut.parquet", marks=pytest.mark.slow),
         pytest.param(
             "packed.csv.gz", b"\x1f\x8b\x08broken", "packed.csv.gz", marks=pytest.mark.slow
@@ -294,7 +295,7 @@ def test_ctrl_c_ends_the_page_and_its_worker(home: Path) -> None:
     assert (process.returncode, told) == (0, "")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a file of 200 MB
 def test_a_file_of_200_mb_is_read_in_another_process(client: Client, home: Path) -> None:
     rows = "".join(f"{np.sin(0.01 * k):.6f},{np.cos(0.01 * k):.6f}\n" for k in range(20_000))
     body = b"x [mm],F [N]\n" + rows.encode() * (200 * 1024**2 // len(rows))
@@ -306,7 +307,7 @@ def test_a_file_of_200_mb_is_read_in_another_process(client: Client, home: Path)
     shutil.rmtree(home / "uploads" / "large")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an export by the page
 def test_a_study_is_handed_on_as_a_package(client: Client, home: Path) -> None:
     assert client.run("export", "rig")["state"] == "done"
     job = client.run("export_ssp", "rig", scenario="bench.toml")
@@ -324,7 +325,7 @@ def test_roles_are_written_by_a_command(client: Client, home: Path) -> None:
     assert 'role = "test"' in text
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two workers and fits
 def test_channels_are_previewed_and_corrected_by_a_command(client: Client, home: Path) -> None:
     asked = {"channels": ["force=-F [N]@kN"], "without": []}
     seen = client.post("/api/studies/rig/preview", asked)

@@ -212,7 +212,7 @@ def test_the_module_is_made_once_by_a_process_that_ends(
     assert all(one._closed for one in made)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a server and runs; by default its functions
 def test_runs_numbers_and_spectra_are_asked_for_over_http(home: Path) -> None:
     with page_on(home, start=False) as client:
         wanted = {"scenario": "half_sine_pulse", "values": {}}

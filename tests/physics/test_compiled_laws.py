@@ -112,7 +112,7 @@ def fast_step(cache: Any) -> Any:
     return compiled(damper.step)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every law with every friction is compiled
 @pytest.mark.parametrize(
     ("law", "effects"), DAMPER_CASES, ids=lambda v: v if isinstance(v, str) else "+".join(v)
 )

@@ -229,7 +229,9 @@ def simulated(tmp_path, name, engine="compiled", step=0.0005, **text):
 
 @pytest.mark.parametrize(("effect", "least"), [(STOP, 0.05), (RUBS, 0.05)], ids=["stop", "rubs"])
 @pytest.mark.parametrize(
-    "damper", [pytest.param("LuGreDamper", marks=pytest.mark.slow), "BinghamDamper"]
+    # A second: the other kind of law.
+    "damper",
+    [pytest.param("LuGreDamper", marks=pytest.mark.slow), "BinghamDamper"],
 )
 def test_in_the_layer_and_in_the_damper_a_building_moves_alike(
     tmp_path, damper: str, effect: str, least: float
@@ -243,7 +245,9 @@ def test_in_the_layer_and_in_the_damper_a_building_moves_alike(
 
 
 @pytest.mark.parametrize(
-    "damper", ["LuGreDamper", pytest.param("BinghamDamper", marks=pytest.mark.slow)]
+    # A second: the other kind of law.
+    "damper",
+    ["LuGreDamper", pytest.param("BinghamDamper", marks=pytest.mark.slow)],
 )
 def test_fmu_and_coupled_engine_agree(tmp_path, damper: str) -> None:
     inside = f'{STOP}, {RUBS}, "duffing.on" = true'

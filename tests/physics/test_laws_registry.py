@@ -184,6 +184,7 @@ def test_an_effect_that_names_laws_is_refused() -> None:
         ),
     ],
 )
+# A law with a state is compiled and fitted.
 @pytest.mark.parametrize("name", ["hyperbolic", pytest.param("lagging", marks=pytest.mark.slow)])
 def test_python_and_numba_agree(
     law: type[Law], slow_law: type[Law], name: str, effects: list[str]
@@ -239,7 +240,7 @@ def test_fits_find_its_parameters(law: type[Law], slow_law: type[Law]) -> None:
         assert found.model.value(name) == pytest.approx(value, abs=5.0 * found.std[name])
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every law is fitted beside an own one
 def test_it_stands_in_the_table_of_all_laws(law: type[Law], slow_law: type[Law]) -> None:
     truth = {"f_c": 1.2, "f_v": 0.6, "c": 25.0, "k": 110.0, "v_s": 0.03}
     made = problem("hyperbolic", truth, [])

@@ -186,7 +186,7 @@ def test_an_fmu_names_each_value(effect: type[Effect]) -> None:
     assert slave["force"] == pytest.approx(2.3, rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an own effect with a table is compiled and fitted
 def test_a_fit_finds_a_curve(law: type[Law], effect: type[Effect]) -> None:
     # The law is there, so that what is compiled serves below as well.
     # The size of all is held: with it free the curve has one degree of freedom too many; and so is

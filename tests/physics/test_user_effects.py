@@ -197,6 +197,7 @@ def test_the_template_conforms(
     [
         ({FORCE: "return -p.f_s * tanh(q.v / p.v_s)"}, "a closed cycle gives no energy"),
         *(
+            # Two seconds each: other promises that do not hold.
             pytest.param(changes, falls_short, marks=pytest.mark.slow)
             for changes, falls_short in (
                 ({FORCE: "return p.f_s * (1.0 + tanh(q.v / p.v_s))"}, "no force at rest"),

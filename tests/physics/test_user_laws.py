@@ -121,7 +121,7 @@ def test_bad_laws_are_left_out_with_file_line_and_reason(tmp_path: Path) -> None
         assert one.error.startswith(f"{one.path}, line {line}:" if at else str(one.path))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # waits for the time limit
 def test_a_hook_that_does_not_end_is_refused_within_the_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -344,7 +344,7 @@ def test_a_bench_has_no_ground_motion(tmp_path: Path, capsys: pytest.CaptureFixt
 # --- the whole of it
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a building is identified, diagnosed and planned
 def test_a_load_cell_settles_what_no_motion_does(tmp_path: Path) -> None:
     make_building(
         tmp_path / "tower", Choice(effects=("gas_spring",), law="lugre", seed=5), load_cell=False
@@ -372,7 +372,7 @@ def test_a_load_cell_settles_what_no_motion_does(tmp_path: Path) -> None:
         assert peak < 0.009
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a plan at every site
 def test_all_sites_are_asked_and_a_wrong_name_is_told(tmp_path: Path) -> None:
     make_building(tmp_path / "tower", Choice(nothing=True, law="lugre", seed=7))
     study = bristle.Study(tmp_path / "tower")

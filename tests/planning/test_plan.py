@@ -247,7 +247,7 @@ def test_a_sheet_that_is_not_there_is_no_study(
     assert "rig.toml: there is no such file." in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a plan with every law as a rival
 def test_laws_are_told_apart_before_the_first_measurement(sheet: Path) -> None:
     few = {"motions": ["sine"], "commands": ["stairs"]}
     found = bristle.plan(sheet, separate=["bingham", "lugre", "none"], **few)
@@ -263,7 +263,7 @@ def test_what_is_no_law_of_a_damper_is_no_rival(rig: bristle.Study) -> None:
         bristle.plan(rig, separate=["linear_layer", "none"])
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # one more plan
 def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
     file = tmp_path / "rig.toml"
     text = SHEET.replace("max_force", 'command = "current"\nmax_force')
@@ -276,7 +276,7 @@ def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
     assert "V" not in "".join(units.values())
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a diagnosis and what it could name
 def test_what_the_runs_at_hand_allow_of_an_effect_is_what_the_verdict_says(
     rig: bristle.Study,
 ) -> None:
@@ -290,7 +290,7 @@ def test_what_the_runs_at_hand_allow_of_an_effect_is_what_the_verdict_says(
     assert found["saturation"].then > found["saturation"].now  # V_s falls as the effect grows
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a diagnosis and what it could name
 def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Study) -> None:
     told = {one.effect: one for one in bristle.diagnose(rig, write=False).limits["damper"]}
     runs, model = rig.runs(), rig.model()
@@ -336,7 +336,7 @@ def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
         found.write(tmp_path / "plan")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two plans
 def test_tests_after_those_that_are_measured_have_the_next_numbers(
     rig: bristle.Study, tmp_path: Path
 ) -> None:
@@ -352,7 +352,7 @@ def test_tests_after_those_that_are_measured_have_the_next_numbers(
     assert (again.write(tmp_path / "plan") / "plan_14.png").is_file()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a plan, twice
 def test_the_same_seed_gives_the_same_plan(sheet: Path) -> None:
     few = {"runs": 1, "duration": "4 s", "seed": 5}
     first, again = (bristle.plan(sheet, sharpen="f_c", **few).runs() for _ in range(2))
@@ -367,7 +367,7 @@ def test_what_is_at_the_resolution_of_the_integration_gains_nothing() -> None:
     assert coarse == 0.0 < fine
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # one more plan
 def test_rivals_that_no_test_tells_apart_are_said_to_be_so(rig: bristle.Study) -> None:
     few = {"runs": 1, "duration": "3 s", "motions": ["sine"], "commands": ["held"]}
     found = bristle.plan(rig, separate=["gas_spring", "duffing"], **few)
@@ -376,7 +376,7 @@ def test_rivals_that_no_test_tells_apart_are_said_to_be_so(rig: bristle.Study) -
     assert "Nothing is left to gain" in found.sentences()[-1]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # one more plan
 def test_a_command_that_does_not_move_shows_no_lag_and_is_said_to(sheet: Path) -> None:
     held = ("2 V", "2 V")
     found = bristle.plan(sheet, see="coil_lag", command=held)
@@ -397,7 +397,7 @@ def test_a_folder_that_is_there_is_refused_before_the_search(
     assert "is there already" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # one more plan
 def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -> None:
     found = bristle.plan(sheet, learn=["displacement"])
     (row,) = found.outcomes

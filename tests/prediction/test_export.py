@@ -121,7 +121,7 @@ print(json.dumps([*(found[name].tolist() for name in names), float(found["fault"
     return np.interp(time, t, force if output == "force" else outside)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an export, run in fmpy and as a scenario
 def test_the_fmu_gives_the_prediction_alone_and_in_its_scenario(bench: Study) -> None:
     chosen(
         bench, "gas_spring", "coil_lag", "delay", sigma_a=700.0, v_n=0.03, gas_spring__k=75.0,
@@ -233,7 +233,7 @@ def test_the_fmu_and_its_scenario_tell_when_a_run_leaves_the_data(
     assert shorter["damper.outside"].max() > 0.15
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an own effect is compiled and exported
 def test_an_effect_of_ones_own_is_in_the_fmu(bench: Study) -> None:
     (bench.effects_folder / "own_spring.py").write_text(OWN, encoding="utf-8")
     study = Study(bench.folder)

@@ -288,7 +288,7 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # processes of the command: a foreign FMU over all runs
 def test_the_command_prints_sentences_and_writes_a_picture(toys, tmp_path):
     data, picture = gain_data(tmp_path), tmp_path / "out.png"
     wires = ["--map", "u=pressure", "--map", "y=flow", "--out", picture]

@@ -91,7 +91,7 @@ def test_own_laws_and_effects_are_copied_before_anything_needs_them(study: Study
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every command that a report prints
 def test_all_of_them_run(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
     for line in commands(study):
         assert run(line) == 0, (line, capsys.readouterr().err)
@@ -127,7 +127,7 @@ def test_a_fit_with_a_table_of_the_command_is_repeated_by_its_form(study: Study)
     ]  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a shell and a process a hint
 def test_printed_hints_can_be_pasted(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
     assert main(["report", "my rig"]) == 0

@@ -43,7 +43,7 @@ def test_it_is_the_run_of_the_exported_fmu(study: Study, tmp_path: Path) -> None
         assert np.max(apart) <= 1e-9 * np.max(np.abs(fmu[name])), name
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a whole report with a page of sliders
 def test_the_report_has_sliders_for_the_numbers_of_the_model(
     study: Study, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

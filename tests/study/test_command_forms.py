@@ -87,7 +87,7 @@ def test_the_rigs_form_is_found_with_intervals_that_hold(
     assert min(table) >= 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # each form is fitted and exported
 def test_the_form_is_stored_and_everything_follows_it(
     study: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -128,7 +128,7 @@ def test_the_forms_are_compared_and_the_better_one_is_named(
     assert "table" not in said
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a diagnosis with a bent command
 def test_a_diagnosis_keeps_the_form(rig: tuple[list[pd.DataFrame], list[pd.DataFrame]]) -> None:
     bent = bristle.identify(rig[0], "bingham", holdout=rig[1], command="quadratic")
     verdict = bristle.diagnose(rig[0], bent, holdout=rig[1])

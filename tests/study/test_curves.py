@@ -301,7 +301,7 @@ def test_a_signal_or_part_that_there_is_not_is_told(study, capsys, option, value
     assert "Did you mean" in told
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a formula is learned and compiled
 def test_the_hidden_formula_comes_back_and_the_study_goes_on_with_it(study):
     identify_study(study, table=False)
     found = learn_effect(Study(study.folder))

@@ -137,7 +137,7 @@ def test_the_channels_of_devices_are_corrected_by_either_name(tmp_path):
     assert {"tie_force", "base_displacement"} <= {one["name"] for one in shown["known"]}
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two diagnoses at a device
 @pytest.mark.parametrize("without", [(), ("brace_force",)])
 def test_a_diagnosis_finds_nothing_beside_the_law_and_a_spring_that_is_hidden(tmp_path, without):
     b = tower(DEVICES[:1], floors=2, isolated=True)

@@ -95,7 +95,7 @@ def test_a_signal_that_no_run_has_is_refused(tmp_path):
         learn_effect(study, along=["humidity"])
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a curve is learned and exported
 def test_a_curve_along_the_pressure_is_learned_and_the_damper_has_it_as_an_input(tmp_path):
     files = lab(tmp_path / "lab", seconds=6.0)
     study = create_study(tmp_path / "rig", files, law="bingham_standard").study

@@ -35,7 +35,7 @@ def crank(*patterns):
     return frames
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two fits of measured data
 def test_crank_driven_damper_needs_a_spring_beside_its_law():
     """Its force carries about 130 N of preload: no law of a damper alone has that."""
     train = crank("ident_*_ensaio1_*.csv", "ident_*_[AB]_[157].csv")

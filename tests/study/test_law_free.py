@@ -207,7 +207,7 @@ def hidden(tmp_path_factory):
     return study.folder
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # law free: every law with every effect
 def test_the_pair_of_law_and_effect_is_found(hidden, capsys):
     assert main(["diagnose", str(hidden), "--law", "all"]) == 0
     shown = capsys.readouterr().out
@@ -223,7 +223,7 @@ def test_the_pair_of_law_and_effect_is_found(hidden, capsys):
         diagnose_study(Study(hidden), law="dahl")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # law free by study auto
 def test_auto_takes_the_law_and_adds_the_effect(hidden):
     study = Study(hidden)
     done = complete(study, law="all", say=print)
@@ -232,7 +232,7 @@ def test_auto_takes_the_law_and_adds_the_effect(hidden):
     assert [step.what for step in done.steps] == ["identify bingham", "add gas_spring"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # law free: every law with every effect
 def test_no_effect_is_named_where_a_law_explains_the_runs():
     case = make_case(2, "none", duration=4.0)
     runs = [

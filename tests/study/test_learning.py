@@ -120,7 +120,7 @@ class Killed(BaseException):
     """Stands for a signal: nothing may catch it."""
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # curves are learned, stopped midway, and learned on
 def test_what_was_learnt_before_a_kill_is_kept(study):
     steps = len(study.steps())
 
@@ -152,7 +152,7 @@ def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch
     assert (study.folder / "verdict.json").read_text() == before
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a diagnosis of frames; by default one of files
 def test_frames_are_diagnosed_without_a_study():
     case = make_case(1, "gas_spring", strength=0.15, duration=4.0)
     frames = {

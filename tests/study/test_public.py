@@ -115,7 +115,7 @@ def test_which_runs_are_held_out_is_said():
     assert "There is one run. It is split in time" in one.notes[0]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two diagnoses; by default of a building
 def test_a_model_is_compared_and_diagnosed_without_a_study(files, found, study):
     compared = bristle.compare(files[1], found)
     assert compared.z == pytest.approx(found.after["z_holdout"], rel=0.1)

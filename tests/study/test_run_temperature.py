@@ -15,7 +15,7 @@ WARM = {"train_1": 18.0, "train_2": 26.0, "train_3": 34.0, "valid_1": 30.0}
 SHARE = 0.012
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # fits by temperature, and an export
 def test_a_study_takes_the_temperature_of_its_runs(tmp_path):
     files = []
     for seed, (name, warm) in enumerate(WARM.items()):

@@ -163,7 +163,7 @@ def test_openings_are_counted_and_told(study: Study, capsys: pytest.CaptureFixtu
     assert len(uses_of_test_set(study)) == 3
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two reports of a study
 def test_the_report_opens_them_unless_they_are_to_stay_closed(
     study: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -210,7 +210,7 @@ def test_a_damaged_count_is_not_taken_for_none(study: Study, text: str) -> None:
         bristle.compare(study, role="test")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two studies are identified and diagnosed
 def test_an_absurd_test_run_changes_no_byte_of_model_and_verdict(tmp_path: Path) -> None:
     studies = [made(tmp_path / name, factor, 6.0) for name, factor in (("a", 1.0), ("b", -1e3))]
     for study in studies:

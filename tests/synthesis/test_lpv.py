@@ -32,7 +32,7 @@ def test_table_of_gammas(tau: float, published: list[tuple[str, float, float]]) 
         assert row["gamma"] == pytest.approx(gamma, rel=1e-3 if varies == "none" else 1e-2)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a dozen designs
 def test_more_freedom_never_costs_gamma() -> None:
     found = gammas(Task("lpv"), [("both", 1.0), ("Y", 1.0), ("Y", 10.0), ("none", 1.0)])
     values = [row["gamma"] for row in found]

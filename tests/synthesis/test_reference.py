@@ -74,7 +74,7 @@ def test_a_failing_design_answers_2(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a process that designs
 @pytest.mark.parametrize(("kind", "seconds"), [("hinf", 5.0), ("lpv", 15.0)])
 def test_a_design_in_a_fresh_process_is_quick(kind: str, seconds: float) -> None:
     code = (

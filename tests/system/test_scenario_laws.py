@@ -100,7 +100,7 @@ def agree(file: Path, most: float) -> None:
         assert error < most, column
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an own law is compiled with the engine
 def test_both_engines_run_a_law_of_ones_own(house: Path) -> None:
     with trust.granted():
         agree(written(house, LAW), 0.03)

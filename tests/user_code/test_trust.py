@@ -159,6 +159,7 @@ def beside(mailed: Path) -> Path:
     [
         "identify --dry-run --no-table --starts 1",
         "add {} stribeck",
+        # A diagnosis: it leaves the file out too.
         pytest.param("diagnose --dry-run", marks=pytest.mark.slow),
     ],
 )

@@ -81,7 +81,7 @@ def test_the_fmu_has_the_error_that_compare_prints(
     assert proof["error_raw"]["rms"] > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # an export: its check with a recorder's lag
 def test_the_check_has_the_recorder_of_the_force(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -83,7 +83,7 @@ def test_labels_that_tell_nothing_are_said_by_the_check(tmp_path, capsys) -> Non
     assert held in text
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a diagnosis by labels, and what it adds
 def test_a_preload_that_depends_on_the_pressure_is_named_and_carried(tmp_path, capsys) -> None:
     rig = tmp_path / "rig"
     data = lab(tmp_path / "lab")

@@ -113,6 +113,7 @@ def test_auto_comes_to_the_same_model(bench_study: Path, capsys: Capture) -> Non
     assert "gas_spring" in (bench_study / "model.toml").read_text()
 
 
+# A diagnosis: its screen beside its details.
 @pytest.mark.parametrize("command", ["compare", pytest.param("diagnose", marks=pytest.mark.slow)])
 def test_what_leaves_the_screen_is_in_the_details_and_in_the_report(
     command: str, bench_study: Path, capsys: Capture

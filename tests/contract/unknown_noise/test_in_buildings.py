@@ -71,7 +71,7 @@ def test_the_verdict_has_a_z_where_the_noise_is_known_and_no_none_where_it_is_no
     assert "nan" not in told.lower()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a comparison and a report of a building
 def test_compare_tells_no_z_of_these_sites(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", str(study)]) == 0
     told = " ".join(capsys.readouterr().out.split())

@@ -129,7 +129,7 @@ def test_identify_and_compare_tell_no_z(
     assert "nan to nan" not in page
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # every effect is fitted to noise that nobody knows
 def test_no_effect_that_lowers_the_error_is_no_proof_that_none_is_missing(
     study_of: Callable[[float], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
