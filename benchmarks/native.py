@@ -1,7 +1,6 @@
 """Native FMUs: how long their steps take, how large they are and how fast they are built.
 
     python -m benchmarks native           # a few minutes
-    python -m benchmarks native --docs    # and writes the table of docs/native.md
 
 Steps are timed by a host in C (`steps.c`): inputs set, doStep, outputs read. Their inputs move, and
 the same steps are made several times from a reset on. A step's own time is that of its fastest
@@ -11,12 +10,9 @@ step. Closed loops are timed in the project's master, in turn with FMUs in Pytho
 
 from __future__ import annotations
 
-import argparse
-import platform
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
 from bristle.errors import BuildError
@@ -27,13 +23,11 @@ from bristle.physics.effect import effects_of
 from bristle.physics.laws import laws_of
 from bristle.system.scenario import load_scenario
 
-from . import _hosts, compatibility
-from ._rows import Row, interleave, ratio_of, show, write_between
+from . import _hosts
+from ._rows import Row, interleave, ratio_of
 from .build import build_afresh
 from .master import SCENARIO, STEPS, find_fmus, time_master
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "native.md"
-BEGIN, END = "<!-- steps: begin -->", "<!-- steps: end -->"
 DAMPERS = ("LuGreDamper", "ModifiedBoucWenDamper")
 """The dampers whose times have goals."""
 COUNT, PASSES = 100_000, 5
@@ -158,37 +152,3 @@ def _archives(folder: Path) -> list[Row]:
         Row(f"build of {of}, all parts in the cache", f"{seconds:.2f} s", "<= 5 s", seconds / 5.0,
             f"the build before, of whatever the cache lacked, took {first:.1f} s"),
     ]  # fmt: skip
-
-
-def table(today: date) -> str:
-    """Return the table of docs/native.md: every component's steps, as it is and at its busiest."""
-    with tempfile.TemporaryDirectory(prefix="bristle-native-") as name:
-        folder = Path(name)
-        program = timer(folder)
-        if program is None:
-            raise SystemExit("the table needs Linux and a C compiler.")
-        lines = [
-            f"{platform.system()} {platform.machine()}, {today.isoformat()}, {COUNT:,} steps:", "",
-            "| FMU | median | worst step | effects on: median | worst step |",
-            "|---|---|---|---|---|",
-        ]  # fmt: skip
-        for component in catalogue.component_names():
-            paths = [ensure(component)]
-            if compatibility.parameters(component):
-                paths.append(compatibility.built(component, folder, native=True))
-            found = [timed(program, path) for path in paths]
-            cells = [f"{time:.2f}" for steps in found for time in (steps.median, steps.worst)]
-            cells += [""] * (4 - len(cells))
-            lines.append(f"| `{component}` | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def main(given: list[str]) -> int:
-    """Write the table of the page, where asked, after the figures."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks native", description=__doc__)
-    parser.add_argument("--docs", action="store_true", help=f"write the table of {PAGE.name}")
-    chosen = parser.parse_args(given)
-    show(run())
-    if chosen.docs:
-        write_between(PAGE, BEGIN, END, table(date.today()))
-    return 0
