@@ -16,11 +16,12 @@ from bristle.diagnosis import Diagnosis, diagnose_rig
 from bristle.diagnosis.prepared import corrected
 from bristle.diagnosis.trials import Trial
 from bristle.identification.building_fit import equilibrium, identify_structure
-from bristle.identification.error_table import error_table
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem
 from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
+
+from .paper.law_errors import law_errors
 
 Runs = tuple[list[Measurement], list[Measurement]]
 """Runs that are fitted to, and runs held out."""
@@ -93,7 +94,7 @@ def bench_row(
     problems = [
         Problem([prepare(m) for m in corrected(part, found.sensors)]) for part in (train, held)
     ]
-    row.least_squares = error_table(*problems, 0.0, laws=(row.law,), starts=2)[0].error.share
+    row.least_squares = law_errors(*problems, 0.0, laws=(row.law,), starts=2)[0].error.share
     row.reference = told(after)
 
 

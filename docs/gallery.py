@@ -34,7 +34,7 @@ BENCH = (
 )
 BUILDING = (
     Shown("example building house", "", ""),
-    Shown("identify house --no-table", "", ""),
+    Shown("identify house", "", ""),
     Shown("compare house", "house/reports/compare.png", "gallery-building"),
 )
 

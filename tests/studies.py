@@ -95,7 +95,7 @@ def case_study(case: Case, folder: Path) -> Path:
 
 def _bench(folder: Path) -> None:
     case_study(make_case(1, "gas_spring", strength=0.15, duration=4.0), folder)
-    _order("identify", folder / "rig", "--no-table")
+    _order("identify", folder / "rig")
     _order("diagnose", folder / "rig")
 
 
@@ -123,7 +123,7 @@ def house(folder: Path) -> Path:
 def _building(folder: Path) -> None:
     rig = ("--rig", "structure", "--building", house(folder), "--law", "bingham")
     _order("study", "new", folder / "rig", *rig, "--data", folder / "*.csv")
-    _order("identify", folder / "rig", "--no-table", "--json")
+    _order("identify", folder / "rig", "--json")
     _order("diagnose", folder / "rig")
 
 
@@ -150,7 +150,7 @@ def braced_tower(
 def _device(folder: Path) -> None:
     rig = ("--rig", "structure", "--building", braced_tower(folder), "--device", "brace")
     _order("study", "new", folder / "rig", *rig, "--law", "tanh", "--data", folder / "*.csv")
-    _order("identify", folder / "rig", "--no-table")
+    _order("identify", folder / "rig")
 
 
 def _learned(folder: Path) -> None:
@@ -165,7 +165,7 @@ def _learned(folder: Path) -> None:
         titles = ("time [s]", "x [m]", "v [m/s]", "F [N]")
         write(folder / f"run_{k}.csv", dict(zip(titles, [t, *noisy], strict=True)))
     _order("study", "new", folder / "rig", "--law", "tanh", "--data", folder / "*.csv")
-    _order("identify", folder / "rig", "--no-table", "--starts", "1")
+    _order("identify", folder / "rig", "--starts", "1")
     _order("learn", folder / "rig", "--along", "displacement", "--as", "force")
     _order("add", folder / "rig", "learned_1")
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bristle.core.arrays import Array
-from bristle.identification.error_table import CUTOFF, LawError, error_table, low_pass
+from bristle.identification.low_passed import CUTOFF, low_pass
 from bristle.identification.problem import Problem, Run
 from bristle.model.model import Model
 from bristle.view.style import BLUE, GREY, INK, RECONSTRUCTED, VERMILION, Page, label, zero_lines
 
+from .law_errors import LawError, law_errors
 from .runs import Drawing, Runs
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def _case(runs: Runs, name: str) -> _Case:
     frame = runs(SCENARIO, BRISTLES[name])
     problem = Problem([_run(frame, name)])
     return _Case(
-        name, problem, {row.law: row for row in error_table(problem, None, laws=TABLED, starts=3)}
+        name, problem, {row.law: row for row in law_errors(problem, None, laws=TABLED, starts=3)}
     )
 
 

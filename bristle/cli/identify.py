@@ -25,13 +25,12 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.option("--command", "FORM", text, dest="form")
     text = (
-        "low-pass for the table of laws and for the low-passed errors beside the error; 0 for "
-        "none; else study.toml's cut_off (18 Hz)"
+        "low-pass for the low-passed errors beside the error; 0 for none; else study.toml's "
+        "cut_off (18 Hz)"
     )
     parser.option("--cutoff", "HZ", text, type=float)
     text = "number of starting points of the fit; else 4"
     parser.option("--starts", "N", text, type=int, default=4)
-    parser.flag("--no-table", "leave out the table that compares the laws")
     parser.add_dry_run()
     text = (
         "for a building: identify only the building (stiffnesses, frequencies and damping ratios "
@@ -63,7 +62,6 @@ def main(arguments: argparse.Namespace) -> int:
         command=arguments.form,
         cutoff=arguments.cutoff,
         starts=arguments.starts,
-        table=not arguments.no_table,
         write=not arguments.dry_run,
     )
     tell("drawing")

@@ -50,7 +50,6 @@ def identify(
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
     device: str | None = None,
-    table: bool = False,
     write: bool = True,
 ) -> Identified:
     """Identify a damper's parameters, with intervals, and judge them on runs held out.
@@ -81,8 +80,6 @@ def identify(
     device : str, optional
         Of a building with several devices the one that is identified; the forces of the others
         must be measured, as brace_force for one that is called brace.
-    table : bool
-        Whether to compare the laws, as the paper does.
     write : bool
         Of a study: whether the result becomes its model, as a step of the history.
 
@@ -121,9 +118,8 @@ def identify(
         _refuse_of_study(holdout=holdout, channels=channels, building=building, device=device)
         begin = None if model is None and not effects else _present(given, model, effects)
         return identify_study(
-            given, law=ALL if free else None, model=begin, command=command, table=table,
-            write=write,
-        )  # fmt: skip
+            given, law=ALL if free else None, model=begin, command=command, write=write
+        )
     chosen = model_of(model, effects, DEFAULT)
     house = building_from(building, device)
     refuse_in_building(ALL if free else None, house is not None)
@@ -132,7 +128,7 @@ def identify(
     rig = _rig(runs, house)
     drives = [run.drive for run in runs.all if run.drive]
     chosen = chosen.with_drive(drives[0] if drives else chosen.drive)
-    task = FitTask(CUT_OFF, table=table, command=command)
+    task = FitTask(CUT_OFF, command=command)
     if not free:
         return identify_on_rig(rig, runs, chosen, task)
     rows = all_laws(rig, runs, chosen)

@@ -209,7 +209,7 @@ def _begun_free(
     stale = bool(other_data(study)) or not is_identified(study.model())
     if law != ALL and (other or stale):
         say("identifying the model")
-        stepped(identify_study(study, law=other, table=False).step)
+        stepped(identify_study(study, law=other).step)
     return law == ALL
 
 

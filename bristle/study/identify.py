@@ -18,10 +18,9 @@ from ..data.measurement import Measurement
 from ..diagnosis.by_label import extrapolated
 from ..errors import StudyError
 from ..identification.error import ForceError
-from ..identification.error_table import LawError, error_table
 from ..identification.fit import Fit
 from ..identification.histories import compile_ahead
-from ..identification.problem import Problem, robust_z, suited, uncommanded
+from ..identification.problem import Problem, robust_z, uncommanded
 from ..identification.rig import DAMPER, Rig
 from ..identification.rig_fit import (
     RigErrors,
@@ -78,8 +77,6 @@ class Identified(Viewable):
         model of anybody.
     cutoff : float
         Low-pass [Hz] of those among them that are low-passed.
-    table : list of LawError
-        Errors of the laws, where they were compared.
     notes : tuple of str
         What to know.
     step : Step or None
@@ -100,11 +97,10 @@ class Identified(Viewable):
     >>> run = {"time": t, "velocity": v, "force": 5.0 * np.sign(v) + 90.0 * v + noise}  # s, m/s, N
     >>> found = bristle.identify(run, "bingham_standard")
     >>> found.model.law, found.unidentified
-    ('bingham_standard', ('f_v', 'c_v'))
+    ('bingham_standard', ())
     """
 
     fit: Fit
-    table: list[LawError]
     cutoff: float
     errors_before: RigErrors | None
     errors: RigErrors
@@ -201,7 +197,6 @@ class Identified(Viewable):
                 role: {site: one.as_dict() for site, one in sites.items()}
                 for role, sites in self.errors.at.items()
             },
-            "table": [row.as_dict() for row in self.table],
             "forms": [row.as_dict() for row in self.forms],
             **laws,
             "notes": list(self.notes),
@@ -232,7 +227,6 @@ class Identified(Viewable):
 # What there is to say of a fit: doubts about its runs, and how far its numbers can be trusted.
 
 _MISFIT = 1.15  # z above which an error is more than noise
-_LESS = 0.95  # share of the model's error below which what least squares leave is told
 _SATURATED = 0.95  # share of samples at the extremes of a force above which it tells nothing else
 
 
@@ -301,33 +295,17 @@ def by_site(models: SiteModels) -> list[str]:
     return [f"The errors are of all sites together, z is that of the worst; held-out runs: {text}."]
 
 
-def weighing(rows: list[LawError], model: Model, own: ForceError, z: float) -> list[str]:
-    """Return what a model that errs by more than noise does to intervals and to the fit.
-
-    Parameters
-    ----------
-    rows : the table of laws at a site
-    model : the study's model
-    own : its error at that site on the training runs
-    z : of the whole rig there
-    """
+def weighing(z: float) -> list[str]:
+    """Return what a model does to intervals whose z on training runs is more than that of noise."""
     if z <= _MISFIT:
         return []
     lead = "The error exceeds the noise"
     if z != z:
         lead = "The noise of the force is not known, so that there is no z"
-    notes = [
+    return [
         f"{lead}. The intervals come from the error itself: they describe "
         "the best values of this model, not the constants of a damper."
     ]
-    same = [row for row in rows if row.law == model.law and not model.effects]
-    if same and same[0].error_train.rms < _LESS * own.rms:
-        notes.append(
-            f"The fit weighs each sample by its noise and by what the model misses, and counts "
-            f"outliers less. Least squares of the force alone, as in the table, would leave "
-            f"{same[0].error_train.text()} on the training runs instead of {own.text()}."
-        )
-    return notes
 
 
 def why(found: Identified) -> str:
@@ -406,10 +384,6 @@ def refuse_effect(model: Model, name: str, bench: bool) -> None:
             raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
 
 
-_TABLE_STARTS = 3
-_LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
-
-
 def identify_study(
     study: Study,
     *,
@@ -418,7 +392,6 @@ def identify_study(
     model: Model | None = None,
     cutoff: float | None = None,
     starts: int = 4,
-    table: bool = True,
     write: bool = True,
     begin: Mapping[str, float] | None = None,
 ) -> Identified:
@@ -432,9 +405,8 @@ def identify_study(
     command : the form in which the command enters, one of `physics.forms.FORMS`; several, or
         "all", are compared, and the model keeps its own if it is among them, else the first
     model : a model to take in place of the present one
-    cutoff : Hz, of the low-pass for the table of errors; None takes the study's
+    cutoff : Hz, of the low-pass for the low-passed errors; None takes the study's
     starts : how many starting points are tried
-    table : whether to compare the laws as the paper does
     write : whether to make the result the present model, as a step of the history
     begin : values in SI by name that a search has come to: one start is then tried beside them
 
@@ -458,7 +430,7 @@ def identify_study(
     model = _of_law(model or present, law)
     compile_ahead(model.law, model.effects)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    task = FitTask(cutoff, 0 if begin else starts, table, begin=begin or {}, command=command)
+    task = FitTask(cutoff, 0 if begin else starts, begin=begin or {}, command=command)
     # Before is what the study had: at its defaults another law would be nobody's model.
     other = present.law != model.law
     task = replace(task, laws=all_of_them, present=present if other else None)
@@ -476,16 +448,15 @@ def identify_study(
 class FitTask:
     """How a model is to be identified.
 
-    `cutoff` [Hz] of the low-pass for the table of errors; `starts` how many starting points are
-    tried, 0 for none beside `begin`; `table` whether to compare the laws; `present` the model whose
-    errors are those before, None for the one that is identified; `command` the form or forms of the
-    command, None for the model's; `laws` whether every law is tried as well; `begin` values in SI
-    by name from which one more fit begins, the better one counts.
+    `cutoff` [Hz] of the low-pass for the low-passed errors; `starts` how many starting points are
+    tried, 0 for none beside `begin`; `present` the model whose errors are those before, None for
+    the one that is identified; `command` the form or forms of the command, None for the model's;
+    `laws` whether every law is tried as well; `begin` values in SI by name from which one more fit
+    begins, the better one counts.
     """
 
     cutoff: float
     starts: int = 4
-    table: bool = True
     present: Model | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
     command: str | Sequence[str] | None = None
@@ -545,17 +516,15 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
     before = errors_of(old, task.cutoff) if fitted_before else None
     after = errors_of(models, task.cutoff)
     at = models.get(DAMPER) or _worst(models)
-    rows = _table(at, task) if task.table else []
-    error = after.at["train"][at.site.name]
     notes += [
         *(f"{site_name(site)}: {text}" for site, text in fits.notes().items()),
         *by_site(models),
-        *weighing(rows, model, error, after.numbers["z_train"]),
+        *weighing(after.numbers["z_train"]),
     ]
     notes += [*rig.notes, *under_load(at)]
-    found = Identified(fit, rows, task.cutoff, before, after, tuple(notes), None, at)
+    found = Identified(fit, task.cutoff, before, after, tuple(notes), None, at)
     if others:
-        alone = FitTask(task.cutoff, task.starts, table=False, present=present, begin=task.begin)
+        alone = FitTask(task.cutoff, task.starts, present=present, begin=task.begin)
         in_forms = {own: found}
         for form, other in others.items():
             tell(f"identifying with the form {form} of the command")
@@ -584,30 +553,6 @@ def _worst(models: SiteModels) -> SiteModel:
         return robust_z(at.site.train if held_out is None else held_out, at.model)
 
     return max(models.values(), key=z)
-
-
-def _table(at: SiteModel, task: FitTask) -> list[LawError]:
-    """Return the errors of the laws; none where not every law can be held against the samples."""
-    site = at.site
-    samples = sum(len(run.force) for run in site.train.runs)
-    if site.is_line or not site.any_law or samples > _LONGEST_TABLE:
-        return []
-    return error_table(
-        site.train, site.holdout, task.cutoff, laws=_tabled(at.model.law, site.train),
-        starts=min(task.starts, _TABLE_STARTS) or 1,
-    )  # fmt: skip
-
-
-def _tabled(own: str, train: Problem) -> tuple[str, ...]:
-    """Return the laws of the table: the model's, and those that a step moves on by `advance`.
-
-    Of these the ones that suit the runs.
-
-    What is integrated by its rates takes minutes to fit; whoever wants it asks for it by name.
-    """
-    named = {name: base_and_variant(name)[0] for name in suited(train, law_names())}
-    names = tuple(n for n, law in named.items() if law.exact() or law.name == own)
-    return names if own in names else (*names, own)
 
 
 def _with_choices(model: Model, begin: Mapping[str, float]) -> Model:

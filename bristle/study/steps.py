@@ -147,7 +147,7 @@ def take_law(study: Study, found: Diagnosis) -> Identified | None:
     if not found.law or (found.law == model.law and is_identified(model)):
         return None
     begin = found.laws.row.trial.model.values if found.laws is not None else {}
-    return identify_study(study, model=with_law(model, found.law), table=False, begin=begin)
+    return identify_study(study, model=with_law(model, found.law), begin=begin)
 
 
 def _turned(study: Study) -> list[str]:
@@ -302,7 +302,7 @@ def identify_with(
     start = {k: v for k, v in known.items() if k in model.values}
     # With the new effects at their defaults it would be nobody's model: before is the one without.
     starts = 0 if alone or begin else FitTask.starts
-    task = FitTask(study.settings.cut_off, starts, table=False, present=present, begin=start)
+    task = FitTask(study.settings.cut_off, starts, present=present, begin=start)
     return identify_model(study, model, task)
 
 

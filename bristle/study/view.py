@@ -39,7 +39,7 @@ from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, verdict_view
 from ..diagnosis.view import error_text as verdict_error
 from ..errors import RecordError
-from ..identification.error_table import force_budget
+from ..identification.low_passed import force_budget
 from ..identification.rig import DAMPER, ROLES
 from ..learning.closure import LearnedClosure
 from ..learning.closure_names import NEAR
@@ -49,7 +49,7 @@ from ..model.model import Model
 from ..physics.drive import DRIVES
 from ..physics.effect import closures
 from ..physics.forms import joined_form, shown_law, split_form
-from ..physics.laws import LAWS, base_and_variant
+from ..physics.laws import LAWS
 from ..view.blocks import Block, Figure, Formula, Next, Table, Text, View, view_of
 from ..view.style import Page, look
 from .auto import Completed, halves
@@ -107,8 +107,6 @@ def identified_view(found: Identified) -> View:
         ),
         (
             Text(starts), errors_beside(found),
-            # Where all laws were asked for, they are told as they do with effects.
-            *([law_errors(found)] if found.table and not found.laws else ()),
             Figure(lambda: draw_identified(found), f"{title}: force measured and predicted"),
         ),
     )  # fmt: skip
@@ -229,32 +227,6 @@ def _forms(found: Identified) -> Table:
     return Table(header, rows, range(1, 6), note=note)
 
 
-def law_errors(found: Identified) -> Table:
-    """Return the table of laws, and what a law does without a part of it."""
-    low = f"below {found.cutoff:g} Hz" if found.cutoff else "no filter"
-    rows, size = [], max(row.error.signal_all for row in found.table)
-    held_out = found.holdout is not None
-    for row in found.table:
-        both = (row.error_train.headline[0], row.error.headline[0])
-        cells = [quantity(one, "N", 4, size) for one in both]
-        below = quantity(row.holdout if held_out else row.train, "N", 4, size)
-        share, starts = percent(row.error.headline[1]), f"{row.agreed} of {row.starts}"
-        rows.append(
-            [shown_law(row.law), cells[0], cells[1] if held_out else "-", share, below, starts]
-        )
-    fitted = f"the force {low}" if found.cutoff else "the force"
-    notes = [f"Each law fitted by least squares of {fitted}, without effects."]
-    own = {row.law: row.error.headline[0] for row in found.table}
-    for name in own:
-        base, variant = base_and_variant(name)
-        if variant.lacks and own[name] and base.name in own:
-            gain = 1.0 - own[base.name] / own[name]
-            way = "lowers" if gain >= 0.0 else "raises"
-            notes.append(f"{base.name}: {variant.lacks} {way} the error by {percent(abs(gain))}.")
-    header = ("law", "training", "held out", "of force", low, "starts")
-    return Table(header, rows, range(1, 6), "Laws", note=" ".join(notes))
-
-
 def budget_text(problem: Problem, model: Model) -> str:
     """Return the parts of a damper's force with their shares, the largest first; "" for others."""
     if LAWS[model.law].site != "damper":
@@ -331,7 +303,7 @@ def identified_with_next(found: Identified, folder: Path) -> View:
 
 
 def _better(found: Identified, folder: Path) -> list[Block]:
-    """Return that another form of the command, or another law, leaves less, and how to take it."""
+    """Return that another form of the command leaves less, and how to take it."""
     if found.laws:
         return [
             Next(command("diagnose", folder, "--law", "all"), "tries every law with its effects")
@@ -344,23 +316,7 @@ def _better(found: Identified, folder: Path) -> list[Block]:
             gain = 1.0 - best.judged / own.judged
             out.append(Text(f"{best.form} errs {percent(gain, 0)} less than {own.form}."))
             out.append(Next(command("identify", folder, "--command", best.form), "takes it"))
-    errors, mine = {row.law: row.error.headline[0] for row in found.table}, found.model.law
-    law = min(errors, key=lambda one: errors[one], default=mine)
-    if mine not in errors or errors[law] >= BETTER * errors[mine]:
-        return out
-    gain = 1.0 - errors[law] / errors[mine]
-    told = f"The law {law} errs {percent(gain, 0)} less than {shown_law(mine)}"
-    has, holds = (set(base_and_variant(one)[0].contains) for one in (mine, law))
-    if more := sorted(holds - has):  # it may stand for an effect: the diagnosis comes first
-        return [
-            *out, Text(f"{told}, but it contains a {' and a '.join(more)}, which may stand for a "
-                       "missing effect: diagnose first."),
-        ]  # fmt: skip
-    return [
-        *out,
-        Text(f"{told}."),
-        Next(command("identify", folder, "--law", law), "changes the law"),
-    ]
+    return out
 
 
 def _next(found: Identified, folder: Path) -> list[Next]:

@@ -134,7 +134,7 @@ def test_a_terminal_shows_what_a_command_does_and_its_answer_does_not(
 ) -> None:  # fmt: skip
     line, expected = {**FAST, **SLOW}[what]
     if what in ("compare", "report"):
-        assert main(["identify", str(rig), "--quiet", "--no-table"]) == 0
+        assert main(["identify", str(rig), "--quiet"]) == 0
         capsys.readouterr()
     with terminal(monkeypatch) as shown:
         assert main(words(line, rig, tmp_path)) == 0

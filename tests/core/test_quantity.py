@@ -70,7 +70,7 @@ def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     [
         "study check",
         "compare",
-        "identify --starts 1 --no-table",
+        "identify --starts 1",
         # A report of very large and very small forces.
         pytest.param("report", marks=pytest.mark.slow),
     ],

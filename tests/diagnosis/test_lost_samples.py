@@ -10,7 +10,7 @@ from bristle.data.left_out import MISSING
 from bristle.diagnosis.decision import missing
 from bristle.diagnosis.effect_limits import detectable
 from bristle.diagnosis.trials import judge
-from bristle.identification.error_table import error_rms
+from bristle.identification.low_passed import error_rms
 from bristle.identification.problem import Problem, Run, robust_z
 from bristle.model.model import Model
 

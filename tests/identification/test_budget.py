@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.identification.error_table import force_budget
+from bristle.identification.low_passed import force_budget
 from bristle.identification.problem import Problem, Run
 from bristle.model.model import Model
 from bristle.physics.laws import laws_of

@@ -170,7 +170,7 @@ def test_a_study_learns_a_surface_draws_it_and_takes_it(tmp_path, capsys):
         table[:, 4] += 6.0 * np.sin(x / 8.0 + 0.4 * V)  # N, mm, V
         with file.open("w", newline="") as text:
             csv.writer(text).writerows([titles, *table.tolist()])
-    assert main(["identify", str(folder), "--no-table", "--quiet"]) == 0
+    assert main(["identify", str(folder), "--quiet"]) == 0
     capsys.readouterr()
     asked = ["--as", "force", "--along", "displacement,voltage", "--quiet"]
     assert main(["learn", str(folder), *asked, "--json"]) == 0

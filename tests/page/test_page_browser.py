@@ -173,7 +173,6 @@ def test_the_hour_on_an_example_from_its_making_to_a_running_fmu(tmp_path: Path)
         page.get_by_role("heading", name="Not identified yet").wait_for(
             state="detached", timeout=300_000
         )
-        page.get_by_role("heading", name="The laws side by side").wait_for(timeout=300_000)
         page.locator("main canvas").nth(2).wait_for(timeout=120_000)
 
         page.get_by_role("link", name="Next: where it fails").click()

@@ -14,7 +14,6 @@ from rigs import Bench, force_at
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
 from bristle.fmu.controller import invertible
-from bristle.identification.error_table import error_table
 from bristle.identification.fit import fit_from_starts
 from bristle.identification.histories import DamperForces as CompiledBench
 from bristle.identification.problem import Problem, Run
@@ -238,16 +237,6 @@ def test_fits_find_its_parameters(law: type[Law], slow_law: type[Law]) -> None:
     found = fit_from_starts(made, Model("hyperbolic"))
     for name, value in truth.items():
         assert found.model.value(name) == pytest.approx(value, abs=5.0 * found.std[name])
-
-
-@pytest.mark.slow  # every law is fitted beside an own one
-def test_it_stands_in_the_table_of_all_laws(law: type[Law], slow_law: type[Law]) -> None:
-    truth = {"f_c": 1.2, "f_v": 0.6, "c": 25.0, "k": 110.0, "v_s": 0.03}
-    made = problem("hyperbolic", truth, [])
-    rows = error_table(made, None, 0.0, starts=1)
-    assert [row.law for row in rows] == list(law_names())
-    best = min(row.train for row in rows)
-    assert [row.law for row in rows if row.train < 1.01 * best] == ["tanh", "hyperbolic"]
 
 
 def test_its_model_is_written_and_read(law: type[Law], tmp_path: Path) -> None:

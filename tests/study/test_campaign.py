@@ -79,7 +79,7 @@ def test_levels_and_labels_are_offered_from_the_names(lab, tmp_path, capsys) -> 
 
 def test_compare_says_on_which_runs_the_error_is(lab, tmp_path) -> None:
     study = Study.create(tmp_path / "rig", files(lab), law="tanh")
-    found = bristle.identify(study, table=False)
+    found = bristle.identify(study)
     comparison = bristle.compare(study)
     told = " ".join(comparison.sentences)
     # The spring acts at 1 A, and most where the amplitude is largest: either label is right.

@@ -106,12 +106,12 @@ def test_the_form_is_stored_and_everything_follows_it(
     assert model.values == pytest.approx(
         {name: row["value"] for name, row in told["parameters"].items()}
     )
-    assert main(["identify", folder, "--no-table", "--json"]) == 0  # the form stays
+    assert main(["identify", folder, "--json"]) == 0  # the form stays
     assert json.loads(capsys.readouterr().out)["command"] == "table"
     assert main(["compare", folder]) == 0
     assert main(["add", folder, "gas_spring"]) == 0
     assert Study(study.folder).model().law == model.law
-    assert main(["identify", folder, "--command", "linear", "--no-table", "--json"]) == 0
+    assert main(["identify", folder, "--command", "linear", "--json"]) == 0
     assert (study.folder / "model.toml").read_text().count("command") == 0
     capsys.readouterr()
 
@@ -119,7 +119,7 @@ def test_the_form_is_stored_and_everything_follows_it(
 def test_the_forms_are_compared_and_the_better_one_is_named(
     study: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    order = ["identify", str(study.folder), "--no-table", "--dry-run"]
+    order = ["identify", str(study.folder), "--dry-run"]
     assert main([*order, "--command", "linear,quadratic"]) == 0
     said = capsys.readouterr().out
     assert "quadratic errs" in said

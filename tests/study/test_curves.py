@@ -303,7 +303,7 @@ def test_a_signal_or_part_that_there_is_not_is_told(study, capsys, option, value
 
 @pytest.mark.slow  # a formula is learned and compiled
 def test_the_hidden_formula_comes_back_and_the_study_goes_on_with_it(study):
-    identify_study(study, table=False)
+    identify_study(study)
     found = learn_effect(Study(study.folder))
     assert found.closed is not None
     assert found.closed.form.name == "bell"

@@ -39,7 +39,7 @@ def study(tmp_path_factory):
 
 
 def test_what_a_load_cell_cut_off_is_in_no_fit_and_no_error(study):
-    found = identify_study(study, table=False)
+    found = identify_study(study)
     assert found.after["z_train"] < 1.15
     assert [note for note in found.notes if note.startswith("cut: force is cut off at 7.2 N")]
     assert found.model.values["f_c"] == pytest.approx(5.0, abs=0.1)

@@ -99,7 +99,7 @@ def test_a_signal_that_no_run_has_is_refused(tmp_path):
 def test_a_curve_along_the_pressure_is_learned_and_the_damper_has_it_as_an_input(tmp_path):
     files = lab(tmp_path / "lab", seconds=6.0)
     study = create_study(tmp_path / "rig", files, law="bingham_standard").study
-    identify_study(study, table=False)
+    identify_study(study)
     found = learn_effect(study, along=["oil_pressure"])
     assert found.found.curve is not None
     assert found.found.curve.along == "oil_pressure"
@@ -117,4 +117,4 @@ def test_a_curve_along_the_pressure_is_learned_and_the_damper_has_it_as_an_input
     lacking = lab(tmp_path / "lab", seconds=6.0, lacking="valid_1")[-1]
     (study.folder / "data" / "valid_1.csv").write_bytes(lacking.read_bytes())
     with pytest.raises(RecordError, match="follows the channel oil_pressure, which this run does"):
-        identify_study(Study(study.folder), table=False)
+        identify_study(Study(study.folder))

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,14 +10,11 @@ import pytest
 
 from bristle.cli import main
 from bristle.errors import RecordError, StudyError
-from bristle.identification.error import ForceError
 from bristle.identification.histories import DamperForces
 from bristle.study.api import identify
 from bristle.study.identify import identify_study
 from bristle.study.steps import create_study
 from bristle.study.study import Study
-from bristle.study.view import identified_with_next
-from bristle.view import terminal
 
 DT, N = 0.004, 2000
 T = np.arange(N) * DT
@@ -119,7 +113,7 @@ def test_a_steady_voltage_leaves_its_parameters_unidentified_at_zero(volts):
 
 
 def test_a_single_run_is_split_and_says_so(tmp_path):
-    found = identify_study(study_of(tmp_path, [bench_frame(1)[0]]), table=False)
+    found = identify_study(study_of(tmp_path, [bench_frame(1)[0]]))
     assert any("one run" in note for note in found.notes)
     assert found.after["z_holdout"] == pytest.approx(1.0, abs=0.15)
 
@@ -133,7 +127,7 @@ def test_held_parameters_and_bounds_of_the_user_are_kept(tmp_path):
         "[parameters.f_c]\nvalue = 1.1\nhigh = 1.2\n"
         '[parameters.c_0]\nvalue = 90.0e-3\nunit = "kN.s/m"\n'
     )
-    found = identify_study(Study(study.folder), table=False)
+    found = identify_study(Study(study.folder))
     model = Study(study.folder).model()
     assert model.values["v_n"] == 0.03
     assert model.facts["v_n"].origin == "assumed"
@@ -148,7 +142,6 @@ def test_the_step_holds_the_errors_before_and_after_and_can_be_undone(tmp_path, 
     assert main(["identify", str(study.folder), "--starts", "2", "--details"]) == 0
     out = capsys.readouterr().out
     assert "95 % interval" in out
-    assert "bingham_standard" in out
     step = Study(study.folder).steps()[-1]
     assert step.what == "identify bingham"
     told = {"z_train", "z_holdout", "error_train", "error_share_holdout", "rms_train", "cut_off"}
@@ -163,31 +156,30 @@ def test_the_step_holds_the_errors_before_and_after_and_can_be_undone(tmp_path, 
     assert (reports / "identify.png").stat().st_size > 10_000
     answer = json.loads((reports / "identify.json").read_text())
     assert answer["step"] == step.number
-    assert {row["law"] for row in answer["table"]} >= {"bingham", "lugre"}
     Study(study.folder).undo()
     assert Study(study.folder).model().facts["f_c"].std is None
 
 
 def test_errors_before_another_law_are_those_of_the_model_that_the_study_had(tmp_path):
     study = study_of(tmp_path, [bench_frame(seed)[0] for seed in (1, 2)])
-    first = identify_study(study, starts=1, table=False)
-    other = identify_study(study, law="bingham_standard", starts=1, table=False)
+    first = identify_study(study, starts=1)
+    other = identify_study(study, law="bingham_standard", starts=1)
     assert other.before == pytest.approx(first.after, rel=1e-6)
 
 
 def test_a_fit_on_other_data_does_not_ask_to_be_repeated(tmp_path):
     study = study_of(tmp_path, [bench_frame(seed)[0] for seed in (1, 2, 3)])
-    identify_study(study, starts=1, table=False)
+    identify_study(study, starts=1)
     study = study.with_roles({"train_1": "exclude"})
     assert "Identify it again" in str(study.runs().notes)
-    assert "Identify it again" not in str(identify_study(study, starts=1, table=False).notes)
+    assert "Identify it again" not in str(identify_study(study, starts=1).notes)
     assert "Identify it again" not in str(study.runs().notes)
 
 
 def test_json_and_a_dry_run_that_writes_nothing(tmp_path, capsys):
     study = study_of(tmp_path, [bench_frame(seed)[0] for seed in (1, 2, 3)])
     before = sorted(path.name for path in study.folder.rglob("*"))
-    command = ["identify", str(study.folder), "--dry-run", "--no-table", "--json"]
+    command = ["identify", str(study.folder), "--dry-run", "--json"]
     assert main([*command, "--law", "bingham_standard"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["law"] == "bingham_standard"
@@ -233,19 +225,3 @@ def test_wrong_choices_are_refused(tmp_path):
         identify_study(study, cutoff=-5.0)
     with pytest.raises(StudyError, match="there are"):
         identify_study(study, law="coulomb")
-
-
-@pytest.mark.parametrize(("errors", "told"), [((3.0, 5.0), True), ((4.8, 5.0), False)])
-def test_a_law_that_errs_less_is_named(errors, told, tmp_path):
-    study = study_of(tmp_path, [bench_frame(seed)[0] for seed in (1, 2)])
-    found = identify_study(study, law="lugre", table=False)
-    rows = tuple(
-        SimpleNamespace(
-            law=law, agreed=3, starts=3, holdout=e,
-            error=ForceError(9, 9, e, 10.0, e, 10.0),
-            error_train=ForceError(9, 9, e, 10.0, e, 10.0),
-        )
-        for law, e in zip(("bingham", "lugre"), errors, strict=True)
-    )  # fmt: skip
-    said = terminal.text(identified_with_next(replace(found, table=rows), Path("rig")))
-    assert ("bristle identify rig --law bingham" in said) is told

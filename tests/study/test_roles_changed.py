@@ -98,7 +98,7 @@ def test_one_run_has_one_role(study: Study, capsys: pytest.CaptureFixture[str]) 
 
 def judged(study: Study) -> Study:
     """Return a study with an identified model and a verdict on it."""
-    identified = identify_study(study, table=False)
+    identified = identify_study(study)
     assert identified.step is not None
     now = Study(study.folder)
     now.model()
@@ -128,7 +128,7 @@ def test_other_data_set_the_verdict_aside_and_say_that_the_model_is_of_others(
     assert json.loads((then.folder / "history/001" / EARLIER).read_text())["kind"] == "none"
     assert "no longer those that the present model was identified with" in notes(then)
     assert "bristle identify" in notes(then)
-    identify_study(then, table=False)
+    identify_study(then)
     assert "no longer" not in notes(Study(known.folder))
 
 
@@ -151,7 +151,7 @@ def test_what_no_fit_and_no_judge_sees_leaves_verdict_and_model(study: Study) ->
 
 def test_a_step_that_is_undone_brings_back_the_data_of_the_one_before(known: Study) -> None:
     then = known.with_roles({"run_3": "holdout"})
-    identify_study(then, table=False)
+    identify_study(then)
     Study(known.folder).undo()
     assert "no longer" in notes(Study(known.folder))
     back = Study(known.folder).with_roles({"run_3": "train"})

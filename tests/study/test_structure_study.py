@@ -21,7 +21,7 @@ from bristle.study.identify import identify_study
 def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):
     study = study_of(tmp_path, friction)
     model = study.model().with_effect("duffing")
-    found = identify_study(study, model=model, table=False, starts=1, write=False)
+    found = identify_study(study, model=model, starts=1, write=False)
     assert found.before == {}  # of the law at its defaults nobody asks
     layer = next(note for note in found.notes if "layer: " in note)
     k = float(layer.split("k = ")[1].split()[0])
@@ -33,7 +33,7 @@ def test_effect_without_a_site_is_refused(tmp_path):
     study = study_of(tmp_path)
     model = study.model().with_effect("gas_spring")
     with pytest.raises(StudyError, match=r"gas_spring: acts at no site.*storey1, layer"):
-        identify_study(study, model=model, table=False)
+        identify_study(study, model=model)
 
 
 def test_each_effect_acts_at_its_own_site():

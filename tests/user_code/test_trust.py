@@ -157,7 +157,7 @@ def beside(mailed: Path) -> Path:
 @pytest.mark.parametrize(
     "line",
     [
-        "identify --dry-run --no-table --starts 1",
+        "identify --dry-run --starts 1",
         "add {} stribeck",
         # A diagnosis: it leaves the file out too.
         pytest.param("diagnose --dry-run", marks=pytest.mark.slow),

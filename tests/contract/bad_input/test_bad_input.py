@@ -79,7 +79,7 @@ def study_of(folder: Path, runs: list[pd.DataFrame]) -> Path:
     return rig
 
 
-@pytest.mark.parametrize("command", [["identify", "--no-table"], ["diagnose"], ["plan"]])
+@pytest.mark.parametrize("command", [["identify"], ["diagnose"], ["plan"]])
 def test_a_run_of_which_scattered_gaps_take_more_than_half_is_refused_with_a_way_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]
 ) -> None:
@@ -150,7 +150,7 @@ def test_a_law_that_is_not_finite_on_one_run_is_refused_and_nothing_is_written(
     (rig / "laws" / "burst.py").write_text(BURST)
     before = content(rig)
     capsys.readouterr()
-    assert main(["identify", str(rig), "--law", "burst", "--no-table", "--starts", "1"]) == 2
+    assert main(["identify", str(rig), "--law", "burst", "--starts", "1"]) == 2
     said = capsys.readouterr().err
     assert "run_1: the force of the model burst is not finite there, so there is no error." in said
     assert "or another law" in said

@@ -47,7 +47,7 @@ def made(folder: Path, train: int, samples: int = 1500) -> Path:
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rig = made(tmp_path_factory.mktemp("closure"), 3)
-    assert main(["identify", str(rig), "--no-table"]) == 0
+    assert main(["identify", str(rig)]) == 0
     return rig
 
 
@@ -68,7 +68,7 @@ def test_it_is_learned_and_called_no_effect(rig: Path, capsys: Capture) -> None:
 @pytest.mark.slow  # a closure is trained and compiled, then the diagnosis has to leave it out
 def test_a_verdict_is_on_the_model_without_it(tmp_path: Path, capsys: Capture) -> None:
     rig = made(tmp_path, 3)
-    told(capsys, "identify", rig, "--no-table")
+    told(capsys, "identify", rig)
     told(capsys, "learn", rig, "--closure", "--name", "network")
     assert asked(capsys, "add", rig, "network")["added"] == ["network"]
     verdict = asked(capsys, "diagnose", rig, "--law", "bingham")
@@ -89,7 +89,7 @@ def test_a_single_run_that_hardly_turns_is_refused(tmp_path: Path, capsys: Captu
 def test_in_a_building_the_response_is_nearer_with_it(tmp_path: Path, capsys: Capture) -> None:
     tower = tmp_path / "tower"
     told(capsys, "example", "building", tower, "--effect", "worn_bore", "--seed", "1")
-    told(capsys, "identify", tower, "--no-table")
+    told(capsys, "identify", tower)
     found = asked(capsys, "learn", tower, "--closure")
     assert found["error_after"] < 0.5 * found["error_before"]
     told(capsys, "add", tower, found["name"])
@@ -108,7 +108,7 @@ def test_in_a_building_whose_damper_has_no_load_cell_it_is_refused(
 ) -> None:
     tower = tmp_path / "tower"
     told(capsys, "example", "building", tower, "--effect", "worn_bore", "--no-load-cell")
-    told(capsys, "identify", tower, "--no-table")
+    told(capsys, "identify", tower)
     assert "whose force was not measured" in told(capsys, "learn", tower, "--closure", code=2)
 
 

@@ -55,7 +55,7 @@ def test_no_sample_of_a_smooth_record_is_left_out(tmp_path, rate, how) -> None:
 
 def test_a_linear_damper_at_3_khz_is_identified(tmp_path, capsys) -> None:
     folder = study(tmp_path, 3000.0)
-    assert main(["identify", str(folder), "--no-table"]) == 0
+    assert main(["identify", str(folder)]) == 0
     said = capsys.readouterr().out
     percent = re.search(r"\(([\d.]+) %\) on the held-out runs", said)
     assert percent

@@ -63,7 +63,7 @@ def test_the_fmu_has_the_error_that_compare_prints(
     for k, rate in enumerate(rates):
         record(tmp_path / f"run_{k}.csv", rate, 0.3 + 0.8 * k, switched)
     assert main(["study", "new", "rig", "--data", "run_*.csv", "--law", law]) == 0
-    assert main(["identify", "rig", "--no-table"]) == 0
+    assert main(["identify", "rig"]) == 0
     capfd.readouterr()
     assert main(["compare", "rig", "--json"]) == 0
     compared = json.loads(capfd.readouterr().out)

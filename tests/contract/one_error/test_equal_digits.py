@@ -69,7 +69,7 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
         "bristle.study.steps.diagnose_rig", lambda *_given, **_named: verdict_of_none
     )
     folder = str(rig)
-    order = ["identify", folder, "--no-table", "--starts", "1", "--details"]
+    order = ["identify", folder, "--starts", "1", "--details"]
     printed = run(order, capsys)
     identified = json.loads((rig / "reports" / "identify.json").read_text())
     told = identified["error"]["holdout"]
@@ -77,7 +77,7 @@ def test_every_command_and_file_tells_the_same_error(rig: Path, capsys, monkeypa
     assert told["left_out"]["missing"] == 3
 
     # By hand, from the definition.
-    found = bristle.identify(Study(rig), table=False, write=False)
+    found = bristle.identify(Study(rig), write=False)
     (held_out,) = found.holdout.runs
     off = held_out.force - found.holdout.predict(found.at.model, held_out)
     kept = np.arange(len(off)) >= held_out.skip

@@ -42,7 +42,7 @@ def left_out_of(folder: Path, frames: list[pd.DataFrame], *more: str) -> dict[st
     new = ["study", "new", str(rig), "--data", str(folder / "r*.csv"), "--law", "bingham", *more]
     assert main(new) == 0
     assert main(["study", "roles", str(rig), "--train", "r0", "--holdout", "r1"]) == 0
-    assert main(["identify", str(rig), "--no-table", "--starts", "1"]) == 0
+    assert main(["identify", str(rig), "--starts", "1"]) == 0
     answer = json.loads((rig / "reports" / "identify.json").read_text())
     return answer["error"]["holdout"]["left_out"]
 

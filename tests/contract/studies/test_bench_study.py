@@ -81,7 +81,7 @@ def test_a_refused_effect_leaves_the_model_as_it_was(bench_study: Path, capsys: 
 
 def test_another_law_is_tried_and_not_kept(bench_study: Path, capsys: Capture) -> None:
     before = (bench_study / "model.toml").read_bytes()
-    order = ("identify", bench_study, "--law", "tanh", "--no-table", "--dry-run")
+    order = ("identify", bench_study, "--law", "tanh", "--dry-run")
     found = asked(capsys, *order)
     assert (found["law"], found["step"], found["noise_known"]) == ("tanh", None, True)
     assert found["parameters"]["k"]["value"] == pytest.approx(TRUE_K, rel=0.1)  # it has a spring

@@ -46,7 +46,7 @@ def test_a_site_that_is_not_there_is_named(building_study: Path, capsys: Capture
 def test_the_law_of_a_brace_is_found_between_its_levels(
     device_study: Path, capsys: Capture
 ) -> None:
-    found = asked(capsys, "identify", device_study, "--no-table", "--dry-run")
+    found = asked(capsys, "identify", device_study, "--dry-run")
     for name, value in braced.BRACE.items():
         known = found["parameters"][name]
         assert known["value"] == pytest.approx(value, rel=0.05), name

@@ -44,7 +44,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "study", "new", str(rig), "--rig", "structure", "--building", str(folder / "house.toml"),
         "--law", "tanh", "--data", str(folder / "run*.csv"),
     ]) == 0  # fmt: skip
-    assert main(["identify", str(rig), "--no-table"]) == 0
+    assert main(["identify", str(rig)]) == 0
     return rig
 
 

@@ -49,7 +49,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[float], Path]:
         write_runs(folder, hard)
         rig, data = str(folder / "rig"), str(folder / "*.csv")
         assert main(["study", "new", rig, "--data", data, "--law", "tanh"]) == 0
-        assert main(["identify", rig, "--no-table", "--starts", "2"]) == 0
+        assert main(["identify", rig, "--starts", "2"]) == 0
         return folder / "rig"
 
     return study
@@ -75,7 +75,7 @@ def test_a_held_out_run_of_unknown_noise_explains_nothing(
     write_runs(tmp_path, HARD, filtered=(2,))
     study, data = str(tmp_path / "rig"), str(tmp_path / "*.csv")
     assert main(["study", "new", study, "--data", data, "--law", "tanh"]) == 0
-    assert main(["identify", study, "--no-table", "--starts", "2"]) == 0
+    assert main(["identify", study, "--starts", "2"]) == 0
     assert main(["add", study, "asymmetry"]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "not known on the held-out runs and" in told
@@ -95,14 +95,14 @@ def test_identify_and_compare_tell_no_z(
     study_of: Callable[[float], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = study_of(0.0)
-    assert main(["identify", str(study), "--no-table", "--dry-run", "--details"]) == 0
+    assert main(["identify", str(study), "--dry-run", "--details"]) == 0
     told = capsys.readouterr().out
     rows = [line for line in told.splitlines() if line.startswith("  z, ")]
     assert len(rows) == 2
     assert all(row.count("not known") == 2 for row in rows)
     assert "How much of it is noise is not known" in told
     assert "times the noise" not in told
-    assert main(["identify", str(study), "--no-table", "--dry-run", "--json"]) == 0
+    assert main(["identify", str(study), "--dry-run", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["noise_known"] is False
     assert set(numbers_of_z(answer)) == {None}
@@ -168,7 +168,7 @@ def test_noise_that_the_user_states_is_known(
     settings = study / "study.toml"
     text = settings.read_text(encoding="utf-8")
     settings.write_text(text.replace("[channels.force]\n", "[channels.force]\nnoise = 0.3\n"))
-    assert main(["identify", str(study), "--no-table", "--dry-run", "--json"]) == 0
+    assert main(["identify", str(study), "--dry-run", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["noise_known"] is True
     assert 0.3 < answer["after"]["z_holdout"] < 3.0

@@ -90,16 +90,15 @@ function laws(fit) {
   if (answer.unidentified.length) {
     parts.push(h("p", {}, "The data do not identify: ", answer.unidentified.join(", "), "."));
   }
-  const rows = answer.table ?? [];
-  if (rows.length) {
-    const judged = rows.map((row) => ({ ...row, error: row.error.rms }));
+  const judged = (answer.laws ?? []).filter((row) => row.error_holdout).map((row) => ({ ...row, error: row.error_holdout.rms }));
+  if (judged.length) {
     const best = Math.min(...judged.map((row) => row.error));
     parts.push(h("h2", {}, "The laws side by side"),
       bars("RMS error of each law", judged.map((row) => ({
         name: row.law, value: row.error, strong: row.law === fit.law, good: false,
         text: `${number(row.error, 4)} N${row.error === best ? " (least)" : ""}`,
       }))),
-      h("p", { class: "soft small" }, `RMS error of the force on held-out runs, each law fitted without effects to the low-passed force. Blue: the model's.`));
+      h("p", { class: "soft small" }, "RMS error of the force on held-out runs, each law fitted with those effects of the model that can join it. Blue: the model's."));
   }
   for (const note of answer.notes) parts.push(h("p", { class: "soft" }, note));
   return parts;
