@@ -81,9 +81,8 @@ def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
         "folder": str(study.folder.absolute()),
         "changes": [asdict(one) for one in done.changes],
         "notes": list(done.notes),
-        "set_aside": done.results.sentences() if done.changes else [],
-        "beside": list(done.results.beside),
-        "kept": str(done.kept.absolute()) if done.kept else None,
+        "of_before": [one.what for one in done.of_before],
+        "step": done.step.number if done.step else None,
     }
     print_json(answer)
 
@@ -100,12 +99,10 @@ def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
         print(f"  {one.channel:16} {one.text}")
     for note in done.notes:
         print(f"{note[:1].upper()}{note[1:]}.")
-    lost = done.results.sentences()
-    if lost:
-        kept = "it would be set aside" if dry else f"kept in {done.kept}"
-        print(f"No longer of these data, {kept}:", *lost, sep="\n  ")
-    if beside := done.results.beside_text():
-        print(beside)
+    if done.of_before:
+        gone = ", ".join(one.what for one in done.of_before)
+        begins = f"begins anew (step {done.step.number})" if done.step else "would begin anew"
+        print(f"The model {begins}; of the channels as they were: {gone}.")
     if not dry:
         print(f"Next:  {command('study', 'check', study.folder)}")
 

@@ -26,7 +26,6 @@ from ..data.table import Table
 from ..errors import BristleError, RecordError, StudyError
 from ..physics.building import with_damper
 from ..study.data_check import check_data
-from ..study.history import results_of
 from ..study.new import parse_channel
 from ..study.read_again import devices_of, first_table, proposed
 from ..study.rig import Place, place_of_damper
@@ -230,7 +229,6 @@ def channels_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "first": Path(table.source).name, "columns": columns_of(table, taken), "known": known,
         "extra": {spec.column: name for name, spec in settings.extra.items()},
-        "results": results_of(folder).sentences(),
     }  # fmt: skip
 
 
@@ -254,7 +252,6 @@ def preview_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         raise StudyError("a channel is given twice; once is right.")
     made = proposed(folder, study.settings, channels, _texts(arguments, "without"))
     before, after = (_first_run(folder, one) for one in (study.settings, made.settings))
-    results = results_of(folder)
     return {
         "changes": [
             {
@@ -264,7 +261,7 @@ def preview_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
             }
             for one in made.changes
         ],
-        "notes": list(made.notes), "results": results.sentences(), "beside": results.beside_text(),
+        "notes": list(made.notes), "results": [one.what for one in study.history.of_data()],
     }  # fmt: skip
 
 

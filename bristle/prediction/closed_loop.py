@@ -239,7 +239,7 @@ def _before(study: Study) -> tuple[Model | None, str]:
 
     The model that a study begins with is nobody's guess of this damper: then there is none.
     """
-    numbers = study.history.numbers()
+    numbers = [step.number for step in study.steps()]
     if len(numbers) < 3:
         return None, ""
     file = study.history.model_file(numbers[-2])

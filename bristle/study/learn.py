@@ -36,7 +36,6 @@ from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..trust import remember_made
 from ..user_code.load import flaw_of
-from .history import LEARNED
 from .identify import is_identified
 from .rig import building_of
 from .study import Study
@@ -130,7 +129,7 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     found = learn_closure(opened, name)
     if found.refused or found.closure is None:
         return found
-    origin = f"{LEARNED} {study.name}, {date.today().year}"
+    origin = f"learned from the runs of {study.name}, {date.today().year}"
     if flaw := flaw_of(name, closure_text(name, found.closure, origin)):
         return replace(found, refused=f"The network can be no effect: {flaw}")
     if not write:
@@ -169,7 +168,7 @@ def _text(study: Study, learned: LearnedEffect, name: str) -> str:
         values = closed.trial.model.values  # of an effect that has no file yet
         memory = tuple((n, values[f"{learned.name}.{n}"]) for n, _ in curve.memory)
         curve = replace(curve, memory=memory)
-    origin = f"{LEARNED} {study.name}, {date.today().year}"
+    origin = f"learned from the runs of {study.name}, {date.today().year}"
     return effect_text(name, curve, origin, closed.formula if closed else None)
 
 

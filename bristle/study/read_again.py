@@ -27,7 +27,7 @@ from ..data.table import Table
 from ..errors import RecordError, StudyError
 from ..physics.building import paper_building
 from ..units import canonical, same_dimension
-from .history import DRAFT, Results, results_of
+from .history import Step
 from .new import refuse_other_columns
 from .runs import read_runs
 from .study_file import TEST, RunFile, Settings, read_settings, spec_text, with_channels
@@ -311,15 +311,16 @@ def _noise_notes(changes: Sequence[ChannelChange]) -> list[str]:
 
 @dataclass(frozen=True)
 class CorrectedChannels:
-    """Channels that are read in another way now, and what is no longer of the data.
+    """Channels that are read in another way now, and the steps of the history `of_before`.
 
-    `kept` is the folder where it is kept; None where there was nothing, or nothing was written.
+    `step` is the one with which the model begins anew; None where no model was from the data, or
+    nothing was written.
     """
 
     changes: tuple[ChannelChange, ...]
     notes: tuple[str, ...]
-    results: Results
-    kept: Path | None = None
+    of_before: tuple[Step, ...] = ()
+    step: Step | None = None
 
 
 def correct_channels(
@@ -331,8 +332,8 @@ def correct_channels(
 ) -> CorrectedChannels:
     """Read channels of a study in another way; where anything is wrong it stays as it was.
 
-    Fits, verdict and reports were of the data as they were read: they are set aside, and the model
-    is the last one that was from no data.
+    Fits and verdict were of the data as they were read: they stay in the history alone, and the
+    model is the last one that was from no data, as a new step.
 
     Parameters
     ----------
@@ -355,29 +356,21 @@ def correct_channels(
         If a file has no such column, or cannot be read by it.
     """
     with study.writing():
-        file, draft = study.folder / "study.toml", study.folder / DRAFT
+        file, draft = study.folder / "study.toml", study.folder / ".study.toml"
         made = proposed(study.folder, read_settings(file), channels, without)
-        results = results_of(study.folder)
-        if not made.changes:
-            return CorrectedChannels((), (), results)
-        _refuse_unreadable(study.folder, made)
-        if not write:
-            return CorrectedChannels(made.changes, made.notes, results)
-        begun, kept = False, None
+        gone = tuple(study.history.of_data())
+        if made.changes:
+            _refuse_unreadable(study.folder, made)
+        if not (made.changes and write):
+            return CorrectedChannels(made.changes, made.notes, gone)
         try:
             write_whole(draft, made.text)
             _refuse_other(draft, made)
-            study.history.keep_edit()
-            results = results_of(study.folder)
-            begun = True
-            if results:
-                kept = study.history.begin_anew(results.first)
-            else:
-                draft.replace(file)
+            draft.replace(file)
         finally:
-            if not begun:
-                draft.unlink(missing_ok=True)
-    return CorrectedChannels(made.changes, made.notes, results, kept)
+            draft.unlink(missing_ok=True)
+        step = study.history.begin_anew(", ".join(one.channel for one in made.changes))
+    return CorrectedChannels(made.changes, made.notes, gone, step)
 
 
 def _refuse_unreadable(folder: Path, made: Proposal) -> None:

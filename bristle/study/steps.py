@@ -493,7 +493,7 @@ def _refined(model: Model, verdict: Mapping[str, Any]) -> BeforeAfter | None:
 
 def last_added(study: Study) -> BeforeAfter | None:
     """Return the models on both sides of the last step that added an effect; None without one."""
-    numbers = study.history.numbers()
+    numbers = [step.number for step in study.steps()]
     later: Model | None = None
     for number in reversed(numbers):
         model = study.model_of(number)

@@ -28,7 +28,7 @@ from ..trust import can_do_without
 from ..user_code.load import Loaded, load, waiting
 from ..version import __version__
 from ..view import Viewable
-from .history import History, Step, building_in
+from .history import ANEW, History, Step, building_in
 from .new import make_folder, parse_channel
 from .run_facts import refuse_too_few, roles_by_place
 from .runs import (
@@ -273,8 +273,10 @@ class Study(Viewable):
         return f"\n  bristle {made_by} wrote this model, and this is bristle {__version__}."
 
     def steps(self) -> list[Step]:
-        """Return the history, the first model included."""
-        return self.history.steps()
+        """Return the history since the data are read as they are, its first model included."""
+        steps = self.history.steps()
+        first = max((k for k, one in enumerate(steps) if one.what.startswith(ANEW)), default=0)
+        return steps[first:]
 
     def add_step(
         self,
@@ -393,8 +395,8 @@ class Study(Viewable):
     ) -> Study:
         """Write where channels are into study.toml, and return the study as it is then.
 
-        All runs are read by them first. Fits, verdict and reports were of the channels as they
-        were: they are set aside in history/, and the model is the last one that was from no data.
+        All runs are read by them first. Fits and verdict were of the channels as they were: they
+        stay in the history alone, and the model is the last one that was from no data.
 
         Parameters
         ----------

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +13,11 @@ from made import bench_run, write
 from bristle.cli import main
 from bristle.data.corrections import Correction
 from bristle.errors import BristleError, StudyError
-from bristle.study import Study, create_study, history, read_again
+from bristle.study import Study, create_study, read_again
 from bristle.study.extend import extend_study
+from bristle.study.history import history_steps
 from bristle.study.new import parse_channel
 from bristle.study.read_again import correct_channels
-from bristle.study.study import FILE as ADDED
 
 RIGHT = ("force=-F [N]@kN",)
 """The title says N, and means kN; the sensor pulls where the damper pushes."""
@@ -85,8 +84,6 @@ def identified(folder: Path) -> Study:
     study.add_step("add gas_spring", "by hand", model.with_effect("gas_spring"))
     study.undo()
     study.write_report("identify.json", '{"step": 1}')
-    (folder / "effects" / "learned_1.py").write_text(f'source = "{history.LEARNED} rig, 2026"\n')
-    (folder / "effects" / "own.py").write_text("# by the lab\n")
     return study
 
 
@@ -104,33 +101,23 @@ def test_the_study_equals_the_one_made_with_the_right_channels(
     np.testing.assert_allclose(run["force"], truth, atol=1e-6 * np.abs(truth).max())
 
 
-def test_what_was_found_in_other_channels_is_set_aside_whole(
+def test_the_model_begins_anew_and_what_was_found_stays_in_the_history(
     both: tuple[Path, Path], found: Path
 ) -> None:
-    study, rig = Study(found), found
-    before = content(rig)
-    done = correct_channels(study, given(*RIGHT))  # type: ignore[arg-type]
-    kept = rig / "history" / "before_channels_1"
-    assert done.kept == kept
-    assert done.results.steps == ("identify bingham",)
-    assert done.results.sentences() == [
-        "1 step of the history: identify bingham", "the verdict", "reports: identify.json",
-        "learned effects: learned_1",
-    ]  # fmt: skip
-    aside = content(kept)
-    assert aside["study.toml"] == before["study.toml"]
-    assert aside["001/model.toml"] == before["history/001/model.toml"]
-    assert aside["verdict.json"] == before["verdict.json"]
-    assert aside["reports/identify.json"] == before["reports/identify.json"]
-    assert aside["effects/learned_1.py"] == before["effects/learned_1.py"]
-    assert any(name.startswith("undone/") for name in aside)
-    now = Study(rig)
-    assert [step.what for step in now.steps()] == ["begin with bingham"]
+    before = content(found)
+    done = correct_channels(Study(found), given(*RIGHT))  # type: ignore[arg-type]
+    assert [one.what for one in done.of_before] == ["identify bingham"]
+    now, after = Study(found), content(found)
+    assert [step.what for step in now.steps()] == ["begin anew: force"]
     assert now.verdict() is None
-    left = {n: c for n, c in content(rig).items() if "before_channels_1" not in n}
-    assert left == {**content(both[1]), "effects/own.py": b"# by the lab\n"}
-    with pytest.raises(StudyError, match="nothing to undo"):
-        now.undo()
+    assert now.runs().notes == ()
+    assert after["model.toml"] == before["history/000/model.toml"]
+    assert after["history/001/verdict.json"] == before["verdict.json"]
+    assert after["history/001/identify.json"] == before["reports/identify.json"]
+    assert after["history/001/model.toml"] == before["model.toml"]
+    assert now.settings == Study(both[1]).settings
+    assert [one.what for one in history_steps(now.steps())] == ["begin anew: force"]
+    assert correct_channels(now, given("force=-F@N")).step is None  # type: ignore[arg-type]
 
 
 def test_a_first_model_that_was_set_by_hand_stays(rig: Path) -> None:
@@ -139,13 +126,13 @@ def test_a_first_model_that_was_set_by_hand_stays(rig: Path) -> None:
     edited = file.read_bytes()
     identified(rig).with_channels({"force": "-F@kN"})
     assert file.read_bytes() == edited
-    assert [step.what for step in Study(rig).steps()] == ["begin with bingham", "edited by hand"]
+    assert Study(rig).history.step(1).what == "edited by hand"
 
 
 def test_runs_that_were_added_are_runs_like_the_others(found: Path, tmp_path: Path) -> None:
     more = write(tmp_path / "day_2.csv", wrong_run(7))
     study = extend_study(Study(found), [more]).study.with_channels({"force": "-F@kN"})
-    assert not (found / ADDED).exists()
+    assert study.runs().notes == ()
     study.add_step("identify bingham", "by hand", study.model())
     assert study.runs().notes == ()
 
@@ -252,34 +239,6 @@ def test_a_command_that_is_stopped_while_it_reads_changes_nothing(
     assert content(found) == before
 
 
-@pytest.mark.parametrize("moves", [0, 2, 5, 8])
-def test_a_process_that_is_killed_while_it_writes_leaves_a_change_that_is_completed(
-    both: tuple[Path, Path], found: Path, moves: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    study, rig, left = Study(found), found, [moves]
-    move: Callable[[Path, Path], None] = history._move
-
-    def some(path: Path, place: Path) -> None:
-        if left[0] == 0:
-            killed()
-        left[0] -= path.exists()
-        move(path, place)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(history, "_move", some)
-        try:
-            correct_channels(study, given(*RIGHT))  # type: ignore[arg-type]
-        except KeyboardInterrupt:
-            assert (rig / "history" / ".pending").is_file()
-    now = Study(rig)
-    assert not (rig / "history" / ".pending").exists()
-    assert now.settings == Study(both[1]).settings
-    assert (rig / "model.toml").read_bytes() == (both[1] / "model.toml").read_bytes()
-    aside = content(rig / "history" / "before_channels_1")
-    assert {"study.toml", "001/model.toml", "verdict.json", "reports/identify.json"} <= {*aside}
-    assert now.verdict() is None
-
-
 def test_a_result_of_the_old_channels_is_not_written(rig: Path) -> None:
     fitting, verdict = Study(rig), {"schema": 2, "kind": "none", "effects": []}
     Study(rig).with_channels({"force": "-F@kN"})
@@ -299,12 +258,12 @@ def test_the_command_says_what_it_changes_and_what_no_longer_counts(
     assert main([*order, "--dry-run"]) == 0
     said = capsys.readouterr().out
     assert '"F [N]" in N -> "F [N]" in kN, sign turned' in said
-    assert "1 step of the history: identify bingham" in said
+    assert "The model would begin anew; of the channels as they were: identify bingham." in said
     assert content(found) == before
     assert main([*order, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["changes"][0]["after"]["unit"] == "kN"
-    assert Path(told["kept"]).name == "before_channels_1"
+    assert (told["of_before"], told["step"]) == (["identify bingham"], 2)
     after = content(found)
     assert main(order) == 0
     assert "are so already" in capsys.readouterr().out

@@ -118,10 +118,9 @@ function preview(told) {
       h("div", { class: "grid" }, one.traces.map((trace, k) => traceOf(one.channel, trace, k ? "after" : "before"))))),
     told.notes.length ? h("ul", {}, told.notes.map((note) => h("li", {}, `${note[0].toUpperCase()}${note.slice(1)}.`))) : null,
     told.results.length
-      ? h("div", {}, h("p", {}, "These are of the channels as they are now. They are set aside in history/, and the model begins anew:"),
+      ? h("div", {}, h("p", {}, "These steps are of the channels as they are now. They stay in the history, and the model begins anew:"),
           h("ul", {}, told.results.map((text) => h("li", {}, text))))
       : null,
-    told.beside ? h("p", { class: "soft" }, told.beside) : null,
   ].filter(Boolean);
 }
 
