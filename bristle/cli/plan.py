@@ -5,8 +5,7 @@ training, half are held out. Without a purpose, they answer the open question of
 alternatives if it is ambiguous, an unknown part if it is unknown, or else all effects and
 parameters.
 
-On a building the tests are ground motions and commands, and the plan names sensors that would show
-more.
+On a building the tests are ground motions and commands.
 """
 
 from __future__ import annotations

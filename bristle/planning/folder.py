@@ -18,9 +18,9 @@ from scipy.signal import correlate, correlation_lags
 from ..core.arrays import Array
 from ..core.config import Document, Key, Spec
 from ..core.files import new_folder
-from ..core.text import plain, scale
+from ..core.text import plain
 from ..core.toml_lines import toml_text
-from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit
+from ..data.channels import DRIVE, PLAIN, ChannelSpec
 from ..data.measurement import Measurement, measurements_of
 from ..data.pieces import holds_several
 from ..data.read import read_table
@@ -271,7 +271,7 @@ def _csv_text(run: PlannedRun) -> str:
     return "\n".join([",".join(titles), *rows, ""])
 
 
-# Measured runs against those planned: amplitude, clipped or late commands, duration.
+# Measured runs against those planned: amplitude, command, duration.
 
 # How far a measured signal differs from the planned one at the same instants.
 
@@ -282,10 +282,6 @@ EDGE = 0.02
 """Share of a planned range that counts as its upper, or its lower, end."""
 OFF = 0.1
 """Share of a command's range by which it may differ at any instant."""
-LATEST = 0.5
-"""Seconds up to which a command may come late, or early."""
-AS_GOOD = 0.01
-"""Correlation by which a nearer peak may be lower than the highest one."""
 
 
 def share_reached(measured: Array, planned: Array) -> float:
@@ -300,81 +296,27 @@ def share_reached(measured: Array, planned: Array) -> float:
     return reached / float(np.median(planned[upper]) - np.median(planned[lower]))
 
 
-def command_differences(name: str, measured: Array, planned: Array, step: float) -> list[str]:
-    """Return how a measured command differs from the planned one: its range, then its time.
+def command_differences(name: str, measured: Array, planned: Array) -> list[str]:
+    """Return how a measured command differs from the planned one: its range, else its course.
 
     Parameters
     ----------
     name : the channel of the command
     measured, planned : (n,) in its unit
-    step : sampling step [s]
     """
-    late = _late(measured, planned, step)
-    in_time, wanted = _shifted(measured, planned, late)
-    share, reached, clipped = _reached(in_time, wanted)
-    goal = np.minimum(planned, reached) if clipped else share * planned
-    wrong = _off(measured, goal)
-    if _off(*_shifted(measured, goal, late)) > DIFFERS:
-        wrong = _off(measured, planned)
+    share = share_reached(measured, planned)
+    if share > 0.0 and abs(share - 1.0) > DIFFERS:
+        return [f"the {name} reached {percent_of(share)} of what was planned"]
+    wrong = _off(measured, planned)
+    if wrong > DIFFERS:
         return [f"the {name} was another one than planned for {percent_of(wrong)} of the run"]
-    out = []
-    if abs(share - 1.0) > DIFFERS:
-        top = float(np.max(planned))
-        factor, unit = scale(channel_unit(name), top)
-        how = f"was clipped at {plain(factor * reached)} {unit}, " if clipped else "reached "
-        told = percent_of(reached / top if clipped and top > 0.0 else share)
-        out.append(f"the {name} {how}{told} of what was planned")
-    if late and wrong > DIFFERS:
-        way = "late" if late > 0 else "early"
-        out.append(
-            f"the {name} came {plain(1e3 * abs(late) * step)} ms {way}, and was another "
-            f"one than planned for {percent_of(wrong)} of the run"
-        )
-    return out
-
-
-def _reached(measured: Array, planned: Array) -> tuple[float, float, bool]:
-    """Return the share of a command that was reached, its upper level, and whether it is cut."""
-    share, top = share_reached(measured, planned), float(np.max(planned))
-    reached = float(np.median(measured[planned >= top - EDGE * float(np.ptp(planned))]))
-    if abs(share - 1.0) <= DIFFERS:
-        return 1.0, reached, False
-    clipped = _off(measured, np.minimum(planned, reached)) < _off(measured, share * planned)
-    return share, reached, share < 1.0 and clipped
+    return []
 
 
 def _off(measured: Array, goal: Array) -> float:
     """Return the share of instants at which a command is another one [1]."""
     size = float(np.ptp(goal)) or abs(float(goal[0])) or 1.0
     return float(np.mean(np.abs(measured - goal) > OFF * size))
-
-
-def _late(measured: Array, goal: Array, step: float) -> int:
-    """Return by how many samples a command is late, less than 0 where it is early.
-
-    By the correlation, which neither clipping nor a weaker command moves. Of peaks alike, as a
-    periodic command has them, the nearest one.
-    """
-    most = min(round(LATEST / step), goal.size // 4)
-    lags = np.arange(-most, most + 1)
-    alike = np.array([_likeness(*_shifted(measured, goal, int(lag))) for lag in lags])
-    beside = np.pad(alike, 1, constant_values=-np.inf)
-    peaks = (alike >= beside[:-2]) & (alike >= beside[2:]) & (alike >= np.max(alike) - AS_GOOD)
-    return int(min(lags[peaks], key=abs))
-
-
-def _likeness(measured: Array, goal: Array) -> float:
-    """Return the correlation of two signals, 0 where one is constant."""
-    own, other = measured - np.mean(measured), goal - np.mean(goal)
-    size = float(np.linalg.norm(own) * np.linalg.norm(other))
-    return float(own @ other) / size if size > 0.0 else 0.0
-
-
-def _shifted(measured: Array, goal: Array, late: int) -> tuple[Array, Array]:
-    """Return a command that is late by some samples, and its goal, at the same instants."""
-    size = goal.size
-    own = slice(max(late, 0), size + min(late, 0))
-    return measured[own], goal[slice(max(-late, 0), size - max(late, 0))]
 
 
 def percent_of(share: float) -> str:
@@ -401,7 +343,6 @@ class _Aligned:
 
     planned: dict[str, Array]
     measured: dict[str, Array]
-    step: float
     covered: float
 
 
@@ -479,7 +420,7 @@ def performed(study: Study, files: Sequence[Path | str], plan: PlanFolder) -> Pe
 def planned_for(runs: Sequence[Measurement], plan: PlanFolder) -> list[PlannedRun | None]:
     """Return the planned run that each measured one stands for, None where none is left.
 
-    Equal names decide; the others are paired so that motions are alike, without changing the order.
+    Equal names decide, then the likeness of the motions.
 
     Parameters
     ----------
@@ -490,10 +431,12 @@ def planned_for(runs: Sequence[Measurement], plan: PlanFolder) -> list[PlannedRu
     for run in runs:
         named = [one for one in plan.runs if _same_name(run.name, one.name)]
         found.append(named[0] if len(named) == 1 and named[0] not in found else None)
-    open_runs = [k for k, one in enumerate(found) if one is None]
-    left = [one for one in plan.runs if one not in found]
-    for k, one in zip(open_runs, _paired([runs[k] for k in open_runs], left, plan), strict=True):
-        found[k] = one
+    for k, run in enumerate(runs):
+        shown = _shown(run, plan.motion)
+        left = [] if found[k] else [one for one in plan.runs if one not in found]
+        alike = [_aligned(run, one, plan.motion, shown)[0] for one in left]
+        if alike and max(alike) >= ALIKE:
+            found[k] = left[int(np.argmax(alike))]
     return found
 
 
@@ -519,8 +462,7 @@ def compared(run: Measurement, planned: PlannedRun, motion: str) -> Pair:
     if command and not run.has(command):
         out.append(f"the {command} was not measured")
     elif command:
-        pair = aligned.measured[command], aligned.planned[command]
-        out += command_differences(command, *pair, aligned.step)
+        out += command_differences(command, aligned.measured[command], aligned.planned[command])
     if aligned.covered < 1.0 - DIFFERS:
         out.append(
             f"the recording covers {percent_of(aligned.covered)} of the "
@@ -533,39 +475,6 @@ def _same_name(measured: str, planned: str) -> bool:
     """Return whether a measured run's name is a planned one's, or contains it as words."""
     own, asked = measured.lower(), planned.lower()
     return re.search(rf"(?<![a-z0-9]){re.escape(asked)}(?![a-z0-9])", own) is not None
-
-
-def _paired(
-    runs: Sequence[Measurement], left: Sequence[PlannedRun], plan: PlanFolder
-) -> list[PlannedRun | None]:
-    """Return the planned run of each measured one: of all ways in order, the most alike."""
-    if not runs or not left:
-        return [None] * len(runs)
-    alike = np.array(
-        [[_aligned(run, one, plan.motion, _shown(run, plan.motion))[0] for one in left]
-         for run in runs]
-    )  # fmt: skip
-    if len(runs) <= len(left):
-        return [left[k] for k in _in_order(alike)]
-    own = dict(zip(_in_order(alike.T), left, strict=True))
-    return [own.get(k) for k in range(len(runs))]
-
-
-def _in_order(alike: Array) -> list[int]:
-    """Return a column for each row (n, m >= n) of likenesses: rising, and the most alike in sum."""
-    rows, columns = alike.shape
-    best = np.zeros((rows + 1, columns + 1))  # of the first rows within the first columns
-    for i in range(1, rows + 1):
-        best[i, :i] = -np.inf
-        for j in range(i, columns + 1):
-            best[i, j] = max(best[i, j - 1], best[i - 1, j - 1] + alike[i - 1, j - 1])
-    found, j = [], columns
-    for i in range(rows, 0, -1):
-        while best[i, j] == best[i, j - 1]:
-            j -= 1
-        j -= 1
-        found.append(j)
-    return found[::-1]
 
 
 def _shown(run: Measurement, motion: str) -> str:
@@ -595,7 +504,6 @@ def _aligned(
     return likeness, _Aligned(
         {name: x[of_plan] for name, x in wanted.items()},
         {name: run[name][inside] for name in wanted if run.has(name)},
-        step,
         (end - begin) / even.size,
     )
 

@@ -243,13 +243,6 @@ class Evidence:
         nothing = np.zeros_like(self.normal)
         return Evidence(self.normal, nothing, nothing, self.samples, self.samples)
 
-    def within(self, mask: Array) -> Evidence:
-        """Return what runs say of some columns alone, by a mask (w, w) of 0 and 1."""
-        return Evidence(
-            self.normal * mask, self.fitted * mask, self.scatter * mask, self.samples,
-            self.held_out,
-        )  # fmt: skip
-
     def __add__(self, other: Evidence) -> Evidence:
         """Return what the runs of both say."""
         return Evidence(

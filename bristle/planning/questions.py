@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, combinations
-from math import hypot, inf, log
+from itertools import combinations
+from math import inf, log
 from typing import Any
 
 import numpy as np
@@ -17,33 +17,31 @@ from ..diagnosis.conclusion import lookalikes
 from ..diagnosis.effect_limits import NO_AMOUNT, EffectLimit, limit_of
 from ..diagnosis.effect_size import SMALLEST, Sized, SizeSearch, named_distance, resolved
 from ..diagnosis.prepared import Prepared, of_layer
-from ..diagnosis.rule import BENCH, SITE, DecisionRule
+from ..diagnosis.rule import BENCH, DecisionRule
 from ..diagnosis.site import joinable_at
 from ..diagnosis.trials import LONG, joinable, short_search
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit_from_starts
 from ..identification.problem import Problem, Run
-from ..identification.rig import DAMPER, at_site
-from ..identification.rig_fit import fit_line, joined
+from ..identification.rig import DAMPER
+from ..identification.rig_fit import joined
 from ..identification.start_grid import SearchContext, ranked_guesses, refine
 from ..learning.curve import CurvePlace
 from ..learning.signals import ALONG
 from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
-from ..physics.laws import LAWS, law_of_part, laws_of
+from ..physics.laws import LAWS, laws_of
 from ..study.study import Study, behind_data
 from .information import (
     USUAL,
-    Evidence,
     Goal,
     Information,
     PreparedQuestion,
     Question,
     Rival,
     basis_along,
-    of_roles,
     ranges,
 )
 from .limits import RESERVE, RigLimits
@@ -832,13 +830,6 @@ def largest_motion(runs: Sequence[Any]) -> tuple[float, float]:
     )
 
 
-# A damper's force that would be measured: layer and damper are then two sites, not one.
-
-LAYER = "layer"
-BOTH = (DAMPER, LAYER)
-Key = tuple[str, str, str]  # site, purpose, name of the figure
-
-
 def of_one_force(stand: Mapping[str, Stated]) -> set[str]:
     """Return the pairs of rivals that no motion tells apart while the force is not measured.
 
@@ -853,120 +844,3 @@ def of_one_force(stand: Mapping[str, Stated]) -> set[str]:
         return set()
     pairs = {rival.name for one in stand[DAMPER].purposes.rivals for rival in one.rivals}
     return {pair for pair in pairs if are_twins(*pair.split(AT))}
-
-
-def with_measured_force(
-    stand: Stated, sites: Sequence[dict[str, StructureProblem]], roles: Sequence[bool]
-) -> dict[Key, float]:
-    """Return the figures of a reconstructed damper's site if its force were measured in the tests.
-
-    Parameters
-    ----------
-    stand : the purposes of the site, with what the runs at hand say
-    sites : of each test, with the damper's force
-    roles : of each test, whether it is held out
-    """
-    before = stand.asked[0].problem
-    assert isinstance(before, StructureProblem)
-    if not before.reconstructed or not all(DAMPER in one for one in sites):
-        return {}
-    damper = [list(one[DAMPER].runs) for one in sites]
-    layer = [one[LAYER] for one in sites if LAYER in one]
-    found = _of_damper(stand, damper, roles)
-    if len(layer) == len(sites):
-        problem = layer[0].of(list(chain(*(one.runs for one in layer))))
-        line = fit_line(problem, law_of_part(LAYER).name).model
-        found |= _of_layer(stand.purposes, line, problem, [list(one.runs) for one in layer], roles)
-        found |= _apart(stand, damper, line, problem)
-    return found
-
-
-def _evidence(
-    asked: PreparedQuestion, runs: Sequence[Sequence[Run]], roles: Sequence[bool]
-) -> Evidence:
-    """Return what tests say of a question."""
-    each = of_roles([asked.evidence(own) for own in runs], roles)
-    return sum(each[1:], start=each[0])
-
-
-def _of_damper(
-    stand: Stated, runs: Sequence[Sequence[Run]], roles: Sequence[bool]
-) -> dict[Key, float]:
-    """Return the figures of the damper's own effects and parameters.
-
-    The layer's are no part of a measured force: the tests say nothing of them there.
-    """
-    asked, now = stand.asked[0], stand.known[0]
-    names = [*asked.names, *(one.name for one in asked.question.rivals)]
-    own = np.array([not _of_structure(name) for name in names])
-    own = np.append(own, np.ones(asked.question.width - len(own), dtype=bool))
-    told = _evidence(asked, runs, roles)
-    known = now.with_runs([told.within(np.outer(own, own))])
-    purposes = replace(stand.purposes, rivals=())
-    return {
-        (DAMPER, one.purpose, one.name): one.value
-        for one in purposes.figures([known])
-        if not _of_structure(one.name)
-    }
-
-
-def _of_structure(name: str) -> bool:
-    """Return whether a parameter or an effect is one of the structure."""
-    effect = EFFECTS.get(name.partition(".")[0])
-    return effect is not None and effect.site == "structure"
-
-
-def _of_layer(
-    purposes: Purposes,
-    line: Model,
-    problem: StructureProblem,
-    runs: Sequence[Sequence[Run]],
-    roles: Sequence[bool],
-) -> dict[Key, float]:
-    """Return from what size the layer's effects are named at their own site."""
-    effects = [one for one in purposes.effects if _of_structure(one.sized.name)]
-    question = Question(line, tuple(_on_line(one, line) for one in effects))
-    if not effects:
-        return {}
-    known = Information(question, _evidence(PreparedQuestion(question, problem), runs, roles))
-    return {(DAMPER, one.purpose, one.name): one.value for one in seen(known, SITE)}
-
-
-def _on_line(one: SizedRival, line: Model) -> Rival:
-    """Return an effect of the layer beside its line, as large as beside the damper's law."""
-    rival = one.rival()
-    return Rival(rival.name, _part(rival.model, line), _part(rival.without, line))
-
-
-def _part(model: Model, line: Model) -> Model:
-    """Return the layer's part of a model: its line with the layer's effects."""
-    part = at_site(model, LAYER, BOTH)
-    return replace(
-        part, values={**line.values, **part.values}, limits={**part.limits, **line.limits}
-    )
-
-
-def _apart(
-    stand: Stated, damper: Sequence[Sequence[Run]], line: Model, problem: StructureProblem
-) -> dict[Key, float]:
-    """Return by how much rivals are too near to be told apart, by damper and layer together."""
-    out: dict[Key, float] = {}
-    runs, own = list(chain(*damper)), stand.asked[0].problem
-    for question in stand.purposes.rivals:
-        for rival in question.rivals:
-            two = (question.model, rival.model)
-            at_damper = _distance(own, runs, *(at_site(one, DAMPER, BOTH) for one in two))
-            in_layer = _distance(problem, problem.runs, *(_part(one, line) for one in two))
-            apart = hypot(at_damper, in_layer)
-            key = (DAMPER, "separate", rival.name)
-            out[key] = max(out.get(key, 0.0), BENCH.separating_sigma / apart if apart else inf)
-    return out
-
-
-def _distance(problem: Problem, runs: Sequence[Run], one: Model, other: Model) -> float:
-    """Return how far a model is from another, refitted, in standard deviations."""
-    if (one.law, one.effects) == (other.law, other.effects):
-        return 0.0
-    question = Question(one, (Rival("other", other, one),))
-    known = Information(question, PreparedQuestion(question, problem).evidence(runs))
-    return known.distances()["other"]

@@ -22,7 +22,6 @@ from ..model.model import Model
 from ..physics.drive import VOLTAGE
 from ..prediction.model_system import BuildingWithFile, Excitation, signals_of
 from ..prediction.monte_carlo import Simulator
-from .bench import NOISE
 from .information import JudgedTest
 from .limits import RESERVE, PrescribedSignals, RigLimits, Test
 from .search import LEAST, Planner
@@ -130,24 +129,14 @@ class ShakingTable:
             value / (RESERVE * float(getattr(limits, name))) for name, value in asked.items()
         )
 
-    def measured(
-        self, signals: PrescribedSignals, columns: Columns, more: Sequence[str] = (), seed: int = 0
-    ) -> Measurement:
-        """Return a test as it would be measured: the study's channels, with noise.
-
-        Parameters
-        ----------
-        signals, columns : of the test, and of its response
-        more : channels that are measured as well; the noise on the others stays the same
-        seed : of the noise
-        """
-        generator = np.random.default_rng(seed)
+    def measured(self, signals: PrescribedSignals, columns: Columns) -> Measurement:
+        """Return a test as it would be measured: the study's channels, with noise."""
+        generator = np.random.default_rng(0)
         clean = {name: columns[_port(name)] for name in self._shown() if _port(name) in columns}
         clean["ground_acceleration"] = signals.a
         if self.drive:
             clean[self.drive] = signals.V
-        clean |= {name: columns[_port(name)] for name in more}
-        std = {name: self._noise(name, values) for name, values in clean.items()}
+        std = {name: self.noise[name] for name in clean}
         channels = {
             name: values + std[name] * generator.standard_normal(len(values))
             for name, values in clean.items()
@@ -163,27 +152,8 @@ class ShakingTable:
 
     def _shown(self) -> list[str]:
         """Return the channels of the building and its damper that the study has."""
-        return [name for name in (*self._of_levels(), FORCE) if self.like.has(name)]
-
-    def _of_levels(self) -> list[str]:
-        return [f"{level}_{kind}" for level in self.levels for kind in KINDS]
-
-    def lacking(self) -> list[str]:
-        """Return the channels that a study of this building may have, and this one lacks."""
-        return [name for name in (*self._of_levels(), FORCE) if not self.like.has(name)]
-
-    def _noise(self, channel: str, values: Array) -> float:
-        """Return the noise of a channel [SI]: its own, or that of the nearest one of its kind."""
-        if channel in self.noise:
-            return self.noise[channel]
-        level, _, kind = channel.partition("_")
-        alike = [f"{one}_{kind}" for one in self.levels if f"{one}_{kind}" in self.noise]
-        if level in self.levels and alike:
-            place = self.levels.index(level)
-            return self.noise[
-                min(alike, key=lambda one: abs(self.levels.index(one.partition("_")[0]) - place))
-            ]
-        return NOISE * float(np.sqrt(np.mean(values**2)))
+        of_levels = [f"{level}_{kind}" for level in self.levels for kind in KINDS]
+        return [name for name in (*of_levels, FORCE) if self.like.has(name)]
 
 
 def _port(channel: str) -> str:

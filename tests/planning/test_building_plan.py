@@ -5,7 +5,6 @@ The long test plans for a tower whose damper's force was not measured.
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from bristle.data.ground_motion import GroundMotion, read_ground_motion
 from bristle.data.measurement import Measurement
 from bristle.errors import RecordError, StudyError
 from bristle.examples.make import Choice, make_building, perform_plan
-from bristle.planning.building import ONE_FORCE, AddedSensors, BuildingPlan, limits_of_shaking
+from bristle.planning.building import ONE_FORCE, BuildingPlan, limits_of_shaking
 from bristle.planning.folder import ROLES, read_plan
 from bristle.planning.information import Goal
 from bristle.planning.limits import RESERVE, PrescribedSignals, RigLimits, Test, read_rig
@@ -124,17 +123,6 @@ def test_a_planned_run_has_the_channels_of_the_study_with_their_noise(run: Measu
     assert shown.step == pytest.approx(one.dt)
     error = shown["base_displacement"] - response(one)["structure.base_displacement"]
     assert np.std(error) == pytest.approx(run.noise["base_displacement"], rel=0.1)
-
-
-def test_a_further_sensor_leaves_the_noise_on_the_others(run: Measurement) -> None:
-    one = shaking()
-    assert table(run).lacking() == ["floor1_velocity", "floor1_acceleration_absolute", "force"]
-    before = table(run).measured(one, response(one))
-    more = table(run).measured(one, response(one), ("floor1_velocity", "force"))
-    for name in before.channels:
-        np.testing.assert_array_equal(before[name], more[name])
-    assert more.noise["floor1_velocity"] == run.noise["base_velocity"]  # that of its kind
-    assert more.noise["force"] == pytest.approx(0.01 * np.std(10.0 * one.a), rel=0.05)
 
 
 def test_the_largest_values_are_held_against_their_limits(run: Measurement) -> None:
@@ -253,36 +241,6 @@ def test_a_coil_has_no_twin_in_the_layer() -> None:
 PAIR = Outcome("separate", "damper: gas_spring or duffing", ONE_FORCE, "std", 0.0, 310.0)
 
 
-@pytest.mark.parametrize(
-    ("added", "said"),
-    [
-        (
-            AddedSensors("force", PAIR, np.inf, True),
-            "A load cell at the damper would settle gas_spring or duffing: with it they are 310 "
-            "std apart; a verdict needs 4.",
-        ),
-        (
-            AddedSensors(
-                "floor1_displacement",
-                Outcome("see", "storey1: storey_softening", "d_half", "m", 0.04, 0.09), 2.2, False,
-            ),
-            "A displacement of floor 1 would lower the smallest visible storey_softening at storey "
-            "1: d_half 90 mm in place of 40 mm.",
-        ),
-        (
-            AddedSensors(
-                "base_acceleration_absolute",
-                Outcome("sharpen", "layer: k", "standard deviation", "%", 0.004, 0.003), 1.3, False,
-            ),
-            "An accelerometer on the base would lower the standard deviation of k at the isolation "
-            "layer from 0.4 % to 0.3 %, and no other sensor does more.",
-        ),
-    ],
-)  # fmt: skip
-def test_a_sensor_is_told_with_what_it_shows(added: AddedSensors, said: str) -> None:
-    assert added.sentence() == said
-
-
 def a_plan(**changed: Any) -> BuildingPlan:
     record = Waveform("record", 0.2, 100.0, record=(0.0, 0.01, 0.0), name="quake")
     tests = [
@@ -292,25 +250,19 @@ def a_plan(**changed: Any) -> BuildingPlan:
     signals = tuple(shaking(one.share) for one in tests)
     rows = (replace(PAIR, settled=False),)
     base = tuple(0.001 * one.a for one in signals)
-    given = {"predicted": base, "sensors": (AddedSensors("force", PAIR, np.inf, True),)} | changed
+    given = {"predicted": base} | changed
     roles = ("train", "holdout")
     return BuildingPlan(
         "tower", tuple(tests), signals, rows, LIMITS, "voltage", 1.0, roles, **given
     )
 
 
-def test_a_plan_is_worth_its_tests_where_a_sensor_settles() -> None:
-    plan = a_plan()
-    assert plan.worth
-    said = plan.sentences()
+def test_what_no_motion_tells_apart_needs_a_load_cell() -> None:
+    said = replace(a_plan(), gain=2.0).sentences()
     assert said[0].startswith("plan_1 (train): quake times ")
     assert "voltage held at 3 V; the base moves by " in said[0]
-    assert "no motion helps" in said[2]
-    assert said[3].startswith("A load cell at the damper would settle")
-    assert said[4].endswith("add it before them.")
-    told = json.loads(json.dumps(plan.as_dict(), allow_nan=False))
-    assert told["sensors"][0]["settles"] is True
-    alone = a_plan(sensors=())
+    assert said[2].endswith("no motion tells them apart, a load cell at the damper does.")
+    alone = a_plan()
     assert not alone.worth
     assert "Nothing is left to gain" in alone.sentences()[-1]
 
@@ -327,7 +279,7 @@ def test_the_folder_is_one_that_a_table_takes(tmp_path: Path) -> None:
     )
     assert (tmp_path / "plan" / "plan_2.png").stat().st_size > 10_000
     page = (tmp_path / "plan" / "plan.md").read_text()
-    assert "## Sensors to add" in page
+    assert "## What they will show" in page
     assert (tmp_path / "plan" / "outcomes.json").is_file()
 
 
@@ -345,7 +297,7 @@ def test_a_bench_has_no_ground_motion(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.slow  # a building is identified, diagnosed and planned
-def test_a_load_cell_settles_what_no_motion_does(tmp_path: Path) -> None:
+def test_a_load_cell_is_asked_for_where_no_motion_tells(tmp_path: Path) -> None:
     make_building(
         tmp_path / "tower", Choice(effects=("gas_spring",), law="lugre", seed=5), load_cell=False
     )
@@ -355,9 +307,7 @@ def test_a_load_cell_settles_what_no_motion_does(tmp_path: Path) -> None:
     limits = {"damper_stroke": "9 mm", "acceleration": "2 m/s2"}
     plan = bristle.plan(study, **limits)
     assert isinstance(plan, BuildingPlan)
-    assert plan.worth
-    assert plan.sensors[0].channel == "force"
-    assert plan.sensors[0].settles
+    assert any(said.endswith("a load cell at the damper does.") for said in plan.sentences())
     assert [one.what for one in plan.outcomes] == [ONE_FORCE]
     for one, moved in zip(plan.signals, plan.predicted, strict=True):
         assert np.max(np.abs(moved)) <= RESERVE * 0.009 * (1.0 + 1e-9)
