@@ -11,7 +11,6 @@ from ..core.text import plain, scale
 from ..view.blocks import Figure, Table, Text, View, view_of
 from ..view.style import COLOURS, GREY, INK, PALE, Page, label, look
 from .result import REFERENCES, ControllerComparison, beside, what, winner
-from .runs import best_level
 from .setting import BEST, DAMPER, LIMIT, OFF, ON
 
 if TYPE_CHECKING:
@@ -235,61 +234,6 @@ def _draw_shares(
 def _unbroken(title: str) -> str:
     """Return a title whose numbers stay with their unit."""
     return title.replace(" %", "\u00a0%")
-
-
-def draw_levels(found: ControllerComparison) -> Page:
-    """Return the figure of constant voltages: what is judged over the voltage, a panel a motion."""
-    judged = found.setting.judged
-    factor, unit = scale(judged.unit, float(found.table[judged.name].max()))
-    count = len(found.motions)
-    columns = min(3, count)
-    rows = -(-count // columns)
-    low = [best_level(found.levels[m], judged.name) for m in found.motions]
-    spread = f"{min(low):g} V" if min(low) == max(low) else f"{min(low):g} to {max(low):g} V"
-    page = Page(
-        8.6, 2.3 * rows + 0.2, f"The best constant voltage is {spread}",
-        f"Grey: {what(found)} [{unit.replace('s2', 's²')}] over a constant voltage; ring: the "
-        "lowest. Lines: the controllers" + ("; black: the limit." if found.limits else "."),
-    )  # fmt: skip
-    with look():
-        grid = page.grid(rows, columns, left=0.5, right=1.25, column_gap=1.3, row_gap=0.65)
-        for k, motion in enumerate(found.motions):
-            axes = page.figure.add_subplot(grid[k // columns, k % columns])
-            values = factor * found.levels[motion][judged.name]
-            volts = values.index.to_numpy()
-            axes.plot(volts, values, color=GREY, linewidth=1.6)
-            at = int(np.argmin(values.to_numpy()))
-            axes.plot(volts[at], values.iloc[at], "o", markersize=8, markerfacecolor="white",
-                      markeredgecolor=INK, clip_on=False, zorder=3)  # fmt: skip
-            lines = {name: factor * found.value(motion, name) for name in found.controllers}
-            if motion in found.limits:
-                lines[LIMIT] = factor * found.value(motion, LIMIT)
-            for name, value in lines.items():
-                colour = INK if name == LIMIT else colour_of(found, name)
-                axes.axhline(value, color=colour, linewidth=1.1)
-            top = 1.06 * max(float(values.max()), *lines.values())
-            axes.set_ylim(0.0, top)
-            axes.set_xlim(0.0, float(volts[-1]))
-            for name, place in _apart(lines, 0.06 * top).items():
-                colour = INK if name == LIMIT else colour_of(found, name)
-                label(axes, name, float(volts[-1]), place, colour, xytext=(5, 0), va="center",
-                      fontsize=7)  # fmt: skip
-            axes.set_title(motion, fontsize=8.5)
-            if k // columns == rows - 1:
-                axes.set_xlabel("voltage [V]", loc="right", labelpad=0)
-    return page
-
-
-def _apart(values: dict[str, float], gap: float) -> dict[str, float]:
-    """Return places for labels at values, at least a gap apart, in their order."""
-    order = sorted(values, key=lambda name: values[name])
-    places: dict[str, float] = {}
-    last = -np.inf
-    for name in order:
-        last = max(values[name], last + gap)
-        places[name] = last
-    over = last - max(values.values())
-    return {name: place - 0.5 * over for name, place in places.items()}
 
 
 def draw_motion(found: ControllerComparison, motion: str) -> Page:

@@ -537,13 +537,13 @@ SOURCE = Path(__file__).with_name("march.c")
 SITES = {"damper": damper.SETS, "structure": structure.SETS}
 
 
-def module(system: RecordLayout | None = None) -> bytes:
+def module(system: RecordLayout) -> bytes:
     """Return the module, compiled if it is not in the cache: a minute or two, once.
 
     Parameters
     ----------
-    system : RecordLayout, optional
-        What it is to run, where a law or effect is not of the library.
+    system : RecordLayout
+        What it is to run.
 
     Raises
     ------
@@ -551,9 +551,7 @@ def module(system: RecordLayout | None = None) -> bytes:
         If zig is not installed, the compiler refuses a law or effect, or the cache cannot be
         written.
     """
-    sets = [one.library for one in SITES.values()]
-    if system is not None:
-        sets = [system.dampers, system.structures]
+    sets = [system.dampers, system.structures]
     functions = text_digest(linked(*sets)(time_loop.integrate))
     sizes = [f"-D{name}_SIZE={record.itemsize}" for name, record in _records(*sets).items()]
     content = hashlib.sha256(SOURCE.read_bytes())

@@ -53,7 +53,7 @@ from .requests import (
     kind_of,
     waiting_texts,
 )
-from .view_cache import Compiling, ViewCache, fingerprint
+from .view_cache import ViewCache, fingerprint
 
 KEPT_LINES = 500
 """Lines of progress that are kept of a job."""
@@ -304,7 +304,6 @@ class App:
         self.first = folder.name if is_study else ""
         self.jobs = Jobs(self.home)
         self.answers = ViewCache()
-        self._compiling = Compiling()
         self._routes: list[tuple[str, re.Pattern[str], Handler]] = [
             (method, re.compile(pattern), handler)
             for method, pattern, handler in (
@@ -323,8 +322,7 @@ class App:
                 ("GET", "/api/jobs/([0-9]+)", self._job),
                 ("POST", "/api/jobs/([0-9]+)/cancel", self._cancel),
                 ("GET", "/api/scenarios", self._scenarios),
-                ("POST", "/api/(simulate|numbers|spectrum)", self._simulate),
-                ("GET", "/api/module", self._module),
+                ("POST", "/api/(simulate|spectrum)", self._simulate),
             )
         ]
 
@@ -335,7 +333,6 @@ class App:
     def close(self) -> None:
         """End the worker, and interrupt the commands that are at work."""
         self.answers.close()
-        self._compiling.close()
         self.jobs.close()
 
     def route(self, method: str, path: str) -> tuple[Handler, tuple[str, ...]]:
@@ -467,9 +464,6 @@ class App:
         view = request.parts[0]
         return Answer(self.answers.get(view, self.home, request.json(), keep=False), PACKED)
 
-    def _module(self, request: Request) -> Answer:
-        return Answer(self._compiling.get(self.home), "application/wasm")
-
 
 def _is_study(folder: Path) -> bool:
     return (folder / "study.toml").is_file() and not folder.name.startswith(".")
@@ -541,8 +535,6 @@ def error_of(error: BristleError) -> tuple[HTTPStatus, dict[str, Any]]:
 # files of this package and answers of `app`. It starts before anything heavy is imported.
 
 STATIC = Path(__file__).with_name("static")
-LOADER = Path(__file__).parent.parent / "export"
-"""Folder with what runs a scenario's WebAssembly module."""
 KINDS = {
     ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8",
     ".mjs": "text/javascript; charset=utf-8", ".svg": "image/svg+xml",
@@ -595,9 +587,7 @@ def static_parts() -> dict[str, Path]:
     """Return the files that the page consists of, by path: no other file is ever read for it."""
     own = [path for path in STATIC.rglob("*") if path.suffix in KINDS]
     found = {f"/{path.relative_to(STATIC).as_posix()}": path for path in own}
-    return {
-        **found, "/": STATIC / "page.html", "/bristle.mjs": LOADER / "bristle.mjs",
-    }  # fmt: skip
+    return {**found, "/": STATIC / "page.html"}
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -23,7 +23,7 @@ from ..data.response_spectrum import DAMPING
 from ..engine.coupled import Coupled
 from ..engine.results import accelerations, spectra
 from ..errors import BristleError, DesignError, ScenarioError, StudyError
-from ..export.web import PageNumbers, Shown, described, module, offered
+from ..export.web import offered
 from ..fmu import catalogue
 from ..fmu.catalogue import component_of_law
 from ..physics.drive import VOLTAGE
@@ -395,43 +395,6 @@ def simulate_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
             "rows": ROWS, "damping": DAMPING,
         }  # fmt: skip
     return found
-
-
-def numbers_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a page needs to run a scenario itself, with the module that `export.web`
-    makes.
-
-    Parameters
-    ----------
-    folder, arguments : as for `simulate_view`; sliders are those of its answer that the module can
-        move
-
-    Raises
-    ------
-    ScenarioError, RecordError
-        As `simulate_view`.
-    """
-    asked = asked_for(folder, {**arguments, "values": {}})
-    sliders = {one["name"]: (one["low"], one["high"]) for one in _sliders(asked.load())}
-    return described(PageNumbers(stock_file(asked.scenario), asked.given()), shown=Shown(sliders))
-
-
-def module_view(folder: Path, arguments: Mapping[str, Any]) -> bytes:
-    """Return the WebAssembly module by which a page runs scenarios itself.
-
-    It is compiled once for all scenarios, which takes a minute or two: a process of its own does
-    it, so that views are answered meanwhile.
-
-    Parameters
-    ----------
-    folder, arguments : none are used
-
-    Raises
-    ------
-    BuildError
-        If zig is not installed, or cannot compile.
-    """
-    return module()
 
 
 def scenarios_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:

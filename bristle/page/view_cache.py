@@ -194,34 +194,3 @@ class ViewCache:
         self._kept[key] = found
         while sum(map(len, self._kept.values())) > KEPT and len(self._kept) > 1:
             self._kept.popitem(last=False)
-
-
-class Compiling:
-    """Makes the module by which pages run scenarios: once, in a process that ends behind it."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._found = b""
-        self._maker: ViewCache | None = None
-
-    def get(self, folder: Path) -> bytes:
-        """Return the module; whoever asks meanwhile waits for the same.
-
-        Raises
-        ------
-        ViewError
-            If it cannot be made: the compiler is not installed.
-        """
-        with self._lock:
-            if not self._found:
-                self._maker = ViewCache()
-                try:
-                    self._found = self._maker.get("module", folder, {}, keep=False)
-                finally:
-                    self._maker.close()
-            return self._found
-
-    def close(self) -> None:
-        """End a process that is at work."""
-        if self._maker is not None:
-            self._maker.close()

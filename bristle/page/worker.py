@@ -23,12 +23,10 @@ VIEWS = {
     "data_views": ("channels", "check", "columns", "data", "preview"),
     "study_views": ("errors", "fit", "history", "residual", "verdict"),
     "control_views": (
-        "controllers", "design", "loops", "weights", "module", "numbers", "scenarios", "simulate",
-        "spectrum",
+        "controllers", "design", "loops", "weights", "scenarios", "simulate", "spectrum",
     ),
 }  # fmt: skip
-"""The views of each module: `NAME_view(folder, arguments)` answers, with bytes or what
-`html.pack` takes."""
+"""The views of each module: `NAME_view(folder, arguments)` answers with what `html.pack` takes."""
 
 Answered = tuple[dict[str, Any], bytes]
 
@@ -48,7 +46,7 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
     try:
         unload_effects()  # those of the study that was asked for before
         found = function_of(view)(folder, arguments)
-        return {"ok": True}, found if isinstance(found, bytes) else pack(found)
+        return {"ok": True}, pack(found)
     except TrustError as error:
         told = {"kind": "TrustError", "file": str(error.path), "text": error.text}
         return {"ok": False, "error": str(error), **told}, b""

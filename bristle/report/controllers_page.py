@@ -6,7 +6,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ..controller_comparison.setting import BEST, ENSEMBLES, LIMIT, SCENARIOS, plain_name
-from ..controller_comparison.view import draw_levels, draw_motion, motion_table
+from ..controller_comparison.view import draw_motion, motion_table
 from ..core.text import command, plain, quantity
 from ..version import __version__
 from ..view import html
@@ -34,7 +34,6 @@ def controllers_report(found: ControllerComparison) -> str:
         _notes(found),
         _setting(found),
         *(_motion(found, name) for name in found.motions),
-        _constants(found),
         _limits(found),
         _again(found),
     ]  # fmt: skip
@@ -92,18 +91,6 @@ def _motion(found: ControllerComparison, motion: str) -> str:
         motion,
         html.blocks([motion_table(found, motion)._replace(title="")]),
         html.figure(png(draw_motion(found, motion)), f"responses under {motion}"),
-    )  # fmt: skip
-
-
-def _constants(found: ControllerComparison) -> str:
-    return html.section(
-        "Constant voltages",
-        html.figure(png(draw_levels(found)), "judged output over a constant voltage"),
-        html.paragraphs(
-            "The best constant voltage of a motion is the best of those that were run. Nobody "
-            "knows it before the motion: it is a strong comparison, not a controller.",
-            kind="soft",
-        ),
     )  # fmt: skip
 
 

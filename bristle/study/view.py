@@ -281,7 +281,7 @@ def _headings(found: Identified, role: str) -> tuple[str, str]:
 # The commands that follow from an identification.
 
 BETTER = 0.9
-"""What part of the error another law must leave to be worth a word."""
+"""What part of the error another form must leave to be worth a word."""
 
 
 def identified_with_next(found: Identified, folder: Path) -> View:

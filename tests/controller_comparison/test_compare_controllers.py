@@ -165,7 +165,7 @@ def test_the_report_is_one_file_with_every_case(tmp_path: Path) -> None:
     assert "http" not in text.replace("http-equiv", "")
     for name in (*found.controllers, *found.motions, *found.notes):
         assert escape(name) in text
-    assert text.count('<img src="data:image/png') == 2 + len(found.motions)
+    assert text.count('<img src="data:image/png') == 1 + len(found.motions)
     files = found.write(tmp_path)
     assert [path.name for path in files] == ["comparison.csv", "quantities.csv", "worst.csv"]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
 import shlex
 from pathlib import Path
@@ -16,9 +15,8 @@ from page.served import page_on
 import bristle
 from bristle.data import read_ground_motion
 from bristle.engine.results import spectra
-from bristle.errors import BristleError, BuildError, RecordError, RunError, ScenarioError
-from bristle.native import zig
-from bristle.page import control_views, view_cache
+from bristle.errors import BristleError, RecordError, RunError, ScenarioError
+from bristle.page import control_views
 from bristle.page.control_views import LONGEST, asked_for, controls, damper_of, stock_file
 from bristle.study import Study, create_study
 from bristle.system.overrides import parse_overrides
@@ -133,19 +131,6 @@ def test_the_spectrum_is_that_of_the_rows_of_the_run(home: Path) -> None:
         control_views.spectrum_view(home, {"scenario": BENCH})
 
 
-def test_the_page_gets_the_numbers_of_the_same_run_and_of_its_sliders(home: Path) -> None:
-    wanted = {"scenario": PASSIVE, "study": "rig"}
-    shown = control_views.simulate_view(home, {**wanted, "about": True})
-    given = control_views.numbers_view(home, wanted)
-    assert given["rows"] + 1 == len(shown["time"]) * shown["every"]
-    assert [one["name"] for one in given["outputs"]] == [one["name"] for one in shown["outputs"]]
-    there = {one["name"]: one for one in shown["sliders"]}
-    assert "voltage.level" in {one["name"] for one in given["sliders"]} <= set(there)
-    for one in given["sliders"]:
-        assert (one["low"], one["high"]) == (there[one["name"]]["low"], there[one["name"]]["high"])
-        assert one["value"] == there[one["name"]]["value"]
-
-
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
@@ -174,49 +159,11 @@ def test_a_scenario_that_cannot_run_says_why(
         assert found.type is ScenarioError
 
 
-def test_without_zig_the_page_is_told_and_the_server_goes_on(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    zig.version.cache_clear()
-    find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name == "ziglang" else find(name)
-    )
-    try:
-        with pytest.raises(BuildError, match=r"pip install 'bristle\[native\]'"):
-            control_views.module_view(home, {})
-    finally:
-        zig.version.cache_clear()
-
-
-def test_the_module_is_made_once_by_a_process_that_ends(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made: list[view_cache.ViewCache] = []
-
-    def get(self: view_cache.ViewCache, view: str, *_: object, **__: object) -> bytes:
-        made.append(self)
-        if len(made) == 1:
-            raise view_cache.ViewError({"error": "zig is not installed", "kind": "BuildError"})
-        return b"\0asm"
-
-    monkeypatch.setattr(view_cache.ViewCache, "get", get)
-    with page_on(home, start=False) as client:
-        refused = client.get("/api/module")
-        assert (refused.status, refused.error) == (422, "zig is not installed")
-        for _ in range(2):
-            found = client.get("/api/module")
-            assert (found.status, found.body) == (200, b"\0asm")
-            assert found.headers["Content-Type"] == "application/wasm"
-    assert len(made) == 2
-    assert all(one._closed for one in made)
-
-
 @pytest.mark.slow  # a server and runs; by default its functions
-def test_runs_numbers_and_spectra_are_asked_for_over_http(home: Path) -> None:
+def test_runs_and_spectra_are_asked_for_over_http(home: Path) -> None:
     with page_on(home, start=False) as client:
         wanted = {"scenario": "half_sine_pulse", "values": {}}
-        for view, key in (("simulate", "outputs"), ("spectrum", "period"), ("numbers", "numbers")):
+        for view, key in (("simulate", "outputs"), ("spectrum", "period")):
             found = client.post(f"/api/{view}", wanted)
             assert found.status == 200, found.body
             assert key in unpack(found.body)

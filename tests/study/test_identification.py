@@ -142,6 +142,7 @@ def test_the_step_holds_the_errors_before_and_after_and_can_be_undone(tmp_path, 
     assert main(["identify", str(study.folder), "--starts", "2", "--details"]) == 0
     out = capsys.readouterr().out
     assert "95 % interval" in out
+    assert "The force consists of" in out
     step = Study(study.folder).steps()[-1]
     assert step.what == "identify bingham"
     told = {"z_train", "z_holdout", "error_train", "error_share_holdout", "rms_train", "cut_off"}

@@ -57,9 +57,6 @@ async function ask(method, path, body) {
 /** @param {string} path @returns {Promise<any>} */
 export const get = async (path) => (await ask("GET", path)).json();
 
-/** @param {string} path @returns {Promise<ArrayBuffer>} */
-export const raw = async (path) => (await ask("GET", path)).arrayBuffer();
-
 /** @param {string} path @param {object} content @returns {Promise<any>} */
 export const post = async (path, content) =>
   (await ask("POST", path, JSON.stringify(content))).json();

@@ -3,7 +3,6 @@
 import { postPacked } from "./api.mjs";
 import { Building, levelsOf } from "./building.mjs";
 import { h, key, number, percent, say, shown, table, unitText } from "./dom.mjs";
-import { Engine } from "./engine.mjs";
 import { Plot, extent } from "./plot.mjs";
 
 const REST = 250; // ms that sliders rest until the spectra are computed
@@ -13,18 +12,13 @@ export class Simulation {
   constructor(page, what, name, first, whole) {
     Object.assign(this, { page, what, name, first, now: first, whole, sliders: first.sliders });
     this.values = {};
-    this.engine = new Engine(what, first);
     this.names = first.outputs.map((one) => one.name);
     this.busy = false;
     this.wanted = false;
-    this.took = h("p", { class: "soft small", role: "status" }, this.engine.why);
+    this.took = h("p", { class: "soft small", role: "status" });
     this.begin = { ...first, label: `${name}, as it is` };
     this.build();
     this.finish();
-    this.engine.prepare().then(() => {
-      this.took.textContent = this.engine.why || "Runs are computed in this page.";
-      whole.dataset.engine = this.engine.why ? "server" : "page";
-    });
     window.bristleSimulation = this;
   }
 
@@ -201,11 +195,9 @@ export class Simulation {
     while (this.wanted) {
       this.wanted = false;
       const began = performance.now();
-      const here = this.engine.runsHere(this.values);
       try {
-        this.now = await this.engine.run({ ...this.values });
-        const took = performance.now() - began;
-        this.took.textContent = `${this.now.time.length} rows in ${took.toFixed(0)} ms, computed ${here ? "in this page" : "on the server"}. ${here ? "" : this.engine.why}`;
+        this.now = await postPacked("simulate", { ...this.what, values: { ...this.values } });
+        this.took.textContent = `${this.now.time.length} rows in ${(performance.now() - began).toFixed(0)} ms`;
         this.finish();
       } catch (error) {
         this.took.textContent = error.message;
