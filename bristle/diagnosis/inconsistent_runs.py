@@ -320,7 +320,7 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) ->
 def _affordable(model: Model, runs: tuple[Problem, Problem], effort: Effort) -> bool:
     """Return whether a look at runs with a model leaves the effort within what it may be."""
     once = sum(problem.steps_of(model) for problem in runs)
-    return effort.steps + LOOK * once <= effort.most
+    return LOOK * once <= effort.left
 
 
 def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Trial, list[str]]]:

@@ -246,6 +246,8 @@ class TrialsByLaw:
             made = self.made[row.law] = Trials(free, self.say, ends=ends)
         elif pairs:
             self.say(f"two effects that {row.law} lacks")
+            if self.effort.spent and any(is_rough(one.model) for one in made.single[:2]):
+                self.not_tried[row.law] = True  # behind a joint
         found = self._lacking(row, made, pairs)
         reached = found.reach()
         if self.kept and (self._nearest is None or reached.z < self._nearest.z):
@@ -272,7 +274,9 @@ class TrialsByLaw:
             (row,) = fitted_anew([row], *runs.damper)
         prepared = runs.prepare(DAMPER, row.trial)
         assert prepared is not None
-        again = Trials(prepared, self.say, *((None, made) if shortened else (made,)))
+        # What explains nothing with the zero free explains no more without: no search begins anew.
+        earlier = None if shortened and found.explains else made
+        again = Trials(prepared, self.say, earlier, made if shortened else None)
         # Where two effects explained nothing they are not sought once more.
         whole = self._lacking(row, again, found.explains and law in self._two)
         together = whole.finding.together or found.finding.together

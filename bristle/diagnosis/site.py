@@ -16,12 +16,12 @@ from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit
-from ..identification.histories import Effort
+from ..identification.histories import Effort, left
 from ..identification.problem import Expected, Problem, Run, has_offset, zero_of
 from ..identification.rig import acts_at
 from ..identification.rig_fit import fit_damper, fit_line, joined
 from ..identification.search import in_threads
-from ..identification.start_grid import refine
+from ..identification.start_grid import is_rough, refine
 from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
@@ -297,8 +297,8 @@ class Trials:
         if known:
             self._noise  # noqa: B018  # before threads ask for it
             trials = in_threads(self._again, known)
-        elif most is not None and self._ended:
-            return []
+        elif most is not None and (self._ended or (is_rough(first.model) and left() < 0.0)):
+            return []  # behind a joint each simulation costs many times as much
         else:
             trials = try_all(
                 first.model, prepared.searched, held_out, shown=prepared.shown, most=most

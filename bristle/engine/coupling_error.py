@@ -385,8 +385,8 @@ ALGORITHMS = ("jacobi", "gauss-seidel")
 """What tools do that hold inputs over a step."""
 TOLERANCE = 0.005
 """Error along a run [1] that a step is named for."""
-MOST_STEPS = 500_000
-"""Steps that a run in the search for that step may have: half a minute, some 100 MB.
+MOST_STEPS = 40_000
+"""Steps that a run in the search for that step may have: a few seconds.
 
 Without the coupled engine each has one of twice as many beside it.
 """
@@ -398,8 +398,8 @@ class Expected:
 
     `output` is that output. `step` [s] is the scenario's divided by a power of two at which a run
     was within the tolerance. `tried` [s] is the shortest step that was run, and `tried_error` [1]
-    the largest error there: where `step` is None it is not within. All are None where the error is
-    not known, and `why` says what is.
+    the largest error there: where `step` is None it is not within, and `wanted` [s] would be by the
+    order of the error. All are None where the error is not known, and `why` says what is.
     """
 
     algorithm: str
@@ -409,6 +409,7 @@ class Expected:
     tried_error: float | None = None
     why: str = ""
     output: str | None = None
+    wanted: float | None = None
 
     def __str__(self) -> str:
         if self.error is None or self.tried is None or self.tried_error is None:
@@ -418,10 +419,9 @@ class Expected:
             return told
         there = f"{plain(100 * self.tried_error, 2)} %"
         if self.step is None:
-            limit = (
-                f"no step down to {1e3 * self.tried:.4g} ms keeps it below {100 * TOLERANCE:g} %"
-            )
-            return f"{told}; {limit}: it is {there} there"
+            tried = f"{1e3 * self.tried:.4g} ms keeps it below {100 * TOLERANCE:g} %"
+            more = f", by its order {1e3 * self.wanted:.4g} ms would" if self.wanted else ""
+            return f"{told}; no step down to {tried}: it is {there} there{more}"
         return f"{told}; {there} at a step of {1e3 * self.step:.4g} ms"
 
 
@@ -462,7 +462,8 @@ def _expected(scenario: System, kept: Again, again: Again) -> Expected:
         there = _error_at(tried, judged, again)
         if there <= TOLERANCE:
             return replace(found, step=tried.step, tried=tried.step, tried_error=there)
-    return replace(found, step=None, tried=tried.step, tried_error=there)
+    wanted = scenario.step / 2**halvings if halvings > most else None
+    return replace(found, step=None, tried=tried.step, tried_error=there, wanted=wanted)
 
 
 def _halvings(error: CouplingError) -> int:

@@ -278,18 +278,31 @@ class Effort:
             self.steps += steps
 
     @property
+    def left(self) -> float:
+        """How much more it may be."""
+        return self.most - self.steps
+
+    @property
     def spent(self) -> bool:
         """Whether no more is to be begun."""
-        return self.steps > self.most
+        return self.left < 0.0
 
 
 _effort: ContextVar[Effort | None] = ContextVar("effort", default=None)
 
 
+def left() -> float:
+    """Return how many steps may still be spent in this context."""
+    return inf if (effort := _effort.get()) is None else effort.left
+
+
 @contextmanager
 def counted(most: float = inf) -> Iterator[Effort]:
-    """Count the steps of all dampers' forces in this context, and in threads begun in it."""
-    effort, outer = Effort(most), _effort.get()
+    """Count the steps of all dampers' forces in this context, and in threads begun in it.
+
+    Within another count no more may be spent than what that has left.
+    """
+    effort, outer = Effort(min(most, left())), _effort.get()
     token = _effort.set(effort)
     try:
         yield effort

@@ -9,7 +9,9 @@ from typing import Any
 from ..core.interrupt import keeps
 from ..core.progress import tell
 from ..diagnosis import Diagnosis
+from ..diagnosis.prepared import Prepared
 from ..errors import StudyError
+from ..identification.histories import compile_ahead, counted, left
 from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
 from ..physics.effect import closures
@@ -33,6 +35,12 @@ from .unproven import unproven
 LEFT = 0.5
 """Share of the error on held-out runs that a step leaves at most for a verdict to be made anew."""
 
+MOST_SPENT = 1500e6
+"""Steps of dampers' forces, see `Effort`, that all verdicts and steps may take together: three to
+four minutes."""
+
+NOT_COMPARED = "Further effects were not compared, because the search had taken long enough."
+
 MOST_EFFECTS = 4
 """Effects that `complete` adds at the most: a model that asks for more is the wrong model."""
 
@@ -43,7 +51,8 @@ class Completed:
 
     `curves` are those learned where no effect of the library explained the error; `unproven` the
     steps that improve the prediction by what no verdict proves, `refuted` why the one that
-    training runs chose was not made; `closure` what the network came to that was asked for in the
+    training runs chose was not made, or that not all was compared; `anew` whether the verdict is on
+    the model with the first of them; `closure` what the network came to that was asked for in the
     end, `no_closure` why these runs carry none; `promise` what one that was not asked for may leave
     of the error, on left-out parts of the training runs.
     """
@@ -53,6 +62,7 @@ class Completed:
     curves: tuple[LearnedEffect, ...] = ()
     unproven: tuple[Step, ...] = ()
     refuted: str = ""
+    anew: bool = False
     closure: LearnedClosure | None = None
     no_closure: str = ""
     promise: float = 1.0
@@ -75,6 +85,7 @@ class Completed:
         }  # fmt: skip
 
 
+@counted(MOST_SPENT)
 def complete(
     study: Study,
     *,
@@ -110,9 +121,11 @@ def complete(
             keeps(_kept(steps))
 
     free = _begun_free(study, law_or_all(study, law), say, stepped)
+    begun, took, anew, opened = left(), 0.0, False, None
     while True:
         found = diagnose_study(study, law=ALL if free else study.model().law, say=say)
         keeps(_kept(steps))
+        took = took or begun - left()
         if free:
             found, free = _with_law_taken(study, found, stepped), False
         names = found.effects if found.kind == "effect" else ()
@@ -121,12 +134,14 @@ def complete(
             learned.append(learn_effect(study))
             names = (learned[-1].name,) if learned[-1].file is not None else ()
         if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
-            done = Completed(found, (), tuple(learned), tuple(gained))
+            done = Completed(found, (), tuple(learned), tuple(gained), anew=anew)
             if _open(found) and not proven and not study.settings.has_building:
-                step, refuted = _gained(study, found, say, stepped)
+                step, refuted, opened = _gained(study, found, say, stepped)
                 if step is not None:
+                    opened = None  # the model is another one
                     gained.append(step)
-                    if gained == [step] and halves(step):
+                    if gained == [step] and halves(step) and left() >= took:
+                        anew = True
                         continue  # a verdict on a model that errs twice as much tells little
                 done = replace(done, unproven=tuple(gained), refuted=refuted)
             lacks_one = _open(found) and not closures(study.model().effects)
@@ -136,7 +151,7 @@ def complete(
                 except StudyError as refused:  # the verdict and the steps stand without one
                     done = replace(done, no_closure=str(refused))
             elif lacks_one and found.noise_known and not study.settings.has_building:
-                done = replace(done, promise=promise_of(study))
+                done = replace(done, promise=promise_of(study, opened))
             return replace(done, steps=tuple(steps))
         say("adding " + " and ".join(names))
         stepped(add_effects(study, names, why=f"verdict: {found.kind}", found=found).step)
@@ -156,8 +171,11 @@ def halves(step: Step) -> bool:
 
 def _gained(
     study: Study, found: Diagnosis, say: Say, stepped: Callable[[Step | None], None]
-) -> tuple[Step | None, str]:
-    """Add what improves the prediction and is not proven; return the step, or why there is none."""
+) -> tuple[Step | None, str, Prepared]:
+    """Add what improves the prediction and is not proven.
+
+    Return the step, why there is none or not all was compared, and what the look began with.
+    """
     say("effects that improve the prediction")
     before = fitted = study.model()
     known = found.before.model if found.before is not None else before
@@ -167,13 +185,14 @@ def _gained(
     laws = found.laws.rows if found.laws is not None and not before.effects else ()
     best = unproven(opened, found.trials, laws, MOST_EFFECTS)
     names = tuple(one for one in best.model.effects if one not in before.effects)
+    cut = NOT_COMPARED if best.cut else ""
     if not names and not best.law:
-        return None, ""
+        return None, cut, opened
     write_effects(study, best.written)
     say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
     step, refuted = add_unproven(study, best.law, names, best.model.values, found)
     stepped(step)
-    return step, refuted
+    return step, refuted or cut, opened
 
 
 def _closed(
@@ -208,6 +227,8 @@ def _begun_free(
     other = None if law in (ALL, study.model().law) else law
     stale = bool(other_data(study)) or not is_identified(study.model())
     if law != ALL and (other or stale):
+        study.usable_effects()
+        compile_ahead()  # all that the verdict needs, while the model is identified
         say("identifying the model")
         stepped(identify_study(study, law=other).step)
     return law == ALL

@@ -142,9 +142,15 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     return found
 
 
-def promise_of(study: Study) -> float:
-    """Return the error that a closure may leave, by the model's, as training folds tell it [1]."""
-    opened = opened_at(study, "", study.model())[1]  # which was just identified
+def promise_of(study: Study, opened: Prepared | None = None) -> float:
+    """Return the error that a closure may leave, by the model's, as training folds tell it [1].
+
+    Parameters
+    ----------
+    study : whose model was just identified
+    opened : its runs, where they were opened for this model before
+    """
+    opened = opened or opened_at(study, "", study.model())[1]
     return promised(opened.problem, opened.before.model)
 
 

@@ -51,12 +51,14 @@ standard errors over them: the rule of one, as in cross-validation, for nothing 
 class Unproven:
     """A model that predicts better: `law` the name of another law that it has, "" for the same.
 
-    `written` are the texts of its effects that change a parameter by a label, by name.
+    `written` are the texts of its effects that change a parameter by a label, by name; `cut` is
+    whether something was not compared, because enough was spent.
     """
 
     model: Model
     law: str = ""
     written: Mapping[str, str] = field(default_factory=dict)
+    cut: bool = False
 
 
 def unproven(
@@ -75,15 +77,6 @@ def unproven(
         return _chosen(prepared, trials, laws, most, effort)
 
 
-@dataclass(frozen=True)
-class _Candidate:
-    """A model that may predict better, the law's name where it is another one, and its texts."""
-
-    model: Model
-    law: str = ""
-    written: Mapping[str, str] = field(default_factory=dict)
-
-
 def _chosen(
     prepared: Prepared, trials: Sequence[Trial], laws: Sequence[LawTrial], most: int, effort: Effort
 ) -> Unproven:
@@ -91,21 +84,22 @@ def _chosen(
     missed = missed_by(prepared.before, prepared.searched)
     data = prepared.with_excess(missed) if missed > 0.0 else prepared
     problem = data.searched
-    best = _Candidate(refine(prepared.before.model, problem, SWEEPS))
+    best, cut = Unproven(refine(prepared.before.model, problem, SWEEPS)), False
     errors = left_out_errors(best.model, problem)
 
-    def gains(candidates: Sequence[_Candidate], sweeps: int = 0) -> bool:
+    def gains(candidates: Sequence[Unproven], sweeps: int = 0) -> bool:
         """Take the candidate that lowers the error most, beyond chance; return whether one does.
 
         Each is refined before, by so many sweeps.
         """
-        nonlocal best, errors
+        nonlocal best, errors, cut
         able: list[tuple[float, int, Model, list[Array]]] = []
         for k, one in enumerate(candidates):  # one by one, so that what is spent is told alike
             with defined({name: text for name, text in one.written.items() if name not in EFFECTS}):
                 look = 2 * SWEEPS * len(one.model.free()) * problem.steps_of(one.model)
-                if effort.steps + look > effort.most:
-                    continue  # nor could its fit be afforded
+                if look > effort.left:  # nor could its fit be afforded
+                    cut = True
+                    continue
                 model = refine(one.model, problem, sweeps) if sweeps else one.model
                 found = left_out_errors(model, problem)
             if lowers(errors, found, GAIN, BEYOND):
@@ -115,7 +109,7 @@ def _chosen(
         _, k, model, errors = min(able, key=lambda one: one[:2])
         written = {**best.written, **candidates[k].written}
         stay.enter_context(defined({n: text for n, text in written.items() if n not in EFFECTS}))
-        best = _Candidate(refine(model, problem, LONG), candidates[k].law or best.law, written)
+        best = Unproven(refine(model, problem, LONG), candidates[k].law or best.law, written)
         return True
 
     with ExitStack() as stay:
@@ -130,17 +124,17 @@ def _chosen(
                     )
             able.sort(key=lambda one: one.train)
             tried = [
-                _Candidate(one.model, "", {n: texts[n] for n in one.effects if n in texts})
+                Unproven(one.model, "", {n: texts[n] for n in one.effects if n in texts})
                 for one in able[:TRIED]
             ]
             if not gains(tried):
                 break
         model = _without_idle(best.model, prepared.before.model.effects, errors, problem)
     written = {name: text for name, text in best.written.items() if name in model.effects}
-    return Unproven(model, best.law, written)
+    return Unproven(model, best.law, written, cut or effort.spent)
 
 
-def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> list[_Candidate]:
+def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> list[Unproven]:
     """Return the laws that fit the training runs best, each with what its parameters owe labels.
 
     Where a label parts the runs, a law without it tells little of what the law can do.
@@ -153,7 +147,7 @@ def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> lis
     able.sort(key=lambda one: one[0])
     closer = []
     for left, labelled, row in able[: 2 * TRIED]:
-        one = _Candidate(row.trial.model, row.law)
+        one = Unproven(row.trial.model, row.law)
         if labelled:
             one = _with_labels(one, problem)
             with defined(one.written):
@@ -163,7 +157,7 @@ def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> lis
     return [one for _, one in closer[:TRIED]]
 
 
-def _with_labels(law: _Candidate, problem: Problem) -> _Candidate:
+def _with_labels(law: Unproven, problem: Problem) -> Unproven:
     """Return a law with the dependences on labels that promise most, one after the other.
 
     A yield force and the way to it may both go with a label: one alone then gains little.
@@ -177,7 +171,7 @@ def _with_labels(law: _Candidate, problem: Problem) -> _Candidate:
             written[worth[0].name] = worth[0].text
             stay.enter_context(defined({worth[0].name: worth[0].text}))
             model = refine(model.with_effect(worth[0].name), problem, SWEEPS)
-    return _Candidate(model, law.law, written)
+    return Unproven(model, law.law, written)
 
 
 def _without_idle(

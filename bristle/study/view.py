@@ -664,7 +664,7 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     view = story_view(study, verdict)
     table = steps_table(history_steps(study.steps()))
     learned = [Text(" ".join(one.sentences())) for one in done.curves]
-    learned += [Text(_unproven(study, one, one is done.unproven[0])) for one in done.unproven]
+    learned += [Text(_unproven(study, done, one)) for one in done.unproven]
     learned += [Text(done.refuted)] if done.refuted else []
     learned += map(Text, done.closure.sentences() if done.closure else ())
     learned += [Text(f"No closure: {done.no_closure}")] if done.no_closure else []
@@ -676,9 +676,12 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     return view._replace(blocks=(first, *learned, *rest, table, *then))
 
 
-def _unproven(study: Study, step: Step, first: bool) -> str:
+def _unproven(study: Study, done: Completed, step: Step) -> str:
     """Return the sentences about a step that improves the prediction and is not proven."""
-    on = "with" if first and halves(step) else "without"
+    first = step is done.unproven[0]
+    on = "with" if first and done.anew else "without"
+    if first and halves(step) and not done.anew:
+        on = f"without; {command('diagnose', study.folder)} makes one on that with"
     fall = [errors.get("error_share_holdout") for errors in (step.before, step.after)]
     falls = " to ".join(percent(one) for one in fall if isinstance(one, float))
     what = step.what.removesuffix(f" ({NOT_PROVEN})")

@@ -310,6 +310,7 @@ def test_where_no_step_is_short_enough_the_error_at_the_shortest_is_told(
         assert (one.step, one.tried) == (None, 0.002 / 4)
         assert one.tried_error == pytest.approx(0.1 / 4, rel=0.05)
         assert "no step down to 0.5 ms keeps it below 0.5 %: it is 2.5 % there" in str(one)
+        assert str(one).endswith("by its order 0.0625 ms would")
 
 
 def test_a_small_error_needs_no_shorter_step(scenario: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ from studies import case_study
 from bristle.cli import main
 from bristle.diagnosis.trials import Trial, judge
 from bristle.errors import StudyError
+from bristle.identification.histories import counted
 from bristle.model.model import Model, new_model
 from bristle.physics.building import paper_building
 from bristle.study import auto, steps
@@ -72,7 +74,7 @@ def folder(monkeypatch):
         return SimpleNamespace(step=f"add {names[0]}")
 
     monkeypatch.setattr(auto, "add_effects", add)
-    monkeypatch.setattr(auto, "promise_of", lambda _study: 0.6)
+    monkeypatch.setattr(auto, "promise_of", lambda *_given: 0.6)
     return made
 
 
@@ -82,9 +84,17 @@ def told(monkeypatch, answers):
     monkeypatch.setattr(auto, "diagnose_study", lambda _study, **_given: next(found))
 
 
-@pytest.mark.parametrize(("kind", "left"), [("unknown", 0.2), ("ambiguous", 0.2), ("unknown", 0.1)])
-def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypatch, kind, left):
-    """Where it takes half of the error, the verdict is made anew: here nothing is missing then."""
+@pytest.mark.parametrize(
+    ("kind", "left", "most"),
+    [("unknown", 0.2, inf), ("ambiguous", 0.2, inf), ("unknown", 0.1, inf), ("unknown", 0.1, -1.0)],
+)
+def test_an_error_that_remains_is_lowered_by_what_is_not_proven(
+    folder, monkeypatch, kind, left, most
+):
+    """Where it takes half of the error, the verdict is made anew: here nothing is missing then.
+
+    Unless enough was spent.
+    """
     found = verdict(kind, 6.0, ("stribeck", 4.0))
     told(monkeypatch, [found, verdict("none", 1.0)])
     step = Step(2, "add stribeck, drift (not proven)", "", {"error_share_holdout": 0.25})
@@ -93,7 +103,8 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypa
 
     def chosen(*given):
         asked.append(given)
-        return SimpleNamespace(model=Model("bingham", ("stribeck", "drift")), law="", written={})
+        model = Model("bingham", ("stribeck", "drift"))
+        return SimpleNamespace(model=model, law="", written={}, cut=most < 0.0)
 
     def add(_study, law, names, values, of):
         added.append((law, names, of))
@@ -103,12 +114,16 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(folder, monkeypa
     monkeypatch.setattr(auto, "write_effects", lambda _study, _texts: None)
     monkeypatch.setattr(auto, "unproven", chosen)
     monkeypatch.setattr(auto, "add_unproven", add)
-    done = complete(folder, say=print)
+    with counted(most):
+        done = complete(folder, say=print)
     assert asked == [("opened", found.trials, (), MOST_EFFECTS)]
     assert added == [("", ("stribeck", "drift"), found)]
     assert done.steps == done.unproven == (step,)
-    assert done.verdict.kind == (kind if left > 0.125 else "none")
-    assert done.promise == (0.6 if left > 0.125 else 1.0)
+    stays = left > 0.125 or most < 0.0
+    assert done.verdict.kind == (kind if stays else "none")
+    assert done.anew is not stays
+    assert bool(done.refuted) is (most < 0.0)
+    assert done.promise == (0.6 if stays else 1.0)
 
 
 def test_what_the_held_out_runs_refute_is_not_kept(bench_study, monkeypatch):
