@@ -124,9 +124,12 @@ def missing(before: Trial, after: Trial, rule: DecisionRule = BENCH) -> bool:
     """Return whether an effect lowers the held-out error by enough, and beyond chance.
 
     An effect that serves the many samples near rest at the cost of all others is none; of a few
-    samples beside reversals the plain error says nothing.
+    samples beside reversals the plain error says nothing. Nor is one that gains nothing where it
+    was fitted.
     """
     if 1.0 - after.z / before.z < rule.gain:
+        return False
+    if before.z <= rule.clean and after.train > (1.0 - rule.learned * rule.gain) * before.train:
         return False
     larger = after.rms > rule.most_rms * before.rms
     if larger and not after.rms_bulk <= rule.most_rms * before.rms_bulk:

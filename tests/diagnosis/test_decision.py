@@ -53,6 +53,13 @@ def test_a_gain_below_the_smallest_is_none_and_above_it_an_effect():
     assert decide(before, [more], no_more).effects == ("drift",)
 
 
+def test_a_gain_on_the_runs_held_out_alone_is_none_where_noise_is_nearly_all():
+    before, after = replace(trial(1.046), train=0.994), replace(trial(1.02, "drift"), train=0.994)
+    assert not missing(before, after)
+    assert missing(before, replace(after, train=0.99))
+    assert missing(replace(before, z=1.5), after)
+
+
 def test_a_gain_within_chance_is_none_missing():
     before, after = trial(1.1), trial(1.05, "drift", spread=1.0)
     assert 1.0 - after.z / before.z > BENCH.gain
