@@ -304,9 +304,10 @@ def _try_layout(rows: list[str], delimiter: str, comma: bool) -> tuple[float, La
     ]
     if not any(layout.numeric):
         return None
-    # What needs no groups of thousands is the better reading.
+    # What needs no groups of thousands is the better reading; a field may well be empty.
     grouped = sum(is_grouped(text, comma) for fields in same for text in fields)
-    numbers = sum(column.count("number") for column in states) - 0.02 * grouped
+    numbers = sum(one.count("number") + 0.9 * one.count("missing") for one in states)
+    numbers -= 0.02 * grouped
     share = numbers / sum(map(len, states))
     # Points win where both would do: whole numbers have neither.
     return (often / len(rows)) * share + 0.01 * min(count, 5) - 0.001 * comma, layout
