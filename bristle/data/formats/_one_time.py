@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -12,11 +13,14 @@ from numpy.typing import NDArray
 from ...core.arrays import Array
 from ...core.text import listed, plain
 from ...errors import RecordError
+from ...units import parse as parse_unit
 from ..noise import SHORTEST, is_switched
 from ..sampling import between, covered
+from ..titles import title
 
 AnyArray: TypeAlias = NDArray[Any]
 
+SECOND, HERTZ = parse_unit("s").dimension, parse_unit("Hz").dimension
 SAME = 0.02
 """Share of the step by which samples may be apart and are taken as simultaneous."""
 
@@ -180,6 +184,40 @@ def _where(one: Series) -> str:
 def _ms(seconds: float) -> str:
     """Return a time in ms, in s where that is longer than a second."""
     return f"{plain(seconds, 4)} s" if seconds >= 1.0 else f"{plain(1e3 * seconds, 4)} ms"
+
+
+# Numbers that tell how far samples are apart, by their names: dt, fs, sampling rate.
+
+OF_SAMPLES = r"(?:sampl\w*|abtast|scan|acquisition|mess)[ _-]?"
+_STEP = re.compile(
+    r"dt|ts|t_s|dx|delta[ _-]t|step|tsample|(?:sampl\w*|abtast)[ _-]?(?:time|zeit)"
+    rf"|{OF_SAMPLES}(?:interval|period)\w*",
+    re.IGNORECASE,
+)
+RATE = re.compile(rf"fs|f_s|fsample|rate|sampling|{OF_SAMPLES}(?:rate|freq\w*)", re.IGNORECASE)
+"""How a number is called that is a rate."""
+
+
+def step_in(key: str, value: float) -> float:
+    """Return the step [s] that a number tells by its name, as dt, fs, dt_ms or fs_kHz; 0 if none.
+
+    Parameters
+    ----------
+    key : name of the number
+    value : the number, in the unit of its name; in s or Hz where that has none
+    """
+    name, factor, quantity = key.rpartition(".")[2], 1.0, ""
+    if not (_STEP.fullmatch(name) or RATE.fullmatch(name)):
+        named = title(0, name)
+        if named.unit is None or named.unit.dimension not in (SECOND, HERTZ):
+            return 0.0
+        name, factor = named.name, named.unit.factor
+        quantity = "step" if named.unit.dimension == SECOND else "rate"
+    if not 0.0 < value < np.inf:
+        return 0.0
+    if _STEP.fullmatch(name) and quantity != "rate":
+        return value * factor
+    return 1.0 / (value * factor) if RATE.fullmatch(name) and quantity != "step" else 0.0
 
 
 def unset_step(called: str, step: float) -> list[str]:

@@ -24,24 +24,12 @@ from ..channels import quantity_of_unit
 from ..noise import SHORTEST
 from ..table import Table, from_arrays, one_below_the_other
 from ..titles import title, unit_or_none
-from ._one_time import Series, by_length, on_one_time
+from ._one_time import Series, by_length, on_one_time, step_in
 
 AnyArray: TypeAlias = NDArray[Any]
 
-_STEPS = (
-    "dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step", "dx",
-    "sampling_interval", "sample_interval", "sampleinterval", "sampling_period", "sample_period",
-    "sampling_time",
-)  # fmt: skip
-_RATES = (
-    "fs", "rate", "samplerate", "sample_rate", "sampling_rate", "samplingrate", "fsample", "f_s",
-    "samplefrequency", "sample_frequency", "samplingfrequency", "sampling_frequency", "samplefreq",
-    "sampling_freq", "sample_freq", "sampling", "abtastrate", "scan_rate", "scanrate",
-)  # fmt: skip
-_STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
-_SECOND, _HERTZ = parse_unit("s").dimension, parse_unit("Hz").dimension
-TELL_TIME = frozenset((*_STEPS, *_RATES, *_STARTS))
-"""Names, in small letters, of numbers beside a channel that tell its time."""
+STARTS = ("t0", "x0", "tstart", "t_start", "starttime", "start_time")
+"""Names, in small letters, of numbers beside a channel that tell when it begins."""
 _TIMES = ("t", "time", "tout", "zeit")
 _NAMES = ("name", "label", "signalname", "channelname")
 _VALUES = ("data", "values", "value", "samples", "signal", "y")
@@ -53,7 +41,7 @@ TELLS_SCALE = re.compile(r"scal(?:e|ing)|factor|sensitivity|lsb", re.IGNORECASE)
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """Numbers of any shape, with their unit and, of `TELL_TIME`, what the file states of them."""
+    """Numbers of any shape, with their unit and, of its time, what the file states."""
 
     array: AnyArray
     unit: str = ""
@@ -290,7 +278,7 @@ def _by_steps(found: _Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
     steps: dict[str, float] = {}
     for key, value in found.scalars.items():
         place, short = key.rpartition(".")[0], _short(key)
-        if short in _STARTS and np.isfinite(value):
+        if short in STARTS and np.isfinite(value):
             starts[place] = value
         elif step := step_in(key, value):
             steps.setdefault(place, step)
@@ -329,8 +317,7 @@ def _without_time(found: _Found, name: str) -> Table:
     for key, value in found.scalars.items():
         if not timed and (step := step_in(key, value)):
             data["time_s"] = np.arange(size) * step
-            unit = {True: " s", False: " Hz"}[_short(key) in _STEPS] if _tells_time(key) else ""
-            notes.append(f"the time is made from {key} = {value:g}{unit}")
+            notes.append(f"the time is made from {key} = {value:g}: {step:g} s a sample")
             break
     return from_arrays(data, name, dict(found.units), tuple(notes), tuple(remarks))
 
@@ -662,32 +649,6 @@ def _is_time_name(key: str) -> bool:
 
 def _short(key: str) -> str:
     return re.sub("[ -]", "_", key.rpartition(".")[2].lower())
-
-
-def step_in(key: str, value: float) -> float:
-    """Return the step [s] that a number tells by its name, as dt, fs, dt_ms or fs_kHz; 0 if none.
-
-    Parameters
-    ----------
-    key : name of the number
-    value : the number, in the unit of its name; in s or Hz where that has none
-    """
-    name, factor, quantity = _short(key), 1.0, ""
-    if not _tells_time(key):
-        named = title(0, key.rpartition(".")[2])
-        if named.unit is None or named.unit.dimension not in (_SECOND, _HERTZ):
-            return 0.0
-        name, factor = re.sub("[ -]", "_", named.name.lower()), named.unit.factor
-        quantity = "step" if named.unit.dimension == _SECOND else "rate"
-    if not 0.0 < value < np.inf:
-        return 0.0
-    if name in _STEPS and quantity != "rate":
-        return value * factor
-    return 1.0 / (value * factor) if name in _RATES and quantity != "step" else 0.0
-
-
-def _tells_time(key: str) -> bool:
-    return _short(key) in (*_STEPS, *_RATES)
 
 
 def _header(fields: Mapping[str, Any], key: str) -> Mapping[str, Any]:

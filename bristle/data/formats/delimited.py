@@ -21,6 +21,7 @@ from ...units import parse as parse_unit
 from ..channels import meaning, quantity_of_unit
 from ..table import Table
 from ..titles import Column, is_unit_row, title, title_rows, titles, unit_or_none
+from ._one_time import HERTZ, OF_SAMPLES, RATE, SECOND, step_in
 from ._rows import (
     Body,
     Layout,
@@ -45,9 +46,8 @@ _QUOTED = 8
 _BEHIND = 40
 """Lines at most that may stand behind the numbers: sums, remarks, a line that is cut."""
 _SAMPLED = re.compile(
-    r"(?P<what>\b(?:fs|dt)\b"
-    r"|(?:sampl\w*|scan|acquisition)[ _-]*(?:rate|freq\w*|interval|period|time)"
-    r"|(?:abtast|mess)(?:rate|frequenz|intervall|zeit))(?P<unit>[^\d\n]*?)"
+    rf"(?P<what>\b(?:fs|dt|{OF_SAMPLES}(?:rate|freq[a-z]*|interval[a-z]*|period[a-z]*|time|zeit))\b)"
+    r"(?P<unit>[^\d\n]*?)"
     r"(?P<value>\d+(?:[.,]\d+)*(?:[eE][+-]?\d+)?)[;,\s]*(?P<after>[A-Za-zµ]+)?",
     re.IGNORECASE,
 )
@@ -172,7 +172,7 @@ def _time_by_rate(
 
 def _step_of(match: re.Match[str]) -> float:
     """Return the sampling step [s] that a line states, 0 where it is not clear."""
-    is_rate = re.search("rate|freq|fs", match["what"].lower()) is not None
+    is_rate = RATE.fullmatch(match["what"]) is not None
     text = match["value"]
     if is_rate and is_grouped(text, comma=False):  # 12,800 Hz
         text = text.replace(",", "")
@@ -184,14 +184,9 @@ def _step_of(match: re.Match[str]) -> float:
     unit = unit_or_none(spelled)
     if not value > 0.0 or (bracket and unit is None):
         return 0.0
-    if unit is None or unit.dimension not in (
-        parse_unit("Hz").dimension,
-        parse_unit("s").dimension,
-    ):
-        return 1.0 / value if is_rate else 0.0
-    if unit.dimension == parse_unit("Hz").dimension:
-        return 1.0 / (value * unit.factor)
-    return 0.0 if is_rate else value * unit.factor
+    if unit is None or unit.dimension not in (SECOND, HERTZ):
+        return step_in(match["what"], value) if is_rate else 0.0
+    return step_in(f"{match['what']} [{unit.name}]", value)
 
 
 def _refuse_channels_as_rows(lines: list[str], name: str) -> None:

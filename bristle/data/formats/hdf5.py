@@ -10,7 +10,8 @@ import numpy as np
 from ...errors import RecordError
 from ..table import Table
 from . import DAMAGED, library
-from ._tree import TELL_TIME, TELLS_SCALE, Bare, Leaf, Node, Unread, step_in, table_of
+from ._one_time import step_in
+from ._tree import STARTS, TELLS_SCALE, Bare, Leaf, Node, Unread, table_of
 
 _MARK = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT")
@@ -96,7 +97,7 @@ def _times(item: Any) -> dict[str, float]:
     return {
         key: float(np.ravel(value)[0])
         for key, value in item.attrs.items()
-        if (key.lower() in TELL_TIME or TELLS_SCALE.search(key) or step_in(key, 1.0))
+        if (key.lower() in STARTS or TELLS_SCALE.search(key) or step_in(key, 1.0))
         and np.size(value) == 1
         and np.asarray(value).dtype.kind in "fiu"
     }

@@ -1,4 +1,4 @@
-"""Text of LabVIEW: measurement files (.lvm), in one or more segments, and those of SignalExpress."""
+"""Text of LabVIEW: measurement files (.lvm), in one or more segments, and SignalExpress's."""
 
 from __future__ import annotations
 

@@ -22,9 +22,8 @@ from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
 from ..table import Table, from_arrays
 from ..titles import unit_or_none
-from . import DAMAGED, library
+from . import DAMAGED, _one_time, library
 from ._one_time import SAME, AnyArray, Series, by_length, on_one_time, overlap, unset_step
-from ._tree import step_in
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
 _UNSET = np.datetime64("1904-01-02")
@@ -137,7 +136,7 @@ def _by_rate(given: Mapping[str, Any]) -> tuple[float, str]:
     for key, value in given.items():
         number, _, unit = str(value).partition(" ")
         with suppress(ValueError):
-            step = step_in(f"{key} [{unit}]" if unit else key, float(number))
+            step = _one_time.step_in(f"{key} [{unit}]" if unit else key, float(number))
             if step > 0.0 and _TELLS_STEP.search(key):
                 found[step] = key
     ((step, called),) = found.items() if len(found) == 1 else ((0.0, _STEP),)

@@ -22,7 +22,7 @@ TEXTS = {
     re.compile(
         rb"-1\s*\n\s*(?:15|55|58b?|82|151|164|24\d\d)\b[^,;\t]*\n"
     ): "a universal file (UFF)",
-    re.compile(rb"<(\?xml|!doctype|html)", re.IGNORECASE): "XML or HTML",
+    re.compile(rb"<[?!a-z]", re.IGNORECASE): "XML or HTML",
     re.compile(rb'\{\s*["}]|\[\s*(?:[{"\[\]]|(?:[-\d.eE+]+|null|true|false)\s*,)'): "JSON",
 }
 """How a text of a format begins, and what it is called."""
