@@ -13,8 +13,11 @@ from .channels import meaning, of_a_sensor, quantity_of_unit
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
 _LIKE_BRACKETS = str.maketrans("{}<>\uff3b\uff3d\uff08\uff09", "[][][]()")
-_FACTOR = re.compile(r"(?<!\d)[*/÷]\s*10+\b|[\])]\s*[x\u00d7]\s*10+\b|\b10\s*\^|\b1[eE][+-]?\d")
-"""A power of ten in a title, by which values may have been multiplied or divided."""
+_FACTOR = re.compile(
+    r"(?<!\d)[*/÷]\s*10+\b|[\])]\s*[x\u00d7·*/÷]\s*[\d.]\S*|(?<=\S)\s+[x\u00d7]\s*10+\b"
+    r"|\b10\s*[\^\u00b9\u00b2\u00b3\u2070-\u2079]|\b1[eE][+-]?\d"
+)
+"""A factor in a title, by which values may have been multiplied or divided."""
 _A_G = "the g can be the unit or stand for ground. Write a_g [m/s2], or acc [g]."
 _PARTED = re.compile(
     r"(?P<name>.*[^\s,:;=/-])\s*(?P<by>\s/\s|\s-\s|[,:;=]\s*|\sin\s|\s)\s*(?P<unit>[^\s,:;=]+)\s*"
@@ -59,7 +62,7 @@ def column(index: int, text: str) -> Column:
     plain = text.translate(_LIKE_BRACKETS)
     if found := _FACTOR.search(plain):
         name = re.split(r"\s*[\[(]", plain)[0]
-        return Column(index, text, name, None, f'"{found[0].strip()}" in it may be a factor')
+        return Column(index, text, name, None, f'"{found[0].strip(" )]")}" in it may be a factor')
     match = _BRACKETS.fullmatch(plain)
     if match:
         spelled = match["square"] if match["square"] is not None else match["round"]
@@ -93,6 +96,12 @@ def title(index: int, text: str) -> Column:
         Its title in the file.
     """
     found = column(index, text)
+    if found.unit is not None and _BRACKETS.fullmatch(found.text):
+        other = title(index, found.name)  # Force [N] (kN); of "cell 25 kN [N]" one is a range
+        unit = other.unit if not other.name[-1:].isdigit() else None
+        if unit and unit.dimension == found.unit.dimension and _differs(other, found.unit):
+            problem = f"the title says {unit.name}, and {found.unit.name}."
+            return replace(found, unit=None, problem=problem)
     if found.unit is not None or _FACTOR.search(found.text):
         return found
     if (own := _by_its_name(found)) is not None:

@@ -177,7 +177,7 @@ def written_by_turns(data: Columns) -> None:
         (lambda d: d["x"].fill(np.nan), "displacement has no number"),
         (lambda d: d["x"].__setitem__(70, 1e30), r"row 71: \"x\" \(displacement\) is 1e\+27 m"),
         (lambda d: d["x"].__setitem__(slice(None, None, 2), np.nan), None),
-        (lambda d: d["F"].__setitem__(np.arange(N) % 50 > 40, np.nan), r"no 60 samples in a row"),
+        (lambda d: d["F"].__setitem__(np.arange(N) % 50 > 40, np.nan), r"no 60 in a row"),
     ],
 )
 def test_times_and_gaps_that_cannot_be_mended(spoil, told: str | None) -> None:  # type: ignore[no-untyped-def]

@@ -266,16 +266,20 @@ def read_groups(
             kinds[k] = _refused(k, body, texts(k), layout)
     of_kind = {kind: [k for k, own in kinds.items() if own == kind] for kind in kinds.values()}
     decimal, groups = of_kind.get("decimal", []), of_kind.get("groups", [])
-    out = [
-        replace(one, doubt=_all_grouped(texts(k), layout)) if kinds.get(k) == "" else one
-        for k, one in enumerate(columns)
-    ]
+    out = list(columns)
+    other = "." if layout.comma else ","
+    for k, own in ((k, texts(k)) for k, kind in kinds.items() if kind == ""):
+        if _all_grouped(own, layout):
+            doubt = _doubt(own[0], own[0].replace(other, ""), other, "a thousandth as large")
+            out[k] = replace(columns[k], doubt=doubt)
     if groups and not decimal:
         groups = groups + [k for k in (*of_kind.get("open", []), *of_kind.get("whole", []))
                            if any(mark in text for text in texts(k))]  # fmt: skip
     elif not decimal:
         for k in of_kind.get("open", []):
-            out[k] = replace(columns[k], doubt=_open_text(texts(k), mark))
+            text = next(text for text in texts(k) if mark in text)
+            doubt = _doubt(text, text.replace(mark, "."), mark, "1000 times as large")
+            out[k] = replace(columns[k], doubt=doubt)
     for k in groups:
         own = texts(k)
         body.grouped[k] = next(text for text in own if mark in text)
@@ -308,15 +312,17 @@ def _refused(k: int, body: Body, texts: list[str], layout: Layout) -> str:
     return ""
 
 
-def _all_grouped(texts: list[str], layout: Layout) -> str:
-    """Return the doubt in a column of which every number may have a decimal mark of its own."""
-    mark = "." if layout.comma else ","
-    own = re.compile(rf"[+-]?[1-9]\d{{0,2}}\{mark}\d{{3}}")
-    if not all(own.fullmatch(text) for text in texts if text):
-        return ""
+def _all_grouped(texts: list[str], layout: Layout) -> bool:
+    """Return whether every number of a column may have a decimal mark of its own."""
+    own = re.compile(rf"[+-]?[1-9]\d{{0,2}}\{'.' if layout.comma else ','}\d{{3}}")
+    return all(own.fullmatch(text) for text in texts if text)
+
+
+def _doubt(text: str, value: str, mark: str, right: str) -> str:
+    """Return that a number with a mark may be another one."""
     return (
-        f'"{texts[0]}" is read as {texts[0].replace(mark, "")}, and nothing in the column tells '
-        f'whether its "{mark}" is a decimal mark: then give a unit a thousandth as large'
+        f'"{text}" is read as {value}, and nothing tells whether its "{mark}" is a decimal mark or '
+        f"parts thousands: then give a unit {right}"
     )
 
 
@@ -368,14 +374,6 @@ def _unevenness(values: Array) -> float:
     """Return how far a column goes from sample to sample in all, by its range."""
     span = float(np.ptp(values))
     return float(np.sum(np.abs(np.diff(values)))) / span if span else 0.0
-
-
-def _open_text(texts: list[str], mark: str) -> str:
-    text = next(text for text in texts if mark in text)
-    return (
-        f'"{text}" is read with decimals, and nothing in the file tells whether its "{mark}" parts '
-        "thousands: then give a unit 1000 times as large"
-    )
 
 
 # Dates and times of day, as recorders of several countries write them, as seconds.

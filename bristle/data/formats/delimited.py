@@ -313,29 +313,19 @@ def _refuse_comma_for_both(lines: list[str], layout: Layout, name: str) -> None:
     if layout.delimiter != ",":
         return
     wide = len(layout.numeric)
-    for k, line in enumerate(lines[:400]):
-        if _is_data(line, layout) and k:
-            fields = layout.split(lines[k - 1].strip())
-            above = [t for t in fields if t.strip()]
-            if len(fields) == wide:
-                return
-            if wide == 2 * len(above) and not any(state_of(t, False) == "number" for t in above):
-                raise RecordError(
-                    f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles. Commas part "
-                    "columns and decimals alike here: save the file with semicolons between "
-                    "columns, or with decimal points."
-                )
-            if wide != len(above) + 1:
-                return
-            rows = [layout.split(_without_ends(one)) for one in lines[k:] if _is_data(one, layout)]
-            last = {row[-1] for row in rows}
-            if len(last) > 1 and all(map(_GROUP.fullmatch, last)):
-                raise RecordError(
-                    f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles, the last one "
-                    "always of three digits. Commas part columns and thousands alike here: save "
-                    "the file with semicolons between columns, or without groups of thousands."
-                )
-            return
+    k = next((k for k, line in enumerate(lines[:400]) if k and _is_data(line, layout)), 0)
+    fields = layout.split(lines[k - 1].strip()) if k else []
+    above = [text for text in fields if text.strip()]
+    doubled = wide == 2 * len(above) and not any(state_of(one, False) == "number" for one in above)
+    if len(fields) == wide or not (doubled or wide == len(above) + 1):
+        return
+    last = {layout.split(_without_ends(one))[-1] for one in lines[k:] if _is_data(one, layout)}
+    if doubled or (len(last) > 1 and all(map(_GROUP.fullmatch, last))):
+        raise RecordError(
+            f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles. Commas part columns "
+            "and decimals, or thousands, alike here: save the file with semicolons between "
+            "columns, or with decimal points and without groups of thousands."
+        )
 
 
 def _header(

@@ -65,6 +65,8 @@ def test_a_supply_beside_a_command_is_doubted_and_a_temperature_is_known(tmp_pat
     ("title", "said"),
     [("Force/10 [N]", '"/10" in it may be a factor'), ("Force [N] *10", '"*10" in it may be'),
      ("Force [1e3 N]", '"1e3" in it may be'), ("Force (N) x10", "may be a factor"),
+     ("Force [N]·10³", '"·10³" in it may'), ("Force (N)*0.001", "may be a factor"),
+     ("Force x10 [N]", "may be a factor"), ("Force [N] (kN)", "the title says N, and kN"),
      ("Load (kg)", 'no unit of it; a load cell shows kgf: --channel "force=Load (kg)@kgf"')],
 )  # fmt: skip
 def test_what_may_be_another_force_is_asked(tmp_path, capsys, title, said) -> None:
