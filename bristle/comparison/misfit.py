@@ -28,9 +28,9 @@ class RunMisfit:
 
     `error` is the one that every command tells. `z` RMS(residual)/noise expected of a true model,
     by a robust scale; `numerical_z` the same of what half the step changes. `noise`, `numerical`
-    [unit]: RMS of the noise expected, of what half the step changes; `noise_own` that of the
-    channel's own noise; `residual`, `scatter`, `spread` the RMS of the residual that z judges, and
-    the standard deviations of it and of the measured output, over `samples`.
+    [unit]: RMS of the noise expected, of what half the step changes; `residual`, `scatter`,
+    `spread` the RMS of the residual that z judges, and the standard deviations of it and of the
+    measured output, over `samples`.
     """
 
     name: str
@@ -39,7 +39,6 @@ class RunMisfit:
     z: float
     residual: float
     noise: float
-    noise_own: float
     numerical: float
     numerical_z: float
     scatter: float
@@ -156,7 +155,7 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
 def without_z(run: RunMisfit) -> RunMisfit:
     """Return an error whose noise is not known: nothing says how much of it is noise."""
     none = float("nan")
-    return replace(run, z=none, numerical_z=none, noise=none, noise_own=none)
+    return replace(run, z=none, numerical_z=none, noise=none)
 
 
 def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunMisfit:
@@ -165,17 +164,16 @@ def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunMisfit:
     predictions = [one for one in predictions if one.judged.any()]
     if not predictions:
         nothing = float("nan")
-        return RunMisfit(name, error, 0, *[nothing] * 8)
+        return RunMisfit(name, error, 0, *[nothing] * 7)
     residual = np.concatenate([one.residual[one.judged] for one in predictions])
     sigma = np.concatenate([one.sigma[one.skip :][one.judged] for one in predictions])
-    own = np.concatenate([np.full(one.judged.sum(), one.noise) for one in predictions])
     tried = [
         one.numerical[one.skip :][one.judged] for one in predictions if one.numerical is not None
     ]
     moved = np.concatenate(tried) if len(tried) == len(predictions) else np.full(1, np.nan)
     measured = np.concatenate([one.measured[one.skip :][one.judged] for one in predictions])
     return RunMisfit(
-        name, error, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
+        name, error, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma),
         rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
         float(np.std(residual)), float(np.std(measured)),
     )  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -135,37 +135,8 @@ class ControllerComparison(Viewable):
         order = list(dict.fromkeys(self.table["controller"]))
         return wide.loc[self.motions, order].div(wide[reference].loc[self.motions], axis=0)
 
-    def quantities(self) -> pd.DataFrame:
-        """Return a row per motion, controller and output.
-
-        Columns motion, controller, output, unit, value, worst (NaN without members), and the value
-        over that of each reference: "over passive off" ...
-        """
-        import pandas as pd
-
-        worsts: dict[tuple[str, str], Any] = {}
-        if self.worst is not None:
-            worsts = {(row["motion"], row["controller"]): row
-                      for row in self.worst.to_dict(orient="records")}  # fmt: skip
-        cases = {(row["motion"], row["controller"]): row
-                 for row in self.table.to_dict(orient="records")}  # fmt: skip
-        rows = []
-        for (motion, controller), case in cases.items():
-            worst = worsts.get((motion, controller), {})
-            for one in self.outputs:
-                row = {
-                    "motion": motion, "controller": controller, "output": one.name,
-                    "unit": one.unit, "value": case[one.name],
-                    "worst": worst.get(one.name, float("nan")),
-                }  # fmt: skip
-                for reference in REFERENCES:
-                    other = cases[motion, reference][one.name]
-                    row[f"over {reference}"] = case[one.name] / other if other else float("nan")
-                rows.append(row)
-        return pd.DataFrame(rows)
-
     def write(self, folder: str | Path) -> list[Path]:
-        """Write the tables as CSV: comparison.csv and quantities.csv; return their paths.
+        """Write the tables as CSV: comparison.csv, and worst.csv with members; return their paths.
 
         Raises
         ------
@@ -174,10 +145,7 @@ class ControllerComparison(Viewable):
         """
         folder = Path(folder)
         titles = {n: f"{n} [{u}]" for n, u in {**self.units, "level": "V", "stroke": "1"}.items()}
-        frames = {
-            "comparison.csv": self.table.rename(columns=titles),
-            "quantities.csv": self.quantities(),
-        }
+        frames = {"comparison.csv": self.table.rename(columns=titles)}
         if self.worst is not None:
             frames["worst.csv"] = self.worst.rename(columns=titles)
         with writing(folder, not_usable):

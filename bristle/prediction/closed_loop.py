@@ -14,6 +14,7 @@ from ..core.text import command, percent, short_z
 from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..identification.problem import following
+from ..identification.run_start import MOVING
 from ..model.draws import OpenEffect, has_covariance, left_open
 from ..model.model import Model
 from ..model.model_file import read_model
@@ -168,7 +169,8 @@ def _trials(
     trials, notes = [], []
     for run in chosen:
         begun = next((one for one in whole if one.time[0] <= run.time[0] <= one.time[-1]), run)
-        trial = trial_of(begun, run.name, (float(run.time[0]), float(run.time[-1])))
+        seen = MOVING if run.time[0] > begun.time[0] else 0  # of the training part, see runs
+        trial = trial_of(begun, run.name, (float(run.time[seen]), float(run.time[-1])))
         moving = begins_in_motion(trial)
         if moving:
             notes.append(
@@ -208,8 +210,7 @@ def _predicted(
         now = figures_of(model, place, trial, draws, number, missed, effects, known)
         then = None
         if before is not None and not following(before.effects):
-            drawn = draws if has_covariance(before) else 0
-            then = figures_of(before, place, trial, drawn, number, judged[-2].missed)
+            then = figures_of(before, place, trial, 0, number)
         rows += now.rows(trial, then)
         strokes.append(now.stroke)
         outside += [f"in {trial.shaking.name} the damper has {now.outside}"] if now.outside else []

@@ -27,8 +27,8 @@ class Predicted:
 
     `kind` "peak" or "rms"; `measured` None where the response was not measured; `predicted` that of
     the model with its best values, the noise of the sensor added; `band` the 95 % band of what
-    would be measured; `before`, `before_band` the same of the model before the last step; None
-    where there is none. `parts` is which share of the band's variance is from what, the largest
+    would be measured; `before` the figure of the model before the last step, None where there is
+    none. `parts` is which share of the band's variance is from what, the largest
     first, where effects that the runs do not exclude are part of it.
     """
 
@@ -39,7 +39,6 @@ class Predicted:
     predicted: float
     band: Band | None = None
     before: float | None = None
-    before_band: Band | None = None
     parts: dict[str, float] = field(default_factory=dict)
 
     @property

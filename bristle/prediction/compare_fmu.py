@@ -15,7 +15,7 @@ from ..comparison.comparison import compare_predictions
 from ..comparison.predictions import RunPrediction, coordinates_of, rms
 from ..comparison.result import Comparison
 from ..core.arrays import Array
-from ..core.text import joined, percent, unknown
+from ..core.text import joined, percent, plain, unknown
 from ..data.channels import (
     DRIVE,
     MOTION,
@@ -41,7 +41,7 @@ from ..fmu.description import Description, Value, Variable, read_description
 from ..identification.error import error_of
 from ..identification.run_start import SETTLING as SETTLED
 from ..identification.smoothing import posterior_draws, smooth, smooth_drive
-from ..units import Measure, conversion, in_base_units, parse, same_dimension, spelling
+from ..units import Measure, conversion, in_base_units, same_dimension, spelling
 from .stepping import SteppingJob, step_through
 
 PASSED_ON = ("fault",)
@@ -55,7 +55,6 @@ class Port:
     """A port of the FMU and the signal of the measurement that belongs to it, with the reason.
 
     `unit` is the port's, by the FMU, its name or the user; `sign` -1 where the signal is turned.
-    `unit_given`, `sign_given` tell whether the user said so: then nothing is in doubt.
     """
 
     name: str
@@ -63,8 +62,6 @@ class Port:
     signal: str
     reason: str
     sign: int = 1
-    unit_given: bool = False
-    sign_given: bool = False
 
 
 @dataclass(frozen=True)
@@ -197,9 +194,12 @@ def _as_given(variable: Variable, given: GivenPort, signals: Mapping[str, str]) 
         unit = signals[given.signal]
         reason += f"; the FMU gives no unit, taken as {unit}"
     return Port(
-        variable.name, unit, given.signal, reason, given.sign or 1, bool(given.unit),
-        bool(given.sign),
-    )  # fmt: skip
+        variable.name,
+        unit,
+        given.signal,
+        reason,
+        given.sign or 1,
+    )
 
 
 def unit_of(variable: Variable) -> str | None:
@@ -357,24 +357,12 @@ AGAINST = -0.5
 ALIKE = 0.8
 """Correlation from which the sizes of two outputs say something of their units."""
 
-NEAR = 0.35
-"""Share by which a ratio of sizes may be off that of two units: the model errs besides."""
-
 LEAST = 30.0
 """Ratio of sizes below which a model may as well be wrong."""
 
-_SPELLED = ("N", "kN", "MN", "m", "mm", "um", "m/s", "mm/s", "V", "mV", "A", "mA", "Pa", "kPa",
-            "MPa", "m/s2", "mm/s2", "s", "ms")  # fmt: skip
 
-
-def doubts(outputs: tuple[Comparison, ...], ports: PortMap, fmu: str) -> list[str]:
-    """Return what is to know of outputs that are turned or of another size, as the user wants them.
-
-    Raises
-    ------
-    FmuError
-        If the unit or the sign of an output is in doubt and the user has said nothing of it.
-    """
+def doubts(outputs: tuple[Comparison, ...], ports: PortMap) -> list[str]:
+    """Return the warnings of outputs that are turned, or many times larger or smaller."""
     named = {port.name: port for port in ports.outputs}
     notes: list[str] = []
     for one in outputs:
@@ -383,48 +371,18 @@ def doubts(outputs: tuple[Comparison, ...], ports: PortMap, fmu: str) -> list[st
         p = np.concatenate([run.predicted for run in one.predictions])
         if not (np.std(y) > 0.0 and np.std(p) > 0.0):
             continue
-        correlation = float(np.corrcoef(y, p)[0, 1])
+        correlation, ratio = float(np.corrcoef(y, p)[0, 1]), float(np.std(y) / np.std(p))
         if correlation < AGAINST:
-            text = f"{port.name} has the opposite sign of {port.signal}"
-            text += f" (correlation {correlation:.2f})"
-            if not port.sign_given:
-                raise FmuError(
-                    f"{fmu}: {text}: its sign is in doubt. --map {port.name}=-{port.signal} "
-                    f"reverses it, --map {port.name}=+{port.signal} keeps it."
-                )
-            notes.append(text)
-        text, unit = _unit(port, float(np.std(y) / np.std(p)), correlation)
-        if text and not port.unit_given:
-            raise FmuError(
-                f"{fmu}: {text}: {unit}? --map {port.name}={port.signal}@{unit} says so, "
-                f"@{port.unit} that it is in {port.unit} and the FMU is that wrong."
+            notes.append(
+                f"Warning: {port.name} has the opposite sign of {port.signal} (correlation "
+                f"{correlation:.2f}); --map {port.name}=-{port.signal} reverses it."
             )
-        notes += [text] if text else []
+        if abs(correlation) > ALIKE and not 1.0 / LEAST < ratio < LEAST:
+            notes.append(
+                f"Warning: {port.signal} is {plain(ratio, 3)} times {port.name}, taken in "
+                f"{port.unit}; --map {port.name}={port.signal}@UNIT gives it another unit."
+            )
     return notes
-
-
-def _unit(port: Port, ratio: float, correlation: float) -> tuple[str, str]:
-    """Return how far an output's size is off, and the unit that would explain it, else "" twice.
-
-    Parameters
-    ----------
-    port : of the output
-    ratio : size of what was measured over that of the output
-    correlation : of the two
-    """
-    if abs(correlation) < ALIKE or 1.0 / LEAST < ratio < LEAST:
-        return "", ""
-    own = parse(port.unit)
-    for spelled in _SPELLED:
-        unit = parse(spelled)
-        if unit.dimension != own.dimension or unit.name == own.name:
-            continue
-        factor = conversion(unit.name, own.name)[0]
-        if abs(ratio / factor - 1.0) < NEAR:
-            way = "small" if factor > 1.0 else "large"
-            times = factor if factor > 1.0 else 1.0 / factor
-            return f"{port.name} is {times:.0f} times too {way}", unit.name
-    return "", ""
 
 
 # One measurement as an FMU is fed: channels and other columns, motion smoothed, errors drawn.
@@ -621,7 +579,7 @@ def compare_fmu(
     Raises
     ------
     FmuError, RecordError, RunError
-        The first also where the unit or the sign of a port is in doubt.
+        The first also where the unit of a port is in doubt.
     """
     path = Path(fmu)
     description = read_description(path, versions=("2.0",))
@@ -637,7 +595,7 @@ def compare_fmu(
     found = step_through(job, passes, timeout)
     predictions = _predictions(pieces, ports, found, notes)
     outputs = tuple(compare_predictions(runs, seen=None) for runs in predictions.values())
-    notes += doubts(outputs, ports, description.name)
+    notes += doubts(outputs, ports)
     if pieces[0].derived:
         notes.append(f"{', '.join(pieces[0].derived)}: from the other channels of the motion")
     return FmuComparison(str(fmu), str(data), ports, outputs, tuple(dict.fromkeys(notes)))

@@ -345,11 +345,12 @@ class Figures:
             value = None
             if measured is not None:
                 value = statistic_of(measured[0][trial.window], kind)
-            bands = self.band((name, kind)), None if then is None else then.band((name, kind))
             before = None if then is None else then.best[name, kind]
             run = trial.shaking.name
             parts = self.parts((name, kind)) if self.left else {}
-            out.append(Predicted(run, name, kind, value, best, bands[0], before, bands[1], parts))
+            out.append(
+                Predicted(run, name, kind, value, best, self.band((name, kind)), before, parts)
+            )
         return out
 
 

@@ -181,31 +181,27 @@ def test_units_that_differ_are_refused(lugre, rig):
         compare_fmu(lugre, rig, maps={"voltage": "force"})
 
 
-def test_a_sign_in_doubt_is_refused_until_it_is_said(toys, tmp_path):
+def test_a_sign_in_doubt_is_warned_of(toys, tmp_path):
     data = gain_data(tmp_path, factor=-2.0)
-    with pytest.raises(FmuError, match=r"has the opposite sign of flow.*--map y=-flow reverses"):
-        compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "flow"})
+    found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "flow"})
+    assert any("has the opposite sign of flow" in note for note in found.notes)
     found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "-flow"})
     assert found.outputs[0].z == pytest.approx(1.0, abs=0.15)
     assert any("is compared with flow, reversed" in line for line in found.mapping_lines())
     (turned,) = compare_fmu(toys["Gain"], data, maps={"u": "-pressure", "y": "flow"}).outputs
     assert turned.z == pytest.approx(1.0, abs=0.15)
-    found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "+flow"})
-    assert any("has the opposite sign of flow" in note for note in found.notes)
 
 
-def test_a_unit_in_doubt_is_refused_until_it_is_said(toys, tmp_path):
+def test_a_unit_in_doubt_is_warned_of(toys, tmp_path):
     t = np.arange(2000) * 0.01
     u = np.sin(3.0 * t)
     y = 2000.0 * u + 20.0 * np.random.default_rng(2).standard_normal(2000)
     data = write(tmp_path / "n.csv", {"time [s]": t, "suction [Pa]": u, "force [N]": y})
     maps = {"u": "suction", "y": "force"}
-    with pytest.raises(FmuError, match=r"y is 1000 times too small: kN\? --map y=force@kN"):
-        compare_fmu(toys["Gain"], data, maps=maps)
+    found = compare_fmu(toys["Gain"], data, maps=maps)
+    assert any("force is 1000 times y, taken in N" in note for note in found.notes)
     (force,) = compare_fmu(toys["Gain"], data, maps={**maps, "y": "force@kN"}).outputs
     assert force.z == pytest.approx(1.0, abs=0.15)
-    found = compare_fmu(toys["Gain"], data, maps={**maps, "y": "force@N"})
-    assert any("1000 times too small" in note for note in found.notes)
     with pytest.raises(FmuError, match='"kilo" is no unit'):
         compare_fmu(toys["Gain"], data, maps={**maps, "y": "force@kilo"})
     with pytest.raises(FmuError, match="y is in mm, force in N"):
@@ -251,7 +247,7 @@ def test_a_port_whose_unit_is_in_doubt_is_refused(own, text):
     with pytest.raises(FmuError, match=re.escape(text)):
         map_ports(described(own, out), SIGNALS, {}, {})
     found = map_ports(described(own, out), SIGNALS, {own.name: "velocity@mm/s"}, {})
-    assert (found.inputs[0].unit, found.inputs[0].unit_given) == ("mm/s", True)
+    assert found.inputs[0].unit == "mm/s"
 
 
 def test_the_unit_of_a_port_is_what_the_fmu_defines_it_as():

@@ -91,9 +91,6 @@ def test_the_model_before_the_last_step_stands_beside_it(found: ClosedLoop) -> N
     )
     assert one.error_before == pytest.approx(twice / right - 1.0, abs=0.01)
     assert abs(one.error) < 0.2 * abs(one.error_before)
-    assert one.before_band is not None
-    assert one.measured is not None
-    assert one.measured > one.before_band[1]
     header = next(found.view().every(Table)).header
     assert header[-2:] == ["error", "error before"]
 
