@@ -145,7 +145,6 @@ def _answer(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> dict
         "rows": len(frame),
         "window": [float(frame.index[0]), float(frame.index[-1])],
         "wall_time": frame.attrs["made"]["wall_time"],
-        "energy_residual": frame.attrs["made"].get("energy_residual", {}),
         "coupling_error": dict(frame.attrs.get("coupling_error", {})),
         "outputs": [asdict(summary) for summary in summarise(frame, everything=True)],
         **{name: str(path.absolute()) for name, path in written.items()},

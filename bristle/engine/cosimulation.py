@@ -27,7 +27,6 @@ from ..fmu.description import Description, Value, read_description
 from ..fmu.library import FATAL, WARNING, answer_of
 from ..system.model import Component, System
 from ..system.toml import signal_file
-from .coupling_error import bond_names, energy_residuals
 from .instance import Instance, Message, Unpacked
 from .results import Array, RunTable, count_steps, make_columns, times
 from .schedule import (
@@ -496,10 +495,6 @@ class Cosimulation:
                     raise
                 stopped = error
         table = master.table()
-        if master.made.get("energy_residual"):
-            table.made["energy_residual"] = energy_residuals(
-                master.nodes, system.algorithm, system.step, table
-            )
         if stopped:
             raise StoppedError(str(stopped), table) from stopped
         if interrupt.asked:  # a caller that makes many runs is to stop as well
@@ -564,8 +559,6 @@ class Master:
         self.made: dict[str, Any] = {
             "fmus": {name: f"{one.name} {one.guid}" for name, one in descriptions.items()}
         }
-        if bonds := bond_names(self.nodes, system.algorithm):
-            self.made["energy_residual"] = dict.fromkeys(bonds)
         schedule = make_schedule(self.nodes, system.algorithm)
         self._memory = Memory(self.nodes, schedule)
         self._rows: list[bytes] = []

@@ -148,19 +148,11 @@ class CsvWriter:
             raise cannot_write(self.path, error, self.rows) from error
         self.rows += len(table.time)
 
-    def finish(
-        self, complete: bool, wall_time: float, residuals: Mapping[str, float | None] | None = None
-    ) -> None:
-        """Write into the head whether the run is complete, its wall time [s], energy residuals.
-
-        Parameters
-        ----------
-        complete, wall_time : bool, float [s]
-        residuals : share [1] per power bond, of the bonds that `made` named
-        """
+    def finish(self, complete: bool, wall_time: float) -> None:
+        """Write into the head whether the run is complete, and its wall time [s]."""
         try:
             self._file.seek(self._place)
-            self._file.write(_status(complete, wall_time, residuals or {}).encode())
+            self._file.write(_status(complete, wall_time).encode())
         except OSError as error:
             raise cannot_write(self.path, error, self.rows) from error
 
@@ -170,8 +162,7 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
     made = frame.attrs["made"]
     writer = CsvWriter(path, from_frame(frame), made)
     try:
-        residuals = made.get("energy_residual")
-        writer.finish(frame.attrs["complete"], made.get("wall_time", 0.0), residuals)
+        writer.finish(frame.attrs["complete"], made.get("wall_time", 0.0))
     finally:
         writer.close()
 
@@ -256,27 +247,14 @@ def cannot_write(path: Path, error: OSError, rows: int) -> RunError:
     return RunError(f"{path}: cannot be written on: {reason}; {rows} rows are in it.")
 
 
-def _status(complete: bool, wall_time: float, residuals: Mapping[str, float | None]) -> str:
+def _status(complete: bool, wall_time: float) -> str:
     """Return the lines of the head that are written twice, always of the same length."""
-    lines = [
-        f"# status: {'complete' if complete else 'incomplete':10}",
-        f"# wall_time: {wall_time:12.3f}",
-    ]
-    if residuals:
-        each = [f"{json.dumps(name)}: {_fixed(value)}" for name, value in residuals.items()]
-        lines.append(f"# energy_residual: {{{', '.join(each)}}}")
-    return "".join(f"{line}\n" for line in lines)
-
-
-def _fixed(value: float | None) -> str:
-    """Return a number of JSON, always of the same length; null for what is not finite."""
-    known = value is not None and math.isfinite(value)
-    return f"{value:24.16e}" if known else f"{'null':>24}"
+    state = "complete" if complete else "incomplete"
+    return f"# status: {state:10}\n# wall_time: {wall_time:12.3f}\n"
 
 
 def _head(columns: tuple[OutputColumn, ...], made: Mapping[str, Any]) -> str:
-    twice = ("wall_time", "energy_residual")
-    known = {k: v for k, v in made.items() if k not in (*twice, "scenario")}
+    known = {k: v for k, v in made.items() if k not in ("wall_time", "scenario")}
     for key, kinds in (("integers", ("Integer", "Enumeration")), ("booleans", ("Boolean",))):
         known[key] = [column.name for column in columns if column.kind in kinds]
     lines = [f"# {key}: {json.dumps(value, ensure_ascii=False)}\n" for key, value in known.items()]
@@ -285,8 +263,9 @@ def _head(columns: tuple[OutputColumn, ...], made: Mapping[str, Any]) -> str:
     csv.writer(titles, lineterminator="\n").writerow(
         ["time [s]", *(column.header for column in columns)]
     )
-    status = _status(False, 0.0, dict.fromkeys(made.get("energy_residual", {})))
-    return f"{_KIND}\n{status}{''.join(lines)}{_SCENARIO}\n{scenario}{titles.getvalue()}"
+    return (
+        f"{_KIND}\n{_status(False, 0.0)}{''.join(lines)}{_SCENARIO}\n{scenario}{titles.getvalue()}"
+    )
 
 
 def _lines(table: RunTable) -> bytes:

@@ -100,10 +100,7 @@ class Output:
     def finish(self, frame: pd.DataFrame) -> None:
         """Mark the file as complete or incomplete; a Parquet file is written now."""
         if self._writer:
-            made = frame.attrs["made"]
-            self._writer.finish(
-                frame.attrs["complete"], made["wall_time"], made.get("energy_residual")
-            )
+            self._writer.finish(frame.attrs["complete"], frame.attrs["made"]["wall_time"])
         elif self.folder is not None:
             write_parquet(frame, self.folder / "results.parquet")
         if self.failed:

@@ -68,11 +68,6 @@ def run_view(frame: pd.DataFrame) -> View:
     said = f"{len(frame)} rows{took} from {first:g} to {last:g} s{state}."
     if more > 0:
         said += f" {more} more columns."
-    energy = made.get("energy_residual", {}) if "coupling_error" not in frame.attrs else {}
-    energies = (
-        f"Stepping part by part adds {100 * share:.2g} % to the energy through {name}."
-        for name, share in energy.items()
-    )
     known = {n: np.isfinite(frame[n].to_numpy(dtype=float)) for n in frame.columns}
     if broken := [n for n, there in known.items() if not there.all()]:
         since = float(frame.index[min(int(np.argmin(known[n])) for n in broken)])
@@ -81,7 +76,7 @@ def run_view(frame: pd.DataFrame) -> View:
         title,
         (
             Table(("output", "peak", "at [s]", "RMS", "unit"), rows, (1, 2, 3)),
-            *_coupling_error(frame), *map(Text, energies), Text(said),
+            *_coupling_error(frame), Text(said),
         ),
         (Figure(lambda: draw_run(frame), title),),
     )  # fmt: skip

@@ -269,25 +269,3 @@ def test_the_command_line_prints_the_error(
     assert "Coupling error at 1 ms, by coupled engine, in %" in told.out
     assert "order" in told.out
     assert main([*given, "--tolerance", "0.3%", "--engine", "compiled"]) == 2
-
-
-@pytest.mark.parametrize(
-    ("algorithm", "low", "high"),
-    [
-        ("gauss-seidel", 1.7, 2.3),
-        ("midpoint", 3.3, 4.7),
-        pytest.param("jacobi", 1.7, 2.3, marks=pytest.mark.slow),  # two runs: the third algorithm
-    ],
-)
-def test_the_energy_that_the_coupling_makes_is_in_every_results_file(
-    tmp_path: Path, algorithm: str, low: float, high: float
-) -> None:
-    def residual(step: float) -> float:
-        given = {"run.step": step, "run.stop": 1.0, "run.algorithm": algorithm}
-        frame = run("half_sine_pulse", given, out=tmp_path)
-        found = frame.attrs["made"]["energy_residual"]
-        assert load_results(tmp_path).attrs["made"]["energy_residual"] == found
-        assert list(found) == ["damper.force"]
-        return float(found["damper.force"])
-
-    assert low < residual(0.002) / residual(0.001) < high

@@ -13,9 +13,6 @@ from scipy.signal import lsim
 from bristle import run
 from bristle.data.building_file import read_building
 from bristle.engine.coupled import Coupled, room, sharing
-from bristle.engine.coupling_error import bond_names
-from bristle.engine.schedule import make_nodes
-from bristle.fmu import catalogue
 from bristle.physics.building import Building, Device
 from bristle.system.library import driven_mass
 from bristle.system.scenario import check_scenario, copy_scenario, load_scenario
@@ -128,17 +125,6 @@ def test_the_master_comes_to_the_coupled_engine_in_second_order() -> None:
     watched = ["damper.force", "brace.force", "structure.floor2_acceleration_absolute"]
     assert (fine[watched] < 0.006).all()
     assert (coarse[watched] > 3.0 * fine[watched]).all()
-
-
-def test_every_damper_has_its_power_bond() -> None:
-    loaded = load_scenario(STOCK)
-    descriptions = {
-        c.name: catalogue.describe(c.made_of(), c.building) for c in loaded.components.values()
-    }
-    assert bond_names(make_nodes(loaded, descriptions), "midpoint") == [
-        "damper.force",
-        "brace.force",
-    ]
 
 
 def test_dry_friction_sticks_at_two_levels_at_once(tmp_path: Path) -> None:
