@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..data.cut_off import CROWDED, LONGEST
-
 
 @dataclass(frozen=True)
 class DecisionRule:
@@ -323,19 +321,6 @@ class DecisionRule:
 
     Trades: if higher, a reversed voltage is missed; if lower, a voltage of both signs counts as
     reversed. Found: stated.
-    """
-
-    longest: int = LONGEST
-    """Samples in a row at exactly the same extreme, which no noisy signal shows.
-
-    Trades: if higher, channels that saturate briefly pass; if lower, coarse instruments count as
-    saturated. Found: blind seeds and published measurements.
-    """
-
-    crowded: float = CROWDED
-    """Times as many samples at a limit as at the next step below it: then the channel saturates.
-
-    Trades and found: as `longest`.
     """
 
     # --- faults that only a model shows

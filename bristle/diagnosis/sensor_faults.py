@@ -88,12 +88,12 @@ NAMED = 3
 """Runs that a sentence names; of more it says how many there are."""
 
 
-def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
+def clipped(runs: Sequence[Measurement]) -> list[Finding]:
     """Return the channels that repeat an extreme: their range ends before the motion does."""
     found = []
     for channel in CHANNELS:
         there = [run for run in runs if run.has(channel)]
-        both = {run.name: ends_of(run, channel, rule.longest, rule.crowded) for run in there}
+        both = {run.name: ends_of(run, channel) for run in there}
         ends = {name: cut for name, cut in both.items() if cut}
         if ends:
             every = [end for cut in ends.values() for end in cut]
@@ -117,7 +117,7 @@ FEWEST = 3
 
 def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
     """Return the faults that the channels show of each other, over all runs."""
-    found = clipped(runs, rule)
+    found = clipped(runs)
     cut = {fault.channel for fault in found}
     pairs = [run for run in runs if run.has("displacement", "velocity")]
     computed = {run.name: how for run in pairs if (how := derived_velocity(run))}

@@ -432,8 +432,6 @@ def _difference(run: Measurement, lower: str, upper: str) -> Measurement | None:
     return replace(run, channels=channels, noise=noise)
 
 
-# Longer than 300 lines: a docstring says of every field and argument which shape and unit it has.
-
 
 FIRST_LEVEL = Device("", GROUND, 0)
 """Where the damper of a building without devices of its own sits."""

@@ -7,8 +7,6 @@ last two the model is a line, k x + c v, and effects of the structure add
 to it; so they are judged by the same searches as a damper's effects in a damper's law.
 """
 
-# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
-
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence

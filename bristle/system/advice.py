@@ -81,8 +81,6 @@ def _settles(cubic: tuple[float, float, float]) -> bool:
     )
 
 
-# Longer than 300 lines: each advice is a function of its own, with its message.
-
 
 _DAMPER_PORTS = frozenset(("displacement", "velocity", "force"))  # and that of its command
 _STRUCTURE_PORTS = frozenset(("ground_acceleration", "damper_force"))
