@@ -432,7 +432,6 @@ def _difference(run: Measurement, lower: str, upper: str) -> Measurement | None:
     return replace(run, channels=channels, noise=noise)
 
 
-
 FIRST_LEVEL = Device("", GROUND, 0)
 """Where the damper of a building without devices of its own sits."""
 

@@ -81,7 +81,6 @@ def _settles(cubic: tuple[float, float, float]) -> bool:
     )
 
 
-
 _DAMPER_PORTS = frozenset(("displacement", "velocity", "force"))  # and that of its command
 _STRUCTURE_PORTS = frozenset(("ground_acceleration", "damper_force"))
 _FORCES = ("damper_force", "extra_force")

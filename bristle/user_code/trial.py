@@ -316,7 +316,7 @@ def probe(effect: type[Effect]) -> None:
     for q, hook in product(_signals(effect), effect.hooks()):
         refuse_reads(effect, hook, q, _state(effect, q, defaults), effect.values_of(defaults))
     _smooth_in_signals(effect, _signals(effect), defaults)
-    _smooth_in_parameters(effect, defaults)
+    _check_parameters(effect, _signals(effect), [*effect.hooks()], defaults)
     refuse_amount(effect, _signals(effect)[1:], partial(_at_amount, effect, defaults))
     for values in corners:
         _start(effect, values)
@@ -429,51 +429,62 @@ def _at_signal(
     return _call(made, hook, q._replace(**{signal: value}), z, values)
 
 
-def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> None:
-    moving: dict[str, bool] = {}
-    within: dict[str, list[Within]] = {}
-    field_of = {name: field for field, names in effect.fields().items() for name in names}
-    for name, parameter in effect.parameters.items():
-        low, high = _span(parameter)
+def _check_parameters(
+    made: type[Made], signals: Sequence[Any], hooks: Sequence[str], values: dict[str, float]
+) -> None:
+    """Refuse hooks that jump with a parameter; a parameter, or a table, that moves nothing."""
+    idle: dict[str, list[Within]] = {}
+    for field, names in fields_of(made.parameters, made.tables).items():
+        within = [(name, *_span(made.parameters[name])) for name in names]
         moved = False
-        for q, hook in product(_signals(effect), effect.hooks()):
-            z = _state(effect, q, values)
-            given = partial(_at_parameters, effect, hook, q, z, values, [(name, low, high)])
-            if name in CHOICES:
+        for one, q, hook in product(within, signals, hooks):
+            z = _state(made, q, values)
+            given = partial(_at_parameters, made, hook, q, z, values, [one])
+            if one[0] in CHOICES:
                 moved = moved or given(0.0) != given(1.0)
             else:
-                jumped = refuse_jump(getattr(effect, hook), given, (0.0, 1.0), f"p.{name}", 24)
+                jumped = refuse_jump(getattr(made, hook), given, (0.0, 1.0), f"p.{one[0]}", 24)
                 moved = jumped or moved
-        moving[field_of[name]] = moved or moving.get(field_of[name], False)
-        within.setdefault(field_of[name], []).append((name, low, high))
-    for field in [field for field, moved in moving.items() if not moved]:
-        # Of a table some knots may lie where no signal of any rig comes: all at once, then each.
-        alone = [[one] for one in within[field]]
-        moving[field] = any(
-            _moved_far_out(effect, some, values) or _moved_between(effect, some, values)
-            for some in (alone if len(alone) == 1 else [within[field], *alone])
-        )
-    for field, moved in moving.items():
         if not moved:
-            line = getattr(effect, next(iter(effect.hooks()))).__code__.co_firstlineno
+            idle[field] = within
+    for field, within in idle.items():
+        # Of a table some knots may lie where no signal of any rig comes: all at once, then each.
+        alone = [[one] for one in within]
+        for some in alone if len(alone) == 1 else [within, *alone]:
+            if _moved_far_out(made, some, values):
+                break
+            if issubclass(made, Effect) and _moved_between(made, some, values):
+                break
+        else:
+            line = getattr(made, next(iter(made.hooks()))).__code__.co_firstlineno
             raise FlawError(f"p.{field} moves nothing: no measurement could tell it.", line)
 
 
-def _moved_far_out(effect: type[Effect], within: list[Within], values: dict[str, float]) -> bool:
+def _moved_far_out(made: type[Made], within: list[Within], values: dict[str, float]) -> bool:
     """Return whether parameters move a hook in larger or smaller motion than that of the rig.
 
     What begins beyond a knot, such as a stop behind a gap, does nothing before it.
     """
-    for factor, signal, hook in product(FURTHER, _signals(effect)[1:], effect.hooks()):
-        q = Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
-        try:
-            z = _state(effect, q, values)
-            given = partial(_at_parameters, effect, hook, q, z, values, within)
-            if len({given(share) for share in SHARES}) > 1:
-                return True
-        except FlawError:  # so far out it need not be right
-            continue
+    for factor, dt in product((1.0, *FURTHER), (1e-6, 2e-3)):
+        for q, hook in product(_further(made, factor), made.hooks()):
+            try:
+                z = _state(made, q, values, dt)
+                given = partial(_at_parameters, made, hook, q, z, values, within)
+                if len({given(share) for share in SHARES}) > 1:
+                    return True
+            except FlawError:  # so far out it need not be right
+                continue
     return False
+
+
+def _further(made: type[Made], factor: float) -> list[Any]:
+    """Return signals in motion, times a factor."""
+    if issubclass(made, Law):
+        return [*_law_signals(factor)[1:]]
+    return [
+        Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
+        for signal in _signals(made)[1:]
+    ]
 
 
 def _moved_between(effect: type[Effect], within: list[Within], values: dict[str, float]) -> bool:
@@ -481,8 +492,8 @@ def _moved_between(effect: type[Effect], within: list[Within], values: dict[str,
 
     A row of a table counts near its own level alone, and so it does of a channel that it follows.
     """
-    for factor, signal, hook in product((1.0, *FURTHER), _signals(effect)[1:7], effect.hooks()):
-        still = Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
+    far = ((factor, still) for factor in (1.0, *FURTHER) for still in _further(effect, factor)[:6])
+    for (factor, still), hook in product(far, effect.hooks()):
         for q, others in _ways(effect, still, factor, values):
             try:
                 z = _state(effect, q, others)
@@ -538,9 +549,6 @@ def _between(low: float, high: float, share: float) -> float:
     return low * (high / low) ** share if by_decades else low + (high - low) * share
 
 
-LAW_FURTHER = (1.0, 10.0, 0.1, 100.0, 0.01)
-"""Factors on the signals at which a parameter is looked at until it moves something."""
-
 CYCLES = ((0.006, 2.0, 4.0), (0.001, 5.0, 8.0), (0.015, 0.5, 0.0), (0.015, 5.0, 8.0))
 """Amplitudes [m], frequencies [Hz] and voltages [V] of cycles in which no energy may come out."""
 
@@ -573,8 +581,9 @@ def probe_law(law: type[Law]) -> None:
             if law.hook("advance"):
                 _call(law, "advance", q._replace(dt=0.0), z, values)
                 _call(law, "advance", q._replace(dt=inf), z, values, finite=False)
-    _law_smooth(law, defaults)
-    _moving(law, defaults)
+    # The sign of the yield force may jump.
+    _smooth_in_signals(law, _law_signals(), defaults)
+    _check_parameters(law, _law_signals()[1:7], _forces(law), defaults)
     _at_zero(law, defaults)
     for values in ends(law):
         for amplitude, frequency, V in CYCLES:
@@ -639,32 +648,6 @@ def _law_signals(factor: float = 1.0) -> list[Inputs]:
     return found
 
 
-def _with(
-    law: type[Law], hook: str, q: Inputs, z: Any, values: dict[str, float], name: str, share: float
-) -> tuple[float, ...]:
-    """Call a hook with a parameter at a share of its range."""
-    return _at_parameters(law, hook, q, z, values, [(name, *_span(law.parameters[name]))], share)
-
-
-def _law_smooth(law: type[Law], values: dict[str, float]) -> None:
-    """Refuse hooks that jump with a signal or a parameter; the sign of the yield force may."""
-    _smooth_in_signals(law, _law_signals(), values)
-    for q in _law_signals()[1:7]:
-        z = _state(law, q, values)
-        for name, hook in product(law.parameters, _forces(law)):
-            if name not in CHOICES:
-                given = partial(_with, law, hook, q, z, values, name)
-                refuse_jump(getattr(law, hook), given, (0.0, 1.0), f"p.{name}", 24)
-
-
-def _moving(law: type[Law], values: dict[str, float]) -> None:
-    """Refuse a parameter, or a table, that moves nothing."""
-    for field, names in fields_of(law.parameters, law.tables).items():
-        if not any(_moves(law, name, values) for name in names):
-            line = getattr(law, next(iter(law.hooks()))).__code__.co_firstlineno
-            raise FlawError(f"p.{field} moves nothing: no measurement could tell it.", line)
-
-
 def _at_zero(law: type[Law], values: dict[str, float]) -> None:
     """Refuse a parameter that may not be zero, and that no `shapes` names: a fit begins there."""
     for name in law.linear():
@@ -677,18 +660,6 @@ def _at_zero(law: type[Law], values: dict[str, float]) -> None:
                     f'is not linear in: shapes = {{"{name}": Shape(...)}} is right.',
                     flaw.line,
                 ) from None
-
-
-def _moves(law: type[Law], name: str, values: dict[str, float]) -> bool:
-    for factor, dt in product(LAW_FURTHER, (1e-6, 2e-3)):
-        for q, hook in product(_law_signals(factor)[1:], law.hooks()):
-            try:
-                z = _state(law, q, values, dt)
-                if len({_with(law, hook, q, z, values, name, share) for share in SHARES}) > 1:
-                    return True
-            except FlawError:  # so far out it need not be right
-                continue
-    return False
 
 
 # Runs users' files in a child process first, under a limit of time and memory.
