@@ -1,5 +1,6 @@
 """Fills fmus/ with the built-in components as FMUs."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -22,7 +23,7 @@ if __name__ == "__main__":
             build, folder = builder(given), folder / "native" if given.native else folder
             folder = folder / "fmi3" if given.fmi == 3 else folder
             for name in given.names or component_names():
-                print(build(plan(name), folder), flush=True)
+                print(os.path.relpath(build(plan(name), folder)), flush=True)
     except BristleError as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         sys.exit(error.exit_code)

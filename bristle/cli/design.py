@@ -50,11 +50,12 @@ def main(arguments: argparse.Namespace) -> int:
         print(f"warning: {arguments.file}: {text}", file=sys.stderr, flush=True)
     result = design(task)
     answer = {**_answer(result), "warnings": warnings}
-    answer["files"] = [str(path.absolute()) for path in _write(result, answer, out)]
+    written = _write(result, answer, out)
+    answer["files"] = [str(path.absolute()) for path in written]
     component = _COMPONENTS[result.controller.kind].split()[0]
     bake = Next(command("build", component, "--controller", out), "bakes it in")
     view = result.view()
-    print_answer(arguments, answer, view._replace(blocks=(*view.blocks, bake)), answer["files"])
+    print_answer(arguments, answer, view._replace(blocks=(*view.blocks, bake)), written)
     return 0
 
 

@@ -237,7 +237,7 @@ def _checked_offers(
     there = [key.removesuffix(SWITCH) for key in known if key.endswith(SWITCH)]
     asked = {*offers, *(load_file(path).name for path in own)}
     for name in sorted(asked - {*there}):
-        raise BuildError(f"{component}: {unknown('effect of it', name, there)}")
+        raise BuildError(f"{component}: {unknown('effect', name, there)}")
     return sorted(asked)
 
 

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..comparison.misfit import run_error
-from ..comparison.names import name_of, site_name
+from ..comparison.names import effect_name, name_of, site_name
 from ..comparison.patterns import ResidualPattern
 from ..comparison.predictions import RunPrediction, shown
 from ..comparison.result import Comparison
 from ..core.files import read_json
+from ..core.text import with_interval
 from ..diagnosis.view import worst
 from ..errors import BristleError, StudyError, TrustError
 from ..model.model import Model
@@ -69,6 +70,8 @@ def fit_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
 def rows_of(model: Model, found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return a row per parameter: value, half of its 95 % interval, how it is known, what it is.
 
+    `shown` are value and half with the digits that the interval leaves.
+
     Parameters
     ----------
     model : of the study
@@ -80,10 +83,12 @@ def rows_of(model: Model, found: Mapping[str, Any]) -> list[dict[str, Any]]:
         std = value.std
         how = own.get("how") or ("identified" if std is not None else value.origin)
         declared = model.declared(name)
+        known = std if how == "identified" else None
         rows.append(
             {
                 "name": name, "value": value.value, "unit": value.unit, "how": how,
-                "half": 1.96 * std if std is not None and how == "identified" else None,
+                "half": 1.96 * known if known is not None else None,
+                "shown": with_interval(value.value, known),
                 "about": declared.text, "low": value.low, "high": value.high,
             }
         )  # fmt: skip
@@ -306,7 +311,9 @@ def shown_verdict(study: Study, verdict: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "kind": verdict["kind"], "title": view.title, "answer": page_data(view.blocks),
         "details": page_data(view.details), "effects": list(verdict.get("effects") or []),
-        "before": at.get("z_holdout_before"), "ranking": verdict.get("ranking") or [],
+        "before": at.get("z_holdout_before"), "ranking": [
+            {**row, "name": effect_name(row["effect"])} for row in verdict.get("ranking") or []
+        ],
     }  # fmt: skip
 
 

@@ -40,7 +40,7 @@ def design_view(result: DesignResult) -> View:
     size = f"{made.n} states, sampled at {1e3 * made.sample_period:g} ms"
     speeds = f", a table of {made.rows} speeds" if made.rows > 1 else ""
     solver = f"; solver: {facts['solver']}" if "solver" in facts else ""
-    rows = [[name, f"{facts[key]:.5g}"] for key, name in _SHOWN.items() if key in facts]
+    rows = [[name, f"{facts[key]:.4g}"] for key, name in _SHOWN.items() if key in facts]
     poles, said = facts["poles"], list[Text]()
     if poles and not isinstance(poles[0][0], list):  # else one list per grid speed
         listed = [f"{a:.4g}" + (f" ± {b:.4g}j" if b else "") for a, b in poles if b >= 0.0]
@@ -59,10 +59,10 @@ def _by_speed(facts: dict[str, Any]) -> list[Table]:
     if "norms" not in facts:
         return []
     norms = zip(facts["grid"], facts["norms"], facts["open_loop_norms"], strict=True)
-    rows = [[f"{speed:g}", f"{norm:.5g}", f"{free:.5g}"] for speed, norm, free in norms]
+    rows = [[f"{speed:g}", f"{norm:.4g}", f"{free:.4g}"] for speed, norm, free in norms]
     note = (
         f"gamma is proved at these speeds. The largest norm between them: "
-        f"{facts['largest_row_norm']:.5g} at {facts['largest_row_norm_at']:g} m/s. LMI between "
+        f"{facts['largest_row_norm']:.4g} at {facts['largest_row_norm_at']:g} m/s. LMI between "
         f"them: holds at {100 * facts['share_proved']:.0f} % of the rows; largest eigenvalue "
         f"{facts['largest_eigenvalue']:.3g} at {facts['largest_eigenvalue_at']:g} m/s (below 0: "
         "proved)."
@@ -73,9 +73,9 @@ def _by_speed(facts: dict[str, Any]) -> list[Table]:
 
 def _margins(found: dict[str, Any]) -> str:
     up, down, phase = (found[key] for key in ("gain_up", "gain_down", "phase"))
-    texts = [f"distance from -1 {found['modulus']:.3g}"]
-    texts.append(f"gain times {up:.3g}" if up is not None else "any larger gain")
-    texts.append(f"gain times {down:.3g}" if down is not None else "any smaller gain")
+    texts = [f"{found['modulus']:.3g} from -1"]
+    texts.append(f"gain up to {up:.3g} times" if up is not None else "any larger gain")
+    texts.append(f"gain down to {down:.3g} times" if down is not None else "any smaller gain")
     texts.append(f"phase {phase:.3g} deg" if phase is not None else "any phase")
     return ", ".join(texts)
 

@@ -2,7 +2,7 @@
 
 import { packed } from "../api.mjs";
 import { consentPanel } from "../consent.mjs";
-import { bars, empty, h, key, number, percent, shown, table, z } from "../dom.mjs";
+import { bars, empty, h, key, number, shown, table, z } from "../dom.mjs";
 import { Plot, extent } from "../plot.mjs";
 
 export async function show(page) {
@@ -75,9 +75,9 @@ function parameters(fit) {
   const rows = fit.parameters.filter((row) => !(row.how === "held" && /(exponent|mass|which)$/.test(row.name)));
   return table("Parameters", ["parameter", "value", "95 % interval", "unit", "what it is"],
     rows.map((row) => [
-      h("code", {}, row.name), number(row.value, 5),
+      h("code", {}, row.name), row.shown[0],
       row.half !== null
-        ? `± ${number(row.half, 2)}${row.value ? ` (${percent(Math.abs(row.half / row.value))})` : ""}`
+        ? `${row.shown[1]}${row.value ? ` (${number(Math.abs(100 * row.half / row.value), 2)} %)` : ""}`
         : row.how,
       row.unit === "1" ? "" : row.unit, row.about,
     ]), [1, 2]);

@@ -101,7 +101,7 @@ function compare(page, found) {
     const [a, b] = [steps[chosen.a], steps[chosen.b]];
     const names = [...new Set([...a.parameters, ...b.parameters].map((row) => row.name))];
     const of = (step, name) => step.parameters.find((row) => row.name === name);
-    const cell = (row) => (row ? `${number(row.value, 4)}${row.half === null ? "" : ` ± ${number(row.half, 2)}`}` : "–");
+    const cell = (row) => (row ? `${row.shown[0]}${row.half === null ? "" : ` ${row.shown[1]}`}` : "");
     back.disabled = Math.min(chosen.a, chosen.b) === 0;
     on.disabled = Math.max(chosen.a, chosen.b) === steps.length - 1;
     target.replaceChildren(

@@ -141,7 +141,7 @@ function evidence(verdict) {
   const log = (value) => Math.log10(Math.max(value, 1) * 1.02);
   return [h("h2", {}, "The evidence"),
     rows.length ? bars("z with each effect", rows.slice(0, 20).map((row) => ({
-      name: row.site && row.site !== "damper" ? `${row.effect} (${row.site})` : row.effect, value: log(row.z_holdout),
+      name: row.site && row.site !== "damper" ? `${row.name} (${row.site})` : row.name, value: log(row.z_holdout),
       strong: verdict.effects.includes(row.effect), good: row.z_holdout <= 1.1 && row.gain > 0.02,
       text: z(row.z_holdout), title: row.refined ? "fitted to the end" : "a first fit gained too little to go on",
     })), { edge: log(before), most: log(Math.max(before, 2)) }) : null,
