@@ -101,7 +101,7 @@ def build_parser(only: str = "") -> Parser:
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     """Return the arguments of a command line, for which one command's module is read."""
-    words = sys.argv[1:] if argv is None else argv
+    words = (sys.argv[1:] if argv is None else argv) or ["--help"]
     known = {one.name.strip("_").replace("_", "-") for one in pkgutil.iter_modules(__path__)}
     return build_parser(words[0] if words and words[0] in known else "").parse_args(words)
 
