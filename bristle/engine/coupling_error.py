@@ -433,15 +433,15 @@ def expect(scenario: System, again: Again) -> tuple[Expected, ...]:
     kept, found = _remembered(again), []
     for name in ALGORITHMS:
         try:
-            found.append(_expected(replace(scenario, algorithm=name), kept, again))
+            found.append(_expected(replace(scenario, algorithm=name), kept))
         except RunError as failure:
             found.append(Expected(name, None, None, why=f"cannot be told: {failure}"))
     return tuple(found)
 
 
-def _expected(scenario: System, kept: Again, again: Again) -> Expected:
-    frame = kept(scenario, "fmu")
-    errors = estimate(scenario, frame, kept)[1]
+def _expected(scenario: System, again: Again) -> Expected:
+    frame = again(scenario, "fmu")
+    errors = estimate(scenario, frame, again)[1]
     output, doubt = worst(errors, frame)
     if doubt:
         return Expected(scenario.algorithm, None, None, why=doubt, output=output)
@@ -473,7 +473,7 @@ def _error_at(scenario: System, judged: Mapping[str, CouplingError], again: Agai
     """Return the largest error [1] along a run of the outputs that it is judged by.
 
     It is measured against the coupled engine; without that, the run at half the step differs by the
-    share of it that the order seen at coarser steps tells. Long runs are not kept.
+    share of it that the order seen at coarser steps tells.
     """
     frame = again(scenario, "fmu")
     exact = coupled_run(scenario, again)
