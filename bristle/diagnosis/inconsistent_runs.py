@@ -13,7 +13,7 @@ from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identification.building_sites import StructureProblem
 from ..identification.fit import fit
-from ..identification.histories import Effort, counted
+from ..identification.histories import counted, left
 from ..identification.problem import Expected, Problem, Run, in_noises, residuals, robust_z
 from ..identification.rig import DAMPER
 from ..identification.search import z_scale
@@ -247,9 +247,9 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
         return found  # of no run can be said what its error is over noise
     # Whether noise is all that a model leaves of some of the runs.
     prepared = prepared.with_excess(0.0)
-    with counted(MOST_SPENT) as effort:
+    with counted(MOST_SPENT):
         for apart in (_but_for_a_run, _but_for_clocks):
-            odd = apart(found, prepared, effort)
+            odd = apart(found, prepared)
             if odd is not found:
                 return odd
     before, rule, at_damper = prepared.before, prepared.rule, found.site == DAMPER
@@ -272,21 +272,20 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     return replace(found, kind=kind, reasons=(text,))
 
 
-def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared, effort: Effort) -> SiteDiagnosis:
+def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding that names the run whose zero or gain is another one, if there is one.
 
     Where a model explains all other runs, what they leave together is no other form of an effect,
     and no further effect. If that model has fewer effects than the finding's, the run is to be set
-    right first.
+    right first. With effects no model is looked at that would take more than may still be spent.
 
     Parameters
     ----------
     found, prepared : as in `contradicted`
-    effort : what was spent; with effects no model is looked at that would take more than is left
     """
     runs = prepared.searched, prepared.held_out
     for trial, added in _to_be_explained(found, prepared):
-        if added and not _affordable(trial.model, runs, effort):
+        if added and not _affordable(trial.model, runs):
             break
         called = f"The model with {' and '.join(added)}" if added else "One model"
         text = odd_run(trial.model, *runs, prepared.rule, called)
@@ -295,7 +294,7 @@ def _but_for_a_run(found: SiteDiagnosis, prepared: Prepared, effort: Effort) -> 
     return found
 
 
-def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) -> SiteDiagnosis:
+def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     """Return a finding that names the runs whose loggers began apart, if that explains the rest.
 
     Beside a missing effect it shows only in what the effect leaves: clocks are looked at for the
@@ -303,11 +302,11 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) ->
 
     Parameters
     ----------
-    found, prepared, effort : as in `_but_for_a_run`
+    found, prepared : as in `_but_for_a_run`
     """
     runs = prepared.problem, prepared.held_out
     for trial, added in _to_be_explained(found, prepared):
-        if added and not _affordable(trial.model, runs, effort):
+        if added and not _affordable(trial.model, runs):
             break
         clocks = clock_faults(trial, *runs) if added else None
         if clocks is not None:
@@ -317,10 +316,9 @@ def _but_for_clocks(found: SiteDiagnosis, prepared: Prepared, effort: Effort) ->
     return found
 
 
-def _affordable(model: Model, runs: tuple[Problem, Problem], effort: Effort) -> bool:
-    """Return whether a look at runs with a model leaves the effort within what it may be."""
-    once = sum(problem.steps_of(model) for problem in runs)
-    return LOOK * once <= effort.left
+def _affordable(model: Model, runs: tuple[Problem, Problem]) -> bool:
+    """Return whether a look at runs with a model takes no more than may still be spent."""
+    return LOOK * sum(problem.steps_of(model) for problem in runs) <= left()
 
 
 def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Trial, list[str]]]:
@@ -434,7 +432,7 @@ def groups(
         alone: rigs may differ in size
     """
     runs = [*train.runs, *held_out.runs]
-    with counted(MOST_SPENT) as effort:
+    with counted(MOST_SPENT):
         every = train.of(runs)
         z = _z_of_runs(model, every, every.expectation(model))
         own = dict.fromkeys(range(len(runs)), model)
@@ -459,7 +457,7 @@ def groups(
                     return ""
                 found.append([run])
                 fitted.append(own[k])
-            if effort.spent:
+            if left() < 0.0:
                 return ""
     if len(found) < 2 or min(len(group) for group in found) < 2:
         return ""

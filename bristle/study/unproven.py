@@ -18,7 +18,7 @@ from ..diagnosis.by_label import promising
 from ..diagnosis.law_trials import LawTrial
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import LONG, SECONDS, Trial, missed_by, try_all
-from ..identification.histories import Effort, counted
+from ..identification.histories import counted, left
 from ..identification.problem import Problem
 from ..identification.search import in_threads
 from ..identification.start_grid import refine
@@ -61,10 +61,13 @@ class Unproven:
     cut: bool = False
 
 
+@counted(MOST_SPENT)
 def unproven(
     prepared: Prepared, trials: Sequence[Trial], laws: Sequence[LawTrial], most: int
 ) -> Unproven:
     """Return the model with the law and effects that lower its error on runs left out.
+
+    What comes when enough was spent is not compared any more.
 
     Parameters
     ----------
@@ -73,14 +76,6 @@ def unproven(
     laws : all laws, fitted, where another one may be taken
     most : how many effects a model has at the most
     """
-    with counted(MOST_SPENT) as effort:
-        return _chosen(prepared, trials, laws, most, effort)
-
-
-def _chosen(
-    prepared: Prepared, trials: Sequence[Trial], laws: Sequence[LawTrial], most: int, effort: Effort
-) -> Unproven:
-    """Return what `unproven` does; what comes when enough was spent is not compared any more."""
     missed = missed_by(prepared.before, prepared.searched)
     data = prepared.with_excess(missed) if missed > 0.0 else prepared
     problem = data.searched
@@ -97,7 +92,7 @@ def _chosen(
         for k, one in enumerate(candidates):  # one by one, so that what is spent is told alike
             with defined({name: text for name, text in one.written.items() if name not in EFFECTS}):
                 look = 2 * SWEEPS * len(one.model.free()) * problem.steps_of(one.model)
-                if look > effort.left:  # nor could its fit be afforded
+                if look > left():  # nor could its fit be afforded
                     cut = True
                     continue
                 model = refine(one.model, problem, sweeps) if sweeps else one.model
@@ -114,7 +109,7 @@ def _chosen(
 
     with ExitStack() as stay:
         gains(_other_laws(laws, best.model, problem), LONG)
-        while len(best.model.effects) < most and not effort.spent:
+        while len(best.model.effects) < most and left() >= 0.0:
             texts = {one.name: one.text for one in promising(problem, best.model)}
             with defined(texts):
                 able = [] if texts else [one for one in trials if _joins(one, best.model)]
@@ -131,7 +126,7 @@ def _chosen(
                 break
         model = _without_idle(best.model, prepared.before.model.effects, errors, problem)
     written = {name: text for name, text in best.written.items() if name in model.effects}
-    return Unproven(model, best.law, written, cut or effort.spent)
+    return Unproven(model, best.law, written, cut or left() < 0.0)
 
 
 def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> list[Unproven]:
@@ -146,13 +141,13 @@ def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> lis
             able.append((row.error_train.rms**2 * (1.0 - gain), gain > 0.0, row))
     able.sort(key=lambda one: one[0])
     closer = []
-    for left, labelled, row in able[: 2 * TRIED]:
+    for rest, labelled, row in able[: 2 * TRIED]:
         one = Unproven(row.trial.model, row.law)
         if labelled:
             one = _with_labels(one, problem)
             with defined(one.written):
-                left = _mean_square(errors_of(one.model, problem))
-        closer.append((left, one))
+                rest = _mean_square(errors_of(one.model, problem))
+        closer.append((rest, one))
     closer.sort(key=lambda one: one[0])
     return [one for _, one in closer[:TRIED]]
 
