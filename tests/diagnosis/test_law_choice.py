@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
 
+from bristle.diagnosis import site
 from bristle.diagnosis.law_choice import (
     LawAndEffects,
     LawVerdict,
@@ -21,11 +23,14 @@ from bristle.diagnosis.law_choice import (
     survivors,
 )
 from bristle.diagnosis.law_trials import LawTrial
+from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.rule import BENCH
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import Trial
 from bristle.diagnosis.words import headline, law_sentences, law_table
 from bristle.identification.error import ForceError
+from bristle.identification.histories import counted
+from bristle.identification.problem import Problem
 from bristle.model.model import Model
 from bristle.physics.laws import base_and_variant
 
@@ -409,6 +414,20 @@ def test_where_enough_was_searched_the_best_law_is_still_looked_at_and_two_effec
     found = search([row(law, z[law]) for law in z], look, enough=lambda _row, pairs: pairs)
     assert [law for law, pairs in asked if pairs] == ["bouc_wen"]
     assert {one.row.law for one in found} == {*z}, "the others stay with a single effect"
+
+
+@pytest.mark.parametrize("most", [inf, -1.0])
+def test_behind_a_joint_no_second_effect_is_sought_once_enough_was_spent(monkeypatch, most):
+    def tried(base, *_given, most=None, **_named):
+        names = ("stribeck",) if most else ("backlash", "gas_spring")
+        return [trial(4.0, "bingham", (*base.effects, name)) for name in names]
+
+    monkeypatch.setattr(site, "try_all", tried)
+    runs = Problem([])
+    with counted(most):
+        made = site.Trials(Prepared(trial(6.0, "bingham"), runs, runs))
+        grown = {first.effects: len(made.grow(first)) for first in made.single}
+    assert grown == {("backlash",): int(most > 0.0), ("gas_spring",): 1}
 
 
 def test_the_verdict_says_of_which_laws_not_all_was_tried():
