@@ -238,29 +238,6 @@ def test_pages_show_the_pictures_that_commands_write_and_no_others_are_kept() ->
     assert {f"{name}.png" for name in made} == {one for one in shown if one.startswith("gallery-")}
 
 
-def test_no_page_repeats_a_block_of_another() -> None:
-    seen: dict[str, str] = {}
-    for name, page in PAGES.items():
-        for block in snippets.blocks(page.read_text(encoding="utf-8")):
-            if block.language == "console" and len(block.body.splitlines()) > 12:
-                assert block.body not in seen, f"{name} and {seen[block.body]}: {block.body}"
-                seen[block.body] = name
-
-
-@pytest.mark.parametrize(
-    ("word", "page"),
-    [
-        ("Simulink", "elsewhere.md"), ("SSP", "elsewhere.md"), ("Excel", "measurements.md"),
-        ("shock absorber", "tutorial_bench.md"), ("missing physics", "index.md"),
-        ("Bouc-Wen", "laws/bouc_wen.md"),
-    ],
-)  # fmt: skip
-def test_what_people_look_for_is_in_the_title_of_the_right_page(word: str, page: str) -> None:
-    made = generate.pages()
-    text = made[page] if page in made else (DOCS / page).read_text(encoding="utf-8")
-    assert word.lower() in text.splitlines()[0].lower()
-
-
 def test_the_architecture_names_files_that_are_there() -> None:
     head = (DOCS / "architecture.md").read_text(encoding="utf-8").partition("## The map")[0]
     named = re.findall(r"`([a-z_]+/)(?:\{([a-z_,]+)\}|([a-z_]+)(?:\.py)?)`", head.replace("\n", ""))

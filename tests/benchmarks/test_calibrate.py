@@ -191,15 +191,6 @@ def test_the_table_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
         write_between(file, page.BEGIN, page.END, block)
 
 
-def test_a_table_that_moves_nowhere_says_that_it_tells_nothing() -> None:
-    far = case("effect", "gas_spring", 3.0, trial(1.01, "gas_spring"))
-    assert "neither support today's values" in page.sensitivity(page.traded([far], BENCH))
-    weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
-    said = page.sensitivity(page.traded([weak], BENCH))
-    assert said.startswith("Counts change with `gain`")
-    assert "neither support" not in said
-
-
 def test_without_trials_it_says_how_to_make_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

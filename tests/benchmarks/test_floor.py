@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from benchmarks import _floor, _free, _reach, boucwen
-from benchmarks._measured import Row
 from bristle.identification.problem import Problem, Run
 from bristle.model.model import Model
 
@@ -74,42 +73,6 @@ def test_least_squares_finds_a_law():
     assert worse == pytest.approx(1.0, abs=0.1)
 
 
-def test_table_beside_the_floor(monkeypatch):
-    steps = {
-        "free": {"share": 0.11, "with": "dahl + stribeck", "z": 2.0},
-        "learned": {"share": 0.09, "with": "dahl + stribeck + a curve", "z": 1.5},
-        "closed": {"share": 0.085, "with": "dahl + stribeck + a curve + a closure", "z": 1.5},
-    }
-    found = {
-        "friction_tribometer": {
-            _reach.STEPS: steps,
-            _reach.LAW: {
-                "share": 0.10,
-                "with": "dahl",
-                "every": {"dahl": 0.10, "lugre": 0.095},
-                "closed": 0.09,
-            },
-            "neural network": {"share": 0.08},
-        },
-        "mr_damper_utfpr": {"neural network": {"share": 0.08}},
-        "mr_damper_mathworks": {},
-    }
-    rows = [Row("friction rig", "lugre", after=0.12, after_with="delay")]
-    one, other = _reach.beside(found, rows)
-    assert one.floor == (0.08, "neural network")
-    assert one.ratio == pytest.approx(1.0625)
-    assert one.without == pytest.approx(1.125)
-    monkeypatch.setattr(_reach, "have_learner", lambda: False)
-    text = "\n".join(_reach.markdown([one, other]))
-    row = "| friction rig | 12.0% | 11.0% | 9.0% | 8.5% | 9.0% | 8.0% (neural network)"
-    assert f"{row} | 1.06 | 1.12 |" in text
-    assert "| not run yet | not run yet | 8.0% (neural network) | - | - |" in text
-    assert "dahl by least squares 10.0%" in text
-    assert "best law on the held-out runs: lugre 9.5%" in text
-    assert "pip install" in text
-    assert [row.ratio for row in _reach.figures([one, other])] == pytest.approx([1.0625 / 1.1])
-
-
 def test_answers_of_another_version_are_none():
     made = {
         json.dumps(["mr_damper_utfpr", "steps", _reach.VERSION - 1]): {"free": {}},
@@ -139,12 +102,6 @@ def test_steps_see_training_runs_alone(monkeypatch):
     assert set(made) == {"free", "learned", "closed"}
     assert made["closed"]["with"] == "dahl + a closure"
     assert made["learned"] == {"share": 0.1, "with": "dahl", "z": 1.0}
-
-
-def test_words_of_a_model():
-    assert _free.Found(Model("lugre", ("gas_spring",)), (), 1.0, (), False).words == (
-        "lugre + gas_spring"
-    )
 
 
 def test_the_published_system_is_integrated_right():

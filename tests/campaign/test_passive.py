@@ -121,14 +121,15 @@ def test_the_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    command = ["optimise", "passive", "--intensities", "0.2", "0.4", "--grid", "5"]
-    assert main([*command, "--set", "run.stop=5"]) == 0
+    command = ["optimise", "passive", "--intensities", "0.2", "0.4"]
+    assert main([*command, "--grid", "3", "--set", "run.stop=1"]) == 0
     said = capsys.readouterr().out
     assert "el_centro_1940_ns 0.4 g" in said
     assert "for all of them" in said
     for name in ("passive.csv", "passive.json", "passive.png"):
         assert (tmp_path / "results" / "optimise" / name).stat().st_size > 100
-    assert main([*command, "--set", "run.stop=5", "--json", "--no-figure"]) == 0
+    more = ["--grid", "5", "--set", "run.stop=5", "--json", "--no-figure"]
+    assert main([*command, *more]) == 0
     assert not (tmp_path / "results" / "optimise" / "passive.png").exists(), "of another optimum"
     answer = json.loads(capsys.readouterr().out)
     assert [round(motion["voltage"]) for motion in answer["motions"]] == [2, 3]

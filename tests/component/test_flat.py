@@ -17,7 +17,7 @@ def effects_of(name: str) -> list[str]:
 both = pytest.mark.parametrize(
     "machine", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["python", "machine"]
 )
-"""By default the functions on arrays run as Python. To compile a kind takes 10 to 25 s; that numba
+"""By default the functions on arrays run as Python. To compile a kind takes 2 to 25 s; that numba
 gives the numbers of Python is seen in test_compiled_laws, and in native FMUs."""
 
 DAMPERS = [name for name in catalogue.component_names() if name.endswith("Damper")]
@@ -96,14 +96,16 @@ CONTROLLERS = [
 ]
 
 
+@both
 @pytest.mark.parametrize(("name", "given"), SIGNALS, ids=str)
-def test_a_source(name: str, given: dict[str, Any]) -> None:
-    check_run(name, given)
+def test_a_source(name: str, given: dict[str, Any], machine: bool) -> None:
+    check_run(name, given, machine=machine)
 
 
-def test_sensors() -> None:
-    check_run("Sensors", {})
-    check_run("Sensors", SENSORS)
+@both
+@pytest.mark.parametrize("given", [{}, SENSORS], ids=["plain", "faulty"])
+def test_sensors(given: dict[str, Any], machine: bool) -> None:
+    check_run("Sensors", given, machine=machine)
 
 
 @both

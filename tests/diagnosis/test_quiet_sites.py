@@ -49,7 +49,10 @@ def softening(x, _v):
 
 @pytest.mark.parametrize(
     ("hidden", "name", "at"),
-    [(stop, "end_stop", "layer"), (softening, "storey_softening", "storey1")],
+    [
+        pytest.param(stop, "end_stop", "layer", marks=pytest.mark.slow),  # a second: another site
+        (softening, "storey_softening", "storey1"),
+    ],
 )
 def test_masses_that_are_off_are_found_beside_an_effect(hidden, name, at):
     b, runs = recorded(hidden, peak=3.0)

@@ -99,7 +99,10 @@ def test_a_force_of_no_effect_is_unknown_and_its_coordinate_named():
     assert "The remaining error depends mainly on displacement." in found.words
 
 
-@pytest.mark.parametrize(("what", "value"), [("delay", 0.008), ("force_gain", 1.15)])
+@pytest.mark.parametrize(
+    ("what", "value"),  # a second each
+    [("delay", 0.008), pytest.param("force_gain", 1.15, marks=pytest.mark.slow)],
+)
 def test_a_load_cell_that_is_late_or_wrong_is_told_from_physics(what, value):
     b = building(2, True, 6)
     runs = []

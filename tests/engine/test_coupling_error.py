@@ -258,6 +258,7 @@ def test_a_tolerance_that_is_no_share_is_refused(
     assert "as 0.2% or 0.002" in capsys.readouterr().err
 
 
+@pytest.mark.slow  # 3 s, runs at finer steps: a tolerance of foreign FMUs is by default
 def test_the_command_line_prints_the_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -283,6 +283,7 @@ def test_the_pulse_keeps_its_goals_and_its_order() -> None:
         assert 10.0 < error / fine[name] < 22.0, name  # 16 is second order
 
 
+@pytest.mark.slow  # 2 s: a run at two steps; a loop of toys is by default
 def test_the_energy_under_a_voltage_that_goes_on_changing_is_of_second_order(
     tmp_path: Path,
 ) -> None:
@@ -317,6 +318,7 @@ def test_a_switching_controller_is_no_worse_than_with_gauss_seidel() -> None:
     assert all(found[name] <= 1.1 * plain[name] for name in plain)
 
 
+@pytest.mark.slow  # 2 s: runs at two algorithms
 def test_an_end_stop_is_no_worse_than_with_gauss_seidel() -> None:
     stop = {"damper__end_stop.on": True, "damper__end_stop.clearance": 0.004}
     found = errors("half_sine_pulse", **stop)

@@ -86,16 +86,20 @@ def test_controllers_invert_laws_of_the_library_beside_any_damper(own: type[Effe
     assert loop.__globals__["sample"].__globals__["take_command"] is time_loop.take_command
 
 
-def test_compiled_and_in_python_it_gives_the_same(
-    own: type[Effect], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    fast = DamperForces("bingham", ["leak"]).force(*MOTION, 0.002, {})
+def test_of_equal_classes_what_is_compiled_is_one(own: type[Effect]) -> None:
     again = leak()  # as a file that is read anew defines it
     assert again is not own
     link = damper.functions_of("bingham", ["leak"]).link
     assert compiled(link(damper.step)) is compiled(
         damper.SETS.of(LAWS["bingham"], own).link(damper.step)
     )
+
+
+@pytest.mark.slow  # 4 s to compile: by default an own law is (test_user_laws.py)
+def test_compiled_and_in_python_it_gives_the_same(
+    own: type[Effect], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fast = DamperForces("bingham", ["leak"]).force(*MOTION, 0.002, {})
     monkeypatch.setenv("BRISTLE_JIT", "off")
     plain = DamperForces("bingham", ["leak"])
     assert compiled(damper.step) is damper.step

@@ -21,7 +21,7 @@ from bristle.physics import damper
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import EFFECTS
 from bristle.user_code import load
-from bristle.user_code.conformance import refused, usable
+from bristle.user_code.conformance import usable
 from bristle.user_code.templates import file_text
 
 
@@ -176,20 +176,6 @@ def test_what_numba_refuses_is_left_out_too(tmp_path: Path) -> None:
     assert checked.made is None
     assert "force cannot be compiled" in checked.error
     assert "seal" not in EFFECTS
-
-
-def test_the_template_conforms(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["new", "effect", "lip_seal"]) == 0
-    assert main(["new", "effect", "lip_seal"]) == 2
-    assert "is there already" in capsys.readouterr().err
-    assert main(["check", "lip_seal.py"]) == 0
-    said = capsys.readouterr().out
-    assert "lip_seal conforms" in said
-    assert "FAIL" not in said
-    assert refused(EFFECTS["lip_seal"]) is None
 
 
 @pytest.mark.parametrize(

@@ -206,6 +206,7 @@ def test_a_wrong_form_in_a_file_is_said(tmp_path: Path, lines: str, text: str) -
         read_model(path)
 
 
+@pytest.mark.slow  # 5 s, an export: by default one of a linear command is proven
 def test_the_fmu_carries_the_form_to_the_last_bit(study: Study) -> None:
     law = "bingham[table 0 1 2.5 5]"
     runs = study.runs()

@@ -63,6 +63,7 @@ def test_no_site_of_a_clean_building_fails(clean):
         assert "fails" not in " ".join(found.sentences)
 
 
+@pytest.mark.slow  # a second: another site; by default the layer
 def test_a_storey_that_softens_is_named_along_its_drift(tmp_path):
     def softening(x, v):
         force = -3.0e7 * (x[1] - x[0]) ** 3

@@ -108,7 +108,7 @@ def test_closed_loop_dissipates_at_the_grid(lpv: DesignResult) -> None:
         assert len(A) == 2 * n
 
 
-@pytest.mark.parametrize("varies", ["X", "Y"])
+@pytest.mark.parametrize("varies", ["X", pytest.param("Y", marks=pytest.mark.slow)])  # a design
 def test_a_varying_pair_gives_a_controller_without_the_rate(varies: str, lpv: DesignResult) -> None:
     result = design(Task("lpv", scheduling=Scheduling(varies=varies, rows=61)))
     facts = result.facts

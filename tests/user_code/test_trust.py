@@ -18,6 +18,7 @@ from bristle.physics.laws import LAWS
 from bristle.study import Study, create_study
 from bristle.study.steps import add_effects
 from bristle.user_code import load
+from bristle.user_code.conformance import refused
 from bristle.user_code.templates import file_text
 
 Files = dict[str, str]
@@ -301,18 +302,26 @@ def test_a_file_made_here_is_trusted_and_checking_it_is_consent(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["new", "effect", "rub"]) == 0
+    assert main(["new", "effect", "rub"]) == 2
+    assert "is there already" in capsys.readouterr().err
     file = tmp_path / "rub.py"
     assert load.load_file(file).name == "rub"
     file.write_text(file.read_text().replace("Parameter(0.2,", "Parameter(0.4,"))
     with pytest.raises(TrustError):
         load.load_file(file)
     assert main(["check", "rub.py"]) == 0
-    assert load.load_file(file).parameters["f_s"].value == 0.4
+    said = capsys.readouterr().out
+    assert "rub conforms" in said
+    assert "FAIL" not in said
+    made = load.load_file(file)
+    assert made.parameters["f_s"].value == 0.4
+    assert refused(made) is None
     other = tmp_path / "sent.py"
-    other.write_text(file_text("effect", "sent"))
+    other.write_text(file_text("effect", "sent").replace('"N"', '"Newtonn"'))
     assert main(["check", "sent.py"]) == 2
     assert "sent.py: this file's code has not run here" in capsys.readouterr().err
-    assert main(["check", "sent.py", "--trust"]) == 0
+    assert main(["check", "sent.py", "--trust"]) == 2
+    assert "Newtonn" in capsys.readouterr().err  # it ran, as far as that
 
 
 def test_links_and_odd_files_are_no_way_round(tmp_path: Path, marker: Path) -> None:

@@ -39,6 +39,7 @@ def test_export_ssp_says_unknown_and_the_least_that_a_run_shows(
     assert errors[told[2]]["least"] >= errors["damper.force"]["least"] > 0.1
 
 
+@pytest.mark.slow  # 4 s: find_step refuses by default
 def test_a_tolerance_is_not_kept_where_the_error_is_unknown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -99,13 +99,6 @@ def test_the_data_check_and_the_roles(bench_study: Path, capsys: Capture) -> Non
     }  # fmt: skip
 
 
-def test_a_model_that_is_complete_has_nothing_missing(bench_study: Path, capsys: Capture) -> None:
-    asked(capsys, "add", bench_study, "gas_spring")
-    verdict = asked(capsys, "diagnose", bench_study)
-    assert (verdict["kind"], verdict["effects"]) == ("none", [])
-    assert json.loads((bench_study / "verdict.json").read_text())["kind"] == "none"
-
-
 def test_auto_comes_to_the_same_model(bench_study: Path, capsys: Capture) -> None:
     asked(capsys, "undo", bench_study)
     learnt = asked(capsys, "study", "auto", bench_study, "--law", "bingham")
