@@ -314,7 +314,7 @@ class App:
                 ("GET", "/api/studies/([^/]+)/file", self._file),
                 ("GET", "/api/studies/([^/]+)/consent", self._waiting),
                 ("POST", "/api/studies/([^/]+)/consent", self._consent),
-                ("POST", "/api/studies/([^/]+)/(weights|preview|loops)", self._asked),
+                ("POST", "/api/studies/([^/]+)/(weights|preview)", self._asked),
                 ("POST", "/api/studies/([^/]+)/design", self._design),
                 ("PUT", "/api/uploads/([^/]+)/(building/)?([^/]+)", self._upload),
                 ("GET", "/api/uploads/([^/]+)/columns", self._columns),
@@ -404,8 +404,7 @@ class App:
 
     def _asked(self, request: Request) -> Answer:
         folder, view = self.study(request.parts[0]), request.parts[1]
-        keep = view == "loops"  # they take seconds
-        return Answer(self.answers.get(view, folder, request.json(), keep), PACKED)
+        return Answer(self.answers.get(view, folder, request.json(), keep=False), PACKED)
 
     def _design(self, request: Request) -> Answer:
         folder, asked = self.study(request.parts[0]), request.json()

@@ -1,4 +1,4 @@
-"""View 8, Design: what is weighed, what the solves found, and their closed loops."""
+"""Views 7 to 9: scenarios simulated, designs and what they weigh, comparisons of controllers."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..campaign.best_constant import OUTPUT, G
-from ..campaign.best_constant import SCENARIO as PASSIVE
+from ..campaign.best_constant import G
 from ..core.config import toml_content
 from ..core.files import read_json
 from ..core.text import command, unknown, written
@@ -22,13 +21,12 @@ from ..data import list_ground_motions, read_ground_motion
 from ..data.response_spectrum import DAMPING
 from ..engine.coupled import Coupled
 from ..engine.results import accelerations, spectra
-from ..errors import BristleError, DesignError, ScenarioError, StudyError
+from ..errors import BristleError, DesignError, ScenarioError
 from ..export.web import offered
 from ..fmu import catalogue
 from ..fmu.catalogue import component_of_law
 from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS
-from ..physics.law import base_and_variant
 from ..physics.laws import LAWS
 from ..study.study import Study
 from ..synthesis import implausible, read_task, task_from_data
@@ -43,18 +41,12 @@ from .orders import (
     FOLDER,
     KINDS,
     MEMBERS,
-    MOTIONS,
-    PEAK,
     content_of,
-    design_name,
-    kind_of_design,
     names_of,
     numbers_of,
-    peak_of,
-    record_name,
     values_of,
 )
-from .requests import UPLOADS, RequestError, batch_name, file_name
+from .requests import UPLOADS, batch_name, file_name
 
 # What may command a scenario's damper: a constant voltage, and every controller of the library.
 #
@@ -474,15 +466,8 @@ def _slider(component: Component, name: str) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-ANSWER = "passive/passive.json"
-"""What `bristle optimise passive` leaves in the folder of designs."""
-RESPONSE_ROWS = 3000
-"""Rows of a response that are sent: a screen has fewer columns."""
-JUDGED = (OUTPUT, "structure.base_displacement", "damper.force")
-
-
 def design_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what view 8 shows of a study before its closed loops.
+    """Return what view 8 shows of a study.
 
     Parameters
     ----------
@@ -506,8 +491,7 @@ def design_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "law": study.model(to_show=True).law, "kinds": list(KINDS), "refused": refused(study),
         "fields": [{"name": name, **one._asdict()} for name, one in FIELDS.items()],
-        "solves": solves, "records": records(folder.parent), "motions": list(MOTIONS),
-        "peak": PEAK,
+        "solves": solves,
     }  # fmt: skip
 
 
@@ -527,56 +511,6 @@ def weights_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     kind, values = arguments.get("kind"), arguments.get("values", {})
     task = task_from_data(content_of(kind, values, building_of(folder), ""), folder, "design")
     return {**task_curves(task), "warnings": implausible(task)}
-
-
-def loops_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the closed loop of a design on ground motions, and the best constant voltage's.
-
-    Parameters
-    ----------
-    folder : of the study
-    arguments : `name` of the design; `motions`, ground motions by name or as dropped files; `peak`
-        [g] to which each is scaled
-
-    Raises
-    ------
-    RequestError
-        If one of them is not right.
-    ScenarioError, RecordError
-        If the study's damper cannot act in the scenario, nothing is designed for it, or there is no
-        such ground motion.
-    DesignError
-        If the controller does not belong to its building.
-    """
-    name = design_name(arguments.get("name"))
-    motions = arguments.get("motions", list(MOTIONS))
-    if not isinstance(motions, list) or not 1 <= len(motions) <= len(MOTIONS):
-        raise RequestError(f"motions: a list of 1 to {len(MOTIONS)} ground motions is right.")
-    peak = peak_of("motions", arguments.get("peak", PEAK))
-    if why := refused(Study(folder)):
-        raise ScenarioError(f"{folder.name}: {why}")
-    shaken = _shaken(folder, [record_name(one) for one in motions], peak)
-    best = _best(folder)
-    found = []
-    for record, ground in shaken.items():
-        voltage = best.get((record, peak))
-        runs = [("controlled", _controlled(folder, name, ground))]
-        if voltage is not None:
-            runs.append(("passive", _passive(folder, {**ground, "voltage.level": voltage})))
-        responses = {key: _response(asked) for key, asked in runs}
-        found.append({"record": record, "voltage": voltage, **responses})
-    # `bristle optimise passive` gives record and peak itself.
-    rest = {key: next(iter(shaken.values()))[key] for key in ("ground.factor", "run.stop")}
-    return {"name": name, "peak": peak, "motions": found, "sets": _passive(folder, rest).sets()}
-
-
-def _shaken(folder: Path, motions: list[str], peak: float) -> dict[str, dict[str, Any]]:
-    """Return by ground motion what makes it that of a scenario, as overrides; ends are alike."""
-    found = {record: record_of(folder.parent, PASSIVE, record) for record in motions}
-    own = load_scenario(stock_file(PASSIVE)).stop
-    stop = max(one.get("run.stop", own) for one in found.values())
-    scale = {"ground.peak": round(peak * G, 9), "ground.factor": 1.0, "run.stop": stop}
-    return {record: {**one, **scale} for record, one in found.items()}
 
 
 def refused(study: Study) -> str:
@@ -622,79 +556,6 @@ def _solve(found: Mapping[str, Any]) -> dict[str, Any]:
             for speed in curves["speeds"]
         ],
     }  # fmt: skip
-
-
-def _house(folder: Path) -> dict[str, Any]:
-    """Return what makes the structure of a scenario the study's building, as overrides."""
-    building = building_of(folder)
-    return {"structure.building": f"{folder.name}/{building}"} if building else {}
-
-
-def _controlled(folder: Path, name: str, ground: Mapping[str, Any]) -> RunRequest:
-    kind = kind_of_design(name)
-    scenario = KINDS[kind]
-    overrides = {
-        **damper_of(folder.parent, scenario, folder.name), **_house(folder),
-        "controller.controller": f"{folder.name}/{FOLDER}/{name}.json", **ground,
-    }  # fmt: skip
-    asked = RunRequest(folder.parent, scenario, overrides)
-    if kind == "hinf":
-        asked = RunRequest(folder.parent, scenario, {**overrides, **_inverse(folder, asked)})
-    return asked
-
-
-def _inverse(folder: Path, asked: RunRequest) -> dict[str, Any]:
-    """Return what makes the inverse of a force controller that of the study's law, as overrides."""
-    model = Study(folder).model()
-    law = base_and_variant(model.law)[0].name
-    known = asked.load().components["controller"].description.variables
-    here = {
-        f"{law}.{name}": float(f"{value:.6g}")
-        for name, value in model.at("damper", not model.building).values.items()
-    }
-    own = {name: value for name, value in here.items() if name in known}
-    if not own:
-        raise ScenarioError(
-            f"{folder.name}: the law {law} has no inverse, which a force controller needs; an LPV "
-            "controller commands the voltage itself."
-        )
-    return {
-        "controller.inverse": law, **{f"controller.{name}": value for name, value in own.items()}
-    }  # fmt: skip
-
-
-def _passive(folder: Path, ground: Mapping[str, Any]) -> RunRequest:
-    damper = damper_of(folder.parent, PASSIVE, folder.name)
-    return RunRequest(folder.parent, PASSIVE, {**damper, **_house(folder), **ground})
-
-
-def _response(asked: RunRequest) -> dict[str, Any]:
-    scenario = asked.load()
-    columns = Coupled().run(scenario)
-    every = -(-len(columns["time"]) // RESPONSE_ROWS)
-    return {
-        "command": asked.run(), "time": columns["time"][::every],
-        "values": columns[OUTPUT][::every], "unit": "m/s2",
-        "peaks": {name: float(np.max(np.abs(columns[name]))) for name in JUDGED},
-        "units": {name: scenario.unit(name) for name in JUDGED},
-    }  # fmt: skip
-
-
-def _best(folder: Path) -> dict[tuple[str, float], float]:
-    """Return by ground motion and peak [g] the best constant voltage [V] that was found.
-
-    Empty where none was, or the study's model has changed since.
-    """
-    path, model = folder / FOLDER / ANSWER, folder / "model.toml"
-    if not path.is_file() or path.stat().st_mtime_ns < model.stat().st_mtime_ns:
-        return {}
-    try:
-        motions = read_json(path)["motions"]
-        return {(one["record"], one["intensity"]): float(one["voltage"]) for one in motions}
-    except (KeyError, TypeError, ValueError) as error:
-        raise StudyError(
-            f"{path}: {type(error).__name__} {error}; `bristle optimise passive` writes it anew."
-        ) from None
 
 
 # View 9, Compare controllers: what can be compared, and what the comparisons found.

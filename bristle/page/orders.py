@@ -25,12 +25,8 @@ Options = Mapping[str, Any]
 # The page solves nothing: `bristle design` reads such a file, and what it found is beside it.
 
 FOLDER = "design"
-KINDS = {"hinf": "el_centro_0p6g_hinf", "lpv": "el_centro_0p6g_lpv"}
-"""What may be designed, and the stock scenario in which it acts."""
-MOTIONS = ("el_centro_1940_ns", "near_fault_pulse", "stationary_motion")
-"""The three ground motions of a closed loop, where no others are chosen."""
-PEAK = 0.2
-"""Peak [g] to which each of them is scaled at first."""
+KINDS = ("hinf", "lpv")
+"""What may be designed."""
 
 
 class Field(NamedTuple):
@@ -272,7 +268,6 @@ def _whole(options: Options, key: str, low: int, high: int) -> int:
 
 
 _WORD = re.compile(r"[A-Za-z][\w.]{0,79}")
-_SET = re.compile(r"[A-Za-z][\w.\[\]]{0,99}=\w[\w .+-]*(/\w[\w .+-]*)*|[\w.\[\]]{1,100}=-[\d.e+-]+")
 
 
 @dataclass(frozen=True)
@@ -414,21 +409,6 @@ def _design(study: str, options: Options) -> list[str]:
             f"--out={study}/{FOLDER}/{name}.json"]  # fmt: skip
 
 
-def _passive(study: str, options: Options) -> list[str]:
-    """Return the command that finds the best constant voltage on the motions of a closed loop."""
-    sets = _list(options, "sets", "NAME=VALUE")
-    for one in sets:
-        if not isinstance(one, str) or not _SET.fullmatch(one):
-            raise RequestError(f"sets: {written(one)}; NAME=VALUE is right.")
-    motions = [record_name(one) for one in _list(options, "motions", "ground motions")]
-    if not motions:
-        raise RequestError("motions: a list of ground motions is right.")
-    peak = peak_of("motions", options.get("peak"))
-    words = ["optimise", "passive", "--motions", *motions, f"--intensities={peak:g}"]
-    words += ["--grid", "33", f"--out={study}/{FOLDER}/passive", "--no-figure"]
-    return [*words, *(word for one in sets for word in ("--set", one))]
-
-
 def _export_ssp(study: str, options: Options) -> list[str]:
     """Return the command that packs a scenario which `bristle export` wrote."""
     file = file_name(options.get("scenario"), "the scenario")
@@ -467,7 +447,6 @@ COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "identify": _plain("identify", words=("law", "command")),
     "learn": _plain("learn"),
     "new": _new,
-    "passive": _passive,
     "plan": _plain("plan", texts=PLANNED),
     "report": _plain("report"),
     "reveal": _plain("example", "reveal"),

@@ -27,7 +27,6 @@ DEPENDS = ("study.toml", "model.toml", "verdict.json", "reports/identify.json")
 """Files of a study that its views show."""
 
 _FOLDERS = ("history", "history/undone", "reports", "export", "design", "comparisons")
-_DESIGNED = ("design/passive/passive.json",)
 
 
 def fingerprint(folder: Path) -> str:
@@ -39,7 +38,7 @@ def fingerprint(folder: Path) -> str:
     """
     parts = []
     own = (file.relative_to(folder).as_posix() for file in own_files(folder))
-    for name in dict.fromkeys((*DEPENDS, *_FOLDERS, *_DESIGNED, *_named(folder), *own)):
+    for name in dict.fromkeys((*DEPENDS, *_FOLDERS, *_named(folder), *own)):
         with suppress(OSError, ValueError):
             about = (folder / name).stat()
             parts.append(f"{name}:{about.st_mtime_ns}:{about.st_size}")

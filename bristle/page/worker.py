@@ -23,7 +23,7 @@ VIEWS = {
     "data_views": ("channels", "check", "columns", "data", "preview"),
     "study_views": ("errors", "fit", "history", "residual", "verdict"),
     "control_views": (
-        "controllers", "design", "loops", "weights", "scenarios", "simulate", "spectrum",
+        "controllers", "design", "weights", "scenarios", "simulate", "spectrum",
     ),
 }  # fmt: skip
 """The views of each module: `NAME_view(folder, arguments)` answers with what `html.pack` takes."""

@@ -89,7 +89,7 @@ def test_a_record_is_dropped_onto_the_simulation(home: Path) -> None:
 
 
 @pytest.mark.slow  # a browser, and designs
-def test_weights_are_moved_solved_and_the_closed_loop_is_drawn(home: Path) -> None:
+def test_weights_are_moved_and_solved(home: Path) -> None:
     with page_on(home) as client, shots.chromium(400) as page:
         seen = Watched(page, client)
         page.goto(client.server.address.partition("#")[0] + "#/rig/design")
@@ -103,13 +103,7 @@ def test_weights_are_moved_solved_and_the_closed_loop_is_drawn(home: Path) -> No
         seen.press("Default values")
         seen.press("Solve")
         page.get_by_role("heading", name=re.compile(r"Gamma is 6\.0")).wait_for(timeout=120_000)
-        row = "stationary_motion, 0.2 g: damper force"
-        page.get_by_role("row", name=re.compile(row)).wait_for(timeout=120_000)
-        page.get_by_label("Peak of each").fill("0.1")
-        page.keyboard.press("Tab")
-        page.get_by_role("row", name=re.compile("near_fault_pulse, 0.1 g: base")).wait_for()
-        page.evaluate(DROP, "time [s],acceleration [m/s2]\n0,0\n0.02,1\n0.04,0\n")
-        page.get_by_role("row", name=re.compile("shake.csv .dropped., 0.1 g: top")).wait_for()
+        page.get_by_role("link", name="Compare it under ground motions").wait_for()
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
         assert (home / "rig" / "design" / "hinf_1.json").is_file()
         assert not seen.errors

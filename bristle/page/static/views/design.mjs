@@ -1,16 +1,10 @@
-// View 8, Design: weights on the singular values, gamma and margins of each solve, closed loops.
+// View 8, Design: weights on the singular values, gamma and margins of each solve.
 
 import { packed, post, postPacked } from "../api.mjs";
-import { empty, h, key, number, percent, say, shown, table, wrong } from "../dom.mjs";
-import { acceptDrops, named, picker, take } from "../records.mjs";
+import { empty, h, key, number, percent, table, wrong } from "../dom.mjs";
 import { Plot, extent } from "../plot.mjs";
 
 const KINDS = { hinf: "H-infinity, commands a force", lpv: "LPV, commands the voltage" };
-const OUTPUTS = {
-  "structure.floor2_acceleration_absolute": "top floor's acceleration",
-  "structure.base_displacement": "base displacement",
-  "damper.force": "damper force",
-};
 const REST = 120; // ms that sliders rest until their weights are drawn
 
 export async function show(page) {
@@ -48,7 +42,6 @@ class Design {
         h("div", { class: "grid" }, this.plots.map(({ title, plot }) => h("figure", {}, h("h3", {}, title), plot.canvas))),
         key(["mark", "without control"], ["blue", "closed loop"], ["soft", "dotted: gamma / weight"], ["purple", "dashed: the same with the sliders' weights"]))),
       solve ? this.solves() : empty("Not solved yet", `Solve designs a controller for the damper of this study (law ${found.law}), verifies it, and shows gamma and margins.`),
-      solve ? this.loops() : null,
     ];
   }
 
@@ -169,102 +162,9 @@ class Design {
           `${one.name}${one === solve ? " (shown)" : ""}${one.older ? ", for an older model" : ""}`, number(one.gamma, 4), number(one.norm, 4), number(one.margins.modulus, 3),
           any(one.margins.gain_up, "any larger"), any(one.margins.phase, "any"), String(one.states),
         ]), [1, 2, 3, 4, 5, 6]),
-      h("div", { class: "act" }, h("label", { class: "field", for: "solve" }, "Controller shown", select), h("a", { href: page.link("hand_on") }, "Download the controller file")),
+      h("div", { class: "act" }, h("label", { class: "field", for: "solve" }, "Controller shown", select), h("a", { href: page.link("hand_on") }, "Download the controller file"),
+        h("a", { href: page.link("controllers") }, "Compare it under ground motions")),
       h("p", { class: "soft small" }, "Margins are those of the loop at the measured acceleration. Modulus margin: the distance from −1. Gain margin: a factor. Of an LPV controller they are the least over its speeds, each held constant",
         solve.proved === null ? "." : `; its bound is proved at ${percent(solve.proved, 0)} of the table's speeds.`));
   }
-
-  /** The closed loop of the shown solve on three motions, beside the best constant voltage. */
-  loops() {
-    const { page, found } = this;
-    const own = page.shaking?.study === page.study ? page.shaking : null;
-    this.shaking = page.shaking = own ?? { study: page.study, motions: [...found.motions], peak: found.peak };
-    this.target = h("div", {});
-    this.best = h("button", { type: "button", onclick: () => {
-      const { motions, peak } = this.shaking;
-      page.run("passive", { motions, peak, sets: this.sets });
-    } });
-    page.onJobs(() => (this.best.disabled = Boolean(page.working()) || !this.sets));
-    this.shake();
-    const takeFiles = (files) => take(node, files, (name) => {
-      found.records.push(name);
-      this.shaking.motions.splice(-1, 1, name);
-      this.choice.replaceWith((this.choice = this.chooser(takeFiles)));
-      this.shake();
-    });
-    this.choice = this.chooser(takeFiles);
-    const node = h("section", { class: "dropped" }, h("h2", {}, `${this.solve.name} in the building, on three ground motions`),
-      this.choice, this.target, h("div", { class: "act" }, this.best,
-        h("span", { class: "soft small" }, "The best of 33 constant voltages and those between them, for each motion. It knows the motion in advance, which no controller does.")));
-    acceptDrops(node, takeFiles);
-    return node;
-  }
-
-  /** Returns the menus of the ground motions, and their peak. */
-  chooser(takeFiles) {
-    const { found, shaking } = this;
-    const menus = shaking.motions.map((chosen, k) => {
-      const menu = h("select", { id: `motion-${k}` }, found.records.map((name) => h("option", { value: name, selected: name === chosen }, named(name))));
-      menu.addEventListener("change", () => {
-        shaking.motions[k] = menu.value;
-        this.shake();
-      });
-      return h("label", { class: "field", for: menu.id }, `Ground motion ${k + 1}`, menu);
-    });
-    const peak = h("input", { id: "motion-peak", type: "number", min: 0.001, max: 3, step: "any", value: shaking.peak, required: true });
-    peak.addEventListener("change", () => {
-      if (!peak.reportValidity()) return;
-      shaking.peak = Number(peak.value);
-      this.shake();
-    });
-    return h("div", { class: "act" }, menus,
-      h("label", { class: "field", for: peak.id, style: { width: "6.5rem" } }, "Peak of each [g]", peak), picker(takeFiles));
-  }
-
-  /** Runs the closed loops anew. */
-  async shake() {
-    const { page, target, solve, shaking } = this;
-    const asked = JSON.stringify(shaking);
-    this.sets = null;
-    page.showJobs();
-    target.replaceChildren(h("p", { class: "loading", role: "status" }, "Running the closed loop on three motions …"));
-    try {
-      const answer = await postPacked(page.path("loops"), { name: solve.name, motions: shaking.motions, peak: shaking.peak });
-      if (asked !== JSON.stringify(shaking)) return;
-      const passive = answer.motions.every((one) => one.passive);
-      this.sets = answer.sets;
-      this.best.className = passive ? "" : "main";
-      this.best.textContent = passive ? "Find the best constant voltages again" : "Find the best constant voltages";
-      target.replaceChildren(...responses(answer));
-      page.same(...this.commands, ...answer.motions.flatMap((one) => [one.controlled, one.passive]).filter(Boolean).map((one) => one.command));
-      page.showJobs();
-      say("The closed loops are drawn.");
-    } catch (error) {
-      if (asked === JSON.stringify(shaking)) target.replaceChildren(page.failure(error));
-    }
-  }
-}
-
-function responses({ motions, peak }) {
-  const passive = motions.every((one) => one.passive);
-  const titles = motions.map((one) => `${named(one.record)}, ${number(peak)} g`);
-  const figures = motions.map((one, k) => h("figure", {}, h("h3", {}, titles[k]),
-    new Plot("", `top floor's acceleration over time, ${titles[k]}`, (p) => {
-      const runs = [[one.passive, "mark"], [one.controlled, "blue"]].filter(([run]) => run);
-      p.axes([0, one.controlled.time.at(-1)], extent(runs.map(([run]) => run.values)), "time [s]", "m/s²");
-      for (const [run, colour] of runs) p.trace(run.time, run.values, colour, { width: 1 });
-    }).canvas));
-  const rows = motions.flatMap((one, k) => Object.keys(one.controlled.peaks).map((name) => {
-    const [factor, unit] = shown(one.controlled.units[name]);
-    const [is, was] = [one.controlled, one.passive].map((run) => (run ? run.peaks[name] : null));
-    const change = was ? `${is > was ? "+" : "−"}${percent(Math.abs(is / was - 1))}` : "–";
-    const word = `${OUTPUTS[name] ?? name} [${unit}]`;
-    return [`${titles[k]}: ${word}`, number(factor * is, 4), was === null ? "–" : number(factor * was, 4), was === null ? "–" : `${number(one.voltage, 3)} V`, change];
-  }));
-  return [
-    h("p", {}, "Absolute acceleration of the top floor:"),
-    h("div", { class: "grid" }, figures),
-    key(["blue", "controlled"], ...(passive ? [["mark", "best constant voltage"]] : [])),
-    table("Peaks", ["ground motion and output", "controlled", "best constant voltage", "which is", "controlled against it"], rows, [1, 2, 3, 4]),
-  ];
 }
