@@ -371,7 +371,7 @@ def _text(
     line : the label's value where the parameter keeps its own, and its values (k,); None for steps
     """
     declared = parameter(model.law, name)
-    unit, word = declared.unit, _word_of(label.name)
+    unit, word = declared.unit, word_of(label.name)
     owner = name.rpartition(".")[0]
     of = f" of {effect_name(owner)}" if owner else ""
     about = f"{declared.text}{of} ({name})"
@@ -558,7 +558,7 @@ def _declared(value: float, unit: str, text: str) -> str:
     return f'Parameter({value:.6g}, "{unit}", ({-most:.6g}, {most:.6g}), {literal(text)})'
 
 
-def _word_of(label: str) -> str:
+def word_of(label: str) -> str:
     """Return what the parameter of a label is called."""
     word = as_word(label)
     taken = word in ("slope", "middle", "step", "on", "b", "") or word.endswith("_0")

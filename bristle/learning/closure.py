@@ -24,6 +24,7 @@ from ..core.arrays import Array, Flags, Indices
 from ..core.progress import tell
 from ..core.text import percent, plain, quantity, scale
 from ..data.corrections import jumps
+from ..data.run_labels import labels_of
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.rule import DecisionRule
 from ..diagnosis.trials import Trial, judge
@@ -34,7 +35,7 @@ from ..physics.drive import DRIVES
 from ..physics.effect import CLOSURE
 from ..user_code.load import defined
 from ..view import Viewable
-from .closure_file import Closure, Input, Region, Store, closure_text, rounded
+from .closure_file import Closure, Input, Region, Store, closure_text, evened, rounded
 from .closure_names import Nearest, nearest_effect
 from .signals import faded
 
@@ -73,6 +74,9 @@ FOLDS = 4
 
 FEWEST_REVERSALS = 2 * FOLDS
 """Reversals of a single training run from which on parts of it are folds."""
+
+QUANTILES, END = 20, 1.7
+"""Of an input, whose ranks go evenly from -END to END: that of what is even, in deviations."""
 
 MOST = 40_000
 """Samples of the training runs, about, that are used."""
@@ -375,7 +379,9 @@ def promised(train: Problem, model: Model) -> float:
 
 
 def _grids(train: Problem, model: Model) -> tuple[list[tuple[_Grid, list[_Tried]]], float]:
-    """Return the networks without and with the displacement that are drawn, and the loss without.
+    """Return the networks that are drawn, and the loss without one.
+
+    They are without and with the displacement, without and with the labels of the runs.
 
     Parameters
     ----------
@@ -389,8 +395,9 @@ def _grids(train: Problem, model: Model) -> tuple[list[tuple[_Grid, list[_Tried]
         for run, row in zip(train.runs, rows, strict=True)
     ]
     fold, out = _folds(rows), []
-    for position in (False, True):
-        inputs = inputs_of(train.runs, position)
+    of_runs = label_inputs(train.runs)
+    for position, labels in product((False, True), (True, False) if of_runs else (False,)):
+        inputs = (*inputs_of(train.runs, position), *(of_runs if labels else ()))
         grid = _Grid([_Seen(train, model, run, inputs) for run in train.runs], rows, y, fold)
         drawn = [one for few, steep in product(SEES, STEEP) for one in grid.drawn(few, steep)]
         out.append((grid, drawn))
@@ -402,7 +409,7 @@ def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None
     grids, without = _grids(train, model)
     grid, _ = min(grids, key=lambda pair: min(loss for loss, _, _ in pair[1]))
     if len(train.runs) == 1:  # its parts are alike: they would not see a network stray
-        tried = [grid.trained(max(DECAYS))]
+        tried = [grid.trained(decay) for decay in DECAYS[1:]]
     else:
         tried = [*(one for _, drawn in grids for one in drawn), *map(grid.trained, DECAYS)]
     least = min(loss for loss, _, _ in tried)
@@ -454,6 +461,17 @@ def inputs_of(runs: Sequence[Run], position: bool) -> tuple[Input, ...]:
     return tuple(out)
 
 
+def label_inputs(runs: Sequence[Run]) -> tuple[Input, ...]:
+    """Return the inputs that are numbers of whole runs."""
+    every = [one for one in labels_of([run.labels for run in runs]) if one.is_number]
+    return tuple(
+        Input("label", 0.0, 1.0, one.name, *rounded(np.array([low, high, middle])).tolist())
+        for one in every
+        for numbers in [one.numbers()]
+        for low, high, middle in [(numbers.min(), numbers.max(), numbers.mean())]
+    )
+
+
 def _time(runs: Sequence[Run]) -> float:
     """Return the time scale of a motion [s]: RMS displacement over RMS velocity."""
     x = np.concatenate([run.x - np.mean(run.x) for run in runs])
@@ -471,7 +489,13 @@ class _Seen:
         self.fed = problem.fed(model, run)
         x, v, _, V, dt = self.fed.moments
         held = np.where(jumps(V), np.append(V[:1], V[:-1]), V)  # what acted up to a jump
-        self.signals = np.column_stack([_history(one, x, v, V, held, dt) for one in inputs])
+        self.signals = np.column_stack(
+            [
+                np.full(len(v), _number(one, run)) if one.label
+                else _history(one, x, v, V, held, dt)
+                for one in inputs
+            ]
+        )  # fmt: skip
 
     @property
     def plain(self) -> bool:
@@ -499,6 +523,12 @@ class _Seen:
         """Return how far a network is supported (n,): 1 inside its region, 0 far outside."""
         inside = closure.region.inside(closure.scaled(self.signals))
         return self.at(inside, np.arange(len(self.run.force)))
+
+
+def _number(one: Input, run: Run) -> float:
+    """Return the number of a run that an input is."""
+    told = run.labels.get(one.label, one.usual)
+    return min(max(one.usual if isinstance(told, str) else told, one.low), one.high)
 
 
 def _history(one: Input, x: Array, v: Array, V: Array, held: Array, dt: float) -> Array:
@@ -555,15 +585,23 @@ class _Grid:
         middle, spread = np.mean(every, axis=0), np.std(every, axis=0)
         self.middle = rounded(middle)
         self.spread = rounded(np.maximum(spread, 1e-9 * (1.0 + np.abs(middle))))
-        self.scaled = [(one.signals - self.middle) / self.spread for one in seen]
+        scaled = (every - self.middle) / self.spread
+        self.knots = tuple(map(_line, scaled.T))
+        self.evened = [
+            evened((one.signals - self.middle) / self.spread, self.knots) for one in seen
+        ]
         self.parts = [fold == k for k in range(FOLDS) if np.any(fold == k)]
-        self.region = region_of((every - self.middle) / self.spread)
-        self.used = np.concatenate([one.at(u, row) for one, u, row in self._runs()])
-        self.windows = [region_of(self.used[~part]).inside(self.used[part]) for part in self.parts]
+        moving = len([one for one in seen[0].inputs if not one.label])
+        self.region = region_of(scaled[:, :moving])
+        used = np.concatenate(
+            [one.at(one.signals, row) for one, row in zip(seen, rows, strict=True)]
+        )
+        used = ((used - self.middle) / self.spread)[:, :moving]
+        self.windows = [region_of(used[~part]).inside(used[part]) for part in self.parts]
         self.powers = [float(self.y[part] @ self.y[part]) for part in self.parts]
 
     def _runs(self) -> list[tuple[_Seen, Array, Indices]]:
-        return list(zip(self.seen, self.scaled, self.rows, strict=True))
+        return list(zip(self.seen, self.evened, self.rows, strict=True))
 
     def drawn(self, few: int, steep: float) -> list[_Tried]:
         """Return networks of all sizes and penalties: loss on left-out folds, hidden units, itself.
@@ -649,11 +687,17 @@ class _Grid:
         k = len(self.middle)
         largest = max(float(np.max(np.abs(force))), 1e-9)
         return Closure(
-            self.seen[0].inputs, self.middle, self.spread, self.region, hidden, bias,
+            self.seen[0].inputs, self.middle, self.spread, self.region, self.knots, hidden, bias,
             theta[1 + k :], theta[1 : 1 + k], float(theta[0]),
             float(rounded(np.array([BOUND * largest]))[0]), Store(0.0, 0.0, 0.0, 0.0),
             self.seen[0].run.drive,
         )  # fmt: skip
+
+
+def _line(u: Array) -> tuple[Array, Array]:
+    """Return the quantiles of an input (m,), each once, and their ranks."""
+    at, first = np.unique(rounded(np.quantile(u, np.linspace(0.0, 1.0, QUANTILES))), True)
+    return at, rounded(np.linspace(-END, END, QUANTILES))[first]
 
 
 def _columns(u: Array, hidden: Array, bias: Array) -> Array:
@@ -749,13 +793,8 @@ def _lives_on(
         still = np.array([one.words == words for one in closure.inputs])
         rest = []
         for one, run in zip(seen, runs, strict=True):
-            signals = np.where(still, closure.middle, one.signals)
             near = closure.region.inside(closure.scaled(one.signals))
-            u = closure.scaled(signals)
-            net = _columns(u, closure.hidden, closure.bias) @ np.concatenate(
-                [[closure.constant], closure.linear, closure.out]
-            )
-            force = closure.size * np.tanh(net / closure.size) * near
+            force = near * closure.output(np.where(still, closure.middle, one.signals))
             rest.append(one.shown(force[:, None])[run.skip :, 0])
         changed = float(np.mean((np.concatenate(rest) - own) ** 2))
         out.append((words, min(changed / total, 1.0)))

@@ -13,12 +13,15 @@ give back themselves. So over a closed cycle the device gives no energy, and in 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.arrays import Array
 from ..core.text import literal
+from ..data.channels import TEMPERATURE, label_name
+from ..diagnosis.by_label import word_of
 from ..physics.drive import drive_named, unit_for
 from ..physics.effect import CLOSURE
 from .effect_file import class_data
@@ -35,17 +38,23 @@ class Input:
 
     `kind` is "v", "x" or "V"; "direction", tanh(v/slow); "way", the same fading over a travel of
     `over` [m]; "recent_v" or "recent_V", by how much the signal has left its trace behind a lag of
-    `over` [s]: beside the signal the trace itself tells little that is new.
+    `over` [s]: beside the signal the trace itself tells little that is new. "label" is the number
+    `label` of the run, held at the ends of what the training runs had, `low` to `high`; a run
+    without it has the `usual` one.
     """
 
     kind: str
     over: float
     slow: float = 1.0
+    label: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    usual: float = 0.0
 
     @property
     def words(self) -> str:
         """The group of inputs that it belongs to, for a sentence."""
-        return {
+        return label_name(self.label) or {
             "v": "velocity", "direction": "velocity", "x": "displacement", "V": "the command",
             "recent_v": "the past of the velocity", "recent_V": "the past of the command",
             "way": "the way since the last reversals",
@@ -70,10 +79,10 @@ class Store:
 
 @dataclass(frozen=True)
 class Region:
-    """Where the training runs support a network, in its k scaled inputs.
+    """Where the training runs support a network, in its k scaled inputs that are no labels.
 
-    `low`, `high` (k,) their range, `margin` (k,) over which it fades beyond; `axes` (k, k), whose
-    product with the inputs has the length `reach` at the most.
+    These come first. `low`, `high` (k,) their range, `margin` (k,) over which it fades beyond;
+    `axes` (k, k), whose product with them has the length `reach` at the most.
     """
 
     low: Array
@@ -84,6 +93,7 @@ class Region:
 
     def inside(self, u: Array) -> Array:
         """Return how far scaled inputs (m, k) are supported (m,): 1 in the region, 0 far away."""
+        u = u[:, : len(self.low)]
         beyond = np.maximum(np.maximum(self.low - u, u - self.high), 0.0) / self.margin
         away = np.sqrt(np.sum((u @ self.axes.T) ** 2, axis=1)) / self.reach - 1.0
         return np.asarray(np.prod(_faded(beyond), axis=1) * _faded(away / FADES))
@@ -93,7 +103,8 @@ class Region:
 class Closure:
     """A network of one hidden layer.
 
-    Of its k `inputs`: `middle`, `spread` (k,) to scale them, and the `region` that supports it;
+    Of its k `inputs`: `middle`, `spread` (k,) to scale them, the `region` that supports it, and
+    per input the `knots` and levels of the broken line that `evened` has;
     `hidden` (n, k), `bias` (n,), `out` (n,) [N], `linear` (k,) [N], `constant` [N]; `size` [N] the
     force that it comes near at most. `drive` is the command's channel.
     """
@@ -102,6 +113,7 @@ class Closure:
     middle: Array
     spread: Array
     region: Region
+    knots: tuple[tuple[Array, Array], ...]
     hidden: Array
     bias: Array
     out: Array
@@ -120,11 +132,25 @@ class Closure:
         """Return inputs (m, k) scaled by their middle and spread."""
         return np.asarray((signals - self.middle) / self.spread)
 
+    def output(self, signals: Array) -> Array:
+        """Return the network's force (m,) [N] at inputs (m, k), supported or not."""
+        u = evened(self.scaled(signals), self.knots)
+        net = np.tanh(u @ self.hidden.T + self.bias) @ self.out + u @ self.linear + self.constant
+        return np.asarray(self.size * np.tanh(net / self.size))
+
     def force(self, signals: Array) -> Array:
         """Return the force (m,) [N] at inputs (m, k), whatever the store of energy holds."""
-        u = self.scaled(signals)
-        net = np.tanh(u @ self.hidden.T + self.bias) @ self.out + u @ self.linear + self.constant
-        return np.asarray(self.size * np.tanh(net / self.size) * self.region.inside(u))
+        return self.output(signals) * self.region.inside(self.scaled(signals))
+
+
+def evened(u: Array, knots: Sequence[tuple[Array, Array]]) -> Array:
+    """Return scaled inputs (m, k), each in the middle between itself and its rank.
+
+    The broken line of an input through its quantiles is its rank: where the runs have much, what
+    they tell in detail is spread out.
+    """
+    ranks = [np.interp(own, *line) for own, line in zip(u.T, knots, strict=True)]
+    return np.asarray(0.5 * (u + np.column_stack(ranks)))
 
 
 def _faded(beyond: Array) -> Array:
@@ -149,11 +175,12 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
     inputs = closure.inputs
     recent = [k for k, one in enumerate(inputs) if one.kind.startswith("recent")]
     states = {f"s{k}": _unit(one, closure.drive) for k, one in enumerate(inputs) if one.over}
+    labels = {word: one for word, one in zip(_words(inputs), inputs, strict=True) if one.label}
     starts = {f"s{k}": inputs[k].kind[-1] for k in recent}
     needs = ["v", "dt", "energy", *(["x"] if any(one.kind == "x" for one in inputs) else [])]
     needs += ["V"] if any(one.kind in ("V", "recent_V") for one in inputs) else []
     words = ", ".join(dict.fromkeys(one.words for one in inputs))
-    names = [f"u{k}" for k in range(len(inputs))]
+    names, even = ([f"{one}{k}" for k in range(len(inputs))] for one in "ue")
     title = name.replace("_", " ").capitalize()
     store, region = closure.store, closure.region
     lines = [
@@ -161,7 +188,7 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         "",
         "from math import exp, sqrt, tanh",
         "",
-        "from bristle.physics.effect import Effect",
+        f"from bristle.physics.effect import Effect,{' Parameter,' if labels else ''} interpolate",
         "",
         f"SIZE = {_n(closure.size)}",
         '"""Force [N] that it comes near at most."""',
@@ -169,6 +196,11 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         '"""Energy [J] that the device may give back at the start, and at most; and in springs."""',
         f"SOON, SLOW = {_n(store.soon)}, {_n(store.slow)}",
         '"""Time [s] in which it may do so; speed [m/s] below which it fades where it may not."""',
+        *(
+            f"KNOTS{k}, LEVELS{k} = {_row(at)}, {_row(levels)}"
+            for k, (at, levels) in enumerate(closure.knots)
+        ),
+        '"""Quantiles of its inputs in the training runs, and their ranks."""',
         "",
         "",
         "def fading(beyond):",
@@ -177,13 +209,13 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         "    return 1.0 - share * share * (3.0 - 2.0 * share)",
         "",
         "",
-        f"def inside({', '.join(names)}):",
+        f"def inside({', '.join(names[: len(region.low)])}):",
         '    """Return how far the training runs support scaled inputs: 1, or less beyond them."""',
         "    near = 1.0",
         *(
             f"    near = near * fading(max({_n(low)} - {u}, {u} - {_n(high)}) / {_n(margin)})"
             for u, low, high, margin in zip(
-                names, region.low, region.high, region.margin, strict=True
+                names, region.low, region.high, region.margin, strict=False
             )
         ),
         "    away = 0.0",
@@ -193,9 +225,13 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         "",
         f"def network({', '.join(names)}):",
         '    """Return the network\'s force [N] at scaled inputs."""',
-        f"    f = {_sum(closure.linear, names)} + {_n(closure.constant)}",
         *(
-            f"    f = f + {_n(out)} * tanh({_sum(row, names)} + {_n(bias)})"
+            f"    e{k} = 0.5 * ({u} + interpolate({u}, KNOTS{k}, LEVELS{k}))"
+            for k, u in enumerate(names)
+        ),
+        f"    f = {_sum(closure.linear, even)} + {_n(closure.constant)}",
+        *(
+            f"    f = f + {_n(out)} * tanh({_sum(row, even)} + {_n(bias)})"
             for row, bias, out in zip(closure.hidden, closure.bias, closure.out, strict=True)
         ),
         "    return SIZE * tanh(f / SIZE)",
@@ -216,6 +252,7 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         f"    needs = {class_data(tuple(needs))}",
         f"    states = {class_data({**states, 'taken': 'J'})}",
         *([f"    starts = {class_data(starts)}"] if starts else []),
+        *(_label_lines(labels) if labels else []),
         "    passive = True",
         f"    zero_at_rest = {store.begin <= 0.0}",
         f"    source = {literal(origin)}",
@@ -225,12 +262,12 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         "    def parallel(q, z, p):",
         "        left = MOST - max(MOST - BEGIN + KEPT, z.taken) + q.energy",
         *(
-            f"        u{k} = ({_signal(k, one)} - {_n(middle)}) / {_n(spread)}"
-            for k, (one, middle, spread) in enumerate(
-                zip(inputs, closure.middle, closure.spread, strict=True)
+            f"        u{k} = ({_signal(k, one, word)} - {_n(middle)}) / {_n(spread)}"
+            for k, (one, word, middle, spread) in enumerate(
+                zip(inputs, _words(inputs), closure.middle, closure.spread, strict=True)
             )
         ),
-        f"        f = inside({', '.join(names)}) * network({', '.join(names)})",
+        f"        f = inside({', '.join(names[: len(region.low)])}) * network({', '.join(names)})",
         "        power = max(left, 0.0) / max(SOON, 2.0 * q.dt)",
         "        held = min(max(q.v / SLOW if f > 0.0 else -q.v / SLOW, 0.0), 1.0)",
         "        return f * max(held, power / (max(-f * q.v, power) + 1e-300))",
@@ -259,7 +296,38 @@ def _unit(one: Input, drive: str) -> str:
     return unit_for(unit, drive_named(drive))
 
 
-def _signal(k: int, one: Input) -> str:
+def _words(inputs: Sequence[Input]) -> list[str]:
+    """Return the parameter's name of each input that is a label, each another one."""
+    words = [word_of(one.label) for one in inputs]
+    return [w if words.count(w) == 1 else f"{w}_{k}" for k, w in enumerate(words)]
+
+
+def _label_lines(labels: dict[str, Input]) -> list[str]:
+    """Return the class data of labels, by the names of their parameters."""
+    names = {word: one.label for word, one in labels.items()}
+    far = [1e3 * max(abs(one.low), abs(one.high), 1.0) for one in labels.values()]
+    return [
+        f"    labels = {class_data(names)}",
+        f"    assumed = {class_data(tuple(names))}",
+        "    start_shares = ({},)",
+        "    parameters = {",
+        *(
+            f'        "{word}": Parameter({_n(one.usual)}, '
+            f'"{"degC" if one.label == TEMPERATURE else "1"}", '
+            f"({_n(-most)}, {_n(most)}), {literal(f'{one.words} of the run')}),"
+            for (word, one), most in zip(labels.items(), far, strict=True)
+        ),
+        "    }",
+    ]
+
+
+def _row(values: Array) -> str:
+    return f"({', '.join(map(_n, values))},)"
+
+
+def _signal(k: int, one: Input, word: str) -> str:
+    if one.label:
+        return f"min(max(p.{word}, {_n(one.low)}), {_n(one.high)})"
     if one.kind.startswith("recent"):
         return f"(q.{one.kind[-1]} - z.s{k})"
     if one.kind == "direction":

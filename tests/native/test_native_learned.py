@@ -93,18 +93,21 @@ def network() -> Closure:
     inputs = (
         Input("v", 0.0), Input("x", 0.0), Input("recent_v", 0.03), Input("way", 0.002, 0.01),
         Input("V", 0.0), Input("recent_V", 0.05),
+        Input("label", 0.0, 1.0, "oil", 80.0, 100.0, 95.0),
     )  # fmt: skip
     size = len(inputs)
     draw = np.random.default_rng(1)
-    middle, spread = np.zeros(size), np.array([0.1, 0.01, 0.1, 0.5, 3.0, 3.0])
-    end = np.full(size, 2.0)
-    region = Region(-end, end, 0.5 * end, np.eye(size), 4.0)
+    middle, spread = np.zeros(size), np.array([0.1, 0.01, 0.1, 0.5, 3.0, 3.0, 90.0])
+    end = np.full(size - 1, 2.0)
+    region = Region(-end, end, 0.5 * end, np.eye(size - 1), 4.0)
+    line = np.array([-2.0, -0.1, 0.2, 2.0]), np.array([-1.7, -0.5, 0.6, 1.7])
     hidden, bias, out, linear = (
         rounded(draw.standard_normal(shape)) for shape in ((8, size), 8, 8, size)
     )
     store = Store(0.001, 0.02, 0.008, 1e-3)
     return Closure(
-        inputs, middle, spread, region, hidden, bias, out, linear, 0.1, 5.0, store, "voltage"
+        inputs, middle, spread, region, (line,) * size, hidden, bias, out, linear, 0.1, 5.0, store,
+        "voltage",
     )  # fmt: skip
 
 
