@@ -180,6 +180,7 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
     needs = ["v", "dt", "energy", *(["x"] if any(one.kind == "x" for one in inputs) else [])]
     needs += ["V"] if any(one.kind in ("V", "recent_V") for one in inputs) else []
     words = ", ".join(dict.fromkeys(one.words for one in inputs))
+    moving = len(closure.region.low)
     names, even = ([f"{one}{k}" for k in range(len(inputs))] for one in "ue")
     title = name.replace("_", " ").capitalize()
     store, region = closure.store, closure.region
@@ -209,17 +210,17 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
         "    return 1.0 - share * share * (3.0 - 2.0 * share)",
         "",
         "",
-        f"def inside({', '.join(names[: len(region.low)])}):",
+        f"def inside({', '.join(names[:moving])}):",
         '    """Return how far the training runs support scaled inputs: 1, or less beyond them."""',
         "    near = 1.0",
         *(
             f"    near = near * fading(max({_n(low)} - {u}, {u} - {_n(high)}) / {_n(margin)})"
             for u, low, high, margin in zip(
-                names, region.low, region.high, region.margin, strict=False
+                names[:moving], region.low, region.high, region.margin, strict=True
             )
         ),
         "    away = 0.0",
-        *(f"    away = away + ({_sum(row, names)}) ** 2" for row in region.axes),
+        *(f"    away = away + ({_sum(row, names[:moving])}) ** 2" for row in region.axes),
         f"    return near * fading((sqrt(away) / {_n(region.reach)} - 1.0) / {FADES})",
         "",
         "",
@@ -267,7 +268,7 @@ def closure_text(name: str, closure: Closure, origin: str) -> str:
                 zip(inputs, _words(inputs), closure.middle, closure.spread, strict=True)
             )
         ),
-        f"        f = inside({', '.join(names[: len(region.low)])}) * network({', '.join(names)})",
+        f"        f = inside({', '.join(names[:moving])}) * network({', '.join(names)})",
         "        power = max(left, 0.0) / max(SOON, 2.0 * q.dt)",
         "        held = min(max(q.v / SLOW if f > 0.0 else -q.v / SLOW, 0.0), 1.0)",
         "        return f * max(held, power / (max(-f * q.v, power) + 1e-300))",

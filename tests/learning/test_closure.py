@@ -17,6 +17,7 @@ from bristle.identification.problem import Problem
 from bristle.learning.closure import (
     LearnedClosure,
     held_by_springs,
+    label_inputs,
     learn_closure,
     lowers,
     one_amplitude,
@@ -101,6 +102,23 @@ def test_what_it_may_win_is_told_before_it_is_trained() -> None:
     base, train = told.before.model, told.problem
     assert learned().folds <= promised(train, base) < 0.8
     assert promised(train.of([train.runs[0].of(slice(0, 60))]), base) == 1.0
+
+
+def test_a_label_of_the_runs_is_an_input_held_at_what_they_had() -> None:
+    closure, part = network(), runs().runs[2]
+    oils = [replace(part, labels={"oil": oil, "batch": "A"}) for oil in (80.0, 100.0, 95.0)]
+    (oil,) = label_inputs(oils)
+    assert (oil.words, oil.low, oil.high) == ("oil", 80.0, 100.0)
+    line = np.array([-1.0, 1.0]), np.array([-1.7, 1.7])
+    more = replace(
+        closure, inputs=(*closure.inputs, oil), middle=np.append(closure.middle, 90.0),
+        spread=np.append(closure.spread, 10.0), linear=np.append(closure.linear, 0.5),
+        knots=(*closure.knots, line), hidden=np.pad(closure.hidden, ((0, 0), (0, 1))),
+    )  # fmt: skip
+    motion = sine(0.008, 2.0, 2)
+    force = [forces(more, motion, {**VALUES, f"{NAME}.oil": told}) for told in (70.0, 80.0, 100.0)]
+    assert np.array_equal(force[0], force[1])
+    assert np.abs(force[2] - force[1]).max() > 1.0
 
 
 def test_of_a_single_run_it_says_that_it_knows_no_other() -> None:
