@@ -2,8 +2,8 @@
 
 python docs/page_pictures.py STUDY OUT [VIEW ...]
 
-Views 2 and 4 are shown at work as well, as fit_live and verdict_live: on a copy of the study, whose
-work is cancelled. Needs Playwright and Chromium.
+View 4 is shown at work as well, as verdict_live: on a copy of the study, whose work is cancelled.
+Needs Playwright and Chromium.
 """
 
 from __future__ import annotations
@@ -25,10 +25,7 @@ VIEWS = (
     "home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design",
     "controllers",
 )  # fmt: skip
-LIVE = {
-    "fit_live": ("Identify", "section.fits canvas >> nth=3"),
-    "verdict_live": ("Diagnose", "h3:text('What remains of the cost')"),
-}
+LIVE = {"verdict_live": ("Diagnose", "h3:text('What remains of the cost')")}
 """Views at work: the button that starts it, and what shows that it is well under way."""
 WORK = 300.0
 """Seconds within which that must be shown."""
