@@ -415,9 +415,10 @@ class Expected:
             return told
         there = f"{plain(100 * self.tried_error, 2)} %"
         if self.step is None:
-            tried = f"{1e3 * self.tried:.4g} ms keeps it below {100 * TOLERANCE:g} %"
-            more = f", by its order {1e3 * self.wanted:.4g} ms would" if self.wanted else ""
-            return f"{told}; no step down to {tried}: it is {there} there{more}"
+            more = ", the shortest that was tried"
+            if self.wanted:
+                more = f", {100 * TOLERANCE:g} % at about {1e3 * self.wanted:.2g} ms (not tried)"
+            return f"{told}; {there} at a step of {1e3 * self.tried:.4g} ms{more}"
         return f"{told}; {there} at a step of {1e3 * self.step:.4g} ms"
 
 
