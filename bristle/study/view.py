@@ -345,7 +345,9 @@ def added_view(added: Added, folder: Path) -> View:
         said.append(Text("The error on the held-out runs did not fall."))
         then.insert(0, Next(command("undo", folder), "takes it out again"))
     title = f"Added: {effect_names(added.effects)} (step {added.step.number})."
-    return View(title, (*said, parameter_table(found, added.effects), *left_out(found), *then))
+    own = parameter_table(found, added.effects)
+    table = [own] if own.rows else []  # a closure's weights are no parameters
+    return View(title, (*said, *table, *left_out(found), *then))
 
 
 # The building alone.
