@@ -36,6 +36,9 @@ MOST_SPENT = 60e6
 """Steps of dampers' forces, see `Effort`, from which on no two effects are tried beside those that
 a model has: most is decided by then."""
 
+SWEEPS = 4
+"""Jacobians of the fit that gives the intervals of a bench."""
+
 NO_PAIRS = "Two effects at once were not tried beside those that the model has."
 
 NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the law."
@@ -83,7 +86,7 @@ def _with_limits(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     visible = detectable(problem, expected, rule, found.z_after)
     hidden = untestable(model, problem, expected, visible, rule, _able(found, prepared))
     experiment = None
-    if found.kind == "ambiguous" and prepared.scope.choose_motion:
+    if found.kind == "ambiguous" and prepared.bench:
         members = [t.model for t in found.trials if set(t.effects) & set(found.effects)]
         experiment = separating(members, prepared.problem)
     least = visible if found.noise_known else float("nan")
@@ -127,17 +130,17 @@ def _with_patterns(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
 
 
 def _with_intervals(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
-    """Return a finding with standard deviations; its model refitted where `Scope.sweeps` asks so.
+    """Return a finding with standard deviations; on a bench its model refitted.
 
     Parameters that the data cannot identify have none.
     """
     after = found.after
     assert after is not None
-    if not prepared.scope.sweeps:
-        fitted = intervals_of(prepared.problem, after.model)
+    if prepared.bench:
+        fitted = multistart_refit(prepared.problem, after.model, SWEEPS)
     else:
-        fitted = multistart_refit(prepared.problem, after.model, prepared.scope.sweeps)
-    if prepared.scope.sweeps and is_rough(after.model):
+        fitted = intervals_of(prepared.problem, after.model)
+    if prepared.bench and is_rough(after.model):
         again = judge(fitted.model, prepared.problem, prepared.held_out)
         after = min(after, again, key=lambda one: one.z)
     identifiable = {
@@ -189,7 +192,7 @@ def diagnose_rig(
     say("whether runs contradict each other")
     found = settled(found, prepared, runs, findings)
     say(f"verdict {found.briefly}")
-    if prepared.scope.any_law:
+    if prepared.bench:
         found = _beside_other_laws(found, prepared, runs.bends, say)
     findings[DAMPER] = with_evidence(found, prepared)
     return conclude(findings, runs.context(prepared))

@@ -256,7 +256,7 @@ def contradicted(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
     kind = kind_of(found.kind, before, found.after, rule)
     runs = prepared.searched, prepared.held_out, rule
     if found.kind == kind == "unknown":
-        text = groups(before.model, *runs, prepared.scope.restart)
+        text = groups(before.model, *runs, prepared.bench)
         return replace(found, kind="insufficient", reasons=(text,)) if text else found
     if found.kind == "unknown":
         differ = HELD_OUT_DIFFER.format(force=force_in(prepared.held_out, found.site))

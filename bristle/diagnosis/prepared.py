@@ -117,34 +117,15 @@ def refuse_lacking(folder: Path, lacking: Insufficient | None) -> None:
 
 
 @dataclass(frozen=True)
-class Scope:
-    """What a rig allows at each of its sites: a bench has one site, a building many and long runs.
-
-    `rank_all`: effects are tried, and ranked, even where noise is all that the model leaves.
-    `restart`: fits begin anew from several starts before runs are called contradictory, and
-    intervals are those of a refit of so many sweeps, `sweeps`; 0 takes the fit as it is.
-    `choose_motion`: the motion can be chosen, so that a run can be proposed. `any_law`: every law
-    can be held against the damper's samples; in a building the law decides which ones count.
-    """
-
-    rank_all: bool
-    restart: bool
-    sweeps: int
-    choose_motion: bool
-    any_law: bool
-
-
-ON_BENCH = Scope(rank_all=True, restart=True, sweeps=4, choose_motion=True, any_law=True)
-IN_BUILDING = Scope(rank_all=False, restart=False, sweeps=0, choose_motion=False, any_law=False)
-
-
-@dataclass(frozen=True)
 class Prepared:
     """What the diagnosis of a site begins with: runs freed of sensors' faults, and its model.
 
     `before` is the present model, fitted to `problem` and judged on `held_out`; `shown` the
     channels whose instruments may still have an effect; `part` the part of the training runs that
-    effects are searched on, None for all; `rule` the numbers that decide there.
+    effects are searched on, None for all; `rule` the numbers that decide there. On a `bench` the
+    motion can be chosen and runs are short: effects are ranked even where noise is all that is
+    left, fits begin anew before runs are called contradictory, intervals are those of a refit, a
+    run can be proposed, and every law is held against the samples.
     """
 
     before: Trial
@@ -155,7 +136,7 @@ class Prepared:
     shown: tuple[str, ...] = ()
     part: Problem | None = None
     rule: DecisionRule = BENCH
-    scope: Scope = ON_BENCH
+    bench: bool = True
 
     @property
     def searched(self) -> Problem:

@@ -43,7 +43,6 @@ from .load_cell import load_cell
 from .model_faults import model_based_faults
 from .prepared import (
     DRAWS,
-    IN_BUILDING,
     Insufficient,
     Prepared,
     Progress,
@@ -456,7 +455,7 @@ class BuildingRuns:
         shown, rule = ((), RECONSTRUCTED) if train.reconstructed else (SHOWN, INSIDE)
         return Prepared(
             before, train, held_out, self._sensors, self._noise, shown,
-            shortened(train, SEARCHED), rule, IN_BUILDING,
+            shortened(train, SEARCHED), rule, bench=False,
         )  # fmt: skip
 
     def excused(self, found: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]) -> SiteDiagnosis:

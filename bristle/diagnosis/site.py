@@ -40,7 +40,7 @@ from .decision import (
     suffices,
     unexplained,
 )
-from .prepared import IN_BUILDING, Prepared, Progress, of_layer, silent
+from .prepared import Prepared, Progress, of_layer, silent
 from .remaining import patterns_of
 from .rule import BENCH, SENSOR, SITE, DecisionRule
 from .site_diagnosis import SiteDiagnosis, of_decision
@@ -98,7 +98,7 @@ def prepare_line(
         start = replace(present, law=linear.name, values=values, limits=limits)
         base = fit(train, start, with_std=False)
     before = judge(base.model, train, held_out)
-    return Prepared(before, train, held_out, faults, noise or {}, rule=SITE, scope=IN_BUILDING)
+    return Prepared(before, train, held_out, faults, noise or {}, rule=SITE, bench=False)
 
 
 def joinable_at(site: str, base: Model) -> list[str]:
@@ -525,9 +525,7 @@ def noise_is_all(prepared: Prepared) -> bool:
     """Return whether a model leaves nothing that an effect could lower, and none is ranked then."""
     before = prepared.before
     known = prepared.held_out.noise_known
-    return (
-        known and not prepared.scope.rank_all and max(before.z, before.train) <= prepared.rule.quiet
-    )
+    return known and not prepared.bench and max(before.z, before.train) <= prepared.rule.quiet
 
 
 def _decided(

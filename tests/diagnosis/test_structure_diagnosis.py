@@ -16,7 +16,7 @@ from bristle.diagnosis.conclusion import VerdictContext, conclude, lookalikes
 from bristle.diagnosis.decision import Decision
 from bristle.diagnosis.inconsistent_runs import kind_of
 from bristle.diagnosis.load_cell import load_cell
-from bristle.diagnosis.prepared import IN_BUILDING, Prepared
+from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.rule import BENCH, INSIDE
 from bristle.diagnosis.site import diagnose_line, prepare_line, shortened
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis, of_decision
@@ -319,7 +319,7 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
 
     monkeypatch.setattr(of_damper, "try_all", search)
     none = StructureProblem([])
-    inside = Prepared(trial((), z, train), none, none, part=none, rule=INSIDE, scope=IN_BUILDING)
+    inside = Prepared(trial((), z, train), none, none, part=none, rule=INSIDE, bench=False)
     found, _ = of_damper.diagnose_damper(inside)
     assert len(asked) == searched
     assert found.kind == "none"
