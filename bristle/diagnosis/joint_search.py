@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from ..data.measurement import Measurement
+from ..data.run_labels import labels_of
 from ..errors import RecordError
 from ..identification.histories import Effort, counted
 from ..identification.rig import DAMPER
@@ -274,8 +275,10 @@ class TrialsByLaw:
             (row,) = fitted_anew([row], *runs.damper)
         prepared = runs.prepare(DAMPER, row.trial)
         assert prepared is not None
-        # What explains nothing with the zero free explains no more without: no search begins anew.
-        earlier = None if shortened and found.explains else made
+        # What explains nothing with the zero free explains no more without, but for a dependence on
+        # a label, which the free zero may hide: else no search begins anew.
+        anew = found.explains or labels_of([run.labels for run in prepared.problem.runs])
+        earlier = None if shortened and anew else made
         again = Trials(prepared, self.say, earlier, made if shortened else None)
         # Where two effects explained nothing they are not sought once more.
         whole = self._lacking(row, again, found.explains and law in self._two)
