@@ -132,17 +132,19 @@ def unproven(
 def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> list[Unproven]:
     """Return the laws that fit the training runs best, each with what its parameters owe labels.
 
-    Where a label parts the runs, a law without it tells little of what the law can do.
+    Where a label parts the runs, a law without it tells little of what the law can do: the
+    model's own is among them with it.
     """
+    others = [(row.law, row.trial.model) for row in laws if row.trial.model.law != model.law]
     able = []
-    for row in laws:
-        if row.trial.model.law != model.law:
-            gain = max((one.gain for one in promising(problem, row.trial.model)), default=0.0)
-            able.append((row.error_train.rms**2 * (1.0 - gain), gain > 0.0, row))
+    for law, own in [("", model), *others] if others else []:
+        gain = max((one.gain for one in promising(problem, own)), default=0.0)
+        if law or gain > 0.0:
+            rest = _mean_square(errors_of(own, problem)) * (1.0 - gain)
+            able.append((rest, gain > 0.0, Unproven(own, law)))
     able.sort(key=lambda one: one[0])
     closer = []
-    for rest, labelled, row in able[: 2 * TRIED]:
-        one = Unproven(row.trial.model, row.law)
+    for rest, labelled, one in able[: 2 * TRIED]:
         if labelled:
             one = _with_labels(one, problem)
             with defined(one.written):

@@ -227,7 +227,7 @@ def test_the_pair_of_law_and_effect_is_found(hidden, capsys):
     assert main(["diagnose", str(hidden), "--law", "all"]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith("Missing from the law bingham: gas spring.")
-    assert "--law bingham , then:  bristle add" in shown
+    assert 0 < shown.find("--law bingham\n") < shown.find("bristle add")
     found = json.loads((hidden / "verdict.json").read_text())
     assert (found["schema"], found["kind"], found["effects"]) == (2, "effect", ["gas_spring"])
     assert (found["law"], found["command"], found["law_before"]) == ("bingham", "linear", "lugre")
