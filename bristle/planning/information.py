@@ -263,11 +263,6 @@ def _scatter(columns: Array, run: Run, expected: Expected) -> Array:
     return np.asarray(total + scores.T @ scores / (len(draws) - 1))
 
 
-def of_roles(told: Sequence[Evidence], held_out: Sequence[bool]) -> list[Evidence]:
-    """Return what runs say, each in its role."""
-    return [one.judging() if out else one for one, out in zip(told, held_out, strict=True)]
-
-
 def samples_of(runs: Sequence[Run]) -> int:
     """Return how many samples of runs count."""
     return sum(len(run.x) - run.skip for run in runs)
