@@ -63,7 +63,7 @@ Node: TypeAlias = "dict[str, Any] | list[Any] | str | Leaf | Unread"
 
 
 @dataclass
-class _Found:
+class Found:
     """What a part of a file holds.
 
     `clocks` are (name of the time, time (n,) in its unit, channels (n,)); `loose` channels of no
@@ -75,6 +75,7 @@ class _Found:
     scalars: dict[str, float] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def free(self, *names: str) -> str:
         """Return the first name that no channel has, the last one with a number if all are taken.
@@ -111,11 +112,11 @@ def table_of(tree: Mapping[str, Node], name: str) -> Table:
     RecordError
         If there is no vector of numbers, or channels do not overlap in time.
     """
-    found = _Found()
+    found = Found()
     runs = next(_runs(tree), None)
     if runs is None:
         _scope(found, "", tree)
-        return _one_table(found, name)
+        return one_table(found, name)
     _scope(found, "", {key: one for key, one in tree.items() if key not in runs.within})
     return _run_by_run(found, runs, tree, name)
 
@@ -165,7 +166,7 @@ def _is_runs(nodes: list[Node]) -> bool:
     found = []
     for one in nodes:
         assert isinstance(one, dict)
-        inside = _Found()
+        inside = Found()
         _scope(inside, "", one)
         found.append({*inside.loose, *(k for _, _, data in inside.clocks for k in data)})
     return len(found[0]) > 1 and all(len(found[0] & other) > 1 for other in found[1:])
@@ -185,7 +186,7 @@ def _is_signal(node: Node) -> bool:
     return len(vectors) == 2 and sum(_is_time_name(key) for key in vectors) == 1
 
 
-def _run_by_run(beside: _Found, runs: _Runs, tree: Mapping[str, Node], name: str) -> Table:
+def _run_by_run(beside: Found, runs: _Runs, tree: Mapping[str, Node], name: str) -> Table:
     """Return the table of several runs, one below the other, with a column of their numbers.
 
     Parameters
@@ -197,9 +198,9 @@ def _run_by_run(beside: _Found, runs: _Runs, tree: Mapping[str, Node], name: str
     texts = {key: one for key, one in tree.items() if _texts(one)}
     tables = []
     for called, node in runs.nodes.items():
-        inside = _Found(scalars=dict(beside.scalars))
+        inside = Found(scalars=dict(beside.scalars))
         _scope(inside, "", node if isinstance(node, dict) else {**texts, runs.called: node})
-        tables.append(_one_table(inside, f"{name}, {called}"))
+        tables.append(one_table(inside, f"{name}, {called}"))
     joined = one_below_the_other(tables, name, "run")
     lost = {one.text for table in tables for one in table.columns} - set(joined.values)
     title = joined.split.removeprefix("column ")
@@ -215,14 +216,13 @@ def _run_by_run(beside: _Found, runs: _Runs, tree: Mapping[str, Node], name: str
     return replace(joined, remarks=tuple(remarks))
 
 
-def _one_table(found: _Found, name: str) -> Table:
+def one_table(found: Found, name: str) -> Table:
     """Return the table of one run."""
     found.clocks += [] if found.clocks else _by_steps(found)
     clocks = _merged(found)
     if not clocks:
         return _without_time(found, name)
     remarks = list(found.remarks)
-    notes: list[str] = []
     units: dict[str, str | None] = dict(found.units)
     series = [Series(_in_seconds(key, time, units), data) for key, time, data in clocks]
     series, loose = by_length(found.loose, series)
@@ -242,10 +242,10 @@ def _one_table(found: _Found, name: str) -> Table:
         remarks.append(
             f"left out, for they have another length than {rows}: {listed(sorted(loose))}"
         )
-    return from_arrays(data, name, units, tuple(notes), tuple(remarks))
+    return from_arrays(data, name, units, tuple(found.notes), tuple(remarks))
 
 
-def _merged(found: _Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
+def _merged(found: Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
     """Return the clocks, those of equal times as one."""
     out: list[tuple[str, AnyArray, dict[str, AnyArray]]] = []
     for key, time, data in found.clocks:
@@ -272,7 +272,7 @@ def _in_seconds(key: str, time: AnyArray, units: Mapping[str, str | None]) -> An
     return np.asarray(time, dtype=float) * factor
 
 
-def _by_steps(found: _Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
+def _by_steps(found: Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
     """Return clocks by the steps and starts that stand beside channels, [] where all are alike."""
     starts: dict[str, float] = {}
     steps: dict[str, float] = {}
@@ -300,7 +300,7 @@ def _by_steps(found: _Found) -> list[tuple[str, AnyArray, dict[str, AnyArray]]]:
     return list(clocks.values())
 
 
-def _without_time(found: _Found, name: str) -> Table:
+def _without_time(found: Found, name: str) -> Table:
     """Return the table of the vectors of the commonest length; a step or a rate gives the time."""
     lengths = Counter(map(len, found.loose.values()))
     if not lengths:
@@ -312,7 +312,7 @@ def _without_time(found: _Found, name: str) -> Table:
     remarks = list(found.remarks)
     if others:
         remarks.insert(0, f"left out, for they have another length than {size}: {listed(others)}")
-    notes = []
+    notes = list(found.notes)
     timed = any(_is_time_name(key) for key in data)
     for key, value in found.scalars.items():
         if not timed and (step := step_in(key, value)):
@@ -322,7 +322,7 @@ def _without_time(found: _Found, name: str) -> Table:
     return from_arrays(data, name, dict(found.units), tuple(notes), tuple(remarks))
 
 
-def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
+def _scope(found: Found, key: str, fields: Mapping[str, Node]) -> None:
     """Add what a structure holds.
 
     Parameters
@@ -381,7 +381,7 @@ def _scope(found: _Found, key: str, fields: Mapping[str, Node]) -> None:
             _list(found, long[one], node)
 
 
-def _note_counts(found: _Found, fields: Mapping[str, Node], names: Mapping[str, str]) -> None:
+def _note_counts(found: Found, fields: Mapping[str, Node], names: Mapping[str, str]) -> None:
     """Note whole numbers beside which a scale stands: nothing tells that they are its counts."""
     leaves = {key: node for key, node in fields.items() if isinstance(node, Leaf)}
     scales = [key for key in leaves if TELLS_SCALE.search(key)]
@@ -395,7 +395,7 @@ def _note_counts(found: _Found, fields: Mapping[str, Node], names: Mapping[str, 
             )
 
 
-def _structure(found: _Found, key: str, node: dict[str, Any]) -> None:
+def _structure(found: Found, key: str, node: dict[str, Any]) -> None:
     """Add a structure: signals of Simulink, of dSPACE, one signal, or any other."""
     signals = _get(node, ("signals",))
     if isinstance(signals, dict | list) and _add_simulink(found, key, node, signals):
@@ -408,7 +408,7 @@ def _structure(found: _Found, key: str, node: dict[str, Any]) -> None:
         _scope(found, key, node)
 
 
-def _list(found: _Found, key: str, nodes: list[Any]) -> None:
+def _list(found: Found, key: str, nodes: list[Any]) -> None:
     """Add the items of an array of structures or of a cell array, called `key(1)`, `key(2)` ..."""
     for number, one in enumerate(nodes, 1):
         called = f"{key}({number})" if len(nodes) > 1 else key
@@ -420,7 +420,7 @@ def _list(found: _Found, key: str, nodes: list[Any]) -> None:
             _scope(found, "", {called: one})
 
 
-def _add_simulink(found: _Found, key: str, node: dict[str, Any], signals: Any) -> bool:
+def _add_simulink(found: Found, key: str, node: dict[str, Any], signals: Any) -> bool:
     """Add signals of Simulink, structure with time or without, by their labels."""
     every = [one for one in (signals if isinstance(signals, list) else [signals]) if one]
     if not all(isinstance(one, dict) and isinstance(one.get("values"), Leaf) for one in every):
@@ -464,7 +464,7 @@ def _name_and_data(node: Mapping[str, Any]) -> tuple[str, AnyArray, str] | None:
     return text.strip().strip('"'), array, _unit_of(node)
 
 
-def _add_dspace(found: _Found, key: str, node: Mapping[str, Any]) -> None:
+def _add_dspace(found: Found, key: str, node: Mapping[str, Any]) -> None:
     """Add signals Y at the times X that their XIndex names."""
     xs, ys = (
         one if isinstance(one, list) else [one] for one in (_get(node, ("x",)), _get(node, ("y",)))
@@ -493,7 +493,7 @@ def _add_dspace(found: _Found, key: str, node: Mapping[str, Any]) -> None:
             found.loose[called] = array
 
 
-def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
+def _add_signal(found: Found, key: str, node: Mapping[str, Any]) -> None:
     """Add one signal with its name, or with its own time."""
     named = _name_and_data(node)
     vectors = {one: array for one, v in node.items() if (array := _vector(v)) is not None}
@@ -528,7 +528,7 @@ def _add_signal(found: _Found, key: str, node: Mapping[str, Any]) -> None:
 
 
 def _matrix(
-    found: _Found, key: str, short: str, node: Leaf, fields: Mapping[str, Node], timed: bool
+    found: Found, key: str, short: str, node: Leaf, fields: Mapping[str, Node], timed: bool
 ) -> None:
     """Add the columns of a matrix, by the names and units that stand beside it.
 
@@ -567,7 +567,7 @@ def _matrix(
 
 
 def _for_columns(
-    found: _Found, key: str, fields: Mapping[str, Node], tells: re.Pattern[str], count: int,
+    found: Found, key: str, fields: Mapping[str, Node], tells: re.Pattern[str], count: int,
     first_rises: bool,
 ) -> list[str]:  # fmt: skip
     """Return the texts beside a matrix that are one for each of its columns, [] if there are none.

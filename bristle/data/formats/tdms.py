@@ -20,10 +20,11 @@ from ...core.text import listed, plain
 from ...errors import RecordError
 from ...units import parse as parse_unit
 from ..channels import quantity_of_unit
-from ..table import Table, from_arrays
+from ..table import Table
 from ..titles import unit_or_none
 from . import DAMAGED, _one_time, library
-from ._one_time import SAME, AnyArray, Series, by_length, on_one_time, overlap, unset_step
+from ._one_time import SAME, AnyArray, Series, by_length, overlap, unset_step
+from ._tree import Found, one_table
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
 _UNSET = np.datetime64("1904-01-02")
@@ -329,49 +330,29 @@ def _table(
 ) -> Table:  # fmt: skip
     """Return the table of the channels in some groups of a file."""
     every = {key: one for group in read for key, one in groups[group].items()}
-    units: dict[str, str | None] = {key: one.unit for key, one in every.items()}
-    series = [one for group in read for one in clocks[group].series]
-    untimed = {key: array for group in read for key, array in clocks[group].untimed.items()}
-    series, untimed = by_length(untimed, series)
-    notes = [] if len(groups) == 1 else [f"of {len(groups)} groups {_named(read)} read"]
-    if not series:
-        size = Counter(map(len, untimed.values())).most_common(1)[0][0]
-        data = {key: array for key, array in untimed.items() if len(array) == size}
-        remarks = [*_another_length(untimed, size), *remarks]
-        return from_arrays(data, name, units, tuple(notes), tuple(remarks))
-    made = any(clocks[group].made for group in read)
-    times = {key for group in read for key in clocks[group].times}
-    series = [one for one in series if set(one.data) - times] or series[:1]
-    if len(series) == 1:
-        size, step = len(series[0].time), series[0].step
-        time, found = np.arange(size) * step, series[0].data
-        made = made and not set(found) & times
-    else:
-        bare = [({k: v for k, v in one.data.items() if k not in times}, one) for one in series]
-        joined = on_one_time([Series(one.time, data) for data, one in bare], name)
-        time, found = joined.time, joined.data
-        made, remarks = True, [*joined.remarks, *remarks]
-    data = {key: found[key] for key in every if key in found}
-    if made:
-        data, units["time"] = {"time": time, **data}, "s"
-        if len(series) == 1:
-            called = {one.called for one in every.values() if one.step}
-            told = f"the time is made from {listed(sorted(called))}: {step:g} s a sample"
-            (notes if called == {_STEP} else remarks).append(told)
-            remarks = [*unset_step(_STEP, step), *remarks]
-    remarks = [*_another_length(untimed, len(time)), *remarks]
-    return from_arrays(data, name, units, tuple(notes), tuple(remarks))
-
-
-def _named(read: list[str]) -> str:
-    """Return groups by name with the verb that follows."""
-    names = listed(f'"{one}"' for one in read)
-    return f"{names} {'is' if len(read) == 1 else 'are'}"
-
-
-def _another_length(channels: dict[str, AnyArray], size: int) -> list[str]:
-    others = [key for key, array in channels.items() if len(array) != size]
-    return [f"left out, for nothing tells their time: {listed(others)}"] if others else []
+    found = Found(units={key: one.unit for key, one in every.items() if one.unit}, remarks=remarks)
+    if len(groups) > 1:
+        told = listed(f'"{one}"' for one in read)
+        verb = "is" if len(read) == 1 else "are"
+        found.notes.append(f"of {len(groups)} groups {told} {verb} read")
+    for clock in (clocks[group] for group in read):
+        for one in clock.series:
+            own = next((key for key in clock.times if key in one.data), "")
+            if own and every[own].array.dtype.kind == "M":
+                found.units[own] = "s"
+            data = {key: array for key, array in one.data.items() if key != own}
+            time = one.time / parse_unit(found.units.get(own, "s")).factor
+            found.clocks.append((own or "time", time, data))
+        found.loose |= clock.untimed
+    times = [(called, time) for called, time, data in found.clocks if data]
+    if len(times) == 1 and times[0][0] == "time" and "time" not in every:
+        called = {one.called for one in every.values() if one.step}
+        step = float(np.median(np.diff(times[0][1])))
+        told = f"the time is made from {listed(sorted(called))}: {step:g} s a sample"
+        (found.notes if called == {_STEP} else found.remarks).append(told)
+        found.remarks[:0] = unset_step(_STEP, step)
+        found.units["time"] = "s"
+    return one_table(found, name)
 
 
 def _is_time(name: str, array: Any, unit: str | None) -> bool:
