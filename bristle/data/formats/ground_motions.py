@@ -8,7 +8,8 @@ states twice must agree: a count with the values, a duration with step and count
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -92,11 +93,7 @@ def read(content: bytes, name: str) -> Table:
         raise RecordError(f"{name}: the file is empty. AT2 has four title lines, then values.")
     try:
         found = (_archive(content) or _at2)(lines, name)
-        values = np.array([
-            number(field, name, line, found.factor)
-            for line, row in enumerate(lines[found.first : found.end], found.first + 1)
-            for field in _fields(row)
-        ])  # fmt: skip
+        values = np.array(_numbers(lines, found.first, found.end, name, found.factor))
     except PhysicsError as error:
         raise RecordError(str(error)) from None
     where = f"{name}, line {found.said}"
@@ -158,6 +155,27 @@ def _fields(row: str) -> Iterator[str]:
         # Of 1.5-101 no one can say whether it is two numbers, or one without its E.
         whole = plain_field if plain_field[-1].isdigit() else field.upper()  # END is no ENE
         yield from parts if all(map(_VALUE.fullmatch, parts)) else (whole,)
+
+
+def _numbers(
+    lines: Sequence[str], begin: int, end: int | None, name: str, factor: float = 1.0
+) -> list[float]:
+    """Return the numbers in some lines, counted from 0, times a factor."""
+    return [
+        number(field, name, line, factor)
+        for line, row in enumerate(lines[begin:end], begin + 1)
+        for field in _fields(row)
+    ]
+
+
+def _told(
+    found: Mapping[str, tuple[str, int]], key: str, name: str, archive: str
+) -> tuple[str, int]:
+    """Return what title lines say for a key, and in which line."""
+    match = next((one for title, one in found.items() if title.startswith(key)), ("", 0))
+    if not match[1] or not (match[0].strip() or key == "memo"):
+        raise PhysicsError(f'{name}: no "{key}" in the title lines, which {archive} has.')
+    return match
 
 
 def _factor(text: str, where: str) -> float:
@@ -249,11 +267,7 @@ def _esm(lines: Sequence[str], name: str) -> _Record:
             break
         found.setdefault(pair[1], (pair[2], line))
 
-    def of(key: str) -> tuple[str, int]:
-        if not found.get(key, ("", 0))[0]:
-            raise PhysicsError(f"{name}: no {key} in the title lines, which ESM and ITACA have.")
-        return found[key]
-
+    of = partial(_told, found, name=name, archive="ESM")
     kind = found.get("DATA_TYPE", ("ACCELERATION", 0))
     if not kind[0].upper().startswith("ACC"):
         raise _not_accelerations(kind[0].lower(), f"{name}, line {kind[1]}")
@@ -275,12 +289,7 @@ def _knet(lines: Sequence[str], name: str) -> _Record:
     """Of K-NET and KiK-net: titles of 18 letters up to `Memo.`, then counts and their scale."""
     found = {line[:18].strip().lower(): (line[18:], k) for k, line in enumerate(lines[:24], 1)}
 
-    def of(key: str) -> tuple[str, int]:
-        match = next((one for title, one in found.items() if title.startswith(key)), None)
-        if match is None:
-            raise PhysicsError(f'{name}: no "{key}" in the title lines, which K-NET has.')
-        return match
-
+    of = partial(_told, found, name=name, archive="K-NET")
     scale, line = of("scale factor")
     if (pair := _KNET_SCALE.search(scale)) is None:
         raise PhysicsError(f'{name}, line {line}: "{scale.strip()}"; 2000(gal)/8388608 is right.')
@@ -313,12 +322,8 @@ def _cosmos(lines: Sequence[str], name: str) -> _Record:
         raise PhysicsError(f"{where}: the values are raw counts. Take the file of V1 or V2.")
     factor, count, long = _factor(data["unit"].strip(), where), int(data["count"]), data["long"]
     head = max(j for j in range(k) if "Real-header value" in lines[j])
-    reals = [
-        number(field, name, line)
-        for line, row in enumerate(lines[head + 1 : k], head + 2)
-        if not row.lstrip().startswith("|") and "omment" not in row
-        for field in _fields(row)
-    ]
+    rows = ["" if row.lstrip()[:1] == "|" or "omment" in row else row for row in lines[:k]]
+    reals = _numbers(rows, head + 1, k, name)
     steps = [1e-3 * reals[at] for at in _COSMOS_STEPS if at < len(reals) and reals[at] > 0.0]
     agree = [step for step in steps if abs(step * count - float(long)) < 1.5]
     if not agree:
@@ -340,14 +345,7 @@ def _smc(lines: Sequence[str], name: str) -> _Record:
         what = lines[0].strip(" *0123456789").lower()
         raise _not_accelerations(what or "record of an unknown kind", f"{name}, line 1")
 
-    def numbers(begin: int, end: int) -> list[float]:
-        return [
-            number(field, name, line)
-            for line, row in enumerate(lines[begin:end], begin + 1)
-            for field in _fields(row)
-        ]
-
-    whole, reals = numbers(11, 17), numbers(17, 27)
+    whole, reals = _numbers(lines, 11, 17, name), _numbers(lines, 17, 27, name)
     if len(whole) != 48 or len(reals) != 50:
         raise PhysicsError(
             f"{name}, lines 12 to 27: {len(whole)} whole numbers and {len(reals)} reals; "

@@ -53,7 +53,7 @@ def test_esm(tmp_path: Path) -> None:
         ({"NDATA": "900"}, "line 7: 900 values are announced, and 803 follow"),
         ({"DATA_TYPE": "VELOCITY", "UNITS": "cm/s"}, "line 14: the values are a velocity"),
         ({"UNITS": "cm/s"}, "line 10: the values are in cm/s, which is no acceleration"),
-        ({"UNITS": ""}, "no UNITS in the title lines"),
+        ({"UNITS": ""}, 'no "UNITS" in the title lines'),
         ({"DURATION_S": "8.02"}, "line 8: 803 values, 0.005 s apart, do not last 8.02 s"),
     ]:
         with pytest.raises(RecordError, match=said):
