@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from ..errors import UnitError
 from ..units import Unit
 from ..units import parse as parse_unit
-from .channels import meaning, of_a_sensor, quantity_of_unit
+from .channels import meaning, of_a_drive, of_a_sensor, quantity_of_unit
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
 _LIKE_BRACKETS = str.maketrans("{}<>\uff3b\uff3d\uff08\uff09", "[][][]()")
@@ -158,7 +158,7 @@ def _by_slash(column: Column) -> Column:
     name, _, spelled = column.text.partition("/")
     whole, unit = unit_or_none(column.text), unit_or_none(spelled)
     told = whole is not None and quantity_of_unit(whole.name) is not None
-    if unit is None or told or meaning(name, None) is None:
+    if unit is None or told or (meaning(name, None) is None and not of_a_drive(name)):
         return column
     return replace(column, name=name, unit=unit)
 

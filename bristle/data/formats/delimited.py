@@ -39,7 +39,8 @@ ORDER = 2
 HEADER = 4
 """Rows of titles, units and what loggers add, at the most."""
 
-_TOKEN = re.compile(r'"[^"]*"|\S+(?: ?[\[(][^\])]*[\])])?')  # a title and its unit in brackets
+_TOKEN = re.compile(r'"[^"]*"|[^\s\[(]\S*(?: ?[\[(][^\])]*[\])])?|\S+')
+"""A title and its unit in brackets, or one of the two."""
 _GROUP = re.compile(r"\d{3}(?:\.\d*)?")
 _QUOTED = 8
 """Lines at most in which a quoted title may be written."""
@@ -301,8 +302,7 @@ def _try_layout(rows: list[str], delimiter: str, comma: bool) -> tuple[float, La
         return None
     # What needs no groups of thousands is the better reading; a field may well be empty.
     grouped = sum(is_grouped(text, comma) for fields in same for text in fields)
-    numbers = sum(one.count("number") + 0.9 * one.count("missing") for one in states)
-    numbers -= 0.02 * grouped
+    numbers = sum(len(one) - one.count("word") for one in states) - 0.02 * grouped
     share = numbers / sum(map(len, states))
     # Points win where both would do: whole numbers have neither.
     return (often / len(rows)) * share + 0.01 * min(count, 5) - 0.001 * comma, layout

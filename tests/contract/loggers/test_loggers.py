@@ -118,6 +118,11 @@ LAYOUTS = {
     + rows(";", BASE, *(lambda v: f"{v:.5f}".replace("-", "\u2212"),) * 4),
     "units behind a slash": "Time;Disp;Coil;Force\n/s;/mm;/V;/kN\n"
     + rows(";", (T, X, U, F / 1e3), P, P, P, point(8)),
+    "units in brackets below titles, of blanks": "Time Disp Coil Force\n[s] [mm] [V] [N]\n"
+    + rows(" ", BASE, P, P, P, P),
+    "units behind a slash in titles": "t/s;Disp/mm;Coil/V;F/N\n" + rows(";", BASE, P, P, P, P),
+    "a channel that ends early, between tabs": "Time [s]\tDisp [mm]\tCoil [V]\tForce [N]\tTemp\n"
+    + rows("\t", (*BASE, COUNT), P, P, P, P, lambda v: "21.5" if v < 0.4 * N else ""),
 }  # fmt: skip
 
 
