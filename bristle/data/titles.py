@@ -98,7 +98,8 @@ def title(index: int, text: str) -> Column:
     found = column(index, text)
     if found.unit is not None and _BRACKETS.fullmatch(found.text):
         other = title(index, found.name)  # Force [N] (kN); of "cell 25 kN [N]" one is a range
-        unit = other.unit if not other.name[-1:].isdigit() else None
+        subscript = re.fullmatch("_.", found.name[len(other.name) :])  # F_N is a normal force
+        unit = None if subscript or other.name[-1:].isdigit() else other.unit
         if unit and unit.dimension == found.unit.dimension and _differs(other, found.unit):
             problem = f"the title says {unit.name}, and {found.unit.name}."
             return replace(found, unit=None, problem=problem)

@@ -11,6 +11,7 @@ from bristle.cli import main
 from bristle.data.guess import guess_channels
 from bristle.data.measurement import measurements_of
 from bristle.data.read import read_table
+from bristle.data.titles import title
 
 G = 9.80665
 T = np.arange(600) / 500.0
@@ -73,3 +74,8 @@ def test_what_may_be_another_force_is_asked(tmp_path, capsys, title, said) -> No
     file = made(tmp_path, f"t [s];x [mm];{title}", X, F)
     assert main(["study", "new", str(tmp_path / "rig"), "--data", str(file)]) == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["F_N [kN]", "x_m [kN]", "Load cell 25 N [kN]"])
+def test_a_subscript_and_a_range_are_no_second_unit(text) -> None:
+    assert title(0, text).stated == "kN"
