@@ -344,6 +344,8 @@ def _table(
             time = one.time / parse_unit(found.units.get(own, "s")).factor
             found.clocks.append((own or "time", time, data))
         found.loose |= clock.untimed
+    if "time" not in every:
+        found.units["time"] = "s"
     times = [(called, time) for called, time, data in found.clocks if data]
     if len(times) == 1 and times[0][0] == "time" and "time" not in every:
         called = {one.called for one in every.values() if one.step}
@@ -351,7 +353,6 @@ def _table(
         told = f"the time is made from {listed(sorted(called))}: {step:g} s a sample"
         (found.notes if called == {_STEP} else found.remarks).append(told)
         found.remarks[:0] = unset_step(_STEP, step)
-        found.units["time"] = "s"
     return one_table(found, name)
 
 
