@@ -144,7 +144,8 @@ def start_in_motion(
     """Return the start values of states at which a model's force comes closest to the measured one.
 
     Least squares over the samples that remember the start, in a few steps of Broyden's: forces of
-    elastic parts are nearly linear in what they hold at first. Nothing where that leads no closer.
+    elastic parts are nearly linear in what they hold at first. None bends by more than the stroke,
+    or one that never slips gives each run a force of its own. Nothing where that leads no closer.
 
     Parameters
     ----------
@@ -155,6 +156,7 @@ def start_in_motion(
     """
     names = [f"{name}_0" for name, _ in states]
     sizes = np.array([stroke if unit == "m" else 1.0 for _, unit in states])
+    most = np.where([unit == "m" for _, unit in states], 1.0, np.inf)
     known = np.isfinite(force)
 
     def missed(at: Array) -> Array:
@@ -168,7 +170,7 @@ def start_in_motion(
         if not (np.isfinite(square).all() and square.any()):
             return {}
         square += LEAST * np.trace(square) * np.eye(len(names))
-        step = np.linalg.solve(square, slopes.T @ left)
+        step = np.clip(at + np.linalg.solve(square, slopes.T @ left), -most, most) - at
         at = at + step
         after = missed(at)
         slopes += np.outer(left - after - slopes @ step, step) / max(float(step @ step), 1e-300)

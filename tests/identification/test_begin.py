@@ -126,6 +126,15 @@ def test_runs_that_begin_under_load_are_told_with_it():
     assert under_load_text({"a": 1.0, "b": 2.0}).startswith("a (1 N), b (2 N) begin at rest")
 
 
+def test_bristles_that_never_slip_tell_no_force_of_each_run():
+    x = 0.01 * np.sin(2.0 * np.pi * 1.1 * np.arange(3000) * DT)
+    run = recorded(x, begin=800, offset=30.0)
+    law = Model("dahl", (), {"f_c": 0.1, "f_v": 0.0, "rho": 1.0, "c_0": 60.0, "c_v": 0.0})
+    (deflection,) = Problem([run]).carrying(law, run).values()
+    assert abs(deflection) <= 1.01 * float(np.ptp(run.x))
+    assert abs(float(np.mean(left(run, law)))) > 25.0
+
+
 TWO_STATES = Model("modified_bouc_wen")  # what its dashpot holds lasts longer than any settling
 STATED = [(Model("bouc_wen"), 1), (Model("fluid_viscous"), 1), (TWO_STATES, 2), (MODEL, 1)]
 
