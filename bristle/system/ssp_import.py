@@ -9,7 +9,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -62,15 +62,6 @@ class FlatSystem:
     values: dict[Port, Value]
 
 
-@dataclass
-class _Network:
-    """Everything of a system by where it stands."""
-
-    blocks: dict[Names, Block] = field(default_factory=dict)
-    feeding: dict[Port, list[tuple[Port, Joint]]] = field(default_factory=dict)
-    given: dict[Port, BoundValue] = field(default_factory=dict)
-
-
 class _Flattener:
     """Puts the components of a structure side by side.
 
@@ -95,22 +86,23 @@ class _Flattener:
         describe: Callable[[str, str], Description],
     ) -> None:
         self.package = package
-        self.net = _Network()
-        self.net.blocks.update(_walk(structure.system, ()))
-        self.fmus = {path: b.source for path, b in self.net.blocks.items() if b.source}
+        # Everything of a system by where it stands.
+        self.blocks = dict(_walk(structure.system, ()))
+        self.feeding: dict[Port, list[tuple[Port, Joint]]] = {}
+        self.given: dict[Port, BoundValue] = {}
+        self.fmus = {path: b.source for path, b in self.blocks.items() if b.source}
         if not self.fmus:
             raise package.error(
                 structure.system.where, "has no component with an FMU: there is nothing to run."
             )
         self.descriptions = {
-            path: describe(source, self.net.blocks[path].where)
-            for path, source in self.fmus.items()
+            path: describe(source, self.blocks[path].where) for path, source in self.fmus.items()
         }
         self._check_connectors()
 
     def flat(self) -> FlatSystem:
         # Inner elements first: the values of outer ones win.
-        for path, block in sorted(self.net.blocks.items(), key=lambda e: -len(e[0])):
+        for path, block in sorted(self.blocks.items(), key=lambda e: -len(e[0])):
             for joint in block.joints:
                 self._join(path, joint)
             for given in block.values:
@@ -135,7 +127,7 @@ class _Flattener:
         return FlatSystem(self.fmus, self.descriptions, tuple(connections), values)
 
     def _note_unused(self) -> None:
-        for (path, name), given in self.net.given.items():
+        for (path, name), given in self.given.items():
             if path in self.fmus:
                 causality = self.descriptions[path].variables[name].causality
                 if causality not in ("input", "parameter"):
@@ -144,7 +136,7 @@ class _Flattener:
 
     def _check_connectors(self) -> None:
         for path in self.fmus:
-            block, variables = self.net.blocks[path], self.descriptions[path].variables
+            block, variables = self.blocks[path], self.descriptions[path].variables
             for name, connector in block.connectors.items():
                 if name not in variables:
                     text = f'has the connector "{name}", which its FMU {block.source} lacks.'
@@ -172,7 +164,7 @@ class _Flattener:
 
     def _check_types(self, source: Port, target: Port, change: Change) -> None:
         """Refuse a connection whose values cannot be passed on."""
-        where = self.net.feeding[target][0][1].where
+        where = self.feeding[target][0][1].where
         given, wanted = (
             self.descriptions[path].variables[name].kind for path, name in (source, target)
         )
@@ -185,13 +177,13 @@ class _Flattener:
         if change != SAME and wanted != "Real":
             text = f'"{_shown(target)}" is {wanted}: only Real has a factor and an offset.'
             raise self.package.error(where, text)
-        port = self.net.feeding[target][0][0]
+        port = self.feeding[target][0][0]
         while port != source:
-            kind = self.net.blocks[port[0]].connectors[port[1]].type
+            kind = self.blocks[port[0]].connectors[port[1]].type
             if kind and not (passes(given, kind) and passes(kind, wanted)):
                 text = f'{ends}, and "{_shown(port)}" between them is {kind}: '
                 self.package.note(where, f"{text}values are passed on as they are.")
-            port = self.net.feeding[port][0][0]
+            port = self.feeding[port][0][0]
 
     def _kind(self, port: Port, where: str) -> str:
         """Return the kind of a connector: an FMU knows better than what is written of it."""
@@ -202,7 +194,7 @@ class _Flattener:
                 text = f'the FMU {self.fmus[path]} of "{".".join(path)}" has no variable "{name}".'
                 raise self.package.error(where, text)
             return variable.causality
-        connector = self.net.blocks[path].connectors.get(name)
+        connector = self.blocks[path].connectors.get(name)
         if connector is None:
             shown = f'the system "{".".join(path)}"' if path else "the system"
             raise self.package.error(where, f'{shown} has no connector "{name}".')
@@ -224,7 +216,7 @@ class _Flattener:
             text = "connects two that give a value" if gives else "connects two that take a value"
             raise self.package.error(joint.where, f"{text}; one of each is right.")
         source, target = (start, end) if gives else (end, start)
-        others = self.net.feeding.setdefault(target, [])
+        others = self.feeding.setdefault(target, [])
         others.append((source, joint))
         if len(others) > 1:
             first = others[0][1].where.rpartition(" <")[2]
@@ -236,11 +228,11 @@ class _Flattener:
         if target is None:
             self.package.note(given.where, f'nothing is called "{given.name}": left aside.')
         else:
-            self.net.given[target] = given
+            self.given[target] = given
 
     def _named(self, path: Names, name: str) -> Port | None:
         """Return what a hierarchical name means seen from an element, None where nothing has it."""
-        block = self.net.blocks[path]
+        block = self.blocks[path]
         if path in self.fmus:
             return (path, name) if name in self.descriptions[path].variables else None
         if name in block.connectors:
@@ -256,8 +248,8 @@ class _Flattener:
         """Follow connections back to where a value comes from, and return how it changes."""
         port, change = target, SAME
         seen = {target}
-        while port in self.net.feeding:
-            source, joint = self.net.feeding[port][0]
+        while port in self.feeding:
+            source, joint = self.feeding[port][0]
             if source in seen:
                 text = f'the connections of "{_shown(target)}" lead round in a circle.'
                 raise self.package.error(joint.where, text)
@@ -278,7 +270,7 @@ class _Flattener:
 
     def _unit(self, port: Port) -> Measure | None:
         path, name = port
-        block = self.net.blocks[path]
+        block = self.blocks[path]
         own = None
         if path in self.fmus and name in self.descriptions[path].variables:
             own = self.descriptions[path].variables[name].measure
@@ -289,7 +281,7 @@ class _Flattener:
 
     def _value(self, port: Port, change: Change) -> Value | None:
         """Return the value given at a port as it arrives behind a change."""
-        given = self.net.given.get(port)
+        given = self.given.get(port)
         if given is None:
             return None
         value = given.value
@@ -310,7 +302,7 @@ class _Flattener:
         if variable.kind != "Enumeration" or not isinstance(value, str):
             return value
         if value not in variable.items:
-            where = next(self.net.given[port].where for port in ports if port in self.net.given)
+            where = next(self.given[port].where for port in ports if port in self.given)
             right = listed(f"{name} = {number}" for name, number in variable.items.items())
             raise self.package.error(where, f'"{value}" is no item; {right} are right.')
         return variable.items[value]
@@ -334,7 +326,7 @@ def _shown(port: Port) -> str:
 
 # An SSP package as a scenario with its FMUs beside it.
 
-FORM = 3
+FORM = 4
 """Version of what is written: another one unpacks packages anew."""
 USUAL_STOP = 1.0
 """Stop [s] where neither the package nor its FMUs name one."""
@@ -379,19 +371,18 @@ def import_ssp(package: Path, folder: Path) -> ImportedPackage:
         If the package is wrong or holds what is not read, with file and element; if a file of the
         same name stands in the folder or it cannot be written.
     """
-    with tempfile.TemporaryDirectory(prefix="bristle_ssp_") as temporary:
-        made = _unpack(package, Path(temporary))
-        files = [made.scenario, *made.fmus]
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for file in files:
-                if (folder / file.name).exists():
-                    raise ScenarioError(f"{folder / file.name}: is there already.")
-            for file in files:
-                shutil.copyfile(file, folder / file.name)
-        except OSError as error:
-            text = f"cannot be written ({error.strerror or error})."
-            raise ScenarioError(f"{error.filename or folder}: {text}") from None
+    made = unpacked(package)
+    files = [made.scenario, *made.fmus]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in files:
+            if (folder / file.name).exists():
+                raise ScenarioError(f"{folder / file.name}: is there already.")
+        for file in files:
+            shutil.copyfile(file, folder / file.name)
+    except OSError as error:
+        text = f"cannot be written ({error.strerror or error})."
+        raise ScenarioError(f"{error.filename or folder}: {text}") from None
     fmus = tuple(folder / file.name for file in made.fmus)
     return ImportedPackage(folder / made.scenario.name, fmus, made.notes)
 
@@ -407,7 +398,7 @@ def unpacked(package: Path) -> ImportedPackage:
     try:
         content = hashlib.sha256(f"{FORM} {package.stem}".encode() + package.read_bytes())
     except OSError as error:
-        text = f"cannot be read: {error.strerror or error}."
+        text = f"cannot be read: {(error.strerror or str(error)).lower()}."
         raise ScenarioError(f"{package}: {text}") from None
     folder = files.cache_folder() / "ssp" / content.hexdigest()[:DIGITS]
     if not folder.is_dir():
@@ -417,19 +408,19 @@ def unpacked(package: Path) -> ImportedPackage:
                 inner = Path(temporary) / "package"
                 inner.mkdir()
                 made = _unpack(package, inner)
-                (inner / _NOTES).write_text(
-                    json.dumps([(note.text, note.kind) for note in made.notes]), encoding="utf-8"
-                )
+                notes = [(note.text, note.kind) for note in made.notes]
+                kept = {"fmus": [file.name for file in made.fmus], "notes": notes}
+                (inner / _NOTES).write_text(json.dumps(kept), encoding="utf-8")
                 if not folder.is_dir():  # another process may have been faster
                     inner.replace(folder)
         except OSError as error:
             text = f"cannot be written ({error.strerror or error})."
             raise ScenarioError(f"{folder}: {text}") from None
-    notes = json.loads((folder / _NOTES).read_text(encoding="utf-8"))
+    kept = json.loads((folder / _NOTES).read_text(encoding="utf-8"))
     return ImportedPackage(
         next(folder.glob("*.toml")),
-        tuple(folder.glob("*.fmu")),
-        tuple(Finding(kind, "note", text) for text, kind in notes),
+        tuple(folder / name for name in kept["fmus"]),
+        tuple(Finding(kind, "note", text) for text, kind in kept["notes"]),
     )
 
 
