@@ -36,7 +36,7 @@ LIBRARY = {
     "sensor": ("delay", "velocity_sensor"),
 }  # fmt: skip
 ALL = [EFFECTS[name] for name in sorted(EFFECTS)]
-USUAL = {"bingham", "lugre", "shock_absorber", "isolator"}
+USUAL = {"lugre", "isolator"}
 
 
 def _usual(effect: type[Effect]) -> set[str]:
