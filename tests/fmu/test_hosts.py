@@ -141,6 +141,7 @@ def by_libcosim(job: dict[str, Any]) -> list[list[float]]:
     return rows
 
 
+@pytest.mark.slow  # 2 s: by default it has the rows of a package (tests/engine/test_export_ssp.py)
 @each_form
 def test_libcosim(form: Callable[[str], Path]) -> None:
     need("libcosimpy")
