@@ -119,7 +119,8 @@ def ringing(trial: Trial, held_out: Problem) -> float:
     The motion ends where nine tenths of the velocity's power lie below. Runs of which samples are
     left out have no spectrum: 0.
     """
-    if any(isinstance(run, StructureRun) and _has_gaps(run) for run in held_out.runs):
+    whole = [run.keep for run in held_out.runs if isinstance(run, StructureRun)]
+    if any(np.any(np.diff(keep) != 1) for keep in whole):
         return 0.0
     f, power, motion = _spectra(trial, held_out)
     largest, motion = 0.0, np.cumsum(motion)
@@ -153,7 +154,3 @@ def _spectra(trial: Trial, held_out: Problem) -> tuple[Array, Array, Array]:
             found.append(np.interp(f, own, power, right=0.0))
     power, motion = (np.asarray(np.mean(one, axis=0), float) for one in (powers, motions))
     return f, power, motion
-
-
-def _has_gaps(run: StructureRun) -> bool:
-    return bool(np.any(np.diff(run.keep) != 1))

@@ -242,7 +242,8 @@ class Diagnosis(Viewable):
         for name in dict.fromkeys(effect for finding in lines for effect in finding.effects):
             at = [finding.site for finding in lines if name in finding.effects]
             # One that is in every storey has the number 0, its default.
-            if _in_a_storey(name) and len(at) == 1 < len(storeys):
+            in_one = name in EFFECTS and "which" in EFFECTS[name].parameters
+            if in_one and len(at) == 1 < len(storeys):
                 out[f"{name}.which"] = float(at[0].removeprefix("storey"))
         return out
 
@@ -330,10 +331,6 @@ class Diagnosis(Viewable):
             ]  # fmt: skip
             rows += own if found.noise_known else without_z(own)
         return sorted(rows, key=lambda row: -row["gain"])
-
-
-def _in_a_storey(name: str) -> bool:
-    return name in EFFECTS and "which" in EFFECTS[name].parameters
 
 
 def late_values(finding: SiteDiagnosis) -> dict[str, float]:

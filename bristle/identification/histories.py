@@ -278,14 +278,9 @@ class Effort:
             self.steps += steps
 
     @property
-    def left(self) -> float:
-        """How much more it may be."""
-        return self.most - self.steps
-
-    @property
     def spent(self) -> bool:
         """Whether no more is to be begun."""
-        return self.left < 0.0
+        return self.steps > self.most
 
 
 _effort: ContextVar[Effort | None] = ContextVar("effort", default=None)
@@ -293,7 +288,7 @@ _effort: ContextVar[Effort | None] = ContextVar("effort", default=None)
 
 def left() -> float:
     """Return how many steps may still be spent in this context."""
-    return inf if (effort := _effort.get()) is None else effort.left
+    return inf if (effort := _effort.get()) is None else effort.most - effort.steps
 
 
 @contextmanager
