@@ -35,9 +35,9 @@ from .unproven import unproven
 LEFT = 0.5
 """Share of the error on held-out runs that a step leaves at most for a verdict to be made anew."""
 
-MOST_SPENT = 1500e6
-"""Steps of dampers' forces, see `Effort`, that all verdicts and steps may take together: three to
-four minutes."""
+MOST_SPENT = 2200e6
+"""Steps of dampers' forces, see `Effort`, that all verdicts and steps may take together: four to
+five minutes."""
 
 NOT_COMPARED = "Further effects were not compared, because the search had taken long enough."
 
