@@ -224,6 +224,7 @@ def test_the_command_starts_checks_and_lists(
     assert 'Did you mean "dahl"?' in capsys.readouterr().err
 
 
+@pytest.mark.slow  # 2 s: of an effect it is found by default
 def test_a_promise_that_does_not_hold_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -159,7 +159,7 @@ def beside(mailed: Path) -> Path:
     "line",
     [
         "identify --dry-run --starts 1",
-        "add {} stribeck",
+        pytest.param("add {} stribeck", marks=pytest.mark.slow),  # 2 s, two fits
         # A diagnosis: it leaves the file out too.
         pytest.param("diagnose --dry-run", marks=pytest.mark.slow),
     ],
