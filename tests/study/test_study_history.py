@@ -60,8 +60,8 @@ def test_single_run_is_split_and_said_to_be_weaker(tmp_path: Path) -> None:
     created = create_study(tmp_path / "rig", [file])
     runs = created.study.runs()
     assert len(runs.train[0].time) == 700
-    assert len(runs.holdout[0].time) == 300
-    assert runs.holdout[0].time[0] > runs.train[0].time[-1]
+    assert len(runs.holdout[0].time) == 315  # led into by 15 that are not judged
+    assert runs.holdout[0].time[15] > runs.train[0].time[-1]
     assert "weaker" in runs.notes[0]
     assert any("one run" in note for note in created.notes)
 
