@@ -44,6 +44,8 @@ from .schedule import (
     Port,
     Ramp,
     ReadOutputs,
+    Restore,
+    Save,
     Schedule,
     Shift,
     Write,
@@ -220,6 +222,8 @@ def compile_loop(
         instance = instances[operation.component]
         if isinstance(operation, DoStep):
             body += _step(number, operation, instance, step, memory, names)
+        elif isinstance(operation, Save | Restore):
+            body += _state(number, operation, instance, names)
         elif isinstance(operation, Keep | Shift):
             body += _keep(operation, memory)
         else:
@@ -315,6 +319,26 @@ def _transfer(
     return [f"if {condition}:", *(f" {line}" for line in whole)] if condition else whole
 
 
+def _state(
+    number: str, operation: Save | Restore, instance: Instance, names: dict[str, Any]
+) -> list[str]:
+    """Return the lines that get a component's state, or set it and free it: a get may allocate."""
+    component = ctypes.c_void_p.from_param(instance.component)
+    state = names.setdefault(f"state{operation.component}", ctypes.c_void_p())
+    calls = {"GetFMUstate": ctypes.byref(state)}
+    if isinstance(operation, Restore):
+        calls = {"SetFMUstate": state, "FreeFMUstate": ctypes.byref(state)}
+    lines = []
+    for i, (function, given) in enumerate(calls.items()):
+        names[f"f{number}_{i}"], names[f"c{number}"] = (
+            instance.calls.function(function),
+            component,
+        )
+        names[f"p{number}_{i}"] = given
+        lines.append(f"if s := f{number}_{i}(c{number}, p{number}_{i}): fail(o{number}, s)")
+    return lines
+
+
 def _keep(operation: Keep | Shift, memory: Memory) -> list[str]:
     assign = operation.change if isinstance(operation, Shift) else "="
     return [f"past{past} {assign} reals[{now}]" for now, past in memory.kept(operation)]
@@ -343,6 +367,8 @@ VERBS = {
     DoStep: "doStep",
     ReadOutputs: "reading its outputs",
     Ramp: "setting the derivatives of its inputs",
+    Save: "getting its state",
+    Restore: "setting its state",
 }
 
 FAULTS = {

@@ -1,6 +1,6 @@
 """FMUs as loaded instances: unpacked, instantiated, initialised, with their messages collected.
 
-The master prepares its calls once, by names without a version ("DoStep") and by
+The master prepares its calls once, by names without a version ("DoStep", "GetFMUstate") and by
 `transfer` for values. `Calls` hands out the library's own functions; `CallsFmi3` hands out
 functions of the same arguments where the library's differ.
 """
@@ -47,6 +47,8 @@ from ..fmu.library import (
 
 _SLAVE_MODULE = Path("resources", "slavemodule.txt")
 """What an FMU of PythonFMU holds: it runs in the interpreter of a Python host."""
+_STATE = {name: name.replace("state", "State") for name in ("GetFMUstate", "SetFMUstate")}
+_STATE["FreeFMUstate"] = "FreeFMUState"
 
 Say = Callable[[str, str], None]
 Status = Callable[..., int]
@@ -93,7 +95,7 @@ class CallsFmi3(Calls):
         self._say = say
 
     def function(self, name: str) -> Status:
-        return self._step() if name == "DoStep" else super().function(name)
+        return self._step() if name == "DoStep" else super().function(_STATE.get(name, name))
 
     def transfer(self, verb: str, kind: str, variables: Sequence[Variable], address: int) -> Status:
         """Return what gets or sets the variables of a kind, each by the function of its type.

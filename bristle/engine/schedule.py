@@ -12,6 +12,8 @@ schedule is worked out once, from the connections alone, and asks for no call th
   already, ahead of the newest by half its last change where it has not. Before outputs that follow
   it are read it gets the value at the step's end. What a component interpolates or samples, and
   what is discrete, gets the newest value.
+- Midpoint, iterated: the components of a loop then go back to the start of the step and make it
+  again, with the middle between the values at its begin and those found at its end.
 - Jacobi: all step, all are read, all inputs are set; outputs that follow an input are read again
   for the row and not passed on.
 
@@ -176,7 +178,21 @@ class Shift:
     change: str  # "-=" or "+="
 
 
-Operation = DoStep | ReadOutputs | Write | Ramp | Keep | Shift
+@dataclass(frozen=True)
+class Save:
+    """Keep the whole state of a component."""
+
+    component: int
+
+
+@dataclass(frozen=True)
+class Restore:
+    """Take a component back to the state that was kept, and forget that."""
+
+    component: int
+
+
+Operation = DoStep | ReadOutputs | Write | Ramp | Keep | Shift | Save | Restore
 
 
 @dataclass(frozen=True)
@@ -280,16 +296,20 @@ def find_late(nodes: Sequence[Node], graph: Mapping[Port, Sequence[Port]]) -> Re
     return refresh
 
 
-def read_early(nodes: Sequence[Node], refresh: Refresh) -> list[list[str]]:
+def read_early(
+    nodes: Sequence[Node], refresh: Refresh, wanted: Collection[Port] = ()
+) -> list[list[str]]:
     """Return what is read directly after each step: all that is final, or that is needed next.
 
     Parameters
     ----------
     nodes, refresh : the components, and what is read once more at the end of the step
+    wanted : what is needed besides by components that have stepped already, and step again
     """
     needed = {
         source for c, node in enumerate(nodes) for source in node.sources.values() if source[0] < c
     }
+    needed.update(wanted)
     early = []
     for c, node in enumerate(nodes):
         levels = {level for (d, _), level in refresh.outputs.items() if d == c}
@@ -329,18 +349,31 @@ def at_level(levels: Mapping[Port, int], component: int, level: int) -> list[str
     return [name for (c, name), at in levels.items() if c == component and at == level]
 
 
-# Components that step one after another: Gauss-Seidel, midpoint.
+def loop_members(nodes: Sequence[Node]) -> tuple[list[int], list[int]]:
+    """Return the components that feed each other in a loop, and those that only follow one."""
+    feeds: dict[int, set[int]] = {c: set() for c in range(len(nodes))}
+    for c, node in enumerate(nodes):
+        for d, _ in node.sources.values():
+            feeds[d].add(c)
+    fed = {c: reached(feeds, c) for c in feeds}
+    inside = [c for c in fed if c in fed[c]]
+    return inside, sorted(set[int]().union(*(fed[c] for c in inside)) - {*inside})
 
 
-def in_sequence(nodes: Sequence[Node], held: Collection[Port]) -> Schedule:
+# Components that step one after another: Gauss-Seidel, midpoint, midpoint with one rollback.
+
+
+def in_sequence(nodes: Sequence[Node], held: Collection[Port], iterated: bool = False) -> Schedule:
     """Return the schedule in which each component gets the newest values, and then steps.
 
     Parameters
     ----------
     nodes : sequence of Node
     held : inputs that get the middle of the step; none of them: Gauss-Seidel
+    iterated : whether the components of a loop go back once and step again, now that the values
+        at the end of the step are known
     """
-    plan = _Plan(nodes, held)
+    plan = _Plan(nodes, held, iterated)
     for _ in range(2):  # the last period is the steady one
         plan.macro_step()
     return Schedule(tuple(plan.operations), lay_out(nodes, plan.refresh, plan.early))
@@ -349,11 +382,14 @@ def in_sequence(nodes: Sequence[Node], held: Collection[Port]) -> Schedule:
 class _Plan:
     """The operations of a macro step while they are worked out."""
 
-    def __init__(self, nodes: Sequence[Node], held: Collection[Port]) -> None:
+    def __init__(self, nodes: Sequence[Node], held: Collection[Port], iterated: bool) -> None:
         self.nodes, self.held = nodes, held
+        inside, behind = loop_members(nodes) if iterated else ([], [])
+        self.again, self.behind = inside, behind
         self.graph = signal_graph(nodes)
         self.refresh = find_late(nodes, self.graph)
-        self.early = read_early(nodes, self.refresh)
+        fed_back = {source for c in inside for source in nodes[c].sources.values()}
+        self.early = read_early(nodes, self.refresh, fed_back)
         self.kept = {nodes[c].sources[name] for c, name in held}
         along = {nodes[c].sources[name] for c in range(len(nodes)) for name in self._along(c)}
         self.kept_for_substeps = along - self.kept
@@ -371,8 +407,19 @@ class _Plan:
         """Work out a macro step that follows on those before."""
         self.operations = []
         self._row = dict(self._read)
+        for c in self.again:
+            late = [n for n in self._older(c) if self.nodes[c].sources[n][0] >= c]
+            self._write(c, dict.fromkeys(late, NEWEST))
+            self.operations.append(Save(c))
         for c in range(len(self.nodes)):
-            self._step(c)
+            if c not in self.behind:
+                self._step(c)
+        if self.again:
+            self.operations += [Restore(c) for c in self.again]
+            for c in self.again:
+                self._step_again(c)
+            for c in self.behind:
+                self._step(c)
         self._refresh()
 
     def _older(self, c: int) -> list[str]:
@@ -402,7 +449,7 @@ class _Plan:
 
     def _step(self, c: int) -> None:
         node = self.nodes[c]
-        stepped = {name: node.sources[name][0] < c for name in self._held(c)}
+        stepped = {name: self._has_stepped(node.sources[name][0], c) for name in self._held(c)}
         values = {name: MIDDLE if stepped[name] else AHEAD for name in stepped}
         values.update(dict.fromkeys(self._older(c), NEWEST))
         ramped = self._ramped_by_others(c)
@@ -424,7 +471,7 @@ class _Plan:
     def _along(self, c: int) -> list[str]:
         """Return the inputs that move on substep by substep: their source's end is known."""
         node = self.nodes[c]
-        known = (name for name, (d, _) in node.sources.items() if d < c)
+        known = (name for name, (d, _) in node.sources.items() if self._has_stepped(d, c))
         return [name for name in known if node.moves(name)]
 
     def _substeps(self, c: int, along: Sequence[str]) -> None:
@@ -450,13 +497,29 @@ class _Plan:
         step before has brought its inputs.
         """
         held, sources = set(stepped), self.nodes[c].sources
-        able = held and held <= self.nodes[c].interpolates
+        able = held and held <= self.nodes[c].interpolates and not self.again
         if not able or not self._end_values(c, stepped):
             return False
         feeding = (sources[name] for name in self._older(c))
         if not all(_stands(self.nodes[d].outputs[output]) for d, output in feeding):
             return False
         return all(self._current[c, name] >= self._row.get(sources[name], 0) for name in held)
+
+    def _has_stepped(self, source: int, c: int) -> bool:
+        """Return whether a source steps before a component; those behind a loop come last."""
+        return source < c or (c in self.behind and source not in self.behind)
+
+    def _step_again(self, c: int) -> None:
+        """Step from the restored state: the ends of all inputs are known, if only nearly."""
+        node = self.nodes[c]
+        before = [n for n, (d, _) in node.sources.items() if d < c and (c, n) not in self.held]
+        values, ramped = dict.fromkeys(self._held(c), MIDDLE), self._ramped_by_others(c)
+        values.update(dict.fromkeys(ramped, PAST))
+        along = self._along(c)
+        self._write(c, {**{n: NEWEST for n in before if n not in along}, **values})
+        self.operations += [Ramp(c, ramped)] if ramped else []
+        self._substeps(c, along)
+        self._show(c, dict.fromkeys((name for name in values if name not in ramped), True))
 
     def _show(self, c: int, known: Mapping[str, bool]) -> None:
         """Give held inputs the end of the step for the outputs that follow them, and read these.
@@ -524,7 +587,7 @@ def make_schedule(nodes: Sequence[Node], algorithm: str) -> Schedule:
         return _jacobi(nodes)
     if algorithm == "gauss-seidel":
         return in_sequence(nodes, ())
-    return in_sequence(nodes, held_inputs(nodes))
+    return in_sequence(nodes, held_inputs(nodes), iterated=algorithm == "midpoint-iterated")
 
 
 def held_inputs(nodes: Sequence[Node]) -> set[Port]:

@@ -9,10 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import sqrt
 
-import numpy as np
-
 from ..core.config import Document
-from ..core.graph import loop_in
+from ..core.graph import loop_in, reached
 from ..errors import BristleError, PhysicsError
 from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
@@ -22,6 +20,9 @@ from .model import Connection, Part, RunSettings
 from .parameters import check_rod
 
 # The step from which the coupling of a mass with a damper is unstable, for each algorithm.
+
+_FINENESS = 1.02
+"""Ratio [1] of neighbouring steps in the search for the first unstable one."""
 
 
 def longest_step(algorithm: str, mass: float, c: float, k: float) -> float:
@@ -35,7 +36,8 @@ def longest_step(algorithm: str, mass: float, c: float, k: float) -> float:
 
     With midpoint s (s - 1)^2 + (3 s - 1)/2 (a s + b) = 0, a = q/2 + g, b = q/2 - g, whichever of
     the two steps first: one of them is told ahead. Jury's criterion gives g < 1 and
-    q^2 < 4 g + 2 g^2 + g q.
+    q^2 < 4 g + 2 g^2 + g q. One rollback makes it
+    s (s - 1)(s - 1 + q/2) + (a s + b)((1 - 3 a/4) s + a/4) = 0.
 
     Parameters
     ----------
@@ -48,9 +50,35 @@ def longest_step(algorithm: str, mass: float, c: float, k: float) -> float:
         return mass * c / (c * c + k * mass)
     if algorithm == "gauss-seidel":
         return 4.0 * mass / (c + sqrt(c * c + 4.0 * k * mass))
-    g, q = c / mass, k / mass
-    ends = np.roots([q * q, -g * q, -2.0 * g * g, -4.0 * g]) if q else np.zeros(0)
-    return min([1.0 / g, *(float(one.real) for one in ends if one.imag == 0.0 < one.real)])
+    k = max(k, 1e-9 * c * c / mass)  # without bristles a root of 1 stands for where the mass is
+    low = high = 1e-3 * mass / (c + sqrt(k * mass))
+    while _settles(_cubic(algorithm, c * high / mass, k * high * high / mass)):
+        low, high = high, high * _FINENESS
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        stable = _settles(_cubic(algorithm, c * middle / mass, k * middle * middle / mass))
+        low, high = (middle, high) if stable else (low, middle)
+    return low
+
+
+def _cubic(algorithm: str, g: float, q: float) -> tuple[float, float, float]:
+    """Return the coefficients of s^2, s and 1 beside s^3 in the characteristic equation."""
+    a, b = 0.5 * q + g, 0.5 * q - g
+    if algorithm == "midpoint":
+        return 1.5 * a - 2.0, 1.0 + 1.5 * b - 0.5 * a, -0.5 * b
+    slope, rest = 1.0 - 0.75 * a, 0.25 * a
+    return 0.5 * q - 2.0 + a * slope, 1.0 - 0.5 * q + a * rest + b * slope, b * rest
+
+
+def _settles(cubic: tuple[float, float, float]) -> bool:
+    """Return whether all roots lie within the unit circle, by Jury's criterion."""
+    a2, a1, a0 = cubic
+    return (
+        1.0 + a2 + a1 + a0 > 0.0
+        and 1.0 - a2 + a1 - a0 > 0.0
+        and abs(a0) < 1.0
+        and 1.0 - a0 * a0 > abs(a1 - a0 * a2)
+    )
 
 
 _DAMPER_PORTS = frozenset(("displacement", "velocity", "force"))  # and that of its command
@@ -134,6 +162,7 @@ def advise(
     network = Network(parts, wires)
     _instances(network, document)
     _order(run, network, document)
+    _rollback(run, network, document)
     _loops(network, document)
     _designs(network, library, document)
     for part in parts.values():
@@ -174,6 +203,24 @@ def _order(run: RunSettings, network: Network, document: Document) -> None:
                 f"[components.{ground[0].name}] comes after [components.{structure.name}], which "
                 "then gets the ground acceleration one step late; put it first, because components "
                 "step in the order of the file.",
+            )
+
+
+def _rollback(run: RunSettings, network: Network, document: Document) -> None:
+    """What is to step again must go back first: each FMU of a loop needs its state in and out."""
+    if run.algorithm != "midpoint-iterated":
+        return
+    feeds = {name: {w.target for w in network.wires if w.source == name} for name in network.order}
+    for part in network.parts.values():
+        if part.file is None or part.description is None:
+            continue  # the built-in components can
+        able = part.description.capabilities.get("canGetAndSetFMUstate")
+        if part.name in reached(feeds, part.name) and able not in ("true", "1"):
+            document.error(
+                ("run", "algorithm"),
+                f"[run] algorithm: midpoint-iterated lets the components of a loop step twice, and "
+                f"[components.{part.name}] cannot go back: {part.file.name} declares no "
+                'canGetAndSetFMUstate. "midpoint" is right.',
             )
 
 

@@ -23,7 +23,7 @@ from ..fmu.component import OUTSIDE, SWITCH
 from ..fmu.description import Description, Value, Variable
 from ..physics.building import PAPER, from_data
 
-ALGORITHMS = ("gauss-seidel", "midpoint", "jacobi")
+ALGORITHMS = ("gauss-seidel", "midpoint", "midpoint-iterated", "jacobi")
 FILE_PARAMETERS = ("record", "file")
 """Parameters that may name a file, relative to the scenario's folder."""
 

@@ -112,6 +112,20 @@ def test_values_of_every_type_come_through(algorithm: str, tmp_path: Path) -> No
 
 
 @needs_fmus
+def test_a_state_is_kept_and_restored(tmp_path: Path) -> None:
+    """In a loop of feedthroughs nothing changes; the iteration goes back by FMI 3.0's functions."""
+    values = {k: v for k, v in FEEDTHROUGH.items() if k != "Float64_continuous_input"}
+    wires = """
+        "a.Float64_continuous_input" = "b.Float64_discrete_output"
+        "b.Float64_continuous_input" = "a.Float64_discrete_output"
+    """
+    parts = dict.fromkeys(("a", "b"), ("3.0", "Feedthrough", values))
+    rows = bristle.run(scenario(tmp_path, parts, wires), {"run.algorithm": "midpoint-iterated"})
+    assert len(rows) == 11
+    assert (rows["a.Float64_continuous_output"] == 0.0).all()
+
+
+@needs_fmus
 def test_an_fmu_that_asks_to_end_says_so(tmp_path: Path) -> None:
     file = scenario(tmp_path, {"one": ("3.0", "Stair", {})}, stop=10.0, step=0.2)
     with pytest.raises(IncompleteRunError, match="it asks to end the simulation at t = 9 s") as end:

@@ -67,6 +67,11 @@ def test_a_damper_that_steps_first_is_told_ahead_by_its_derivatives() -> None:
     assert ("set", 1, "v x") in found[4:]  # the row's own, before what follows them is read
 
 
+def test_the_values_that_a_rollback_repeats_are_the_middle() -> None:
+    found = calls(make_schedule(OURS, "midpoint-iterated"))
+    assert not [one for one in found if one[0] == "ramp"]
+
+
 def test_without_midpoint_nothing_is_said_of_derivatives() -> None:
     for algorithm in ("gauss-seidel", "jacobi"):
         assert not [one for one in calls(make_schedule(OURS, algorithm)) if one[0] == "ramp"]
@@ -74,11 +79,14 @@ def test_without_midpoint_nothing_is_said_of_derivatives() -> None:
 
 def test_a_foreign_fmu_gets_value_and_derivative_and_no_value_behind_the_step() -> None:
     nodes = [*LOOP[:2], STANDING, able(LOOP[3])]
-    found = of(calls(make_schedule(nodes, "midpoint")), 3)
-    (i,) = (i for i, one in enumerate(found) if one[0] == "ramp")
-    assert "x:past v:past" in str(found[i - 1])
-    assert found[i : i + 2] == [("ramp", 3, "x v"), ("step", 3)]
-    assert found[i + 2][0] == "get"
+    for algorithm, last in (("midpoint", 1), ("midpoint-iterated", 2)):
+        found = of(calls(make_schedule(nodes, algorithm)), 3)
+        ramps = [i for i, one in enumerate(found) if one[0] == "ramp"]
+        assert len(ramps) == last
+        for i in ramps:
+            assert "x:past v:past" in str(found[i - 1])
+            assert found[i : i + 2] == [("ramp", 3, "x v"), ("step", 3)]
+            assert found[i + 2][0] == "get"
 
 
 def test_an_fmu_that_interpolates_follows_its_input_over_the_step(tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from bristle.engine.schedule import (
     Node,
     Ramp,
     ReadOutputs,
+    Restore,
+    Save,
     Schedule,
     Shift,
     Write,
@@ -58,10 +60,11 @@ LOOP = [GROUND, STRUCTURE, VOLTAGE, DAMPER]
 def calls(schedule: Schedule) -> list[tuple[object, ...]]:
     """Return the operations in short: (kind, component, names)."""
     verbs = {ReadOutputs: "get", Write: "set", Ramp: "ramp", Keep: "keep", Shift: "shift"}
+    alone = {DoStep: "step", Save: "save", Restore: "restore"}
     found: list[tuple[object, ...]] = []
     for o in schedule.operations:
-        if isinstance(o, DoStep):
-            found.append(("step", o.component))
+        if isinstance(o, DoStep | Save | Restore):
+            found.append((alone[type(o)], o.component))
         elif isinstance(o, Write) and o.values:
             each = (f"{n}:{v}" for n, v in zip(o.names, o.values, strict=True))
             found.append(("set", o.component, " ".join(each)))

@@ -229,6 +229,39 @@ def test_built_in_components_say_it_themselves() -> None:
         run("half_sine_pulse", {"damper.over_step.velocity": "held", "run.stop": 0.1})
 
 
+def test_the_components_of_a_loop_go_back_once_and_step_again() -> None:
+    # Behind the loop: what reads it alone. Before it: ground and voltage, the latter late in file.
+    watch = node("watch", {"x": (1, "x")}, {"y": ()})
+    nodes = [GROUND, LINEAR_GROUND, told(STANDING), LOOP[3], watch]
+    found = calls(make_schedule(nodes, "midpoint-iterated"))
+    assert [one[:2] for one in found if one[0] in ("save", "step", "restore")] == [
+        ("save", 1), ("save", 3), ("step", 0), ("step", 1), ("step", 2), ("step", 3),
+        ("restore", 1), ("restore", 3), ("step", 1), ("step", 3), ("step", 4),
+    ]  # fmt: skip
+    again = found[found.index(("restore", 3)) :]
+    assert ("set", 1, "a_g:newest force:middle") in again  # its end is known now
+    assert ("set", 4, "x:middle") in again
+    assert ("keep", 1, "x v") not in again
+
+
+def test_without_a_loop_nothing_goes_back(scenario_of: Maker) -> None:
+    wires = {"sum.u": "ramp.value"}
+    components = {"ramp": "Ramp", "sum": "Integrator"}
+    frame = run(scenario_of(components, wires, algorithm="midpoint-iterated"))
+    assert frame["sum.x"].to_numpy() == pytest.approx(0.5 * T**2)
+
+
+def test_a_loop_that_cannot_go_back_is_refused(scenario_of: Maker) -> None:
+    components = {"one": "Integrator", "two": "Gain", "free": "Ramp"}
+    file = scenario_of(
+        components, {"one.u": "two.y", "two.u": "one.x"}, algorithm="midpoint-iterated"
+    )
+    with pytest.raises(ScenarioError, match="canGetAndSetFMUstate") as error:
+        run(file)
+    assert "[components.one]" in str(error.value)
+    assert "free" not in str(error.value)
+
+
 PULSE = {"run.stop": 1.0, "run.algorithm": "midpoint"}
 FELT = ["structure.base_acceleration_absolute", "structure.base_displacement", "damper.force"]
 
@@ -269,6 +302,12 @@ def test_the_energy_under_a_voltage_that_goes_on_changing_is_of_second_order(
     assert coarse["damper.dissipated_energy"] < 0.001
     for name, error in coarse.items():
         assert 10.0 < error / fine[name] < 22.0, name  # 16 is second order
+
+
+def test_one_rollback_is_better_still_and_repeats_nothing_of_the_first_pass() -> None:
+    plain = errors("half_sine_pulse")
+    iterated = errors("half_sine_pulse", run__algorithm="midpoint-iterated")
+    assert all(iterated[name] < 0.5 * plain[name] for name in plain)
 
 
 @pytest.mark.slow  # runs at several steps

@@ -15,7 +15,7 @@ from bristle import run
 from bristle.component import HELD, LINEAR, SAMPLED
 from bristle.engine.schedule import ALONG, DoStep, Node, Write, make_schedule
 
-SEQUENTIAL = ("gauss-seidel", "midpoint")
+SEQUENTIAL = ("gauss-seidel", "midpoint", "midpoint-iterated")
 H, PARTS = 0.1, 4
 T = np.arange(11) / 10
 AHEAD = H * H * (PARTS + 1) / (2 * PARTS)

@@ -56,7 +56,7 @@ MISTAKES = [
      ["3.5e+10 steps", "GB of results", "a step from"]),
     ("steps beyond counting", "step = 0.002", "step = 1e-320", "step =", ["inf steps"]),
     ("algorithm unlike any", '"gauss-seidel"', '"euler"', "algorithm",
-     ["There are: gauss-seidel, midpoint, jacobi."]),
+     ["There are: gauss-seidel, midpoint, midpoint-iterated, jacobi."]),
     # components
     ("components no table", VALID[VALID.index("[components.ground]"):], "[[components]]\n",
      "components", ["is a list: expected a table"]),

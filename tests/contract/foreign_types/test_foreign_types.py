@@ -38,7 +38,7 @@ def told(file: Path, capsys: pytest.CaptureFixture[str], code: int) -> list[tupl
     return [(one["level"], one["text"]) for one in findings]
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", [a for a in ALGORITHMS if a != "midpoint-iterated"])
 @pytest.mark.parametrize("step", [None, 0.05])
 def test_a_whole_number_feeds_a_real(
     algorithm: str, step: float | None, scenario_of: Maker
