@@ -35,9 +35,9 @@ from .unproven import unproven
 LEFT = 0.5
 """Share of the error on held-out runs that a step leaves at most for a verdict to be made anew."""
 
-MOST_SPENT = 2200e6
-"""Steps of dampers' forces, see `Effort`, that all verdicts and steps may take together: four to
-five minutes."""
+MOST_SPENT = 2600e6
+"""Steps of dampers' forces, see `Effort`, that all verdicts and steps may take together: some
+five minutes. A verdict is made anew where twice what the first one took is left."""
 
 NOT_COMPARED = "Further effects were not compared, because the search had taken long enough."
 
@@ -140,7 +140,7 @@ def complete(
                 if step is not None:
                     opened = None  # the model is another one
                     gained.append(step)
-                    if gained == [step] and halves(step) and left() >= took:
+                    if gained == [step] and halves(step) and left() >= 2.0 * took:
                         anew = True
                         continue  # a verdict on a model that errs twice as much tells little
                 done = replace(done, unproven=tuple(gained), refuted=refuted)
