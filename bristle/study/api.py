@@ -279,7 +279,7 @@ def diagnose(
     ...     size = np.array([[8e-3], [2e-3], [1e-3]])  # m
     ...     x = (size * np.sin(turn * t + phase)).sum(0)
     ...     v = (size * turn * np.cos(turn * t + phase)).sum(0)
-    ...     force = 5.0 * np.tanh(v / 2e-3) + 90.0 * v + 400.0 * x  # N; the spring is hidden
+    ...     force = 5.0 * np.sign(v) + 90.0 * v + 400.0 * x  # N; the spring is hidden
     ...     force += rng.normal(0.0, 0.05, t.size)
     ...     return {"time": t, "displacement": x, "velocity": v, "force": force}
     >>> verdict = bristle.diagnose([run(0.0), run(1.0)], "bingham", holdout=run(2.0))
