@@ -51,9 +51,6 @@ SLOW = 0.1
 SIZES = (30, 60, 120)
 """Hidden units that are tried."""
 
-SEES = (3, 99)
-"""Inputs that a hidden unit sees, at the most."""
-
 STEEP = (0.3, 0.6, 1.2)
 """Spreads of the hidden weights."""
 
@@ -363,8 +360,7 @@ def _refitted(train: Problem, model: Model, closure: Closure) -> Model:
 def promised(train: Problem, model: Model) -> float:
     """Return the error that a closure may leave on left-out folds, by that without one [1].
 
-    Networks whose hidden weights are drawn tell it, at little cost: one that is trained leaves
-    less, or as much.
+    It is told by networks with one penalty, beside the model as it is.
 
     Parameters
     ----------
@@ -373,19 +369,20 @@ def promised(train: Problem, model: Model) -> float:
     """
     if len(train.runs) == 1 and reversals(train.runs[0]) < FEWEST_REVERSALS:
         return 1.0
-    grids, without = _grids(train, model)
-    least = min(loss for _, drawn in grids for loss, _, _ in drawn)
-    return min(1.0, float(np.sqrt(least / without)))
+    tried, without = _tried(train, model, DECAYS[1:2])
+    return min(1.0, float(np.sqrt(min(loss for loss, _, _ in tried) / without)))
 
 
-def _grids(train: Problem, model: Model) -> tuple[list[tuple[_Grid, list[_Tried]]], float]:
-    """Return the networks that are drawn, and the loss without one.
+def _tried(train: Problem, model: Model, decays: Sequence[float]) -> tuple[list[_Tried], float]:
+    """Return networks, those that are trained last, and the loss without one.
 
-    They are without and with the displacement, without and with the labels of the runs.
+    Drawn ones are without and with the displacement, without and with the labels of the runs; with
+    the inputs that are best for them others are trained.
 
     Parameters
     ----------
     train, model : the training runs, and the model that networks are beside
+    decays : penalties of those that are trained
     """
     zero = zero_of(train, model)[0] if train.free_zero and not has_offset(model) else 0.0
     total = sum(int(np.count_nonzero(_counts(run))) for run in train.runs)
@@ -394,24 +391,24 @@ def _grids(train: Problem, model: Model) -> tuple[list[tuple[_Grid, list[_Tried]
         (run.force - train.predict(model, run) - zero)[row]
         for run, row in zip(train.runs, rows, strict=True)
     ]
-    fold, out = _folds(rows), []
+    fold, of_inputs = _folds(rows), list[tuple[float, list[_Tried], _Grid]]()
     of_runs = label_inputs(train.runs)
     for position, labels in product((False, True), (True, False) if of_runs else (False,)):
         inputs = (*inputs_of(train.runs, position), *(of_runs if labels else ()))
         grid = _Grid([_Seen(train, model, run, inputs) for run in train.runs], rows, y, fold)
-        drawn = [one for few, steep in product(SEES, STEEP) for one in grid.drawn(few, steep)]
-        out.append((grid, drawn))
-    return out, float(np.mean(np.concatenate(y) ** 2))
+        drawn = [one for steep in STEEP for one in grid.drawn(steep)]
+        of_inputs.append((min(loss for loss, _, _ in drawn), drawn, grid))
+    _, _, best = min(of_inputs, key=lambda one: one[0])
+    tried = [one for _, drawn, _ in of_inputs for one in drawn]
+    return [*tried, *map(best.trained, decays)], float(np.mean(np.concatenate(y) ** 2))
 
 
 def _chosen(train: Problem, model: Model) -> tuple[Closure, float, float] | None:
     """Return the best network beside a model, its loss on left-out folds, and that without one."""
-    grids, without = _grids(train, model)
-    grid, _ = min(grids, key=lambda pair: min(loss for loss, _, _ in pair[1]))
-    if len(train.runs) == 1:  # its parts are alike: they would not see a network stray
-        tried = [grid.trained(decay) for decay in DECAYS[1:]]
-    else:
-        tried = [*(one for _, drawn in grids for one in drawn), *map(grid.trained, DECAYS)]
+    decays = DECAYS if len(train.runs) > 1 else DECAYS[1:]
+    tried, without = _tried(train, model, decays)
+    if len(train.runs) == 1:  # its parts are alike: they would not see a drawn one stray
+        tried = tried[-len(decays) :]
     least = min(loss for loss, _, _ in tried)
     if least > without:  # few folds promise less than all runs give: what is left out is outermost
         return None
@@ -603,22 +600,15 @@ class _Grid:
     def _runs(self) -> list[tuple[_Seen, Array, Indices]]:
         return list(zip(self.seen, self.evened, self.rows, strict=True))
 
-    def drawn(self, few: int, steep: float) -> list[_Tried]:
+    def drawn(self, steep: float) -> list[_Tried]:
         """Return networks of all sizes and penalties: loss on left-out folds, hidden units, itself.
 
-        Their hidden weights are drawn.
-
-        Parameters
-        ----------
-        few : how many inputs a hidden unit sees
-        steep : spread of the hidden weights
+        Their hidden weights are drawn, with a spread of `steep`.
         """
         most, k = max(SIZES), len(self.middle)
         draw = np.random.default_rng(1)
-        hidden = steep * draw.standard_normal((most, k))
-        for row in hidden:
-            row[draw.permutation(k)[few:]] = 0.0
-        hidden, bias = rounded(hidden), rounded(draw.uniform(-1.5, 1.5, most))
+        hidden = rounded(steep * draw.standard_normal((most, k)))
+        bias = rounded(draw.uniform(-1.5, 1.5, most))
         A = np.concatenate(
             [
                 _columns(u[row], hidden, bias) if one.plain
