@@ -150,7 +150,7 @@ def complete(
                     done = replace(done, closure=_closed(study, found, say, stepped))
                 except StudyError as refused:  # the verdict and the steps stand without one
                     done = replace(done, no_closure=str(refused))
-            elif lacks_one and found.noise_known and not study.settings.has_building:
+            elif lacks_one and not study.settings.has_building:
                 done = replace(done, promise=promise_of(study, opened))
             return replace(done, steps=tuple(steps))
         say("adding " + " and ".join(names))

@@ -112,7 +112,7 @@ def learn_study_closure(study: Study, *, name: str = "", write: bool = True) -> 
     for why in study.usable_effects():
         tell(f"left out: {why}")
     given, name = name, _new_name(study, name, "closure")
-    _, opened = opened_at(study, DAMPER)
+    _, opened = opened_at(study, DAMPER, noise=False)
     if opened.problem.reconstructed:
         raise StudyError(
             f"{study.folder}: a closure is in parallel with the damper, whose force was not "
@@ -197,7 +197,9 @@ def _written(study: Study, learned: LearnedEffect, given: str) -> LearnedEffect:
     return replace(learned, file=file, picture=picture)
 
 
-def opened_at(study: Study, at: str, fitted: Model | None = None) -> tuple[str, Prepared]:
+def opened_at(
+    study: Study, at: str, fitted: Model | None = None, *, noise: bool = True
+) -> tuple[str, Prepared]:
     """Return the site of a study to learn at, "" for that where the model errs, and its runs.
 
     Parameters
@@ -206,6 +208,7 @@ def opened_at(study: Study, at: str, fitted: Model | None = None) -> tuple[str, 
     at : a site, or ""
     fitted : the model of a test bench as these runs were fitted before, noise known or not; None
         for the study's, which is refined
+    noise : whether the noise of the runs has to be known
     """
     rig, nothing = _rig(study), f"{study.folder}: nothing can be learned from these runs."
     if rig.lacking is not None:
@@ -222,7 +225,7 @@ def opened_at(study: Study, at: str, fitted: Model | None = None) -> tuple[str, 
         return DAMPER, opened
     wanted = [at] if at else _wanted(study, there)
     prepared = {site: one for site in wanted if (one := rig.prepare(site)) is not None}
-    able = [(site, one) for site, one in prepared.items() if one.held_out.noise_known]
+    able = [pair for pair in prepared.items() if pair[1].held_out.noise_known or not noise]
     if not able:
         why = dict.fromkeys(noise_not_known(one.held_out) for one in prepared.values())
         raise StudyError(f"{nothing} {' '.join(why)}")
