@@ -11,7 +11,7 @@ from statistics import median
 from typing import NamedTuple
 
 from ..units import convert, same_dimension
-from .channels import DRIVE, PLAIN, UNITS, label_text
+from .channels import DRIVE, PLAIN, TEMPERATURE, UNITS, label_text
 from .tone import Tone, amplitude_fits, amplitude_off, frequency_fits, frequency_off
 
 # What the names of files tell of their runs: numbers with units, and how decimals are written.
@@ -275,7 +275,7 @@ def _doubled_is_minus(name: str, files: Sequence[Path]) -> int:
         return -1
     if any(re.search(r"(?<![-_= ])-(?!-)", stem.lstrip("-")) for stem in stems):
         return 1  # one alone parts words: run--10C beside run-10C
-    return 0 if name == "temperature" else -1
+    return 0 if name == TEMPERATURE else -1
 
 
 def _open_text(
@@ -311,10 +311,10 @@ def _ranges(files: Sequence[Path], plain: Sequence[Mapping[str, Token]]) -> dict
 def _below_zero(files: Sequence[Path], plain: Sequence[Mapping[str, Token]]) -> dict[str, str]:
     """Return what is said of temperatures such as m10C, whose letter may stand for a minus."""
     for file, tokens in zip(files, plain, strict=True):
-        one = tokens.get("temperature")
+        one = tokens.get(TEMPERATURE)
         if one and re.search(rf"(?<![A-Za-z])[mMnN]{re.escape(one.number)}", file.stem):
             return {
-                "temperature": f'"{one.text}" in the names may lie below zero: no temperature is '
+                TEMPERATURE: f'"{one.text}" in the names may lie below zero: no temperature is '
                 "taken. --runs FILE, a table with a row per file, says it"
             }
     return {}

@@ -286,7 +286,7 @@ def _beside(
 def promising(problem: Problem, model: Model) -> list[Dependence]:
     """Return of each label the dependence that fits runs best, the most promising first.
 
-    Nothing is proven by that, of few runs least.
+    Nothing is proven by that, of few runs least. One that is defined for another model is the same.
 
     Parameters
     ----------
@@ -309,7 +309,10 @@ def promising(problem: Problem, model: Model) -> list[Dependence]:
         gain, size, j = max(gains, key=lambda one: one[0])
         name = fits.names[j]
         effect = f"{name.replace('.', '_')}_by_{as_word(label.name)}"
-        if gain >= WORTH and size.any() and effect.isidentifier() and effect not in EFFECTS:
+        same = effect not in model.effects and effect in EFFECTS and EFFECTS[effect].changes == name
+        if gain < WORTH or not size.any() or not effect.isidentifier():
+            continue
+        if same or effect not in EFFECTS:
             text = _text(effect, name, label, model, size, (middle, numbers))
             out.append(Dependence(effect, text, label.name, gain))
     return sorted(out, key=lambda one: -one.gain)

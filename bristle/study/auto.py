@@ -14,7 +14,7 @@ from ..errors import StudyError
 from ..identification.histories import compile_ahead, counted, left
 from ..learning.closure import LearnedClosure
 from ..learning.result import LearnedEffect
-from ..physics.effect import closures
+from ..physics.effect import EFFECTS, closures
 from .forms import law_or_all
 from .history import Step
 from .identify import identify_study, is_identified
@@ -183,15 +183,20 @@ def _gained(
         fitted = replace(before, values={**before.values, **known.values})
     opened = opened_at(study, "", fitted)[1]
     laws = found.laws.rows if found.laws is not None and not before.effects else ()
-    best = unproven(opened, found.trials, laws, MOST_EFFECTS)
-    names = tuple(one for one in best.model.effects if one not in before.effects)
-    cut = NOT_COMPARED if best.cut else ""
-    if not names and not best.law:
-        return None, cut, opened
-    write_effects(study, best.written)
-    say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
-    step, refuted = add_unproven(study, best.law, names, best.model.values, found)
-    stepped(step)
+    refuted = ""
+    for labels in (True, False):  # a law of a label may fail at a level that no training run had
+        best = unproven(opened, found.trials, laws, MOST_EFFECTS, labels)
+        names = tuple(one for one in best.model.effects if one not in before.effects)
+        cut = NOT_COMPARED if best.cut else ""
+        if not names and not best.law:
+            return None, refuted or cut, opened
+        write_effects(study, best.written)
+        say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
+        step, why_not = add_unproven(study, best.law, names, best.model.values, found)
+        stepped(step)
+        refuted = refuted or why_not
+        if step is not None or not any(EFFECTS[name].labels for name in names):
+            break
     return step, refuted or cut, opened
 
 

@@ -7,14 +7,14 @@ what lowers the error on the training runs left out of the fit; the held-out run
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..core.arrays import Array
-from ..diagnosis.by_label import promising
+from ..diagnosis.by_label import Dependence, promising
 from ..diagnosis.law_trials import LawTrial
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import LONG, SECONDS, Trial, missed_by, try_all
@@ -63,7 +63,11 @@ class Unproven:
 
 @counted(MOST_SPENT)
 def unproven(
-    prepared: Prepared, trials: Sequence[Trial], laws: Sequence[LawTrial], most: int
+    prepared: Prepared,
+    trials: Sequence[Trial],
+    laws: Sequence[LawTrial],
+    most: int,
+    labels: bool = True,
 ) -> Unproven:
     """Return the model with the law and effects that lower its error on runs left out.
 
@@ -75,7 +79,12 @@ def unproven(
     trials : of that model with one effect more each, as far as they are known
     laws : all laws, fitted, where another one may be taken
     most : how many effects a model has at the most
+    labels : whether parameters may depend on labels of the runs
     """
+
+    def dependences(model: Model) -> list[Dependence]:
+        return promising(problem, model) if labels else []
+
     missed = missed_by(prepared.before, prepared.searched)
     data = prepared.with_excess(missed) if missed > 0.0 else prepared
     problem = data.searched
@@ -90,7 +99,7 @@ def unproven(
         nonlocal best, errors, cut
         able: list[tuple[float, int, Model, list[Array]]] = []
         for k, one in enumerate(candidates):  # one by one, so that what is spent is told alike
-            with defined({name: text for name, text in one.written.items() if name not in EFFECTS}):
+            with _defined(one.written):
                 look = 2 * SWEEPS * len(one.model.free()) * problem.steps_of(one.model)
                 if look > left():  # nor could its fit be afforded
                     cut = True
@@ -103,15 +112,15 @@ def unproven(
             return False
         _, k, model, errors = min(able, key=lambda one: one[:2])
         written = {**best.written, **candidates[k].written}
-        stay.enter_context(defined({n: text for n, text in written.items() if n not in EFFECTS}))
+        stay.enter_context(_defined(written))
         best = Unproven(refine(model, problem, LONG), candidates[k].law or best.law, written)
         return True
 
     with ExitStack() as stay:
-        gains(_other_laws(laws, best.model, problem), LONG)
+        gains(_other_laws(laws, best.model, problem, dependences), LONG)
         while len(best.model.effects) < most and left() >= 0.0:
-            texts = {one.name: one.text for one in promising(problem, best.model)}
-            with defined(texts):
+            texts = {one.name: one.text for one in dependences(best.model)}
+            with _defined(texts):
                 able = [] if texts else [one for one in trials if _joins(one, best.model)]
                 if not able:
                     able = try_all(
@@ -125,11 +134,25 @@ def unproven(
             if not gains(tried):
                 break
         model = _without_idle(best.model, prepared.before.model.effects, errors, problem)
-    written = {name: text for name, text in best.written.items() if name in model.effects}
-    return Unproven(model, best.law, written, cut or left() < 0.0)
+    new = {
+        name: text
+        for name, text in best.written.items()
+        if name in model.effects and name not in EFFECTS
+    }
+    return Unproven(model, best.law, new, cut or left() < 0.0)
 
 
-def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> list[Unproven]:
+def _defined(texts: Mapping[str, str]) -> AbstractContextManager[None]:
+    """Define those of the effects that are not defined yet: a verdict names dependences, too."""
+    return defined({name: text for name, text in texts.items() if name not in EFFECTS})
+
+
+def _other_laws(
+    laws: Sequence[LawTrial],
+    model: Model,
+    problem: Problem,
+    dependences: Callable[[Model], list[Dependence]],
+) -> list[Unproven]:
     """Return the laws that fit the training runs best, each with what its parameters owe labels.
 
     Where a label parts the runs, a law without it tells little of what the law can do: the
@@ -138,7 +161,7 @@ def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> lis
     others = [(row.law, row.trial.model) for row in laws if row.trial.model.law != model.law]
     able = []
     for law, own in [("", model), *others] if others else []:
-        gain = max((one.gain for one in promising(problem, own)), default=0.0)
+        gain = max((one.gain for one in dependences(own)), default=0.0)
         if law or gain > 0.0:
             rest = _mean_square(errors_of(own, problem)) * (1.0 - gain)
             able.append((rest, gain > 0.0, Unproven(own, law)))
@@ -147,7 +170,7 @@ def _other_laws(laws: Sequence[LawTrial], model: Model, problem: Problem) -> lis
     for rest, labelled, one in able[: 2 * TRIED]:
         if labelled:
             one = _with_labels(one, problem)
-            with defined(one.written):
+            with _defined(one.written):
                 rest = _mean_square(errors_of(one.model, problem))
         closer.append((rest, one))
     closer.sort(key=lambda one: one[0])
@@ -166,7 +189,7 @@ def _with_labels(law: Unproven, problem: Problem) -> Unproven:
             if not worth:
                 break
             written[worth[0].name] = worth[0].text
-            stay.enter_context(defined({worth[0].name: worth[0].text}))
+            stay.enter_context(_defined({worth[0].name: worth[0].text}))
             model = refine(model.with_effect(worth[0].name), problem, SWEEPS)
     return Unproven(model, law.law, written)
 

@@ -18,6 +18,7 @@ from bristle.errors import StudyError
 from bristle.identification.histories import counted
 from bristle.model.model import Model, new_model
 from bristle.physics.building import paper_building
+from bristle.physics.effect import EFFECTS
 from bristle.study import auto, steps
 from bristle.study.api import diagnose, identify
 from bristle.study.auto import MOST_EFFECTS, complete
@@ -116,7 +117,7 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(
     monkeypatch.setattr(auto, "add_unproven", add)
     with counted(most):
         done = complete(folder, say=print)
-    assert asked == [("opened", found.trials, (), MOST_EFFECTS)]
+    assert asked == [("opened", found.trials, (), MOST_EFFECTS, True)]
     assert added == [("", ("stribeck", "drift"), found)]
     assert done.steps == done.unproven == (step,)
     stays = left > 0.125 or most < 0.0
@@ -124,6 +125,30 @@ def test_an_error_that_remains_is_lowered_by_what_is_not_proven(
     assert done.anew is not stays
     assert bool(done.refuted) is (most < 0.0)
     assert done.promise == (0.6 if stays else 1.0)
+
+
+def test_where_held_out_runs_refute_a_dependence_on_a_label_the_look_goes_on_without(
+    folder, monkeypatch
+):
+    told(monkeypatch, [verdict("unknown", 6.0)])
+    by_oil = SimpleNamespace(labels={"oil": "oil"})
+    monkeypatch.setitem(EFFECTS, "f_c_by_oil", by_oil)
+    step = Step(2, "add stribeck (not proven)", "")
+
+    def chosen(_opened, _trials, _laws, _most, labels):
+        names = ("f_c_by_oil",) if labels else ("stribeck",)
+        return SimpleNamespace(model=Model("bingham", names), law="", written={}, cut=False)
+
+    def add(_study, _law, names, _values, _of):
+        return (step, "") if names == ("stribeck",) else (None, "Not kept: add f_c_by_oil.")
+
+    monkeypatch.setattr(auto, "opened_at", lambda *_: ("damper", "opened"))
+    monkeypatch.setattr(auto, "write_effects", lambda _study, _texts: None)
+    monkeypatch.setattr(auto, "unproven", chosen)
+    monkeypatch.setattr(auto, "add_unproven", add)
+    done = complete(folder, say=print)
+    assert done.unproven == (step,)
+    assert done.refuted == "Not kept: add f_c_by_oil."
 
 
 def test_what_the_held_out_runs_refute_is_not_kept(bench_study, monkeypatch):
