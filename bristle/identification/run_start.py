@@ -8,6 +8,7 @@ carry a force begin where they give this one, as far as the damper remembers its
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import copysign
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +46,10 @@ COARSE = 0.05
 """Step [s] in which the path is followed: noise would lengthen it sample by sample."""
 
 CARRIED = 0.01
-"""Share of the load by which the model's force may miss it once its state is found."""
+"""Share of the load by which the model's force misses it where the search for its state ends."""
+
+HELD = 0.2
+"""Share of the load by which the model's force may miss it: a rest holds more than a slip does."""
 
 TURNS = 4
 """Steps of the search for the state; the force of a bristle at rest is linear in it."""
@@ -185,7 +189,7 @@ def start_under_load(
     stroke: float,
     resting: Callable[[Mapping[str, float]], Array],
 ) -> dict[str, float]:
-    """Return the start value of a state at which a damper at rest carries its load.
+    """Return the start value of a state at which a damper at rest carries its load, or nearly so.
 
     Nothing where no value of the state does: what the model holds at rest then is another part. Nor
     where the force only passes the load as it fades, as a bristle's does behind a dashpot.
@@ -205,20 +209,26 @@ def start_under_load(
         force = resting({f"{name}_0": value})
         return float(np.mean(force[len(force) // 2 :]))  # a series element has settled by then
 
-    now, step = 0.0, NUDGE * (stroke if unit == "m" else 1.0)
-    force = settled(now)
+    now, most = 0.0, stroke if unit == "m" else 1.0
+    force, step = settled(now), copysign(NUDGE * most, load)
+    while settled(step) == force and abs(step) < most:  # play carries nothing before it is crossed
+        step *= TURNS
+    best, missed = 0.0, HELD * abs(load)
     for _ in range(TURNS):
         following = settled(now + step)
         slope = (following - force) / step
         now, force = now + step, following
+        if abs(load - force) < missed:
+            best, missed = now, abs(load - force)
         if not np.isfinite(slope) or slope == 0.0:
-            return {}
+            break
         step = (load - force) / slope
         if abs(load - force) <= CARRIED * abs(load):
-            found = {f"{name}_0": now + step}
-            stays = np.max(np.abs(resting(found) - load)) <= abs(load)
-            return found if stays else {}
-    return {}
+            best = now + step
+            break
+    found = {f"{name}_0": best}
+    stays = best and np.max(np.abs(resting(found) - load)) <= abs(load)
+    return found if stays else {}
 
 
 def under_load_text(loads: Mapping[str, float]) -> str:

@@ -91,6 +91,19 @@ def test_bristles_begin_with_the_load_under_which_a_run_begins(begin):
     assert deflection * run.force[0] > 0.0
 
 
+@pytest.mark.parametrize("held", [1.0, 0.9])
+def test_plates_behind_play_begin_with_the_load_or_the_nearest_that_they_hold(held):
+    values = {"f_c": 8.0, "c": 20.0, "k": 0.0, "f_0": 0.0, "rho": 4e3, "play": 2e-4, "gamma": 1.0}
+    model = Model("friction_damper", (), values)
+    run = recorded(stop_and_go(), 750, model=model)
+    assert run.rest
+    weaker = model.with_values({"f_c": held * 8.0})
+    (offset,) = Problem([run]).carrying(weaker, run).values()
+    assert offset * run.force[0] > 0.0
+    at_rest = left(run, weaker)[: run.rest]
+    assert abs(float(np.mean(at_rest))) < (1.05 - held) * abs(float(run.force[0]))
+
+
 def test_an_effect_in_the_place_of_the_sign_carries_the_load_of_a_law_without_states():
     run = recorded(stop_and_go(), 750)
     law = Model("bingham", ("presliding",), {"f_c": 12.0, "presliding.x_s": 2e-3})
