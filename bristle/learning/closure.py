@@ -127,7 +127,8 @@ class LearnedClosure(Viewable):
     samples where it has faded by half or more; `stroke` [m] RMS displacement of the training runs
     where all have one amplitude, else 0; `single` the name of the only one, else ""; `nearest` the
     effect of the library that is; `refused` why it is not kept, "" where it is; `file` its
-    effect's, None where none is written.
+    effect's, None where none is written; `falls` the error on held-out runs without and with it,
+    over the RMS of the force, as the step has it that adds it: () where none does.
     """
 
     name: str
@@ -143,13 +144,15 @@ class LearnedClosure(Viewable):
     nearest: Nearest | None = None
     refused: str = ""
     file: Path | None = None
+    falls: tuple[float, ...] = ()
 
     def sentences(self) -> list[str]:
         """Return what was learned, as an engineer would say it."""
         if self.refused or self.closure is None or self.after is None:
             return [f"No closure is kept. {self.refused}", *self._narrow()]
         errors = [one.error for one in (self.before, self.after)]
-        fall = " to ".join(percent(one.headline[1]) for one in errors if one is not None)
+        falls = self.falls or [one.headline[1] for one in errors if one is not None]
+        fall = " to ".join(map(percent, falls))
         lives = [(words, part) for words, part in self.lives_on if part >= LIVES][:TOLD]
         inputs = ", ".join(f"{words} ({100.0 * part:.0f} %)" for words, part in lives)
         return [

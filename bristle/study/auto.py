@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import nan
 from typing import Any
 
 from ..core.interrupt import keeps
@@ -209,7 +210,11 @@ def _closed(
     if network.file is not None:
         say(f"adding {network.name}")
         why = f"verdict: {found.kind}"
-        stepped(add_effects(study, (network.name,), why=why).step)  # beside the present values
+        step = add_effects(study, (network.name,), why=why).step  # beside the present values
+        stepped(step)
+        parts = (step.before, step.after) if step is not None else ()
+        falls = tuple(float(one.get("error_share_holdout", nan)) for one in parts)
+        network = replace(network, falls=falls)
         study.write_verdict(verdict_of(study, found))  # on the model without it
     return network
 
