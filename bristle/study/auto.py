@@ -190,7 +190,7 @@ def _gained(
         names = tuple(one for one in best.model.effects if one not in before.effects)
         cut = NOT_COMPARED if best.cut else ""
         if not names and not best.law:
-            return None, refuted or cut, opened
+            return None, " ".join(filter(None, (refuted, cut))), opened
         write_effects(study, best.written)
         say("adding " + " and ".join([*names, *([best.law] if best.law else [])]))
         step, why_not = add_unproven(study, best.law, names, best.model.values, found)
@@ -198,7 +198,7 @@ def _gained(
         refuted = refuted or why_not
         if step is not None or not any(EFFECTS[name].labels for name in names):
             break
-    return step, refuted or cut, opened
+    return step, " ".join(filter(None, (refuted, cut))), opened
 
 
 def _closed(

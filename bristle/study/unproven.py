@@ -126,6 +126,13 @@ def unproven(
                     able = try_all(
                         best.model, problem, data.held_out, shown=data.shown, most=SECONDS
                     )
+            if not labels:
+                own = best.model.effects
+                able = [
+                    one
+                    for one in able
+                    if not any(EFFECTS[name].labels for name in one.effects if name not in own)
+                ]
             able.sort(key=lambda one: one.train)
             tried = [
                 Unproven(one.model, "", {n: texts[n] for n in one.effects if n in texts})
