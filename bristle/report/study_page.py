@@ -462,7 +462,7 @@ def _history(content: Content) -> str:
     if (page := draw_staircase(content.history_steps)) is not None:
         caption = (
             "The error of each model of the history on runs that no fit has seen, over the RMS of "
-            "their force. The green lines are what noise alone leaves."
+            "their force; green, where the last one comes near it, what noise alone leaves."
         )
         fall = " \u2192 ".join(percent(one.share) for one in content.history_steps if one.share)
         picture = html.figure(png(page), f"Error on held-out runs: {fall} of the force", caption)

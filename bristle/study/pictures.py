@@ -14,11 +14,10 @@ from ..data.channels import DRIVE
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
 from ..view.style import BLUE, GREEN, GREY, VERMILION, Page, label, look
+from .history import CLOSE, HistoryStep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from .history import HistoryStep
 
 _SCALES = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
 _SHOWN = 12000  # samples per line: more are not seen
@@ -165,12 +164,11 @@ def draw_staircase(history_steps: Sequence[HistoryStep]) -> Page | None:
         grid = page.grid(1, 1, top=0.25, bottom=0.4, left=0.6, right=0.9)
         axes = page.figure.add_subplot(grid[0, 0])
         axes.stairs(shares, np.arange(len(steps) + 1) - 0.5, baseline=None, color=BLUE, lw=2.6)
-        for k, (one, share) in enumerate(zip(steps, shares, strict=True)):
+        for k, share in enumerate(shares):
             told = percent(share / 100.0)
             label(axes, told, k, share, BLUE, xytext=(0, 5), ha="center", va="bottom")
-            if one.z:
-                axes.hlines(share / one.z, k - 0.5, k + 0.5, color=GREEN, lw=1.3)
-        if last := steps[-1].z:
+        if (last := steps[-1].z) and last < CLOSE:  # far from noise z tells no share of it
+            axes.axhline(shares[-1] / last, color=GREEN, lw=1.3)
             label(axes, "noise", len(steps) - 0.5, shares[-1] / last, GREEN, xytext=(5, 0))
         axes.set(xlim=(-0.5, len(steps) - 0.5), ylim=(0.0, 1.2 * max(shares)))
         named = [textwrap.fill(f"{one.number}  {one.what}", 92 // len(steps)) for one in steps]
