@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import nan
 from typing import Any
 
 from ..core.interrupt import keeps
@@ -213,8 +212,8 @@ def _closed(
         step = add_effects(study, (network.name,), why=why).step  # beside the present values
         stepped(step)
         parts = (step.before, step.after) if step is not None else ()
-        falls = tuple(float(one.get("error_share_holdout", nan)) for one in parts)
-        network = replace(network, falls=falls)
+        falls = tuple(one["error_share_holdout"] for one in parts if "error_share_holdout" in one)
+        network = replace(network, falls=falls if len(falls) == len(parts) else ())
         study.write_verdict(verdict_of(study, found))  # on the model without it
     return network
 
