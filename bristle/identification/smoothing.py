@@ -161,6 +161,20 @@ def posterior_draws(
     draws, seed : how many draws, and their seed
     motion : the motion that was found, (n,); None where there is none
     """
+    out, left = _errors_drawn(n, dt, noise, jerk, have, draws, seed, motion)
+    if motion is not None and draws:
+        out[:, :, 2] = _by_spectrum(motion.a, out[:, :, 2], dt)
+    return out + left
+
+
+def _errors_drawn(
+    n: int, dt: float, noise: tuple[float, float], jerk: float, have: tuple[bool, bool], draws: int,
+    seed: int, motion: SmoothedMotion | None,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return draws (draws, n, 3) of the noise let pass, and the motion (n, 3) taken for noise.
+
+    Whatever the time and frequency: of an acceleration, less of the noise is an error.
+    """
     generator = np.random.default_rng(seed)
     std = np.array([max(one, 1e-15) for one in noise])
     out = np.zeros((draws, n, 3))
@@ -175,11 +189,9 @@ def posterior_draws(
         state = _smoothed(_samples(y, noise, have, dt), jerk).state
         out[d] = (truth - state)[lead : lead + n]
     _centre(out)
-    if motion is not None and draws:
-        left = _left_out(motion, out[0], noise, have, dt)
-        out[:, :, 2] = _by_spectrum(motion.a, out[:, :, 2], dt)
-        out += left
-    return out
+    if motion is None or not draws:
+        return out, np.zeros((n, 3))
+    return out, _left_out(motion, out[0], noise, have, dt)
 
 
 class MovingPart:
@@ -349,7 +361,8 @@ def smooth_drive(V: Array, noise: float, dt: float, draws: int, seed: int) -> tu
             found = smooth(piece, None, dt, (noise, 1.0))
             out[part] = found.x
             own = (noise, 1.0), found.jerk, (True, False), draws, seed + begin, found
-            error[:, part] = posterior_draws(end - begin, dt, *own)[:, :, 0]
+            passed, left = _errors_drawn(end - begin, dt, *own)
+            error[:, part] = (passed + left)[:, :, 0]
     return out, error
 
 
