@@ -36,15 +36,14 @@ from .questions import (
     Stated,
     able_beside,
     cost_of,
-    default_request,
-    effects_beside,
     law_rivals,
     notes_of_error,
     open_parts,
     parameters_of,
+    purposes_at,
     refuse_no_rival,
     refuse_unable,
-    rivals,
+    requests_of,
     rivals_of,
     sized_rival,
     stated,
@@ -263,8 +262,8 @@ def plan_study(
     opened = _opened(study)
     runs = [*opened.problem.runs, *opened.held_out.runs]
     rig = with_given(limits_of_runs(runs), limits or {})
-    request = request if request is not None and not request.nothing else default_request(study)
-    purposes = _purposes(request, opened, rig, study.drive)
+    requests = requests_of(request, study)
+    purposes = purposes_at({DAMPER: opened}, requests, rig, study.drive)[DAMPER]
     measured = RunsAtHand(opened.problem.runs, opened.held_out.runs)
     found = stated(purposes, opened.searched, measured, max(opened.before.z, 1.0), seed)
     tell("looking at tests")
@@ -293,23 +292,6 @@ def _opened(study: Study) -> Prepared:
     assert opened is not None
     refuse_unknown_noise(study.folder, opened.held_out)
     return opened
-
-
-def _purposes(request: PlanRequest, opened: Prepared, limits: RigLimits, drive: str) -> Purposes:
-    """Return what a plan is for, with the models and effects that this takes."""
-    model = opened.before.model
-    effects: tuple[SizedRival, ...] = ()
-    others: tuple[Question, ...] = ()
-    parts = None
-    if request.see is not None:
-        tell("looking at effects")
-        effects = tuple(effects_beside(opened, request.see))
-    if request.separate is not None:
-        others = tuple(rivals(opened, request.separate))
-    if request.learn is not None:
-        parts = open_parts(model, limits, request.learn, drive or "voltage")
-    parameters = () if request.sharpen is None else parameters_of(model.free(), request.sharpen)
-    return Purposes(model, effects, others, parameters, parts, drive=drive)
 
 
 def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:

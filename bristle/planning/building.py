@@ -31,14 +31,13 @@ from .plan import Outcome, Plan, or_beyond, outcomes
 from .questions import (
     PlanRequest,
     RunsAtHand,
-    SiteRequest,
     Stated,
     cost_of,
-    default_requests,
     largest_motion,
     notes_of_error,
     of_one_force,
     purposes_at,
+    requests_of,
     stated,
 )
 from .shaking_table import ShakingTable, TablePlanner
@@ -230,11 +229,7 @@ def plan_building(
     found = BuildingRuns(runs.train, runs.holdout, model, building, say=tell)
     sites = _opened(study, found)
     rig = _within(limits_of_shaking(measured, sites, house), limits or {})
-    given = request is not None and not request.nothing
-    requests = (
-        [SiteRequest(request)] if given and request else default_requests(study.verdict() or {})
-    )
-    purposes = purposes_at(sites, requests, rig, study.drive)
+    purposes = purposes_at(sites, requests_of(request, study), rig, study.drive)
     stand = {site: _stated(one, sites[site], seed) for site, one in purposes.items()}
     tell("looking at ground motions")
     table = ShakingTable(model, house, runs.train[0], median_noise(measured), rig.command[1])

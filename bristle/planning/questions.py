@@ -32,7 +32,7 @@ from ..learning.signals import ALONG
 from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
-from ..physics.laws import LAWS, laws_of
+from ..physics.laws import laws_of
 from ..study.study import Study, behind_data
 from .information import (
     USUAL,
@@ -75,27 +75,6 @@ class SizedRival:
         return Rival(self.sized.name, found, self.sized.without())
 
 
-def effects_beside(opened: Prepared, names: Sequence[str] = ()) -> list[SizedRival]:
-    """Return effects that could join a model, each at the size from which it would be named now.
-
-    Parameters
-    ----------
-    opened : the model, fitted to the runs at hand
-    names : of the effects; all that can join where empty
-
-    Raises
-    ------
-    StudyError
-        If there is no such effect, or it cannot join the model.
-    """
-    problem, model = opened.searched, opened.before.model
-    able = able_beside(model, problem, opened.shown)
-    for name in names:
-        refuse_unable(name, able, model)
-    fitted = opened.known(model)
-    return [sized_rival(name, fitted) for name in names or able]
-
-
 def sized_rival(name: str, fitted: SizeSearch) -> SizedRival:
     """Return an effect beside a model, at the size from which it would be named."""
     sized = Sized(name, fitted)
@@ -118,8 +97,8 @@ def able_beside(model: Model, problem: Problem, shown: Sequence[str] = ()) -> li
     ]
 
 
-def refuse_unable(name: str, able: Sequence[str], model: Model) -> None:
-    """Refuse an effect that is not among those that can join a model.
+def refuse_unable(name: str, able: Sequence[str], *models: Model) -> None:
+    """Refuse an effect that is not among those that can join the models of a rig's sites.
 
     Raises
     ------
@@ -128,16 +107,15 @@ def refuse_unable(name: str, able: Sequence[str], model: Model) -> None:
     """
     if name not in EFFECTS:
         raise StudyError(unknown("effect", name, sorted(EFFECTS)))
-    if name in model.effects:
+    if any(name in one.effects for one in models):
         raise StudyError(f"{name} is in the model already; --sharpen {name} sharpens it.")
+    these = f"These can: {', '.join(able)}."
     if not EFFECTS[name].amount:
-        raise StudyError(
-            f"{name} cannot be planned for: {NO_AMOUNT}. These can: {', '.join(able)}."
-        )
+        raise StudyError(f"{name} cannot be planned for: {NO_AMOUNT}. {these}")
     if name not in able:
         raise StudyError(
-            f"{name} cannot be seen beside the law {model.law}: the law holds it already, or it "
-            f"acts elsewhere. These can: {', '.join(able)}."
+            f"{name} cannot be seen: the law {models[0].base_law} holds it already, or no run "
+            f"shows where it acts. {these}"
         )
 
 
@@ -155,24 +133,8 @@ def refuse_no_rival(name: str) -> None:
         With the nearest names.
     """
     known = [*law_rivals(), *sorted(EFFECTS), NONE]
-    if name not in known:
+    if plain_name(name) not in known:
         raise StudyError(unknown("effect or law", name, known))
-
-
-def rivals(opened: Prepared, names: Sequence[str]) -> list[Question]:
-    """Return questions whose rivals are each other: the model with one effect, or with another.
-
-    Parameters
-    ----------
-    opened : the model, fitted to the runs at hand
-    names : of effects, laws, or "none" for the model as it is; two or more
-
-    Raises
-    ------
-    StudyError
-        If fewer than two are given, or one is not known.
-    """
-    return rivals_of({name: _fitted(name, opened) for name in names})
 
 
 def rivals_of(models: Mapping[str, Model]) -> list[Question]:
@@ -191,19 +153,6 @@ def rivals_of(models: Mapping[str, Model]) -> list[Question]:
         asked[name].append(Rival(pair, models[other], models[name]))
         asked[other].append(Rival(pair, models[name], models[other]))
     return [Question(model, tuple(asked[name])) for name, model in models.items()]
-
-
-def _fitted(name: str, opened: Prepared) -> Model:
-    """Return the model with an effect, or with another law, fitted to the training runs."""
-    model, problem = opened.before.model, opened.searched
-    if name == NONE:
-        return model
-    if name in law_rivals():
-        return fit_from_starts(problem, Model(name, model.effects)).model
-    plain = plain_name(name)
-    refuse_no_rival(plain)
-    refuse_unable(plain, able_beside(model, problem, opened.shown), model)
-    return fitted_with(plain, model, problem)
 
 
 def fitted_with(name: str, model: Model, problem: Problem) -> Model:
@@ -513,18 +462,6 @@ class PlanRequest:
         return self == PlanRequest()
 
 
-def default_request(study: Study) -> PlanRequest:
-    """Return what a plan is for where nobody says: what the verdict leaves open, or else all."""
-    verdict = study.verdict() or {}
-    kind = verdict.get("kind", "")
-    named = tuple(dict.fromkeys(map(plain_name, verdict.get("effects", ()))))
-    if kind == "ambiguous" and len(named) > 1 and all(name in EFFECTS for name in named):
-        return PlanRequest(separate=named)
-    if kind == "unknown":
-        return PlanRequest(learn=())
-    return PlanRequest(see=(), sharpen=())
-
-
 def parameters_of(free: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     """Return the parameters that are meant by names of them or of effects; all where empty.
 
@@ -582,9 +519,16 @@ class SiteRequest:
     sites: tuple[str, ...] = ()
 
 
+def requests_of(request: PlanRequest | None, study: Study) -> list[SiteRequest]:
+    """Return what a plan is for: what is asked for, or else what the verdict leaves open."""
+    if request is None or request.nothing:
+        return default_requests(study.verdict() or {})
+    return [SiteRequest(request)]
+
+
 def default_requests(verdict: Mapping[str, Any]) -> list[SiteRequest]:
     """Return what a plan is for where nobody says: what the verdict leaves open, or else all."""
-    findings = verdict.get("findings") or []
+    findings = verdict.get("findings") or [{"effects": (), **verdict, "site": DAMPER}]
     out = []
     if verdict.get("kind") == "ambiguous" and verdict.get("force") == "reconstructed":
         named = [name for one in findings if one["site"] == DAMPER for name in one["effects"]]
@@ -594,10 +538,11 @@ def default_requests(verdict: Mapping[str, Any]) -> list[SiteRequest]:
                 SiteRequest(PlanRequest(separate=tuple(dict.fromkeys([*named, *alike]))), (DAMPER,))
             )
     for one in findings if not out else ():
-        site, names = one["site"], tuple(dict.fromkeys(one.get("effects") or ()))
-        if one["kind"] == "ambiguous" and len(names) > 1:
+        site, kind = one["site"], one.get("kind")
+        names = tuple(dict.fromkeys(one.get("effects") or ()))
+        if kind == "ambiguous" and len(names) > 1 and all(plain_name(n) in EFFECTS for n in names):
             out.append(SiteRequest(PlanRequest(separate=names), (site,)))
-        elif one["kind"] == "unknown":
+        elif kind == "unknown":
             out.append(SiteRequest(PlanRequest(learn=()), (site,)))
     return out or [SiteRequest(PlanRequest(see=(), sharpen=()))]
 
@@ -709,7 +654,7 @@ def _rivals(
     model = opened.before.model
     models: dict[str, Model] = {}
     for name in names:
-        if name in LAWS and site == DAMPER:
+        if name in law_rivals() and site == DAMPER:
             models[name] = fit_from_starts(opened.searched, Model(name, model.effects)).model
         own = next((one for one in able if _asked_for(one, (name,))), "")
         if own:
@@ -770,10 +715,12 @@ def _refuse_unknown(
     """Refuse names of effects and parameters that no site has."""
     there = sorted({name for names in able.values() for name in names})
     for name in (*(request.see or ()), *(request.separate or ())):
-        law = request.separate is not None and name in request.separate and name in (*LAWS, NONE)
+        if name in (request.separate or ()):
+            refuse_no_rival(name)
+        law = name in (request.separate or ()) and name in (*law_rivals(), NONE)
         known = any(_asked_for(one, (name,)) for one in there)
         if not law and not known and not any(name in twins_of(one) for one in there):
-            _refuse_effect(name, there, sites)
+            refuse_unable(name, there, *(one.before.model for one in sites.values()))
     if request.separate is not None and len(request.separate) < 2:
         raise StudyError("--separate needs two or more rivals, such as  --separate gas_spring none")
     own = [full for site, one in sites.items() for full in _own_parameters(site, one.before.model)]
@@ -781,18 +728,6 @@ def _refuse_unknown(
     for name in request.sharpen or ():
         if not any(one.startswith(f"{name}.") for one in (*own, *short)):
             parameters_of(own, (name,))
-
-
-def _refuse_effect(name: str, there: Sequence[str], sites: Mapping[str, Prepared]) -> None:
-    if name not in EFFECTS:
-        raise StudyError(unknown("effect", name, sorted(EFFECTS)))
-    inside = [site for site, one in sites.items() if name in one.before.model.effects]
-    if inside:
-        raise StudyError(f"{name} is in the model already; --sharpen {name} sharpens it.")
-    raise StudyError(
-        f"{name} cannot be seen at a site of this building: no run shows its site, or the model "
-        f"there holds it already. These can: {', '.join(there)}."
-    )
 
 
 def _learned_at(requests: Sequence[SiteRequest], sites: Mapping[str, Prepared]) -> list[str]:
@@ -806,6 +741,9 @@ def _parts(
     site: str, opened: Prepared, names: Sequence[str], limits: RigLimits, drive: str
 ) -> Question:
     """Return the question what a part without a form does at a site, along coordinates there."""
+    drive = drive or VOLTAGE.name
+    if not isinstance(opened.problem, StructureProblem):
+        return open_parts(opened.before.model, limits, names, drive)
     runs = [*opened.problem.runs, *opened.held_out.runs]
     stroke = limits.damper_stroke if not site.startswith("storey") else limits.drift
     reached, fastest = largest_motion(runs)
@@ -816,7 +754,6 @@ def _parts(
     )  # fmt: skip
     place = CurvePlace(site)
     able = [name for name in ranges(there) if place.offers(ALONG[name].needs)]
-    drive = drive or VOLTAGE.name
     own = coordinates_of(names, able, there, drive) or [name for name in USUAL if name in able]
     return open_parts(opened.before.model, there, own, drive)
 

@@ -41,11 +41,11 @@ from bristle.planning.questions import (
     Purposes,
     RunsAtHand,
     cost_of,
-    default_request,
-    effects_beside,
     notes_of_change,
     open_parts,
+    requests_of,
     seen,
+    sized_rival,
     stated,
 )
 from bristle.planning.search import Planner
@@ -297,7 +297,8 @@ def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Stu
     opened = BenchRuns(runs.train, runs.holdout, model, identified=True).prepare("damper")
     assert opened is not None
     names = ["delay", "stribeck", "saturation"]
-    purposes = Purposes(opened.before.model, tuple(effects_beside(opened, names)))
+    fitted = opened.known(opened.before.model)
+    purposes = Purposes(fitted.model, tuple(sized_rival(name, fitted) for name in names))
     measured = RunsAtHand(opened.problem.runs, opened.held_out.runs)
     found = stated(purposes, opened.searched, measured, 1.0, seed=1)
     rows = outcomes(purposes, found.asked, found.known, found.known)  # no further test
@@ -455,7 +456,8 @@ def test_without_a_purpose_the_verdict_says_what_for(
     rig: bristle.Study, monkeypatch: pytest.MonkeyPatch, verdict: object, wanted: PlanRequest
 ) -> None:
     monkeypatch.setattr(type(rig), "verdict", lambda _self: verdict)
-    assert default_request(rig) == wanted
+    (found,) = requests_of(None, rig)
+    assert found.request == wanted
 
 
 def test_a_plan_says_that_its_model_or_verdict_is_of_other_data(

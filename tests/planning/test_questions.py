@@ -18,7 +18,7 @@ MODEL = Model("bingham", ("gas_spring",))
     [
         ("gas_sprin", 'there is no effect "gas_sprin"'),
         ("gas_spring", "is in the model already; --sharpen gas_spring"),
-        ("base_friction", "cannot be seen beside the law bingham"),
+        ("base_friction", "cannot be seen: the law bingham holds it"),
     ],
 )
 def test_an_effect_that_cannot_be_asked_for_is_refused(name: str, told: str) -> None:
