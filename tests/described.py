@@ -24,7 +24,7 @@ _SSD = (
 
 def write_fmu(
     file: Path, ports: str, *, units: str = "", types: str = "", experiment: str = "",
-    version: str = "2.0",
+    claims: str = "", version: str = "2.0",
 ) -> Path:  # fmt: skip
     """Write an FMU whose library is the first bytes of this platform's Python.
 
@@ -33,11 +33,11 @@ def write_fmu(
     file : its path, NAME.fmu
     ports : variables, as `port` returns them
     units, types : what stands in UnitDefinitions and TypeDefinitions
-    experiment : attributes of the default experiment
+    experiment, claims : attributes of the default experiment, and of CoSimulation
     version : of FMI
     """
     name = file.stem
-    parts = [f'<CoSimulation modelIdentifier="{name}"/>']
+    parts = [f'<CoSimulation modelIdentifier="{name}" {claims}/>']
     parts += [f"<UnitDefinitions>{units}</UnitDefinitions>"] if units else []
     parts += [f"<TypeDefinitions>{types}</TypeDefinitions>"] if types else []
     parts += [f"<DefaultExperiment {experiment}/>"] if experiment else []

@@ -12,10 +12,11 @@ from math import sqrt
 from ..core.config import Document
 from ..core.graph import loop_in, reached
 from ..errors import BristleError, PhysicsError
+from ..fmu.catalogue import check_controller
 from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, laws_of
-from .library import Library
+from .library import check_carried, driven_mass
 from .model import Connection, Part, RunSettings
 from .parameters import check_rod
 
@@ -141,7 +142,6 @@ def advise(
     run: RunSettings,
     parts: Mapping[str, Part],
     wires: Sequence[Connection],
-    library: Library,
     document: Document,
 ) -> None:
     """Add warnings, notes, and the errors of ports that must be used together.
@@ -154,8 +154,6 @@ def advise(
         Name to component, in the order of the file.
     wires : sequence of Connection
         The connections that could be read.
-    library : Library
-        Knows masses and designs of what is installed.
     document : Document
         Takes what is found.
     """
@@ -164,14 +162,14 @@ def advise(
     _order(run, network, document)
     _rollback(run, network, document)
     _loops(network, document)
-    _designs(network, library, document)
+    _designs(network, document)
     for part in parts.values():
         check_rod(part, run, document)
     for damper, drive in dampers_of(network):
         _holding(damper, network, document)
         _limits(damper, drive, network, document)
     for structure in network.with_ports(_STRUCTURE_PORTS):
-        _coupling(run, structure, network, library, document)
+        _coupling(run, structure, network, document)
 
 
 def _instances(network: Network, document: Document) -> None:
@@ -245,7 +243,7 @@ def _loops(network: Network, document: Document) -> None:
         )
 
 
-def _designs(network: Network, library: Library, document: Document) -> None:
+def _designs(network: Network, document: Document) -> None:
     """A designed controller belongs to one building: that whose floor it measures."""
     for part in network.parts.values():
         structure = network.measured_by(part)
@@ -253,9 +251,9 @@ def _designs(network: Network, library: Library, document: Document) -> None:
             continue
         try:
             if part.file:
-                library.check_carried(part.file, structure.building)
+                check_carried(part.file, structure.building)
             else:
-                library.check_controller(part.kind, part.controller, structure.building)
+                check_controller(part.kind, part.controller, structure.building)
         except PhysicsError:
             continue  # the building is no building: its own check has said so
         except BristleError as error:
@@ -339,9 +337,7 @@ def slopes(damper: Part, level: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def _coupling(
-    run: RunSettings, structure: Part, network: Network, library: Library, document: Document
-) -> None:
+def _coupling(run: RunSettings, structure: Part, network: Network, document: Document) -> None:
     """Warn where a damper's mass terms or the step make the explicit coupling unstable.
 
     Of dampers on one level together, of those elsewhere in the building each by itself.
@@ -358,7 +354,7 @@ def _coupling(
     for port, dampers in driven.items():
         attached = structure.real("attached_mass") or 0.0
         try:
-            mass = library.driven_mass(structure.building, port, attached)
+            mass = driven_mass(structure.building, port, attached)
         except BristleError:
             return  # the component's own check has said what is wrong with the building
         _stability(run, structure, dampers, mass, network, document)

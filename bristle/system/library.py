@@ -5,80 +5,22 @@ from __future__ import annotations
 import hashlib
 import re
 import zipfile
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from ..component.controller_file import KINDS, Controller, parse_controller
 from ..core.text import unknown
 from ..core.toml_lines import KeyPath
+from ..data.building_file import read_building
 from ..errors import DesignError, PhysicsError
-from ..fmu.description import Description
+from ..fmu import catalogue
+from ..physics.building import driven_mass as building_mass
+from ..physics.building import paper_building
 from ..physics.forms import joined_form
 from ..physics.laws import LAWS, laws_of
+from ..user_code.load import load_file
 from .model import FILE_PARAMETERS, Component, DamperLaw
 from .overrides import MADE_FROM
-
-
-@dataclass(frozen=True)
-class Library:
-    """Where a check looks things up; tests put their own in its place.
-
-    Attributes
-    ----------
-    names
-        () -> names of the built-in components.
-    describe
-        (name, building file or None, controller file or None, effects=files, ranged=whether a
-        damper knows the range of its data) -> Description of a built-in component; raises
-        BristleError where a file is wrong.
-    describe_file
-        (path) -> Description of an FMU file; raises FmuError.
-    read_record
-        (record, folder) -> the ground motion; raises RecordError.
-    check_controller
-        (name, controller file or None, building file or None); raises BristleError where the
-        component carries a design for another building.
-    check_carried
-        (FMU file, building file or None); likewise for the design that a built FMU carries.
-    damper_of
-        (law's name or file of a user's own, form of the command, knots [V]) -> the law of a damper;
-        raises BristleError.
-    law_of
-        (component) -> the law of a built-in damper, "" of what is none.
-    driven_mass
-        (building file or None, the Structure's force input, attached mass [kg]) -> mass [kg] that
-        a damper's force there acts on; raises PhysicsError.
-    """
-
-    names: Callable[[], Sequence[str]]
-    describe: Callable[..., Description]
-    describe_file: Callable[[Path], Description]
-    read_record: Callable[[str, Path], object]
-    driven_mass: Callable[[Path | None, str, float], float]
-    check_controller: Callable[[str, Path | None, Path | None], None]
-    check_carried: Callable[[Path, Path | None], None]
-    damper_of: Callable[[str | Path, str, tuple[float, ...]], DamperLaw]
-    law_of: Callable[[str], str]
-
-
-def installed() -> Library:
-    """Return the library of what is installed."""
-    from ..data import read_ground_motion
-    from ..fmu import catalogue
-    from ..fmu.description import read_description
-
-    return Library(
-        names=catalogue.component_names,
-        describe=catalogue.describe,
-        describe_file=read_description,
-        read_record=read_ground_motion,
-        driven_mass=driven_mass,
-        check_controller=catalogue.check_controller,
-        check_carried=check_carried,
-        damper_of=damper_of,
-        law_of=law_of,
-    )
 
 
 def damper_of(law: str | Path, form: str = "", knots: tuple[float, ...] = ()) -> DamperLaw:
@@ -96,9 +38,6 @@ def damper_of(law: str | Path, form: str = "", knots: tuple[float, ...] = ()) ->
     TrustError
         If nobody consented to the file's code.
     """
-    from ..fmu import catalogue
-    from ..user_code.load import load_file
-
     file = law if isinstance(law, Path) else None
     name = str(law) if file is None else load_file(file, "law").name
     known = [one.name for one in laws_of("damper")]
@@ -110,8 +49,6 @@ def damper_of(law: str | Path, form: str = "", knots: tuple[float, ...] = ()) ->
 
 def law_of(component: str) -> str:
     """Return the law of a built-in damper, "" of a component that is none."""
-    from ..fmu import catalogue
-
     return getattr(catalogue.component_class(catalogue.source(component)), "law", "")
 
 
@@ -127,13 +64,9 @@ def driven_mass(building: Path | None, port: str = "damper_force", attached: flo
     port : the Structure's input that takes the force
     attached : mass [kg] more on the first level
     """
-    from ..data.building_file import read_building
-    from ..physics.building import driven_mass as driven_by
-    from ..physics.building import paper_building
-
     found = read_building(building) if building else paper_building()
     pushed = next((d for d in found.devices if d.ports.force == port), found.device(""))
-    return driven_by(found.with_attached_mass(attached).M, pushed)
+    return building_mass(found.with_attached_mass(attached).M, pushed)
 
 
 def check_carried(file: Path, building: Path | None) -> None:
@@ -146,9 +79,6 @@ def check_carried(file: Path, building: Path | None) -> None:
     DesignError, PhysicsError
         Naming both; if the building is wrong.
     """
-    from ..data.building_file import read_building
-    from ..physics.building import paper_building
-
     controller = controller_in(file)
     if controller is not None:
         on = read_building(building) if building else paper_building()

@@ -11,15 +11,17 @@ from typing import Any
 from ..component import SAMPLED
 from ..core.config import Document
 from ..core.text import unknown
+from ..data import read_ground_motion
 from ..data.building_file import read_building
 from ..errors import BristleError, PhysicsError, RecordError, TrustError
+from ..fmu.catalogue import component_names
 from ..fmu.description import Variable
 from ..physics.building import ROUNDING, Building
 from ..physics.effect import EFFECTS
 from ..physics.forms import TABLE_FORM
 from ..physics.motion_file import read_two_column
 from ..physics.signals import KINDS, PARAMETERS, STEPS, TAKEN, read_steps
-from .library import Library
+from .library import damper_of, law_of
 from .model import (
     FILE_PARAMETERS,
     Component,
@@ -135,9 +137,7 @@ def _better(duration: float, mean: float, phase: float) -> str:
     return f"; duration = {(halves - before) / (2.0 * mean):.9g} ends it at its offset"
 
 
-def check_parameter(
-    part: Part, name: str, value: object, folder: Path, library: Library, document: Document
-) -> None:
+def check_parameter(part: Part, name: str, value: object, folder: Path, document: Document) -> None:
     """Check one parameter, and keep its value in `part.values` if it is right.
 
     Parameters
@@ -148,8 +148,6 @@ def check_parameter(
         Its name, and its value as the file has it.
     folder : Path
         The scenario's; relative names of files begin there.
-    library : Library
-        Reads ground motions.
     document : Document
         Takes what is found.
     """
@@ -174,20 +172,11 @@ def check_parameter(
         document.error(place, f"{where} {checked.words}")
         return
     part.values[name] = checked
-    if variable.kind == "String" and name in FILE_PARAMETERS:
-        _check_file(part, name, str(checked), folder, library, document)
-
-
-def _check_file(
-    part: Part, name: str, value: str, folder: Path, library: Library, document: Document
-) -> None:
-    """Check a file that a parameter names: a ground motion is read as the run will read it."""
-    if part.kind != "GroundMotion" or name != "record":
-        return
-    try:
-        library.read_record(value, folder)
-    except RecordError as error:
-        document.error(part.places[name], f"{part.name}.{name}: {error}")
+    if part.kind == "GroundMotion" and name == "record":
+        try:
+            read_ground_motion(str(checked), folder)  # as the run will read it
+        except RecordError as error:
+            document.error(place, f"{where}: {error}")
 
 
 def check_together(part: Part, folder: Path, document: Document) -> None:
@@ -207,7 +196,7 @@ def check_together(part: Part, folder: Path, document: Document) -> None:
 
 def choose_law(
     part: Part, settings: Mapping[str, Any], found: Mapping[str, Any], folder: Path,
-    library: Library, document: Document,
+    document: Document,
 ) -> bool:  # fmt: skip
     """Read `law`, `command` and `command_knots` of a component; return whether they are right.
 
@@ -215,7 +204,7 @@ def choose_law(
     ----------
     part, settings, found : the component, which gets its law; its table; what could be read in it
     folder : where relative names begin
-    library, document : where laws are looked up; takes what is found
+    document : takes what is found
 
     Raises
     ------
@@ -223,12 +212,12 @@ def choose_law(
         If nobody consented to the code of a user's own law.
     """
     where = f"[components.{part.name}]"
-    law = _named(part, settings, found, folder, library, document)
+    law = _named(part, settings, found, folder, document)
     form = _form(part, settings, found, document)
     if law is None or form is None:
         return False
     try:
-        part.law = library.damper_of(law, *form)
+        part.law = damper_of(law, *form)
     except TrustError:
         raise  # no mistake of the file, and it is asked about
     except BristleError as error:
@@ -241,14 +230,14 @@ def choose_law(
 
 def _named(
     part: Part, settings: Mapping[str, Any], found: Mapping[str, Any], folder: Path,
-    library: Library, document: Document,
+    document: Document,
 ) -> str | Path | None:  # fmt: skip
     """Return the law that is named, by itself or by a built-in damper; None where none is."""
     where = f"[components.{part.name}]"
     fmu, path = found["fmu"], (*part.path, "law")
     value: str | None = found["law"]
     if "law" not in settings:
-        own = library.law_of(fmu) if fmu in library.names() else ""
+        own = law_of(fmu) if fmu in component_names() else ""
         if not own:
             words = (
                 f"{where}: only a built-in damper takes a form of the command, or law = ... does."

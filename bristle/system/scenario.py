@@ -20,7 +20,7 @@ from ..errors import ScenarioError
 from ..fmu.description import Value
 from .advice import advise
 from .connections import check_connections
-from .library import Library, changed_title, installed, needs_title
+from .library import changed_title, needs_title
 from .model import FILE_PARAMETERS, Component, Part, RunSettings, System, plain_target
 from .overrides import (
     SCENARIO,
@@ -36,8 +36,6 @@ _SCHEMA = re.compile(r"^#:schema .*\n", re.MULTILINE)
 def load_scenario(
     scenario: str | Path | System,
     overrides: Mapping[str, object] | None = None,
-    *,
-    library: Library | None = None,
 ) -> System:
     """Return a scenario that has been checked.
 
@@ -49,8 +47,6 @@ def load_scenario(
     overrides : mapping, optional
         Dotted names with values that take the place of the file's, e.g.
         `{"damper.f_c": 2.0, "run.step": 1e-3, "damper.fmu": "BinghamDamper"}`.
-    library : Library, optional
-        Where components, records and buildings are looked up; what is installed by default.
 
     Raises
     ------
@@ -66,8 +62,8 @@ def load_scenario(
         changes = {name: v for name, v in scenario.changes.items() if name not in anew}
         overrides = {**scenario.overrides, **overrides}
         file = scenario.package or scenario.origin
-        return load_scenario(file, overrides, library=library).with_values(changes)
-    return _checked(scenario, *_read(resolve_scenario(scenario), overrides or {}, library))
+        return load_scenario(file, overrides).with_values(changes)
+    return _checked(scenario, *_read(resolve_scenario(scenario), overrides or {}))
 
 
 def make_system(
@@ -107,8 +103,6 @@ def _checked(name: str | Path, system: System | None, found: Sequence[Finding]) 
 def check_scenario(
     file: str | Path,
     overrides: Mapping[str, object] | None = None,
-    *,
-    library: Library | None = None,
 ) -> list[Finding]:
     """Return everything that a check finds in a scenario, by line; nothing is run or written.
 
@@ -118,12 +112,10 @@ def check_scenario(
         path = resolve_scenario(file)
     except ScenarioError as error:
         return [Finding("file", "error", str(error))]
-    return _read(path, overrides or {}, library)[1]
+    return _read(path, overrides or {})[1]
 
 
-def _read(
-    path: Path, overrides: Mapping[str, object], library: Library | None
-) -> tuple[System | None, list[Finding]]:
+def _read(path: Path, overrides: Mapping[str, object]) -> tuple[System | None, list[Finding]]:
     """Return the system of a file or package, None where it has a mistake, and the findings."""
     package, notes = None, tuple[Finding, ...]()
     if path.suffix.lower() == ".ssp":
@@ -139,28 +131,26 @@ def _read(
         document = Document(path, ScenarioError)
         if package is not None:
             document.lines.clear()  # of a file that the user does not have
-        system, found = _judged(document, overrides, library, notes)
+        system, found = _judged(document, overrides, notes)
     except ScenarioError as error:
         return None, list(error.findings)
     return system and replace(system, origin=path, package=package), found
 
 
 def _judged(
-    document: Document, overrides: Mapping[str, object], library: Library | None = None,
-    notes: Sequence[Finding] = (),
-) -> tuple[System | None, list[Finding]]:  # fmt: skip
+    document: Document, overrides: Mapping[str, object], notes: Sequence[Finding] = ()
+) -> tuple[System | None, list[Finding]]:
     """Return the system that a document describes, None where it has a mistake, and findings."""
     changed = apply_overrides(document, overrides)
     read = document.read(SCENARIO)
-    library = library or installed()
     for note in notes:
         if ("run", note.kind) not in document.overridden:
             document.note((), note.text)
     run, title = RunSettings(**read["run"]), read["title"]
-    parts = check_components(document, read["components"], library)
+    parts = check_components(document, read["components"])
     check_steps(run, parts.values(), document)
     wires = check_connections(document, read["connections"], parts)
-    advise(run, parts, wires, library, document)
+    advise(run, parts, wires, document)
     found = document.in_order()
     if any(finding.level == "error" for finding in found):
         return None, found

@@ -10,9 +10,9 @@ import json
 from typing import Any
 
 from ..core.config import SCHEMA, json_schema
+from ..fmu.catalogue import component_names, describe
 from ..fmu.description import Description, Variable
 from .connections import FACTOR, FROM, OFFSET
-from .library import installed
 from .model import choices
 from .overrides import COMPONENT, SCENARIO
 
@@ -27,8 +27,7 @@ def schema_text() -> str:
 
 def build_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 7) of a scenario file."""
-    library = installed()
-    names = list(library.names())
+    names = component_names()
     whole = json_schema(SCENARIO)
     whole["required"] = ["schema", "run", "components"]
     tables = whole["properties"]
@@ -46,7 +45,7 @@ def build_schema() -> dict[str, Any]:
     return {
         "$schema": "http://json-schema.org/draft-07/schema#", "title": "bristle scenario", **whole,
         "definitions": {
-            name: _parameters(library.describe(name, None, None, ranged=True)) for name in names
+            name: _parameters(describe(name, ranged=True)) for name in names
         },
     }  # fmt: skip
 

@@ -13,9 +13,9 @@ from ..core.files import write_whole
 from ..core.text import listed, unknown
 from ..core.toml_lines import KeyPath, toml_key, toml_table, toml_value
 from ..errors import BristleError, PhysicsError, TrustError
-from ..fmu.description import Description
+from ..fmu.catalogue import component_names, describe
+from ..fmu.description import Description, read_description
 from ..physics.forms import split_form
-from .library import Library
 from .model import Component, Part, RunSettings, Signal, System, existing_file
 from .overrides import COMPONENT, LAW_KEYS, MADE_FROM, SCENARIO, flatten
 from .parameters import check_parameter, check_storeys, check_together, choose_law, choose_over_step
@@ -87,9 +87,7 @@ def _check_fraction(part: Part, step: float, document: Document) -> None:
         )
 
 
-def check_components(
-    document: Document, components: Mapping[str, Any], library: Library
-) -> dict[str, Part]:
+def check_components(document: Document, components: Mapping[str, Any]) -> dict[str, Part]:
     """Check every component on its own; return them in the order of the file."""
     parts: dict[str, Part] = {}
     if not components and isinstance(document.data.get("components", {}), dict):
@@ -106,14 +104,13 @@ def check_components(
         # A key that is none of them may be a parameter, which its description knows.
         found = document.read(COMPONENT._replace(each=ANY), path, settings)
         if isinstance(settings, dict):
-            parts[name] = _check_component(document, Part(name, path), settings, found, library)
+            parts[name] = _check_component(document, Part(name, path), settings, found)
     return parts
 
 
 def _check_component(
-    document: Document, part: Part, settings: Mapping[str, Any], found: Mapping[str, Any],
-    library: Library,
-) -> Part:  # fmt: skip
+    document: Document, part: Part, settings: Mapping[str, Any], found: Mapping[str, Any]
+) -> Part:
     """Check a component; `settings` is its table, `found` what could be read in it."""
     where, folder = f"[components.{part.name}]", Path(document.path).parent
     part.step = found["step"]
@@ -126,9 +123,9 @@ def _check_component(
             setattr(part, key, file)
     _choose_effects(part, found, folder, document)
     if not any(key in settings for key in LAW_KEYS):
-        _choose_fmu(part, settings, found, folder, library, document)
-    elif choose_law(part, settings, found, folder, library, document):
-        _describe(part, (*part.path, "law"), settings, library, document)
+        _choose_fmu(part, settings, found, folder, document)
+    elif choose_law(part, settings, found, folder, document):
+        _describe(part, (*part.path, "law"), settings, document)
     choose_over_step(part, settings, found["over_step"], document)
     for key in settings:
         if key in COMPONENT.keys:
@@ -144,7 +141,7 @@ def _check_component(
             document.error(place, f"{where}: {name} is set twice, with and without quotes.")
         part.places[name] = place
         if part.description:
-            check_parameter(part, name, value, folder, library, document)
+            check_parameter(part, name, value, folder, document)
     check_together(part, folder, document)
     check_storeys(part, document)
     return part
@@ -165,7 +162,7 @@ def _choose_effects(part: Part, found: Mapping[str, Any], folder: Path, document
 
 def _choose_fmu(
     part: Part, settings: Mapping[str, Any], found: Mapping[str, Any], folder: Path,
-    library: Library, document: Document,
+    document: Document,
 ) -> None:  # fmt: skip
     """Read `fmu` of a component, and what that FMU says of itself."""
     path, where = (*part.path, "fmu"), f"[components.{part.name}]"
@@ -183,27 +180,25 @@ def _choose_fmu(
             document.error((*part.path, "controller"), f"{where}: {words}")
         if part.file is None:
             return
-    elif value not in library.names():
-        document.error(path, f"{where}: {unknown('built-in FMU', value, library.names())}")
+    elif value not in component_names():
+        document.error(path, f"{where}: {unknown('built-in FMU', value, component_names())}")
         return
-    _describe(part, path, settings, library, document)
+    _describe(part, path, settings, document)
 
 
-def _describe(
-    part: Part, path: KeyPath, settings: Mapping[str, Any], library: Library, document: Document
-) -> None:
+def _describe(part: Part, path: KeyPath, settings: Mapping[str, Any], document: Document) -> None:
     """Read what a component's FMU says of itself.
 
     Parameters
     ----------
     part, settings : the component
     path : the keys that lead to what chose its FMU
-    library, document : where it is looked up; takes what is found
+    document : takes what is found
     """
     where = f"[components.{part.name}]"
     try:
         if part.file:
-            part.description = library.describe_file(part.file)
+            part.description = read_description(part.file)
             _note_on_fmu(part, part.description, path, document)
         elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
             made_of = part.law.component if part.law else part.kind
@@ -211,7 +206,7 @@ def _describe(
             given = settings.get("parameters")
             if isinstance(given, dict) and any(key.partition(".")[0] == "range" for key in given):
                 more["ranged"] = True  # what knows the range of its data has an output more
-            part.description = library.describe(made_of, part.building, part.controller, **more)
+            part.description = describe(made_of, part.building, part.controller, **more)
     except TrustError:
         raise  # no mistake of the file, and it is asked about
     except BristleError as error:

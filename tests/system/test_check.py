@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from fake_library import VALID
+from valid import VALID
 
 from bristle.cli import main
 from bristle.core import files

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fake_library import FAKE, VALID
+from valid import VALID
 
 from bristle.system.library import LONGEST_NAME, run_name
 from bristle.system.scenario import load_scenario
@@ -27,7 +27,7 @@ TITLE = "El Centro, LuGre damper at 4 V"
 
 
 def title(write, overrides):
-    return load_scenario(write(VALID), overrides, library=FAKE).title
+    return load_scenario(write(VALID), overrides).title
 
 
 @pytest.mark.parametrize(

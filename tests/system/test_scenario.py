@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_library import FAKE, VALID
+from valid import VALID
 
 from bristle.core import files
 from bristle.errors import ScenarioError
@@ -28,7 +28,7 @@ def write(tmp_path):
 
 
 def load(file, overrides=None):
-    return load_scenario(file, overrides, library=FAKE)
+    return load_scenario(file, overrides)
 
 
 def test_a_scenario_is_read_as_it_is_written(write):
@@ -54,7 +54,7 @@ def test_a_scenario_is_read_as_it_is_written(write):
 
 def test_a_valid_scenario_leaves_nothing_to_say_and_writes_nothing(write, tmp_path):
     file = write(VALID)
-    assert check_scenario(file, library=FAKE) == []
+    assert check_scenario(file) == []
     assert list(tmp_path.iterdir()) == [file]
 
 
@@ -200,7 +200,7 @@ def test_a_file_named_by_an_override_is_looked_for_in_the_current_folder(
 ):
     here = tmp_path / "here"
     here.mkdir()
-    (here / "mine.csv").write_text("x")
+    (here / "mine.csv").write_text("time [s],acceleration [m/s2]\n0,0\n1,1\n")
     monkeypatch.chdir(here)
     scenario = load(write(VALID), {"ground.record": "mine.csv"})
     assert scenario.components["ground"].values["record"] == str(here / "mine.csv")

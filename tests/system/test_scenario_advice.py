@@ -1,7 +1,7 @@
 """What is allowed but seldom meant: order, coupling steps, saturation, masses, loops."""
 
 import pytest
-from fake_library import BASE_MASS, FAKE, VALID
+from valid import BASE_MASS, VALID
 
 from bristle.engine.run import run
 from bristle.system.advice import longest_step
@@ -18,9 +18,9 @@ def levels(tmp_path):
     def of(text=VALID, overrides=None):
         file = tmp_path / "my.toml"
         file.write_text(text.replace('{ "gas_spring.on" = true, "gas_spring.k" = 80.0 }', "{}"))
-        found = check_scenario(file, overrides, library=FAKE)
+        found = check_scenario(file, overrides)
         assert all(finding.level != "error" for finding in found), found
-        load_scenario(file, overrides, library=FAKE)  # advice stops nothing
+        load_scenario(file, overrides)  # advice stops nothing
         return {
             level: [finding.text for finding in found if finding.level == level]
             for level in ("warning", "note")
@@ -48,7 +48,7 @@ def test_the_ground_motion_after_the_structure_is_a_warning(told, tmp_path):
     (warning,) = told(text)
     assert "[components.ground] comes after [components.structure]" in warning
     assert "one step late" in warning
-    (finding,) = check_scenario(tmp_path / "my.toml", library=FAKE)
+    (finding,) = check_scenario(tmp_path / "my.toml")
     assert (tmp_path / "my.toml").read_text().splitlines()[
         finding.line - 1
     ] == "[components.ground]"
@@ -124,7 +124,8 @@ def test_the_longest_step_is_where_the_coupled_motion_begins_to_grow(algorithm, 
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel", "midpoint"])
 def test_a_step_beyond_stability_is_a_warning_with_the_limit(told, overrides, c, k, algorithm):
     mass = BASE_MASS + overrides.get("structure.attached_mass", 0.0)
-    limit = longest_step(algorithm, mass, c, k)
+    jumps = algorithm == "midpoint" and k == 0.0  # friction that nothing holds: as gauss-seidel
+    limit = longest_step("gauss-seidel" if jumps else algorithm, mass, c, k)
     overrides = {**overrides, "run.algorithm": algorithm}
     below, above = 0.99 * limit, 1.01 * limit
     assert told(VALID, {**overrides, "run.step": below, "run.stop": 100 * below}) == []
@@ -240,8 +241,8 @@ def test_holding_force_and_its_mass_belong_together(told):
 
 def test_fluid_inertia_of_half_the_moving_mass_is_a_warning(told):
     on = {"damper.fluid_inertia.on": True}
-    assert told(VALID, {**on, "damper.fluid_inertia.mass": 0.49 * BASE_MASS}) == []
-    (warning,) = told(VALID, {**on, "damper.fluid_inertia.mass": 0.5 * BASE_MASS})
+    assert told(VALID, {**on, "damper.fluid_inertia.m_f": 0.49 * BASE_MASS}) == []
+    (warning,) = told(VALID, {**on, "damper.fluid_inertia.m_f": 0.5 * BASE_MASS})
     assert "half or more of the moving mass of 1.969 kg" in warning
     assert "attached_mass" in warning
 
@@ -251,15 +252,10 @@ def test_a_parameter_of_an_effect_that_is_off_is_a_warning(told):
     assert "damper.gas_spring.k does nothing while damper.gas_spring.on is false" in warning
 
 
-def test_an_algebraic_loop_is_a_note(levels, tmp_path):
-    (tmp_path / "loop.fmu").write_text("the fake library goes by names")
-    text = VALID.replace(
-        "[connections]",
-        '[components.mine]\nfmu = "loop.fmu"\n\n[connections]\n'
-        '"mine.acceleration" = "structure.base_acceleration_absolute"',
-    ).replace('= "damper.force"', '= "mine.force"')
-    (note,) = levels(text)["note"]
-    assert "mine.force" in note
+def test_an_algebraic_loop_is_a_note(levels):
+    felt = '"damper.acceleration" = "structure.base_acceleration_absolute"\n'
+    (note,) = levels(VALID + felt)["note"]
+    assert "damper.force" in note
     assert "structure.base_acceleration_absolute" in note
     assert "one step old" in note
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bristle.system.library import installed
+from bristle.system.library import driven_mass
 from bristle.system.scenario import check_scenario, load_scenario, stock_scenarios
 
 STOCK = {file.stem: file for file in stock_scenarios()}
@@ -50,7 +50,7 @@ def test_the_pulse_and_the_mass_that_sticks():
     pulse = scenario.components["ground"].values
     assert pulse == {"kind": "half_sine", "amplitude": 2.0, "duration": 0.2}
     mass = scenario.components["damper"].values["moving_mass"]
-    assert mass == pytest.approx(installed().driven_mass(None), rel=1e-12)
+    assert mass == pytest.approx(driven_mass(None), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["bench_sine_lugre", "bench_sine_bingham"])
