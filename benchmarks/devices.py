@@ -72,7 +72,7 @@ def _typed(place: str, found: Answer, *words: str) -> str | None:
     """Return what a command prints, None where it fails; its processor time [s] goes to `found`."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     made = subprocess.run(
-        [sys.executable, "-m", "bristle", *words], cwd=place, capture_output=True, text=True,
+        [sys.executable, "-m", "bristle.cli", *words], cwd=place, capture_output=True, text=True,
         env={**os.environ, "OMP_NUM_THREADS": "1"}, check=False,
     )  # fmt: skip
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

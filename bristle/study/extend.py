@@ -19,7 +19,7 @@ from ..data.table import Table
 from ..data.tone import Tone, tone_of
 from ..errors import StudyError
 from .new import refuse_other_columns, remarks_on
-from .run_facts import RunChoices, facts_of, roles_by_name
+from .run_facts import RunChoices, facts_of, of_columns, roles_by_name
 from .runs import read_runs
 from .study import FILE as ADDED
 from .study import Study, note_addition
@@ -75,9 +75,11 @@ def extend_study(
     first, columns = _columns(study)
     for table in tables:
         refuse_other_columns(table, columns, first)
+    labels = {name for run in study.settings.runs for name in run.labels}
+    told = of_columns(tables, {one.column for one in columns}, known=labels)[0]
     about, notes = facts_of(
         paths, choices, bool({*DRIVE} & {*study.settings.channels}), _tones(study, tables),
-        [Path(run.file) for run in (*study.settings.runs, *study.settings.excluded)],
+        [Path(run.file) for run in (*study.settings.runs, *study.settings.excluded)], told,
     )  # fmt: skip
     notes += remarks_on([path.name for path in paths], tables, columns, first)
     assigned, said = _roles(paths, roles or {}, holdout)

@@ -42,7 +42,7 @@ from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
 from ..units import canonical, convert, same_dimension
 from .history import History, Step
-from .run_facts import Facts, RunChoices, facts_of, for_test, roles_of
+from .run_facts import Facts, RunChoices, facts_of, for_test, of_columns, roles_of
 from .runs import names_of_runs
 from .study_file import ALL, EXCLUDE, ROLES, TEST, RunFile, Settings, write_settings
 
@@ -125,15 +125,21 @@ def make_folder(
         refuse_other_columns(table, guesses, first)
     taken = [guess.column for guess in guesses]
     ignored = [guess.column for guess in seen if guess.channel in without]
-    extra = found_in(first, [*taken, *ignored], specs)
+    told, of_runs, still = (
+        of_columns(tables, {*taken, *ignored}, closed)
+        if rig == "bench" and not holds_several(split)
+        else ((), [], [])
+    )
+    extra = found_in(first, [*taken, *ignored, *still], specs)
     names = _names([Path(file) for file in files])
     is_test = dict(zip(names, closed, strict=True))
     specs, centred = _centred(specs, tables, closed) if rig == "bench" else (specs, "")
     found = _parts(names, tables, specs, split)
     about, notes = facts_of(
         [Path(file) for file in files], choices, _commanded(specs, studied),
-        _tones(names, found, is_test),
+        _tones(names, found, is_test), columns=told,
     )  # fmt: skip
+    notes += of_runs
     notes += remarks_on(names, tables, guesses, first)
     of_file = dict(zip(names, about, strict=True))
     copies = _copies(found, is_test)
@@ -163,7 +169,7 @@ def make_folder(
     notes += _copies_text(folder, copies, settings)
     data = dict(zip(names, map(Path, files), strict=True))
     _write(folder, settings, data, building, law or DEFAULT)
-    taken += [spec.column for spec in extra.values()]
+    taken += [*still, *(spec.column for spec in extra.values())]
     unused = tuple(text for text in left_out(first, guesses) if text not in taken)
     return NewStudy(tuple(guesses), extra, unused, tuple(notes))
 

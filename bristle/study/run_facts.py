@@ -5,15 +5,18 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from math import inf, isfinite
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
+import numpy as np
+
 from ..core.text import command, listed, quantity
 from ..data.channels import DRIVE, PLAIN, TEMPERATURE, UNITS, Label, label_name, label_text, meaning
+from ..data.extra_channels import as_word
 from ..data.formats.delimited import decoded
 from ..data.run_names import (
     DOUBTFUL,
@@ -27,6 +30,7 @@ from ..data.run_names import (
     tokens_of,
     value_of,
 )
+from ..data.table import Table
 from ..data.titles import Column, title, unit_or_none
 from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubt
 from ..errors import RecordError, StudyError, UnitError
@@ -139,6 +143,7 @@ def facts_of(
     commanded: bool,
     tones: Sequence[Tone | None] = (),
     others: Sequence[Path] = (),
+    columns: Sequence[Facts] = (),
 ) -> tuple[list[Facts], list[str]]:
     """Return what is known of each file's run, and where it is from, in sentences.
 
@@ -149,6 +154,7 @@ def facts_of(
     commanded : whether the files hold a channel of the command: then names give no level unasked
     tones : what the motion of each file is, against which its name is held; none by default
     others : files of the same campaign, whose names tell how numbers are written, too
+    columns : what columns of the files tell, see `of_columns`; names, patterns and table go before
 
     Raises
     ------
@@ -161,6 +167,7 @@ def facts_of(
         files = [Path(f"{one.parent.name}_{one.name}") for one in files]
     reading = reading_of([*files, *others], [*tones, *([None] * len(others))])
     found, notes = _offered(files, choices, commanded, reading)
+    found = [one.and_(other) for one, other in zip(columns or found, found, strict=True)]
     for pattern in choices.levels:
         rows = [_matched(file, pattern, reading, level=True) for file in files]
         found = [one.and_(other) for one, other in zip(found, rows, strict=True)]
@@ -374,6 +381,62 @@ def _matched(file: Path, pattern: str, reading: Reading, *, level: bool) -> Fact
         except UnitError as error:
             raise StudyError(f"{asked}: {named}: {error}") from None
     return _fact(named, value, level=level)
+
+
+# -- columns that stand still
+
+STILL = 0.02
+"""Standard deviation within runs, by that of the runs' means, below which a column stands still."""
+
+
+def of_columns(
+    tables: Sequence[Table],
+    taken: Container[str],
+    closed: Sequence[bool] = (),
+    known: Container[str] | None = None,
+) -> tuple[list[Facts], list[str], list[str]]:
+    """Return what columns tell of whole runs, by standing still in each file and differing.
+
+    Parameters
+    ----------
+    tables : one run each
+    taken : titles of the columns that are channels
+    closed : which files are test runs, by which nothing is chosen; none by default
+    known : names that are looked for, of runs that others join; None takes what differs
+
+    Returns
+    -------
+    the facts of each file, sentences that say where they are from, and the titles of the columns
+    that change in no file at all
+    """
+    facts, notes, constant = [Facts() for _ in tables], list[str](), list[str]()
+    open_ = [k for k in range(len(tables)) if not (closed and closed[k])]
+    for column in tables[0].columns:
+        unit = column.unit.name if column.unit else ""
+        name = as_word(column.name) + (f"_{unit}" if unit.isalpha() else "")
+        own = [one.values[column.text] for one in tables if column.text in one.values]
+        if (
+            column.text in taken or len(own) < len(tables) or name in (*DRIVE, *UNITS, "")
+            or any(column.text in one.not_numeric for one in tables)
+            or not all(np.isfinite(values).any() for values in own)
+        ):  # fmt: skip
+            continue
+        within = max(float(np.nanmax(values) - np.nanmin(values)) for values in own)
+        levels = [float(np.nanmean(values)) for values in own]
+        levels = [float(f"{y:.{4 if within else 9}g}") for y in levels]
+        between = float(np.std([levels[k] for k in open_]))
+        if known is not None:
+            tells = name in known
+        elif unit:
+            tells = max(float(np.nanstd(one)) for one in own) <= STILL * between and between > 0.0
+        else:  # without a unit a number that no run shares only names the runs
+            tells = within == 0.0 and 1 < len({*levels}) < len(levels)
+        if tells:
+            facts = [one.and_(_fact(name, y)) for one, y in zip(facts, levels, strict=True)]
+            seen = listed(_texts(name, sorted({levels[k] for k in open_}), level=False), 6)
+            notes.append(f'{label_name(name)} of each run: from the column "{column.text}": {seen}')
+            constant += [column.text] if within == 0.0 else []
+    return facts, notes, constant
 
 
 # -- a table beside the files

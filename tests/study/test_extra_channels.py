@@ -118,3 +118,30 @@ def test_a_curve_along_the_pressure_is_learned_and_the_damper_has_it_as_an_input
     (study.folder / "data" / "valid_1.csv").write_bytes(lacking.read_bytes())
     with pytest.raises(RecordError, match="follows the channel oil_pressure, which this run does"):
         identify_study(Study(study.folder))
+
+
+def test_a_column_that_stands_still_in_each_file_is_a_label_of_the_runs(tmp_path, capsys):
+    files = []
+    for seed, name in enumerate((*NAMES, "more_1")):
+        columns = bench_run(seed, 4.0)
+        rows = len(columns["time [s]"])
+        gauge = np.random.default_rng(seed).normal(40.0 + 5.0 * (seed % 3), 0.01, rows)
+        columns |= {
+            "Gas [bar]": np.full(rows, 10.0 + 2.5 * (seed % 2)), "RH [%]": gauge,
+            "oil": np.full(rows, seed % 2 + 1.0), "test": np.full(rows, 7.0 + seed),
+            "gain [V/N]": np.full(rows, 5.0),
+        }  # fmt: skip
+        files.append(write(tmp_path / "lab" / f"{name}.csv", columns))
+    rig = tmp_path / "rig"
+    assert main(["study", "new", str(rig), "--data", *map(str, files[:-1]), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert 'gas of each run: from the column "Gas [bar]": 10 bar, 12.5 bar' in answer["notes"]
+    assert "gas" not in answer["extra"]
+    assert "rh" in answer["extra"]  # it moves a little, which a curve may follow
+    labels = [run.labels for run in Study(rig).read()]
+    assert [one["gas_bar"] for one in labels] == [10.0, 12.5, 10.0, 12.5]
+    assert [one["rh"] for one in labels] == pytest.approx([40.0, 45.0, 50.0, 40.0], abs=0.01)
+    assert [one["oil"] for one in labels] == [1.0, 2.0, 1.0, 2.0]
+    assert {*labels[0]} == {"gas_bar", "rh", "oil"}
+    assert main(["study", "extend", str(rig), str(files[-1])]) == 0
+    assert Study(rig).read()[-1].labels["gas_bar"] == 10.0
