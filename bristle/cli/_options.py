@@ -26,6 +26,23 @@ if TYPE_CHECKING:
     from ..view.blocks import View
 
 
+_LEAVE = "leave it out"
+GONE = {
+    "--no-table": f"{_LEAVE}: there is no table any more that it would leave out",
+    "--static": f"{_LEAVE}: a report has no scripts unless --what-if is given",
+    "--limits": f"{_LEAVE}: --details prints the limits",
+    "--cluster": f"{_LEAVE}: ensembles run on this machine",
+    "--osp": f"{_LEAVE}: packages are written in SSP alone",
+    "--greedy": f"{_LEAVE}: it is so without it; --proven adds only what is proven",
+    "--with-limits": "bristle predict --with-limits",
+    "--fmu": "bristle compare-fmu",
+    "--closed-loop": "bristle predict",
+    "--exclude": "bristle study roles --exclude",
+    **{name: f"bristle list {name}" for name in ("effects", "laws", "components", "scenarios")},
+}
+"""Options and commands of checkouts before 1.0, and what takes their place."""
+
+
 class Parser(argparse.ArgumentParser):
     """The parser of a command or action: it knows the options that several of them share.
 
@@ -40,7 +57,7 @@ class Parser(argparse.ArgumentParser):
         known, rest = super().parse_known_args(args, namespace)
         if rest:
             options = [name for action in self._actions for name in action.option_strings]
-            self.error(f"unrecognized arguments: {' '.join(rest)}.{did_you_mean(rest[0], options)}")
+            self.error(f"unrecognized arguments: {' '.join(rest)}.{instead(rest[0], options)}")
         return known, rest
 
     def error(self, message: str) -> NoReturn:
@@ -48,7 +65,7 @@ class Parser(argparse.ArgumentParser):
         wrong = re.match(r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)$", message)
         if wrong:
             names = re.findall(r"[\w.-]+", wrong[3])
-            near = did_you_mean(wrong[2], names) or f" There are: {', '.join(names)}."
+            near = instead(wrong[2], names) or f" There are: {', '.join(names)}."
             message = fill(f'{wrong[1]}: there is no "{wrong[2]}".{near}', 80)
         super().error(message)
 
@@ -148,6 +165,12 @@ class Parser(argparse.ArgumentParser):
         self.flag("--sources", text)
         text = "version of FMI; 3 needs --native (default: 2)"
         self.add_argument("--fmi", type=int, choices=(2, 3), default=2, help=text)
+
+
+def instead(word: str, names: Iterable[str]) -> str:
+    """Return a sentence with what is right in place of a word that is not known, or ""."""
+    now = GONE.get(word.partition("=")[0])
+    return f" It is gone; now: {now}." if now else did_you_mean(word, names)
 
 
 def test_files(patterns: list[str], files: list[str]) -> list[str]:

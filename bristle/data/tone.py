@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf, log, pi
 from typing import NamedTuple
 
@@ -29,6 +30,9 @@ FAR = 8.0
 
 FULLY = 1.7
 """The same for an amplitude, which a rig need not reach, or its double, the stroke."""
+
+TOLD = (1.0, 2.0)
+"""Of how many amplitudes what is stated may be: an amplitude, or a stroke."""
 
 
 class Tone(NamedTuple):
@@ -80,11 +84,17 @@ def frequency_off(stated: float, found: Tone) -> float:
     return abs(log(stated / found.frequency)) if stated > 0.0 else inf
 
 
-def amplitude_off(stated: float, found: Tone) -> float:
-    """Return how far a stated amplitude or stroke [m] is off, as a logarithm."""
+def amplitude_off(stated: float, found: Tone, told: Sequence[float] = TOLD) -> float:
+    """Return how far a stated amplitude or stroke [m] is off, as a logarithm.
+
+    Parameters
+    ----------
+    stated, found : what is told of a motion, and what it does
+    told : how many amplitudes it may be
+    """
     if not stated > 0.0:
         return inf
-    return min(abs(log(stated / found.amplitude)), abs(log(0.5 * stated / found.amplitude)))
+    return min(abs(log(stated / (times * found.amplitude))) for times in told)
 
 
 def frequency_fits(stated: float, found: Tone) -> bool:
@@ -92,13 +102,33 @@ def frequency_fits(stated: float, found: Tone) -> bool:
     return frequency_off(stated, found) <= log(SAME if found.even else ROUGH)
 
 
-def amplitude_fits(stated: float, found: Tone) -> bool:
+def amplitude_fits(stated: float, found: Tone, told: Sequence[float] = TOLD) -> bool:
     """Return whether an amplitude that is stated [m] can be that of a motion, or its stroke."""
-    return amplitude_off(stated, found) <= log(FULLY)
+    return amplitude_off(stated, found, told) <= log(FULLY)
 
 
-def label_doubt(labels: Labels, found: Tone) -> str:
-    """Return which label of a run its motion contradicts, in words; "" where none."""
+def label_doubts(labels: Sequence[Labels], found: Sequence[Tone | None]) -> list[str]:
+    """Return which labels of each run its motion contradicts, in words; "" where none.
+
+    All amplitudes of a campaign are told in one way: as amplitudes, or as strokes.
+
+    Parameters
+    ----------
+    labels, found : (n,) of the runs, None where a motion is not known
+    """
+    known = [
+        (size, tone)
+        for one, tone in zip(labels, found, strict=True)
+        if tone is not None and isinstance(size := one.get("amplitude"), float)
+    ]
+    told = max(TOLD, key=lambda times: sum(amplitude_fits(*one, (times,)) for one in known))
+    return [
+        "" if tone is None else _label_doubt(one, tone, told)
+        for one, tone in zip(labels, found, strict=True)
+    ]
+
+
+def _label_doubt(labels: Labels, found: Tone, told: float) -> str:
     frequency, amplitude = labels.get("frequency"), labels.get("amplitude")
     wrong = []
     most = SAME if found.even else FAR
@@ -108,7 +138,7 @@ def label_doubt(labels: Labels, found: Tone) -> str:
             f"frequency is {label_text('frequency', frequency)} by its label, and the motion has "
             f"{'' if found.even else 'about '}{quantity(found.frequency, 'Hz', 3)}"
         )
-    if isinstance(amplitude, float) and not amplitude_fits(amplitude, found):
+    if isinstance(amplitude, float) and not amplitude_fits(amplitude, found, (told,)):
         wrong.append(
             f"amplitude is {label_text('amplitude', amplitude)} by its label, and the motion has "
             f"{quantity(found.amplitude, 'm', 3, fine=True)}"

@@ -32,7 +32,7 @@ from ..data.run_names import (
 )
 from ..data.table import Table
 from ..data.titles import Column, title, unit_or_none
-from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubt
+from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubts
 from ..errors import RecordError, StudyError, UnitError
 from ..units import convert, same_dimension
 from .runs import names_of_runs
@@ -201,11 +201,8 @@ def _doubted(
     files: Sequence[Path], found: Sequence[Facts], tones: Sequence[Tone | None]
 ) -> list[str]:
     """Return that labels contradict the measured motion, in one sentence."""
-    wrong = [
-        (file.name, text)
-        for file, one, tone in zip(files, found, tones, strict=True)
-        if tone is not None and (text := label_doubt(one.labels, tone))
-    ]
+    doubts = label_doubts([one.labels for one in found], tones)
+    wrong = [(file.name, text) for file, text in zip(files, doubts, strict=True) if text]
     if not wrong:
         return []
     name, text = wrong[0]
@@ -228,7 +225,8 @@ def _told_twice(files: Sequence[Path], tones: Sequence[Tone | None], reading: Re
             key = key.replace(token.text, f"<{name} {token.value:g}>")
         other, motion = first.setdefault(key, (file, tone))
         if other.stem == file.stem or (
-            frequency_fits(motion.frequency, tone) and amplitude_fits(motion.amplitude, tone)
+            frequency_fits(motion.frequency, tone)
+            and amplitude_fits(motion.amplitude, tone, (1.0,))
         ):
             continue
         one, two = (

@@ -114,7 +114,7 @@ def _check_wire(
         return None
     _check_kinds(target, entry, source, exit_, path, isinstance(said, dict), document)
     if entry.kind == "Real" and passes(exit_.kind, "Real") and isinstance(said, str):
-        _check_units(target, entry.measure, source, exit_.measure, path, document)
+        _check_units(target, entry.measure, source, exit_.measure or origin.played, path, document)
     if entry.name in to.places:
         document.error(
             path,

@@ -22,6 +22,7 @@ from ..fmu.catalogue import BuildingData
 from ..fmu.component import OUTSIDE, SWITCH
 from ..fmu.description import Description, Value, Variable
 from ..physics.building import PAPER, from_data
+from ..units import Measure
 
 ALGORITHMS = ("gauss-seidel", "midpoint", "midpoint-iterated", "jacobi")
 FILE_PARAMETERS = ("record", "file")
@@ -94,7 +95,10 @@ class DamperLaw:
 
 @dataclass
 class Part:
-    """A component as far as it could be read; `places` gives the path of each parameter."""
+    """A component as far as it could be read; `places` gives the path of each parameter.
+
+    `played` is the unit of a signal's samples where their file tells it and the FMU does not.
+    """
 
     name: str
     path: KeyPath
@@ -108,6 +112,7 @@ class Part:
     description: Description | None = None
     values: dict[str, Value] = field(default_factory=dict)
     signal: Signal | None = None
+    played: Measure | None = None
     places: dict[str, KeyPath] = field(default_factory=dict)
     over_step: dict[str, str] = field(default_factory=dict)
 

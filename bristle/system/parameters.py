@@ -13,14 +13,16 @@ from ..core.config import Document
 from ..core.text import unknown
 from ..data import read_ground_motion
 from ..data.building_file import read_building
+from ..data.titles import column
 from ..errors import BristleError, PhysicsError, RecordError, TrustError
 from ..fmu.catalogue import component_names
 from ..fmu.description import Variable
 from ..physics.building import ROUNDING, Building
 from ..physics.effect import EFFECTS
 from ..physics.forms import TABLE_FORM
-from ..physics.motion_file import read_two_column
+from ..physics.motion_file import read_text, read_two_column, rows
 from ..physics.signals import KINDS, PARAMETERS, STEPS, TAKEN, read_steps
+from ..units import Measure, alike
 from .library import damper_of, law_of
 from .model import (
     FILE_PARAMETERS,
@@ -80,6 +82,15 @@ def _check_csv(part: Part, folder: Path, document: Document) -> None:
             read_two_column(file, header=None)
         except PhysicsError as error:
             document.error(path, f"{where}: {error}")
+            return
+        title = next(rows(read_text(file)))[1].partition(",")[2].strip()
+        unit, like = column(1, title).unit, part.variables.get("offset")
+        wanted = like.measure if like else None
+        if unit and wanted is None:
+            part.played = Measure(unit.name)
+        elif unit and wanted and wanted.unit and not alike(unit, wanted.unit):
+            text = f'its values are "{title}", and are taken in [{wanted.name}]. Convert them.'
+            document.error(path, f"{where}: {file}: {text}")
 
 
 def _check_steps(part: Part, document: Document) -> None:
@@ -156,6 +167,8 @@ def check_parameter(part: Part, name: str, value: object, folder: Path, document
     if variable is None:
         settable = [v.name for v in part.variables.values() if v.causality == "parameter"]
         words = unknown("parameter", name, settable, part.ports_command)
+        if name == "record":
+            words += ' A record is played by fmu = "GroundMotion", as in el_centro_0p6g_clipped.'
         document.error(place, f"[components.{part.name}]: {words}")
         return
     if variable.causality not in ("parameter", "input"):

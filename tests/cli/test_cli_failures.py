@@ -221,6 +221,21 @@ def test_a_file_may_follow_an_option(
     assert "unrecognized arguments: other" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("line", "now"),
+    [
+        ("identify rig --no-table", "leave it out: there is no table"),
+        ("compare rig --fmu=a.fmu", "bristle compare-fmu"),
+        ("study check rig --exclude a", "bristle study roles --exclude"),
+        ("laws", "bristle list laws"),
+    ],
+)
+def test_an_option_that_is_gone_names_the_new_form(line, now, capsys) -> None:
+    with pytest.raises(SystemExit):
+        main(line.split())
+    assert f"It is gone; now: {now}" in " ".join(capsys.readouterr().err.split())
+
+
 def test_an_interrupted_command_ends_without_taking_the_process_down_first(tmp_path: Path) -> None:
     code = """
 import atexit, time

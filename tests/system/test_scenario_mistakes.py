@@ -382,6 +382,7 @@ def with_signal(keys):
         ('kind = "csv"', 'voltage.file is missing: kind = "csv" reads a file'),
         ('kind = "csv", file = "nix.csv"', 'voltage.file: there is no file "nix.csv"'),
         ('kind = "csv", file = "bad.csv"', "bad.csv"),
+        ('kind = "csv", file = "mV.csv"', "[V] is fed by; [mV]; factor = 0.001 }"),
         ('kind = "steps", steps = "0:0 1"', 'voltage.steps: "1" is not TIME:VALUE'),
         ('kind = "steps", steps = "0:0 0:1"', "voltage.steps: the time 0 s does not follow 0 s"),
         ('kind = "steps", steps = ""', "voltage.steps: no pair"),
@@ -389,12 +390,14 @@ def with_signal(keys):
 )  # fmt: skip
 def test_wrong_signals(findings, tmp_path, keys, words):
     (tmp_path / "bad.csv").write_text("time [s],value\n0,0\n1,one\n")
+    (tmp_path / "mV.csv").write_text("time [s],value [mV]\n0,0\n1,1000\n")
     text = with_signal(keys)
     errors = findings(text)
     assert len(errors) == 1
     for word in words.split("; "):
         assert word in errors[0].text
-    assert errors[0].line == where(text, "parameters = { " + keys)
+    of_wire = '"damper.voltage"' if "mV" in keys else "parameters = { " + keys
+    assert errors[0].line == where(text, of_wire)
 
 
 @pytest.mark.parametrize(
@@ -413,7 +416,9 @@ def test_a_wrong_whole_number(findings, seed, words):
 
 
 def test_a_right_signal_leaves_one_note_on_its_unit(findings, tmp_path):
-    (tmp_path / "signal.csv").write_text("time [s],value [V]\n0,0\n1,4\n2,0\n")
+    (tmp_path / "signal.csv").write_text("time [s],value\n0,0\n1,4\n2,0\n")
+    (tmp_path / "volts.csv").write_text("time [s],value [V]\n0,0\n1,4\n2,0\n")
+    assert findings(with_signal('kind = "csv", file = "volts.csv"'), "note") == []
     for keys in ('kind = "csv", file = "signal.csv"', 'kind = "steps", steps = "0:0 1:2.5 3:4"'):
         assert findings(with_signal(keys)) == []
         (note,) = findings(with_signal(keys), "note")

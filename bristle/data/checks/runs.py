@@ -17,7 +17,7 @@ from ..measurement import Measurement
 from ..noise import is_switched
 from ..relation import top_of
 from ..run_labels import MOVED, LabelOfRuns
-from ..tone import label_doubt, tone_of
+from ..tone import label_doubts, tone_of
 from .motion import velocity_of_run
 
 _LEVELS = 12  # at most; a voltage with more moves continuously
@@ -304,9 +304,8 @@ def _steps(runs: list[Measurement]) -> Iterator[Finding]:
 
 def check_labels(runs: Sequence[Measurement]) -> Iterator[Finding]:
     """Yield the runs on a bench whose frequency or amplitude is another one than their label's."""
-    for run in runs:
-        tone = tone_of(run) if {"frequency", "amplitude"} & {*run.labels} else None
-        text = "" if tone is None else label_doubt(run.labels, tone)
+    tones = [tone_of(run) if {"frequency", "amplitude"} & {*run.labels} else None for run in runs]
+    for run, text in zip(runs, label_doubts([run.labels for run in runs], tones), strict=True):
         if text:
             yield Finding(
                 "label", "warning",

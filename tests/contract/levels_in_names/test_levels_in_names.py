@@ -297,3 +297,14 @@ def test_what_a_table_of_runs_says_is_told_with_its_units(tmp_path, capsys) -> N
         assert main(["study", "new", study, "--data", data, "--runs", str(table)]) == 0
         said = " ".join(capsys.readouterr().out.split())
         assert f"of each run, from {table}: {told}" in said.replace("Of each", "of each")
+
+
+def test_one_amplitude_in_names_and_two_in_motions_is_said(tmp_path, capsys) -> None:
+    made(tmp_path / "lab_1", {"10mm_1Hz_0A": (1.0, 0.0), "10mm_1Hz_1A": (1.0, 1.0)})
+    made(tmp_path / "lab_2", {"10mm_2Hz_0A": (2.0, 0.0)}, 0.005)
+    study = str(tmp_path / "rig")
+    assert main(["study", "new", study, "--data", str(tmp_path / "lab_*" / "*.csv")]) == 0
+    told = "amplitude is 10 mm by its label, and the motion has 4.99 mm"
+    assert f"10mm_2Hz_0A.csv: {told}" in " ".join(capsys.readouterr().out.split())
+    assert main(["study", "check", study]) == 0
+    assert f"10mm_2Hz_0A: {told}" in " ".join(capsys.readouterr().out.split())
