@@ -76,8 +76,7 @@ def verdict_view(verdict: Verdict) -> View:
     return View(
         headline(verdict),
         (
-            *(Text(text, "say") for text in named if kind == "effect"),
-            *(Text(text) for text in named if kind != "effect"),
+            *map(Text, named),
             Text(error_text(verdict)),
             *map(Text, shown),
             Text(f"To distinguish them: {separate}" if separate else ""),

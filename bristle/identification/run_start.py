@@ -139,6 +139,7 @@ def remembering_states(law: str, effects: Sequence[str]) -> list[tuple[str, str]
     ]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a force that overflows leads no closer
 def start_in_motion(
     states: Sequence[tuple[str, str]],
     force: Array,

@@ -17,7 +17,7 @@ from ..core.toml_lines import KeyPath
 from ..errors import StudyError, TrustError, UnitError
 from ..physics.drive import DRIVES, VOLTAGE, declared_for, unit_for
 from ..physics.effect import AT, EFFECTS, plain_name
-from ..physics.laws import DEFAULT, Law, base_and_variant
+from ..physics.laws import DEFAULT, LAWS, Law, base_and_variant
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..units import canonical, convert
 from ..user_code.load import waiting
@@ -366,6 +366,11 @@ class Model:
     def written(self) -> dict[str, Fact]:
         """Return all parameters as a model.toml has them, numbers as typed where they still are."""
         return {name: self._written(name) for name in self.facts or self.values}
+
+    def written_for(self, drive: str) -> dict[str, Fact]:
+        """Return what `written` does; without a `drive` ("") not what acts through one alone."""
+        driven = () if drive or self.law not in LAWS else LAWS[self.law].driven()
+        return {name: fact for name, fact in self.written().items() if name not in driven}
 
     def written_of(self, effect: str = "") -> dict[str, Fact]:
         """Return the parameters of an effect, or of the law, by their own names; see `written`."""

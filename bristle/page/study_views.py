@@ -61,13 +61,13 @@ def fit_view(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         "law": model.law, "effects": list(model.effects), "building": model.building,
         "about": [] if hidden else _about(model), "waiting": sorted(hidden),
         "identified": is_identified(model),
-        "parameters": rows_of(model, found if fresh else {}),
+        "parameters": rows_of(model, study.drive, found if fresh else {}),
         "answer": found if fresh else None, "laws": sorted(LAWS),
         "step": numbers[-1] if numbers else None, "other_data": other_data(study),
     }  # fmt: skip
 
 
-def rows_of(model: Model, found: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rows_of(model: Model, drive: str, found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return a row per parameter: value, half of its 95 % interval, how it is known, what it is.
 
     `shown` are value and half with the digits that the interval leaves.
@@ -75,10 +75,11 @@ def rows_of(model: Model, found: Mapping[str, Any]) -> list[dict[str, Any]]:
     Parameters
     ----------
     model : of the study
+    drive : "voltage", "current", or "" without a command
     found : what its identification found, empty where it is not known
     """
     rows = []
-    for name, value in model.written().items():
+    for name, value in model.written_for(drive).items():
         own = (found.get("parameters") or {}).get(name, {})
         std = value.std
         how = own.get("how") or ("identified" if std is not None else value.origin)
@@ -368,7 +369,7 @@ def _step(study: Study, step: Step, one: HistoryStep) -> dict[str, Any]:
     parameters: list[dict[str, Any]] = []
     with suppress(TrustError):  # the model of a step may hold code that must not run yet
         model = study.model_of(step.number, to_show=True)
-        parameters = rows_of(model, {})
+        parameters = rows_of(model, study.drive, {})
     return {
         "number": step.number, "what": step.what, "why": step.why, "z": one.z, "train": one.z_train,
         "rms": one.rms, "share": one.share, "parameters": parameters,

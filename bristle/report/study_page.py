@@ -30,7 +30,6 @@ from ..errors import BristleError
 from ..model.equations import equations
 from ..physics.drive import DRIVES
 from ..physics.forms import shown_law, split_form
-from ..physics.laws import LAWS
 from ..prediction.export import write_editable
 from ..study.history import HistoryStep, history_steps
 from ..study.pictures import draw_staircase
@@ -116,8 +115,7 @@ def parameter_table(model: Model, drive: str) -> tuple[list[str], list[list[str]
     """
     header = ["parameter", "value", "95 % interval", "unit", "origin", "what it is"]
     rows, edges = [], []
-    driven = LAWS[model.law].driven() if not drive and model.law in LAWS else ()
-    flat = {name: fact for name, fact in model.written().items() if name not in driven}
+    flat = model.written_for(drive)
     for name, value in flat.items():
         text, half = with_interval(value.value, value.std)
         origin = value.origin if value.free else f"{value.origin}, held"

@@ -49,8 +49,8 @@ from .study_file import ALL, EXCLUDE, ROLES, TEST, RunFile, Settings, write_sett
 _REMARKS = 6
 """Remarks on files that are printed at most."""
 _NO_COMMAND = (
-    "no command was recorded: this is taken as a device that nothing commands, and laws of such "
-    "devices are tried as well. If one acts on it, its column or --level is needed"
+    "no command was recorded: this is taken as a device that nothing commands{}. If one acts on "
+    "it, its column or --level is needed"
 )
 ENDS = (0.005, 0.995)
 """Shares of the samples below the two ends of the displacement's range, so that no spike is one."""
@@ -158,7 +158,8 @@ def make_folder(
     _refuse_one_role(settings.runs)
     notes += [centred] if centred else []
     if rig == "bench" and not settings.drive:
-        notes.append(_NO_COMMAND)
+        tried = ", and laws of such devices are tried as well"
+        notes.append(_NO_COMMAND.format(tried if law is None else ""))
     if settings.excluded:
         notes.append(settings.excluded_text.removesuffix("."))
     raw = [(one, of) for one, of in raw_signals(first).items() if one not in taken]

@@ -612,7 +612,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     if not added:
         return view
     own = [effect_text(name, _sizes(model, name), DRIVES[model.drive]) for name in added]
-    told = [Text(text, "say") for text in own]
+    told = [Text(text) for text in own]
     if verdict.get("kind") != "none":
         told.insert(0, Text(view.title, "say"))
     fall = Text(_fall(judged))
@@ -721,7 +721,8 @@ def _error(step: HistoryStep, factor: float, unit: str) -> str:
 def steps_table(steps: Sequence[HistoryStep]) -> Table:
     """Return the table of a history: the error of each model on held-out runs."""
     factor, unit = scale("N", max((one.rms for one in steps if one.rms is not None), default=0.0))
-    rows = [[f"{one.number} {one.what}", *_step(one, factor)] for one in steps]
+    judged = [one for one in steps if one.z is not None or one.share is not None]
+    rows = [[f"{one.number} {one.what}", *_step(one, factor)] for one in judged or steps]
     header = ["step", f"error [{unit}]", "of force", "z", "z train"]
     title = "Error of each model on the held-out runs"
     note = "z: error / noise; a true model has 1."
@@ -733,7 +734,7 @@ def steps_table(steps: Sequence[HistoryStep]) -> Table:
 
 def _step(step: HistoryStep, factor: float) -> list[str]:
     if step.z is None and step.share is None:
-        return ["not judged", "", "", ""]
+        return ["not fitted", "", "", ""]
     error = "" if step.rms is None else plain(factor * step.rms, 4)
     share = "" if step.share is None else percent(step.share)
     return [error, share, short_z(step.z), or_nothing(step.z_train)]

@@ -105,9 +105,9 @@ def test_view_2_has_values_with_half_of_their_intervals(home: Path, tmp_path: Pa
     model = Study(home / "rig").model()
     known = model.with_values({"f_c": 1.5}, {"f_c": 0.1})
     assert isinstance(known.facts["f_c"], Fact)
-    (row,) = [row for row in study_views.rows_of(known, {}) if row["name"] == "f_c"]
+    (row,) = [row for row in study_views.rows_of(known, "voltage", {}) if row["name"] == "f_c"]
     assert (row["value"], row["half"], row["how"]) == (1.5, pytest.approx(0.196), "identified")
-    held = study_views.rows_of(known, {"parameters": {"f_c": {"how": "not identified"}}})
+    held = study_views.rows_of(known, "voltage", {"parameters": {"f_c": {"how": "not identified"}}})
     assert [row["half"] for row in held if row["name"] == "f_c"] == [None]
 
 

@@ -52,20 +52,24 @@ function orders(page, found) {
     added ? h("a", { href: page.link("verdict") }, "The residual before and after") : null);
 }
 
-/** The error of each model on held-out runs, on a logarithmic scale from the noise floor. */
+/** The error of each model on held-out runs: over the noise, on a logarithmic scale from the noise
+ *  floor; in per cent of the force where the noise is not known. */
 function staircase(found) {
-  const known = found.steps.filter((step) => step.z !== null);
+  const noise = found.steps.some((step) => step.z !== null);
+  const of = (step) => (noise ? step.z : step.share);
+  const known = found.steps.filter((step) => of(step) !== null);
   if (!known.length) return empty("The history holds the first model alone", "Identify fits it and gives its first error.", null);
-  const log = (value) => Math.log10(Math.max(value, 1) * 1.03);
-  const top = log(Math.max(...known.map((step) => step.z), 2));
+  const height = (value) => (noise ? Math.log10(Math.max(value, 1) * 1.03) : value);
+  const text = (step) => [noise ? z(step.z) : percent(step.share), step.rms === null ? "" : `${number(step.rms, 4)} N`];
   return h("section", {},
     h("h2", {}, "How the error fell"),
-    bars("error / noise (z) of each step on held-out runs", found.steps.map((step) => ({
-      name: `${step.number} ${step.what}`, value: step.z === null ? null : log(step.z), strong: true,
-      good: step.z !== null && step.z <= found.close,
-      text: step.z === null ? "not judged" : `${z(step.z)}${step.rms === null ? "" : ` · ${number(step.rms, 4)} N`}`,
-    })), { most: top, edge: log(1) }),
-    h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic, and the RMS error. Green line: the noise floor, z = 1. Green bar: a model that reaches it."));
+    bars(`${noise ? "error / noise (z)" : "error"} of each step on held-out runs`, known.map((step) => ({
+      name: `${step.number} ${step.what}`, value: height(of(step)), strong: true,
+      good: noise && step.z <= found.close, text: text(step).filter(Boolean).join(" · "),
+    })), { most: height(Math.max(...known.map(of), noise ? 2 : 0)), edge: noise ? height(1) : null }),
+    h("p", { class: "soft small" }, noise
+      ? "Error / noise (z) on held-out runs, logarithmic, and the RMS error. Green line: the noise floor, z = 1. Green bar: a model that reaches it."
+      : "Error on held-out runs in per cent of the force, and the RMS error. How much of it is noise is not known."));
 }
 
 function compare(page, found) {
@@ -119,7 +123,7 @@ function compare(page, found) {
   return h("section", {},
     h("h2", {}, "Two steps side by side"),
     h("ol", { class: "timeline", tabindex: "0", "aria-label": "the steps of the history" }, steps.map((step, k) => h("li", { class: k === steps.length - 1 ? "present" : null },
-      h("b", {}, step.what), h("span", { class: "soft small" }, step.z === null ? "not judged" : `z = ${z(step.z)}`),
+      h("b", {}, step.what), h("span", { class: "soft small" }, step.z !== null ? `z = ${z(step.z)}` : step.share !== null ? percent(step.share) : "not fitted"),
       h("span", { class: "soft small why" }, step.why)))),
     h("div", { class: "act" }, labelA, labelB, back, on),
     target);
