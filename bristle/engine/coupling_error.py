@@ -364,7 +364,7 @@ def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> tuple[str
     first = max(doubtful, key=lambda name: doubtful[name].known)
     others = f" and {len(doubtful) - 1} more" if len(doubtful) > 1 else ""
     known = judged[output].known
-    least = f", at least {plain(100 * known, 2)} % along the run of {output}" if known > 0.0 else ""
+    least = f", at least {plain(100 * known, 2)} % of the peak of {output}" if known > 0.0 else ""
     return output, f"unknown{least}; {first}{others}: {doubtful[first].doubt()}"
 
 
@@ -410,7 +410,7 @@ class Expected:
     def __str__(self) -> str:
         if self.error is None or self.tried is None or self.tried_error is None:
             return f"{self.algorithm}: {self.why}"
-        told = f"{self.algorithm}: {plain(100 * self.error, 2)} % along the run of {self.output}"
+        told = f"{self.algorithm}: {plain(100 * self.error, 2)} % of the peak of {self.output}"
         if self.error <= TOLERANCE:
             return told
         there = f"{plain(100 * self.tried_error, 2)} %"

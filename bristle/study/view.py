@@ -614,7 +614,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     own = [effect_text(name, _sizes(model, name), DRIVES[model.drive]) for name in added]
     told = [Text(text) for text in own]
     if verdict.get("kind") != "none":
-        told.insert(0, Text(view.title, "say"))
+        told.insert(0, Text(view.title.replace("Something is", "Something else is"), "say"))
     fall = Text(_fall(judged))
     # What a missing effect would gain stands in the verdict's sentence alone.
     said = Text(verdict_error(verdict)) if verdict.get("kind") != "effect" else None

@@ -316,7 +316,7 @@ def test_where_no_step_is_short_enough_the_error_at_the_shortest_is_told(
 def test_a_small_error_needs_no_shorter_step(scenario: Path) -> None:
     for one in expect(load_scenario(scenario), sampled(1.0, scale=0.002)):
         assert one.step == 0.002
-        assert str(one).endswith(f"0.2 % along the run of {one.output}")
+        assert str(one).endswith(f"0.2 % of the peak of {one.output}")
         assert one.output == "damper.force"
 
 

@@ -16,6 +16,7 @@ from ..noise import Noise, estimate_noise, is_switched, spikes_text
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
 _HELD = 2  # samples per value from which a channel is one that was logged more slowly
+_ALL_NOISE = 0.9  # the share of a command's RMS about its mean from which it is noise alone
 _COLOURS = {
     "low-passed": "it fades towards half the sampling rate: this is its level below",
     "blue": "it grows towards high frequencies, as after a numerical derivative: an upper limit",
@@ -144,9 +145,9 @@ def _ends_text(ends: list[tuple[float, float, int]], unit: str) -> str:
 
 def _noise(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
     std, facts = run.noise[channel], run.noise_facts[channel]
-    if channel in DRIVE and is_switched(values):
-        return
     rms = float(np.std(values))
+    if channel in DRIVE and (is_switched(values) or std > _ALL_NOISE * rms):
+        return  # a command that keeps its level shows nothing else
     share = std / rms if rms else 0.0
     unit = run.units[channel]
     if facts is None:

@@ -28,9 +28,9 @@ def test_export_ssp_says_unknown_and_the_least_that_a_run_shows(
 ) -> None:
     assert main(["export-ssp", *SHORT, "-o", str(tmp_path / "clipped.ssp")]) == 0
     jacobi, seidel = capsys.readouterr().out.splitlines()[-2:]
-    told = re.search(r"jacobi: unknown, at least (\d+) % along the run of ([\w.]+);", jacobi)
+    told = re.search(r"jacobi: unknown, at least (\d+) % of the peak of ([\w.]+);", jacobi)
     assert told is not None
-    assert re.search(r"gauss-seidel: [\d.]+ % along the run of structure", seidel)
+    assert re.search(r"gauss-seidel: [\d.]+ % of the peak of structure", seidel)
     out = str(tmp_path / "out")
     assert main(["run", *JACOBI, "--coupling-error", "--json", "--out", out]) == 0
     errors = json.loads(capsys.readouterr().out)["coupling_error"]
@@ -46,7 +46,7 @@ def test_a_tolerance_is_not_kept_where_the_error_is_unknown(
     given = ["run", *JACOBI, "--tolerance", "0.5%", "--out", str(tmp_path / "out")]
     assert main(given) == 1
     said = capsys.readouterr().err
-    assert re.search(r"is unknown, at least \d+ % along the run of", said)
+    assert re.search(r"is unknown, at least \d+ % of the peak of", said)
     assert "keeps the coupling error" not in said
 
 
@@ -81,7 +81,7 @@ def test_from_finer_steps_too_the_exact_source_does_not_stand_for_the_rest(
     assert judged_by(again(pair, "fmu")) == ["one.value", "two.y"]
     for one in expect(pair, again):
         assert (one.error, one.step, one.output) == (None, None, "two.y")
-        assert re.search(r"unknown, at least [\d.]*[1-9][\d.]* % along the run of two\.y", str(one))
+        assert re.search(r"unknown, at least [\d.]*[1-9][\d.]* % of the peak of two\.y", str(one))
 
 
 def test_a_step_with_an_unknown_error_is_no_end_where_a_finer_one_tells(pair: Any) -> None:
