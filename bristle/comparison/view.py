@@ -37,6 +37,7 @@ _HALF = "half step [z]"
 _NO_STEP = 0.05
 """What half the calculation step changes, over the noise, before it has a column."""
 _NOTE = "z: error / noise; a true model has 1."
+_SHARES = "Fit: 1 - error / standard deviation of what was measured; VAF: the same of variances."
 _SHOWN = 6  # coordinates in a table
 _TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 
@@ -95,10 +96,11 @@ def run_table(comparison: Comparison) -> Table:
     title = "Error on each run"
     if comparison.sites:
         title = f"{capitalised(site_name(comparison.site))}: error on each run"
-    note = f"{_NOTE} Half step: what half the calculation step changes, over the noise."
+    plain_note = f"{_NOTE} {_SHARES}"
+    note = f"{plain_note} Half step: what half the calculation step changes, over the noise."
     table = Table(header, rows, range(1, len(header)), title, note=note)
     if all(run.numerical_z < _NO_STEP for run in (*comparison.runs, comparison.total)):
-        table = _without(table, (_HALF,))._replace(note=_NOTE)
+        table = _without(table, (_HALF,))._replace(note=plain_note)
     return _as_known(comparison, table)
 
 
@@ -168,7 +170,8 @@ def _as_known(comparison: Comparison, table: Table) -> Table:
         ]
         return _without(table, empty)
     apart = ("z", _EXCESS, _HALF, *(one for one in table.header if one.startswith("noise [")))
-    return _without(table, apart)._replace(note="" if _NOTE in table.note else table.note)
+    note = _SHARES if _SHARES in table.note else ""
+    return _without(table, apart)._replace(note=note if _NOTE in table.note else table.note)
 
 
 def _without(table: Table, names: Collection[str]) -> Table:

@@ -195,7 +195,7 @@ def sentences(found: ControllerComparison) -> list[str]:
 
 
 def winner(found: ControllerComparison) -> str:
-    """Return the controller that is lowest in most motions; of two, the lower on the mean."""
+    """Return the controller that is lowest in most motions; of two, the lower on average."""
     wins = dict.fromkeys(found.controllers, 0)
     for motion in found.motions:
         wins[min(found.controllers, key=lambda c, m=motion: found.value(m, c))] += 1  # type: ignore[misc]
@@ -241,7 +241,7 @@ def _lowest(found: ControllerComparison, first: str) -> str:
     text = f"{first} has the lowest {what(found)} of the controllers in {wins} of {count} motions"
     if len(found.controllers) == 1:
         text = f"{first} is below the best constant voltage in {below} of {count} motions"
-    text += f"; on the mean it lies {beside(_mean(found, first), _best(found))}"
+    text += f"; on average it lies {beside(_mean(found, first), _best(found))}"
     best = min(found.controllers, key=lambda c: _mean(found, c))
     if best != first and _mean(found, first) - _mean(found, best) > _ALIKE:
         text += f", {best} {beside(_mean(found, best), 'it')}"
@@ -268,7 +268,7 @@ def _one_for_all(found: ControllerComparison, first: str) -> list[str]:
     own = _mean(found, first) / float(ratios[at])
     return [
         "The best constant voltage of each motion was chosen with the motion known. One voltage "
-        f"for all of them, {volts[at]:g} V, lies {beside(float(ratios[at]), 'it')} on the mean; "
+        f"for all of them, {volts[at]:g} V, lies {beside(float(ratios[at]), 'it')} on average; "
         f"{first} is {beside(own, 'that')}."
     ]
 
@@ -286,7 +286,7 @@ def _gap(found: ControllerComparison, first: str) -> list[str]:
     lowest = _mean(found, LIMIT)
     share = (1.0 - _mean(found, first)) / (1.0 - lowest) if lowest < 1.0 else float("nan")
     text = f"The limit, with the motion known, lies {beside(lowest, 'the best constant voltage')}"
-    text += " on the mean" if len(found.motions) > 1 else ""
+    text += " on average" if len(found.motions) > 1 else ""
     if share > 0.0:
         text += f"; {first} closes {100.0 * share:.0f} % of that gap"
     unsure = [motion for motion, one in found.limits.items() if not one.sure]

@@ -161,7 +161,7 @@ def draw_summary(found: ControllerComparison) -> Page:
     first = winner(found)
     mean = float(wide[first].mean())
     title = f"{first}: {what(found)} lies {beside(mean, 'the best constant voltage')}"
-    title += " on the mean" if len(found.motions) > 1 else ""
+    title += " on average" if len(found.motions) > 1 else ""
     unit = judged.unit.replace("s2", "s²")
     words = what(found)
     said = [

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..comparison.names import site_name
-from ..core.text import plain, quantity
+from ..core.text import plain, quantity, with_interval
 from ..view import Viewable
 from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
 from .curve import Curve
@@ -95,11 +95,12 @@ class LearnedEffect(Viewable):
 
     def _values(self) -> list[str]:
         assert self.closed is not None
-        return [
-            f"{name} = {plain(value, 4)} ± {plain(1.96 * self.closed.std[name], 2)}"
-            + (f" {unit}" if unit != "1" else "")
-            for name, value, unit in self.closed.formula.parameters
-        ]
+        texts = []
+        for name, value, unit in self.closed.formula.parameters:
+            text, half = with_interval(value, self.closed.std[name] or None)
+            parts = (f"{name} = {text}", half.strip("-"), unit if unit != "1" else "")
+            texts.append(" ".join(part for part in parts if part))
+        return texts
 
     def _nearest(self, curve: Curve) -> dict[str, list[float]]:
         """Return the best closed form along its signal, to draw it; empty where there is none."""

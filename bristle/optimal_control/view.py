@@ -31,7 +31,7 @@ def limit_view(found: Limit) -> View:
         title,
         (
             *map(Text, confidence(found)),
-            Table(("control", f"{found.statistic} [{found.unit}]", "beside"), rows, (1,)),
+            Table(("control", f"{found.statistic} [{found.unit}]", "note"), rows, (1,)),
         ),
         (Figure(lambda: draw_limit(found), title),),
     )

@@ -37,7 +37,7 @@ from ..study.read_again import devices_of
 from ..study.runs import names_of_runs, place_of_run
 from ..study.steps import NOT_PROVEN
 from ..study.study_file import TEST
-from ..study.view import budget_text, channel_table, steps_table, story_view
+from ..study.view import budget_text, channel_table, judged, steps_table, story_view
 from ..version import __version__
 from ..view import html
 from ..view.blocks import Text, View
@@ -454,7 +454,9 @@ def _on_test_runs(content: Content) -> str:
 
 def _history(content: Content) -> str:
     table = steps_table(content.history_steps)
-    rows = [[*row, step.why] for row, step in zip(table.rows, content.steps, strict=True)]
+    why = {step.number: step.why for step in content.steps}
+    shown = judged(content.history_steps)
+    rows = [[*row, why[one.number]] for row, one in zip(table.rows, shown, strict=True)]
     table = table._replace(header=[*table.header, "why"], rows=rows)
     picture = ""
     if (page := draw_staircase(content.history_steps)) is not None:

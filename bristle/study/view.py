@@ -602,8 +602,8 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     then = next_steps({**verdict, "gains": advised}, study.folder, known)
     view = view._replace(blocks=(*view.blocks, *then))
     steps = history_steps(study.steps())
-    judged = [one for one in steps if one.rms is not None]
-    if not judged:
+    measured = [one for one in steps if one.rms is not None]
+    if not measured:
         return view
     began = study.model_of(steps[0].number, to_show=True)
     guessed = [name for one in doubtful for name in unproven_of(study, one)]
@@ -615,7 +615,7 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     told = [Text(text) for text in own]
     if verdict.get("kind") != "none":
         told.insert(0, Text(view.title.replace("Something is", "Something else is"), "say"))
-    fall = Text(_fall(judged))
+    fall = Text(_fall(measured))
     # What a missing effect would gain stands in the verdict's sentence alone.
     said = Text(verdict_error(verdict)) if verdict.get("kind") != "effect" else None
     rest = [one for one in view.blocks if one != said]
@@ -718,11 +718,15 @@ def _error(step: HistoryStep, factor: float, unit: str) -> str:
     return f"{plain(factor * (step.rms or 0.0), 4)} {unit}{share}"
 
 
+def judged(steps: Sequence[HistoryStep]) -> Sequence[HistoryStep]:
+    """Return the steps whose errors are known; all of them where none is."""
+    return [one for one in steps if one.z is not None or one.share is not None] or steps
+
+
 def steps_table(steps: Sequence[HistoryStep]) -> Table:
     """Return the table of a history: the error of each model on held-out runs."""
     factor, unit = scale("N", max((one.rms for one in steps if one.rms is not None), default=0.0))
-    judged = [one for one in steps if one.z is not None or one.share is not None]
-    rows = [[f"{one.number} {one.what}", *_step(one, factor)] for one in judged or steps]
+    rows = [[f"{one.number} {one.what}", *_step(one, factor)] for one in judged(steps)]
     header = ["step", f"error [{unit}]", "of force", "z", "z train"]
     title = "Error of each model on the held-out runs"
     note = "z: error / noise; a true model has 1."
