@@ -428,7 +428,7 @@ def _run(
 ) -> dict[str, Array]:  # fmt: skip
     """Return the columns of a run as a logger has them, the force in units of the device."""
     times = max(1, round(1.0 / (FINE * rate)))
-    count = round(max(5.0, 2000.0 / rate) * rate)
+    count = round(max(4.0, 800.0 / rate) * rate)
     dt = 1.0 / (rate * times)
     t = dt * np.arange(count * times)
     share, w = rng.uniform(0.4, 1.0), fast / far

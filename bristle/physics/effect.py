@@ -18,6 +18,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
 from . import laws as _laws  # noqa: F401  (importing it registers the laws)
+from .forms import QUADRATIC_FORM, choosable, joined_form
 from .law import LAWS, PARTS, Law, laws_of
 from .parameter import (
     ANY_BY_NAME,
@@ -621,8 +622,16 @@ def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:
 
 
 def laws_joined(effect: type[Effect]) -> tuple[str, ...]:
-    """Return the names of the laws that an effect can join in a damper; none for other sites."""
-    return tuple(law.name for law in laws_of("damper") if effect.joins(law))
+    """Return the names of the laws that an effect can join in a damper; none for other sites.
+
+    One that changes what only a bent command has joins laws of that form.
+    """
+    laws = laws_of("damper")
+    straight = tuple(law.name for law in laws if effect.joins(law))
+    if straight or not effect.changes:
+        return straight
+    bent = [LAWS[joined_form(law.name, QUADRATIC_FORM, ())] for law in laws if choosable(law)]
+    return tuple(law.name for law in bent if effect.joins(law))
 
 
 def instrument_of(channel: str, fault: str) -> str:

@@ -19,7 +19,7 @@ from bristle.identification.problem import Problem, Run
 from bristle.identification.start_grid import initial_guesses, refine
 from bristle.model.model import Model
 from bristle.physics.damper import DamperModel
-from bristle.physics.effect import EFFECTS
+from bristle.physics.effect import EFFECTS, laws_joined
 from bristle.user_code.load import define, defined, flaw_of
 
 DT, N, NOISE = 0.002, 1500, 0.05
@@ -29,7 +29,7 @@ LAW = {"f_c": 1.3, "f_v": 0.8, "c_0": 60.0, "c_v": 0.0, "k": 70.0, "f_0": 1.0, "
 PRESSURES = (50.0, 100.0, 150.0, 100.0, 50.0, 150.0, 100.0, 150.0)
 
 
-def made(seed, labels, size=1.0, **own):
+def made(seed, labels, size=1.0, bend=0.0, **own):
     """Return a run of a damper whose yield force is smooth, with values of its own."""
     random = np.random.default_rng(seed)
     w = 2.0 * np.pi * random.uniform(0.4, 4.0, 10)
@@ -38,16 +38,17 @@ def made(seed, labels, size=1.0, **own):
     a = -(length * w**2) @ np.sin(angle)
     V = np.repeat(random.choice([0.0, 2.0, 4.0], 10), N // 10)
     p = {**LAW, **own}
-    force = (p["f_c"] + p["f_v"] * V) * np.tanh(v / p["v_s"]) + p["c_0"] * v + p["k"] * x + p["f_0"]
+    yielding = p["f_c"] + p["f_v"] * V + bend * V**2
+    force = yielding * np.tanh(v / p["v_s"]) + p["c_0"] * v + p["k"] * x + p["f_0"]
     force = force + NOISE * random.standard_normal(N)
     return Run(f"run_{seed}", DT, x, v, a, V, force, NOISE, np.zeros((2, N, 4)), labels=labels)
 
 
-def prepared(runs, train=6):
+def prepared(runs, train=6, law="tanh"):
     """Return what a diagnosis begins with."""
     fixed = ("c_v", "delta", "x_s", "v_s")
     problems = Problem(list(runs[:train])), Problem(list(runs[train:]))
-    base = fit(problems[0], Model("tanh", (), LAW, fixed), with_std=False).model
+    base = fit(problems[0], Model(law, (), LAW, fixed), with_std=False).model
     return Prepared(judge(base, *problems), *problems)
 
 
@@ -75,6 +76,17 @@ def test_what_depends_on_a_label_is_tried_with_its_size_and_no_other_label():
         text = EFFECTS[one.name].in_words(values)
     assert text.startswith("The force of the accumulator at mid-stroke (f_0) rises by 0.018")
     assert "N per psi of pressure; the model's value of it is that at 100 psi." in text
+
+
+def test_a_bend_of_the_command_may_depend_on_a_label():
+    runs = with_pressure(lambda p: {"bend": 0.3 + 0.1 * (p - 100.0) / 50.0})
+    found = dependences(prepared(runs, law="tanh[quadratic]"))
+    (one,) = (one for one in found if one.name == "yield_force_bend_by_pressure_psi")
+    assert flaw_of(one.name, one.text) == ""
+    with defined({one.name: one.text}):
+        joined = laws_joined(EFFECTS[one.name])
+        assert "tanh[quadratic]" in joined
+        assert "tanh" not in joined
 
 
 @pytest.mark.parametrize("own", [{}, {"f_0": 3.0}])
