@@ -30,7 +30,7 @@ from ..identification.start_grid import Search
 from ..model.model import Model
 from ..physics.building import Building
 from ..physics.laws import LAWS, law_of_part
-from .rule import BENCH, SITE, DecisionRule
+from .rule import BENCH, SITE
 from .trials import judge
 
 DEVIATIONS = 3.0
@@ -67,49 +67,46 @@ class Shaken:
         return {site: pair for site, pair in found.items() if site != "damper"}
 
 
-def suited_masses(shaken: Shaken, building: Building, rule: DecisionRule = SITE) -> Building:
+def suited_masses(shaken: Shaken, building: Building) -> Building:
     """Return a building with masses that make its sites lines, its own where they do not.
 
     Parameters
     ----------
     shaken : responses to fit to, and those that decide
     building : as its file has it
-    rule : how far masses may move, and how much that must explain
     """
     lines = shaken.lines(building)
-    before = _excess(lines, rule)
-    if max(before.values(), default=0.0) <= rule.least_excess:
+    before = _excess(lines)
+    if max(before.values(), default=0.0) <= SITE.least_excess:
         return building
-    rows = _rows(shaken, building, lines, rule)
+    rows = _rows(shaken, building, lines)
     found, least = building, sum(before.values())
-    clear = [site for site in lines if before[site] > rule.excess(rule.clean)]
+    clear = [site for site in lines if before[site] > SITE.excess(SITE.clean)]
     for one in (None, *clear):  # an effect of one site may look like masses; the others then tell
         able = [rows[site] for site in lines if site != one]
-        shift = _shift(able, _determined(building.size, shaken.lowest, shaken.measured), rule)
-        if float(np.max(np.abs(shift / (1.0 + shift)))) > rule.mass_doubt:
+        shift = _shift(able, _determined(building.size, shaken.lowest, shaken.measured))
+        if float(np.max(np.abs(shift / (1.0 + shift)))) > SITE.mass_doubt:
             continue
         moved = with_masses(building, shift)
-        after = _excess(shaken.lines(moved), rule)
-        if _suit_better(before, after, rule) and sum(after.values()) < least:
+        after = _excess(shaken.lines(moved))
+        if _suit_better(before, after) and sum(after.values()) < least:
             found, least = moved, sum(after.values())
-        if max(after.values()) <= rule.excess(rule.adequate):
+        if max(after.values()) <= SITE.excess(SITE.adequate):
             break
     return found
 
 
-def _suit_better(
-    before: Mapping[str, float], after: Mapping[str, float], rule: DecisionRule
-) -> bool:
+def _suit_better(before: Mapping[str, float], after: Mapping[str, float]) -> bool:
     """Return whether masses take half of what a line leaves, at one site, and add to none.
 
     An effect of one site leaves its excess there, whatever the masses are: that says nothing of
     what they do at the others.
     """
-    noise = rule.excess(rule.adequate)
-    if any(after[site] > max(noise, (1.0 + rule.trace) * before[site]) for site in before):
+    noise = SITE.excess(SITE.adequate)
+    if any(after[site] > max(noise, (1.0 + SITE.trace) * before[site]) for site in before):
         return False
-    clear = [site for site in before if before[site] > rule.excess(rule.quiet)]
-    return any(after[site] <= rule.building_excess * before[site] for site in clear)
+    clear = [site for site in before if before[site] > SITE.excess(SITE.quiet)]
+    return any(after[site] <= SITE.building_excess * before[site] for site in clear)
 
 
 def with_masses(building: Building, shift: Array) -> Building:
@@ -144,12 +141,12 @@ def text_of_masses(before: Building, after: Building, measured: bool = True) -> 
     ]
 
 
-def _excess(lines: Mapping[str, StructurePair], rule: DecisionRule) -> dict[str, float]:
+def _excess(lines: Mapping[str, StructurePair]) -> dict[str, float]:
     """Return what lines leave beyond noise on held-out runs, by site."""
     found = {}
     for site, (train, held_out) in lines.items():
         line = fit_line(train, law_of_part(site).name).model
-        found[site] = rule.excess(judge(line, train, held_out).z)
+        found[site] = SITE.excess(judge(line, train, held_out).z)
     return found
 
 
@@ -162,7 +159,7 @@ class _Rows(NamedTuple):
 
 
 def _rows(
-    shaken: Shaken, building: Building, lines: Mapping[str, StructurePair], rule: DecisionRule
+    shaken: Shaken, building: Building, lines: Mapping[str, StructurePair]
 ) -> dict[str, _Rows]:
     """Return by site how its force follows its line (m, p), and each mass (m, n) by a deviation.
 
@@ -171,7 +168,7 @@ def _rows(
     """
     n = building.size
     told = np.array([i > 0 or shaken.train[0].pulse is None for i in range(n)])
-    unit = rule.mass_doubt / DEVIATIONS
+    unit = SITE.mass_doubt / DEVIATIONS
     moved = [with_masses(building, unit * np.eye(n)[j]) for j in range(n)]
     rows = {}
     for site, (train, _) in lines.items():
@@ -195,7 +192,7 @@ def _rows(
     return rows
 
 
-def _shift(sites: Sequence[_Rows], able: Array, rule: DecisionRule) -> Array:
+def _shift(sites: Sequence[_Rows], able: Array) -> Array:
     """Return by which share (n,) each mass is to move: least squares, with what the file knows.
 
     Robust, and what a line of a site misses anyhow counts as noise there: an effect is not to move
@@ -205,7 +202,6 @@ def _shift(sites: Sequence[_Rows], able: Array, rule: DecisionRule) -> Array:
     ----------
     sites : what tells of them
     able : basis (n, k) of the changes that equilibrium may tell
-    rule : how well masses are known
     """
     n = len(able)
     shift = np.zeros(n)
@@ -222,7 +218,7 @@ def _shift(sites: Sequence[_Rows], able: Array, rule: DecisionRule) -> Array:
             normal += own.T @ own
             gradient += own.T @ target
         shift = -able @ np.linalg.solve(able.T @ normal @ able, able.T @ gradient)
-    return np.asarray(rule.mass_doubt / DEVIATIONS * shift)
+    return np.asarray(SITE.mass_doubt / DEVIATIONS * shift)
 
 
 def _above(building: Building, problem: StructureProblem) -> float:
@@ -295,12 +291,7 @@ LEAST_CHANGE = 0.005
 
 
 def within_prior(
-    model: Model,
-    responses: Sequence[Response],
-    building: Building,
-    law: str,
-    straight: bool = True,
-    rule: DecisionRule = BENCH,
+    model: Model, responses: Sequence[Response], building: Building, law: str, straight: bool = True
 ) -> Building:
     """Return the building whose numbers, within what is known of them, suit the runs best.
 
@@ -310,41 +301,40 @@ def within_prior(
     responses : the training runs
     building : the building as its file has it
     law, straight : see `identification.building_sites.damper_run`
-    rule : how well a building's numbers are known, and how far they may move
     """
-    slopes = _slopes(responses, building, law, straight, rule)
+    slopes = _slopes(responses, building, law, straight)
     shift = np.zeros(2 * building.size)
     for _ in range(TURNS):
-        now = moved(building, shift, rule)
+        now = moved(building, shift)
         problem = StructureProblem(
             [damper_run(one, now, law, straight) for one in responses], 0, reconstructed=True
         )
         step, model = _step(problem, model, slopes, shift)
-        shift = np.clip(shift + step, -rule.farthest, rule.farthest)
+        shift = np.clip(shift + step, -BENCH.farthest, BENCH.farthest)
         if float(np.max(np.abs(step))) < SETTLED:
             break
-    return moved(building, shift, rule)
+    return moved(building, shift)
 
 
-def moved(building: Building, shift: Array, rule: DecisionRule = BENCH) -> Building:
+def moved(building: Building, shift: Array) -> Building:
     """Return a building with its numbers (2 n,) moved, in standard deviations.
 
     Stiffnesses (n,), masses above the first level (n - 1,), and by how much all masses and
     stiffnesses above it are larger alike.
     """
     n, first = building.size, building.stiffnesses[0]
-    alike = 1.0 + rule.mass_doubt / DEVIATIONS * float(shift[-1])
+    alike = 1.0 + BENCH.mass_doubt / DEVIATIONS * float(shift[-1])
     upper = np.append(0.0, np.full(n - 1, alike - 1.0))
     M = np.array(with_masses(building, upper).M)
     K, stiffnesses = alike * np.array(building.K), np.array(building.stiffnesses) * (1.0 + upper)
     K[0, 0] -= (alike - 1.0) * first
     for i in range(n):
-        more = rule.stiffness_known * shift[i] * stiffnesses[i]
+        more = BENCH.stiffness_known * shift[i] * stiffnesses[i]
         across = np.eye(n)[i] - (np.eye(n)[i - 1] if i else 0.0)
         K += more * np.outer(across, across)
         stiffnesses[i] += more
         if i:
-            M[i, i] *= 1.0 + rule.mass_known * shift[n + i - 1]
+            M[i, i] *= 1.0 + BENCH.mass_known * shift[n + i - 1]
     return building._replace(
         M=tuple(map(tuple, M.tolist())), K=tuple(map(tuple, K.tolist())),
         stiffnesses=tuple(stiffnesses.tolist()),
@@ -397,17 +387,13 @@ def moved_numbers(before: Building, after: Building) -> list[str]:
 
 
 def _slopes(
-    responses: Sequence[Response],
-    building: Building,
-    law: str,
-    straight: bool,
-    rule: DecisionRule,
+    responses: Sequence[Response], building: Building, law: str, straight: bool
 ) -> list[list[Array]]:
     """Return, per number and run, what a standard deviation of it adds to the force (n,) [N]."""
     here = [damper_run(one, building, law, straight) for one in responses]
     slopes = []
     for unit in np.eye(2 * building.size):
-        other = moved(building, unit, rule)
+        other = moved(building, unit)
         there = [damper_run(one, other, law, straight) for one in responses]
         slopes.append([(b.force - a.force)[a.skip :] for a, b in zip(here, there, strict=True)])
     return slopes

@@ -21,7 +21,7 @@ from ..identification.problem import Problem, Run, robust_z
 from ..identification.start_grid import refine
 from ..model.model import Model
 from .model_faults import ModelBasedFaults
-from .rule import SENSOR, DecisionRule
+from .rule import SENSOR
 from .trials import Trial, judge
 
 WINDOW = 250
@@ -70,46 +70,43 @@ class Clocks:
         return replace(more, rate=self.rate + more.rate, late=self.late + more.late)
 
 
-def clock_faults(
-    before: Trial, train: Problem, held_out: Problem, rule: DecisionRule = SENSOR
-) -> ModelBasedFaults | None:
+def clock_faults(before: Trial, train: Problem, held_out: Problem) -> ModelBasedFaults | None:
     """Return the faults of clocks that explain what a model leaves; None where they do not.
 
     Parameters
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
     train, held_out : runs to fit to, and those that decide
-    rule : the numbers that decide
     """
     runs = [*train.runs, *held_out.runs]
-    if max(before.z, before.train) < 1.0 + rule.gain:
+    if max(before.z, before.train) < 1.0 + SENSOR.gain:
         return None
     model, clocks = before.model, clocks_of(before.model, train.of(runs))
-    if clocks is None or not _differ(clocks, runs, rule):
+    if clocks is None or not _differ(clocks, runs):
         return None
     count = len(train.runs)
     for turn in range(TURNS):
         moved = [_set_right(run, clocks, k) for k, run in enumerate(runs)]
-        if turn == 0 and _hopeless(moved[:count], model, train, before, rule, UNFITTED):
+        if turn == 0 and _hopeless(moved[:count], model, train, before, UNFITTED):
             return None
         model = refine(model, train.of(moved[:count]), 4)
         left = clocks_of(model, train.of(moved))
         if left is None:
             return None
         clocks = clocks.plus(left)
-        if turn == 0 and _hopeless(moved[:count], model, train, before, rule, 1.0):
+        if turn == 0 and _hopeless(moved[:count], model, train, before, 1.0):
             return None
         if _largest(left, runs) < SETTLED:
             break
         if turn + 1 == LOOKED:
             both = train.of(moved[:count]), held_out.of(moved[count:])
-            if _taken([robust_z(one, model) for one in both], before, rule) < TAKEN:
+            if _taken([robust_z(one, model) for one in both], before) < TAKEN:
                 return None
     moved = [_set_right(run, clocks, k) for k, run in enumerate(runs)]
     right = train.of(moved[:count]), held_out.of(moved[count:])
     trial = judge(refine(model, right[0]), *right)
-    faults = _faults(clocks, runs, rule)
-    if not faults or not _explain(trial, before, rule):
+    faults = _faults(clocks, runs)
+    if not faults or not _explain(trial, before):
         return None
     return ModelBasedFaults(faults, *right, trial)
 
@@ -119,19 +116,18 @@ def _hopeless(
     model: Model,
     train: Problem,
     before: Trial,
-    rule: DecisionRule,
     share: float,
 ) -> bool:
     """Return whether a first correction takes less than a share of what is asked of a large excess.
 
     A small excess says nothing: one run apart hardly shows in it.
     """
-    if before.train < rule.clocks_large:
+    if before.train < SENSOR.clocks_large:
         return False
     problem = train.of(moved)
     z = robust_z(problem, model)
     excess = before.train**2 - 1.0
-    return excess - max(z**2 - 1.0, 0.0) < share * rule.clocks_promise * excess
+    return excess - max(z**2 - 1.0, 0.0) < share * SENSOR.clocks_promise * excess
 
 
 def _largest(clocks: Clocks, runs: list[Run]) -> float:
@@ -220,30 +216,30 @@ def _set_right(run: Run, clocks: Clocks, k: int) -> Run:
     )  # fmt: skip
 
 
-def _explain(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
+def _explain(trial: Trial, before: Trial) -> bool:
     """Return whether runs set right lack nearly nothing of what the model left before.
 
     A run apart may be one that the model was fitted to, so that runs held out show nothing of it.
     """
-    return _taken([trial.train, trial.z], before, rule) > rule.share_when_clean
+    return _taken([trial.train, trial.z], before) > SENSOR.share_when_clean
 
 
-def _taken(z: list[float], before: Trial, rule: DecisionRule) -> float:
+def _taken(z: list[float], before: Trial) -> float:
     """Return the share of the excess that is gone where z is this on runs to fit to and held out.
 
     Nothing of an excess that is none.
     """
     was, now = (sum(one**2 for one in each) / 2.0 - 1.0 for each in ((before.train, before.z), z))
-    return 1.0 - max(now, 0.0) / was if was > rule.gain else 0.0
+    return 1.0 - max(now, 0.0) / was if was > SENSOR.gain else 0.0
 
 
-def _rate_matters(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> bool:
+def _rate_matters(clocks: Clocks, runs: list[Run]) -> bool:
     longest = max(len(run.force) for run in runs)
-    least = rule.least_delay / longest
-    return abs(clocks.rate) > max(rule.fault_sigma * clocks.rate_std, least)
+    least = SENSOR.least_delay / longest
+    return abs(clocks.rate) > max(SENSOR.fault_sigma * clocks.rate_std, least)
 
 
-def _apart(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[float, list[int]]:
+def _apart(clocks: Clocks, runs: list[Run]) -> tuple[float, list[int]]:
     """Return how late the force is in most runs [s], and which runs began apart from that."""
     usual = float(np.median(clocks.late))
     if len(runs) < 3:
@@ -252,20 +248,20 @@ def _apart(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[float, 
         k
         for k, run in enumerate(runs)
         if abs(clocks.late[k] - usual)
-        > max(rule.fault_sigma * clocks.late_std[k], rule.least_delay * run.dt)
+        > max(SENSOR.fault_sigma * clocks.late_std[k], SENSOR.least_delay * run.dt)
     ]
     return usual, off
 
 
-def _differ(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> bool:
-    return _rate_matters(clocks, runs, rule) or bool(_apart(clocks, runs, rule)[1])
+def _differ(clocks: Clocks, runs: list[Run]) -> bool:
+    return _rate_matters(clocks, runs) or bool(_apart(clocks, runs)[1])
 
 
-def _faults(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[Finding, ...]:
+def _faults(clocks: Clocks, runs: list[Run]) -> tuple[Finding, ...]:
     """Return the faults that clocks are; what all runs share is one, each run apart another."""
     out: list[Finding] = []
-    rated = _rate_matters(clocks, runs, rule)
-    usual, off = _apart(clocks, runs, rule)
+    rated = _rate_matters(clocks, runs)
+    usual, off = _apart(clocks, runs)
     if rated:
         length = max(run.dt * len(run.force) for run in runs)
         way = "fast" if clocks.rate > 0.0 else "slow"
@@ -282,7 +278,7 @@ def _faults(clocks: Clocks, runs: list[Run], rule: DecisionRule) -> tuple[Findin
         )  # fmt: skip
     coarsest = max(run.dt for run in runs)
     if (rated or off) and abs(usual) > max(
-        rule.fault_sigma * float(np.median(clocks.late_std)), rule.least_delay * coarsest
+        SENSOR.fault_sigma * float(np.median(clocks.late_std)), SENSOR.least_delay * coarsest
     ):
         out.append(_late(usual, float(np.median(clocks.late_std)), "In every run", ""))
     for k in off:

@@ -23,7 +23,7 @@ from ..model.model import Model
 from ..physics.drive import DRIVES
 from .model_faults import ModelBasedFaults, explains, has_rival, promise
 from .prepared import COARSE
-from .rule import LIMITED, DecisionRule
+from .rule import LIMITED
 from .trials import Trial, judge
 
 NODES = 7
@@ -59,38 +59,34 @@ class _Limit:
     std: float = 0.0
 
 
-def limited_drive(
-    before: Trial,
-    train: Problem,
-    held_out: Problem,
-    rule: DecisionRule = LIMITED,
-) -> ModelBasedFaults | None:
+def limited_drive(before: Trial, train: Problem, held_out: Problem) -> ModelBasedFaults | None:
     """Return the limit of the command that explains what a model leaves; None where none does.
 
     Parameters
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
     train, held_out : runs to fit to, and those that decide
-    rule : the numbers that decide
     """
-    if before.z < 1.0 + rule.gain or not _moving(train):
+    if before.z < 1.0 + LIMITED.gain or not _moving(train):
         return None
     coarse = train.of([run.coarser(COARSE) for run in train.runs])
     expected = coarse.expectation(before.model)
     at_first = mean_loss(loss(residuals(coarse, before.model, expected)))
     looked = [_looked_at(kind, before.model, coarse, expected) for kind in LIMITS]
-    able = [one for one in looked if one and promise(one.cost, at_first) > rule.promise]
+    able = [one for one in looked if one and promise(one.cost, at_first) > LIMITED.promise]
     if not able:
         return None
     found = min((_fitted(one, coarse, expected) for one in able), key=lambda one: one.cost)
     explained = promise(found.cost, at_first)
-    if explained < rule.share_when_clean or not found.value > rule.fault_sigma * found.std:
+    if explained < LIMITED.share_when_clean or not found.value > LIMITED.fault_sigma * found.std:
         return None
     right, other = _felt(train, found), _felt(held_out, found)
     trial = judge(refine(found.model, right, 4), right, other)
     fault = _fault(found, train, held_out)
     shown = ModelBasedFaults((fault,), right, other, trial)
-    if not explains(trial, before, rule) or has_rival(shown, before, train, "limited_drive", rule):
+    if not explains(trial, before, LIMITED) or has_rival(
+        shown, before, train, "limited_drive", LIMITED
+    ):
         return None
     return shown
 

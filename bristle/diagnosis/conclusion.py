@@ -15,7 +15,7 @@ from . import words
 from .decision import NOISE
 from .load_cell import FORCE_GAIN, low_pass_text
 from .prepared import Insufficient
-from .rule import BENCH, SITE, DecisionRule
+from .rule import BENCH, SITE
 from .sensor_faults import instruments_of
 from .site_diagnosis import SiteDiagnosis
 from .verdict import Diagnosis
@@ -143,9 +143,7 @@ def _after_the_force(found: SiteDiagnosis, damper: SiteDiagnosis | None) -> Site
     return replace(found, kind="insufficient", reasons=(why,))
 
 
-def _beside_what_is_found(
-    parts: Sequence[SiteDiagnosis], rule: DecisionRule = SITE
-) -> list[SiteDiagnosis]:
+def _beside_what_is_found(parts: Sequence[SiteDiagnosis]) -> list[SiteDiagnosis]:
     """Return what sites show, a little beside a clear finding as told in words alone.
 
     Where an effect is found, another site may show a trace of it, of the instruments, or of what
@@ -155,13 +153,13 @@ def _beside_what_is_found(
     if not found:
         return list(parts)
     clear = max(found, key=lambda part: part.z_before)
-    little = max(rule.excess(rule.beside), rule.trace * rule.excess(clear.z_before))
+    little = max(SITE.excess(SITE.beside), SITE.trace * SITE.excess(clear.z_before))
     return [
         replace(part, kind="none", effects=(), reasons=(f"{LITTLE} {' '.join(part.reasons)}",))
         if part is not clear
         and part.kind != "none"
         and part.noise_known
-        and rule.excess(part.z_before) <= little
+        and SITE.excess(part.z_before) <= little
         else part
         for part in parts
     ]

@@ -269,7 +269,7 @@ def _beside_other_laws(
 
     def better(than: Trial) -> OtherLaw | None:
         laws = try_laws(prepared.searched, prepared.held_out, than.model, bends=bends)
-        return better_law(than, laws, prepared.rule)
+        return better_law(than, laws)
 
     def explains(one: OtherLaw | None) -> bool:
         return one is not None and one.z <= prepared.rule.adequate

@@ -12,7 +12,7 @@ from ..identification.problem import Problem, Run, at_means
 from ..identification.start_grid import Search
 from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE, Drive
-from .rule import BENCH, DecisionRule
+from .rule import BENCH
 
 LENGTH = 12.0
 """Length of a proposed run [s]."""
@@ -46,9 +46,9 @@ class Experiment:
     deviations: float = 0.0
     drive: Drive | None = VOLTAGE
 
-    def sentence(self, rule: DecisionRule = BENCH) -> str:
+    def sentence(self) -> str:
         """Return the run as a sentence of an experiment's plan."""
-        if self.deviations < rule.separating_sigma:
+        if self.deviations < BENCH.separating_sigma:
             levels = f" and levels of the {self.drive.name}" if self.drive else ""
             return (
                 f"No run within the strokes, speeds{',' if self.drive else ' and'} accelerations"

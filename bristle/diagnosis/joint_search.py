@@ -29,7 +29,6 @@ from .law_choice import (
 from .law_trials import KeptFits, LawTrial, fitted_anew, not_finite, try_laws
 from .prepared import Prepared, Progress, silent
 from .rig_runs import RigRuns, runs_of_rig
-from .rule import BENCH, DecisionRule
 from .site import Trials, diagnose_damper, noise_is_all, with_zero_free
 from .trials import Trial, missed_by, promised
 from .verdict import Diagnosis
@@ -45,7 +44,6 @@ def diagnose_laws(
     named: str = "",
     kept: KeptFits | None = None,
     say: Progress = silent,
-    rule: DecisionRule = BENCH,
 ) -> Diagnosis:
     """Return which law a damper has, and which effects that law misses.
 
@@ -57,7 +55,6 @@ def diagnose_laws(
     named : the present law with its variant, "" where nobody chose one
     kept : fits of laws that are known already, and where those that are made go
     say : called with a few words at each stage
-    rule : the numbers that decide
 
     Raises
     ------
@@ -76,7 +73,7 @@ def diagnose_laws(
     if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law at hand
         say("trying every law, with the building as its file has it")
         first = try_laws(*runs.damper, present, bends=bends)
-        runs.suppose(simplest(first, rule).trial.model)
+        runs.suppose(simplest(first).trial.model)
     runs.correct(findings)
 
     def searched(kept: KeptFits | None) -> _Sought:
@@ -86,7 +83,7 @@ def diagnose_laws(
         rows = try_laws(*there.damper, present, bends=bends, kept=kept)
         if kept:
             kept.stands(rows[0].law, rows[0].trial.effects, rows[0].trial.z)
-        sought = _sought(rows, TrialsByLaw(there, say, kept), runs, say, rule)
+        sought = _sought(rows, TrialsByLaw(there, say, kept), runs, say)
         runs.suppose(sought.chosen.row.trial.model)
         return sought
 
@@ -129,11 +126,7 @@ class _Sought:
 
 
 def _sought(
-    rows: tuple[LawTrial, ...],
-    by_law: TrialsByLaw,
-    runs: RigRuns,
-    say: Progress,
-    rule: DecisionRule,
+    rows: tuple[LawTrial, ...], by_law: TrialsByLaw, runs: RigRuns, say: Progress
 ) -> _Sought:
     """Search the effects that laws lack; return the pair that the runs ask for, and the others.
 
@@ -142,18 +135,18 @@ def _sought(
     next one is.
     """
     with counted(MOST_SPENT) as by_law.effort:
-        pairs = search(rows, by_law, rule, by_law.enough, by_law.promise)
-        nearest = min(pairs, key=lambda pair: pair.reach(rule).z)
+        pairs = search(rows, by_law, by_law.enough, by_law.promise)
+        nearest = min(pairs, key=lambda pair: pair.reach().z)
         assert nearest.prepared is not None
         assert by_law.runs.damper is not None
-        by_law.excess = missed_by(nearest.reach(rule), nearest.prepared.problem)
+        by_law.excess = missed_by(nearest.reach(), nearest.prepared.problem)
         if by_law.excess:
             say("what no law explains counts beside the noise: fitting the laws anew")
             train, held_out = (one.with_excess(by_law.excess) for one in by_law.runs.damper)
             rows = fitted_anew(rows, train, held_out)
-            pairs = search(by_law.left_of(rows, pairs, rule), by_law, rule, by_law.enough)
+            pairs = search(by_law.left_of(rows, pairs), by_law, by_law.enough)
     whole: dict[str, LawAndEffects] = {}
-    while (found := choose(pairs, rule)).row.law not in whole:
+    while (found := choose(pairs)).row.law not in whole:
         chosen = by_law.settled(found, runs)
         assert chosen.prepared is not None
         chosen = replace(chosen, finding=confirmed(chosen.finding, chosen.prepared))
@@ -165,7 +158,7 @@ def _sought(
         chosen = found
     of_all = {row.law: row for row in (*rows, *(pair.row for pair in pairs))}
     ranked = tuple(sorted(of_all.values(), key=lambda row: row.trial.z))
-    equal = tuple(equivalents(chosen, pairs, ranked, rule))
+    equal = tuple(equivalents(chosen, pairs, ranked))
     return _Sought(chosen, tuple(pairs), ranked, by_law, equal)
 
 
@@ -199,16 +192,16 @@ class TrialsByLaw:
         self._shortened: set[str] = set()
 
     def left_of(
-        self, rows: Sequence[LawTrial], pairs: Sequence[LawAndEffects], rule: DecisionRule
+        self, rows: Sequence[LawTrial], pairs: Sequence[LawAndEffects]
     ) -> Sequence[LawTrial]:
         """Return the laws for a second search: where enough was spent, those that came near."""
         if not self.effort.spent:
             return rows
-        more = [row.law for row in survivors(rows, rule) if row.law not in self.made]
+        more = [row.law for row in survivors(rows) if row.law not in self.made]
         self.not_tried |= dict.fromkeys(more, False)
         for made in self.made.values():
             made.closed = True
-        reached = {pair.row.law: pair.reach(rule).z for pair in pairs}
+        reached = {pair.row.law: pair.reach().z for pair in pairs}
         near = FAR * min(reached.values())
         return [row for row in rows if reached.get(row.law, inf) <= near]
 

@@ -16,7 +16,7 @@ from ..physics.law import Law
 from .decision import missing
 from .law_trials import LawTrial
 from .prepared import Prepared
-from .rule import BENCH, DecisionRule
+from .rule import BENCH
 from .site_diagnosis import SiteDiagnosis
 from .trials import Trial, joinable, paired
 
@@ -54,11 +54,11 @@ class LawAndEffects:
         """Whether the law with its effects leaves nothing unexplained."""
         return self.finding.kind in EXPLAINING
 
-    def reach(self, rule: DecisionRule = BENCH) -> Trial:
+    def reach(self) -> Trial:
         """Return the trial of the law with what lowers its error most, beyond chance, or alone."""
         found = self.finding
         tried = (*found.trials, found.together) if found.together else found.trials
-        gaining = [trial for trial in tried if missing(self.after, trial, rule)]
+        gaining = [trial for trial in tried if missing(self.after, trial, BENCH)]
         return min((self.after, *gaining), key=lambda trial: trial.z)
 
     @property
@@ -67,52 +67,52 @@ class LawAndEffects:
         return self.fitted, len(self.finding.effects), self.after.z
 
 
-def _apart(first: Trial, second: Trial, rule: DecisionRule) -> bool:
+def _apart(first: Trial, second: Trial) -> bool:
     """Return whether one model's loss is above another's beyond chance, or of other samples."""
     alike = len(first.losses) == len(second.losses)
-    return not alike or paired(first.losses, second.losses, rule.chance) > 0.0
+    return not alike or paired(first.losses, second.losses, BENCH.chance) > 0.0
 
 
-def serves_rest(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+def serves_rest(other: Trial, best: Trial) -> bool:
     """Return whether a model's z is that of the many samples near rest, at the cost of all others.
 
     Only where the best model leaves more than noise: its plain error then says which one is wrong.
     """
-    return best.z > rule.clean and other.rms > rule.most_rms * best.rms
+    return best.z > BENCH.clean and other.rms > BENCH.most_rms * best.rms
 
 
-def clearly_worse(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+def clearly_worse(other: Trial, best: Trial) -> bool:
     """Return whether a model errs more than another by enough, and beyond chance."""
-    if serves_rest(other, best, rule):
+    if serves_rest(other, best):
         return True
-    if other.z <= best.z * (1.0 + rule.law_gain):
+    if other.z <= best.z * (1.0 + BENCH.law_gain):
         return False
-    return _apart(other, best, rule)
+    return _apart(other, best)
 
 
-def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+def as_good(other: Trial, best: Trial) -> bool:
     """Return whether the data cannot distinguish a model from the best one."""
-    if serves_rest(other, best, rule):
+    if serves_rest(other, best):
         return False
-    if other.z <= best.z * (1.0 + rule.close):
+    if other.z <= best.z * (1.0 + BENCH.close):
         return True
-    return not _apart(other, best, rule)
+    return not _apart(other, best)
 
 
-def best_of(trials: Sequence[Trial], rule: DecisionRule = BENCH) -> Trial:
+def best_of(trials: Sequence[Trial]) -> Trial:
     """Return the best of trials on held-out runs, by z.
 
     Where none explains the runs, a plain error of more than `most_rms` times the smallest one puts
     a trial out: it serves the many samples near rest at the cost of all others.
     """
     able = list(trials)
-    if min(trial.z for trial in able) > rule.clean:
+    if min(trial.z for trial in able) > BENCH.clean:
         least = min(trial.rms for trial in able)
-        able = [trial for trial in able if trial.rms <= rule.most_rms * least]
+        able = [trial for trial in able if trial.rms <= BENCH.most_rms * least]
     return min(able, key=lambda trial: trial.z)
 
 
-def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
+def survivors(rows: Sequence[LawTrial]) -> list[LawTrial]:
     """Return the laws that go on through the search for effects.
 
     The best on held-out runs, and the simplest that is not clearly worse; the best of those that
@@ -125,29 +125,29 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     rows = [
         row
         for row in rows
-        if not (_holds(row) and any(_equals_with_less(other, row, rule) for other in rows))
+        if not (_holds(row) and any(_equals_with_less(other, row) for other in rows))
     ]
     ranked = sorted(rows, key=lambda row: row.trial.z)
-    first = best_of([row.trial for row in rows], rule)
+    first = best_of([row.trial for row in rows])
     by_z = next(row for row in rows if row.trial is first)
-    best = _formed(by_z, rows, rule)
+    best = _formed(by_z, rows)
     plain = [row for row in ranked if not _holds(row)]
     straight = [row for row in plain if CURVED not in row.contains]
     others = [row for row in ranked if row is best or row is not by_z]
-    level = [row for row in others if not clearly_worse(row.trial, best.trial, rule)]
+    level = [row for row in others if not clearly_worse(row.trial, best.trial)]
     picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
-    if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
+    if straight and clearly_worse(straight[0].trial, plain[0].trial):
         picked.insert(1, plain[0])
     front = [
         row
         for row in straight
         if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
     ]
-    usual = list({row.law: row for row in [*picked, *front]}.values())[: rule.most_laws]
+    usual = list({row.law: row for row in [*picked, *front]}.values())[: BENCH.most_laws]
     # What a law lacks may be why it fits the many samples near rest alone, or why one that contains
     # an effect does no better than one without.
     holding = sorted(filter(_holds, level), key=lambda row: row.fitted)
-    hidden = [_formed(ranked[0], rows, rule), *holding[:1]]
+    hidden = [_formed(ranked[0], rows), *holding[:1]]
     return list({row.law: row for row in [*usual, *hidden]}.values())
 
 
@@ -156,16 +156,16 @@ def _holds(row: LawTrial) -> bool:
     return bool(set(row.contains) - {CURVED})
 
 
-def _formed(best: LawTrial, rows: Sequence[LawTrial], rule: DecisionRule) -> LawTrial:
+def _formed(best: LawTrial, rows: Sequence[LawTrial]) -> LawTrial:
     """Return the best law in the form of its command that its plain error asks for.
 
     Only where the law leaves many times the noise: the runs with the least noise then decide by z.
     """
-    if best.trial.z <= rule.coarse:
+    if best.trial.z <= BENCH.coarse:
         return best
     forms = [row for row in rows if _plain_name(row) == _plain_name(best)]
     least = min(forms, key=lambda row: row.trial.rms)
-    return least if least.trial.rms < (1.0 - rule.law_gain) * best.trial.rms else best
+    return least if least.trial.rms < (1.0 - BENCH.law_gain) * best.trial.rms else best
 
 
 def _plain_name(row: LawTrial) -> str:
@@ -173,17 +173,16 @@ def _plain_name(row: LawTrial) -> str:
     return split_form(row.law)[0]
 
 
-def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
+def simplest(rows: Sequence[LawTrial]) -> LawTrial:
     """Return the simplest law that the best one on held-out runs does not surpass."""
-    best = best_of([row.trial for row in rows], rule)
-    level = [row for row in rows if as_good(row.trial, best, rule)]
+    best = best_of([row.trial for row in rows])
+    level = [row for row in rows if as_good(row.trial, best)]
     return min(level, key=lambda row: (row.fitted, row.trial.z))
 
 
 def search(
     rows: Sequence[LawTrial],
     lacking: Callable[[LawTrial, bool], LawAndEffects],
-    rule: DecisionRule = BENCH,
     enough: Callable[[LawTrial, bool], bool] = lambda _row, _pairs: False,
     promise: Callable[[LawAndEffects], float] = lambda pair: pair.reach().z,
 ) -> list[LawAndEffects]:
@@ -202,43 +201,42 @@ def search(
     ----------
     rows : the laws tried
     lacking : called with a row, and whether to try two effects; returns what its law lacks
-    rule : the numbers that decide
     enough : called as `lacking` is; returns whether so much was spent that this is not tried: what
         the best law lacks always is, and two effects of the law that promises most
     promise : called with what a law lacks alone; returns the z that two effects may leave
     """
-    first, begun = simplest(rows, rule), list[LawAndEffects]()
-    if first.trial.z <= rule.complete:
+    first, begun = simplest(rows), list[LawAndEffects]()
+    if first.trial.z <= BENCH.complete:
         begun.append(lacking(first, True))
         if begun[0].finding.kind == "none" and not first.contains:
             return begun
-    others = [row for row in survivors(rows, rule) if row is not first or not begun]
+    others = [row for row in survivors(rows) if row is not first or not begun]
     best = others[0] if others else None
     others.sort(key=lambda row: (row.fitted, row.trial.z))
     single = list(begun)
 
     def look(row: LawTrial, found: list[LawAndEffects], pairs: bool) -> None:
-        if _waits(row, found, rule) or not _could_be_simpler(row, found, rule):
+        if _waits(row, found) or not _could_be_simpler(row, found):
             return
         if (row is best and not pairs) or not enough(row, pairs):
             found.append(lacking(row, pairs))
 
     for row in others:
         look(row, single, False)
-    if not _explained(single, rule):
+    if not _explained(single):
         # One law's missing effect may be what another law has: it then fits better alone.
         for row in _best_passed_over(rows, [*others, *(pair.row for pair in begun)]):
             look(row, single, False)
             others.append(row)
-    if _explained(single, rule):
+    if _explained(single):
         return single
     found, far = list(begun), float("inf")
     for pair in sorted(single[len(begun) :], key=promise):
-        left = rule.excess(pair.reach(rule).z)
-        able = left <= far and _could_be_simpler(pair.row, found, rule)
+        left = BENCH.excess(pair.reach().z)
+        able = left <= far and _could_be_simpler(pair.row, found)
         if able and not (found and enough(pair.row, True)):
             pair = lacking(pair.row, True)
-            far = min(far, rule.within * left) if pair.explains else far
+            far = min(far, BENCH.within * left) if pair.explains else far
         found.append(pair)
     known = {pair.row.law for pair in found}
     for row in others:
@@ -247,9 +245,9 @@ def search(
     return found
 
 
-def _explained(found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
+def _explained(found: Sequence[LawAndEffects]) -> bool:
     """Return whether a pair explains the runs so well that none could be clearly better."""
-    return any(pair.explains and pair.after.z <= 1.0 + rule.law_gain for pair in found)
+    return any(pair.explains and pair.after.z <= 1.0 + BENCH.law_gain for pair in found)
 
 
 def _best_passed_over(rows: Sequence[LawTrial], looked: Sequence[LawTrial]) -> list[LawTrial]:
@@ -259,27 +257,27 @@ def _best_passed_over(rows: Sequence[LawTrial], looked: Sequence[LawTrial]) -> l
     return sorted(left, key=lambda row: row.trial.z)[:1]
 
 
-def _waits(row: LawTrial, found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
+def _waits(row: LawTrial, found: Sequence[LawAndEffects]) -> bool:
     """Return whether a simpler law of the same parts equals a law, and its effects leave much."""
     return any(
-        _equals_with_less(pair.row, row, rule)
-        and rule.excess(pair.reach(rule).z) > HIDDEN * rule.excess(pair.row.trial.z)
+        _equals_with_less(pair.row, row)
+        and BENCH.excess(pair.reach().z) > HIDDEN * BENCH.excess(pair.row.trial.z)
         for pair in found
     )
 
 
-def _equals_with_less(simpler: LawTrial, row: LawTrial, rule: DecisionRule) -> bool:
+def _equals_with_less(simpler: LawTrial, row: LawTrial) -> bool:
     """Return whether a law does as well as another that has the same parts with more parameters."""
     if _base(row) is _base(simpler) or {*_base(row).parts} != {*_base(simpler).parts}:
         return False
-    level = simpler.trial.z <= (1.0 + rule.close) * row.trial.z
-    level &= simpler.trial.rms <= (1.0 + rule.law_gain) * row.trial.rms
+    level = simpler.trial.z <= (1.0 + BENCH.close) * row.trial.z
+    level &= simpler.trial.rms <= (1.0 + BENCH.law_gain) * row.trial.rms
     return simpler.fitted < row.fitted and level
 
 
-def _could_be_simpler(row: LawTrial, found: Sequence[LawAndEffects], rule: DecisionRule) -> bool:
+def _could_be_simpler(row: LawTrial, found: Sequence[LawAndEffects]) -> bool:
     """Return whether a law, with an effect, could be simpler than what explains the runs."""
-    known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
+    known = [pair.fitted for pair in found if pair.explains and pair.after.z <= BENCH.complete]
     return not known or min(known) > _least_with_effect(row)
 
 
@@ -290,7 +288,7 @@ def _least_with_effect(row: LawTrial) -> int:
     return min((len(one.free()) for one in joined), default=row.fitted)
 
 
-def choose(pairs: Sequence[LawAndEffects], rule: DecisionRule = BENCH) -> LawAndEffects:
+def choose(pairs: Sequence[LawAndEffects]) -> LawAndEffects:
     """Return the pair of law and effects that the runs ask for.
 
     Of those that explain the runs and that the best one on held-out runs does not surpass, the
@@ -298,42 +296,39 @@ def choose(pairs: Sequence[LawAndEffects], rule: DecisionRule = BENCH) -> LawAnd
     pair that leaves more than noise explains most of what its own law leaves: a simpler one of
     another law, which began nearer and comes as near, is taken in its place.
     """
-    best = best_of([pair.after for pair in pairs], rule)
-    level = [pair for pair in pairs if pair.explains and as_good(pair.after, best, rule)]
+    best = best_of([pair.after for pair in pairs])
+    level = [pair for pair in pairs if pair.explains and as_good(pair.after, best)]
     if not level:
-        return _nearest(pairs, rule)
+        return _nearest(pairs)
     chosen = min(level, key=lambda pair: pair.order)
-    if chosen.after.z > rule.adequate:
-        nearest = _nearest(pairs, rule)
-        reached = nearest.reach(rule)
+    if chosen.after.z > BENCH.adequate:
+        nearest = _nearest(pairs)
+        reached = nearest.reach()
         fewer = len(reached.model.free()) < len(chosen.after.model.free())
-        if fewer and as_good(reached, chosen.after, rule):
+        if fewer and as_good(reached, chosen.after):
             return nearest
     return chosen
 
 
-def _nearest(pairs: Sequence[LawAndEffects], rule: DecisionRule) -> LawAndEffects:
+def _nearest(pairs: Sequence[LawAndEffects]) -> LawAndEffects:
     """Return the pair that comes nearest to the runs, the simplest of those that hardly differ.
 
     Where all leave many times the noise, effects that a simpler law needs to come as near are no
     less of a guess than the parts of a law that does so by itself: that one is taken.
     """
-    reached = [pair.reach(rule) for pair in pairs]
-    least = best_of(reached, rule)
-    far = least.z > rule.coarse
+    reached = [pair.reach() for pair in pairs]
+    least = best_of(reached)
+    far = least.z > BENCH.coarse
     alike = [
         (far * len(one.effects), len(one.model.free()), one.z, k)
         for k, one in enumerate(reached)
-        if one.z <= (1.0 + rule.law_gain) * least.z and not serves_rest(one, least, rule)
+        if one.z <= (1.0 + BENCH.law_gain) * least.z and not serves_rest(one, least)
     ]
     return pairs[min(alike)[-1]]
 
 
 def equivalents(
-    chosen: LawAndEffects,
-    pairs: Sequence[LawAndEffects],
-    rows: Sequence[LawTrial],
-    rule: DecisionRule = BENCH,
+    chosen: LawAndEffects, pairs: Sequence[LawAndEffects], rows: Sequence[LawTrial]
 ) -> list[tuple[str, tuple[str, ...], float]]:
     """Return what explains the runs as well as the pair chosen: law, effects, z on held-out runs.
 
@@ -345,7 +340,6 @@ def equivalents(
     chosen : what the verdict is about
     pairs : the laws whose effects were searched
     rows : the laws tried
-    rule : the numbers that decide
     """
     if not chosen.explains:
         return []
@@ -355,11 +349,11 @@ def equivalents(
     for pair in pairs:
         effects = pair.finding.effects if pair.finding.kind == "effect" else ()
         sure = pair.finding.kind in ("none", "effect")
-        if pair is not chosen and sure and as_good(pair.after, chosen.after, rule):
+        if pair is not chosen and sure and as_good(pair.after, chosen.after):
             out[pair.row.law, effects] = pair.after.z
     searched = {pair.row.law for pair in pairs}
     for row in rows:
-        if row.law not in searched and as_good(row.trial, chosen.after, rule):
+        if row.law not in searched and as_good(row.trial, chosen.after):
             out.setdefault((row.law, ()), row.trial.z)
     return [(law, effects, z) for (law, effects), z in sorted(out.items(), key=lambda i: i[1])]
 

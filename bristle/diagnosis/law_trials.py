@@ -21,7 +21,7 @@ from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
 from ..physics.laws import base_and_variant, law_names
 from .decision import NOISE
-from .rule import BENCH, DecisionRule
+from .rule import BENCH
 from .trials import KeptEnds, Trial, judge
 
 STARTS = 2
@@ -182,22 +182,19 @@ class OtherLaw:
         return {"law": plain, "command": form or LINEAR_FORM, "z_holdout": z, "explained": share}
 
 
-def better_law(
-    judged: Trial, laws: Sequence[LawTrial], rule: DecisionRule = BENCH
-) -> OtherLaw | None:
+def better_law(judged: Trial, laws: Sequence[LawTrial]) -> OtherLaw | None:
     """Return the law that leaves least in the place of a model's own; None where that does.
 
     Parameters
     ----------
     judged : the model
     laws : all laws with the model's effects, on the same runs
-    rule : the numbers that decide
     """
-    able = [one for one in laws if one.trial.rms <= rule.most_rms * judged.rms]
+    able = [one for one in laws if one.trial.rms <= BENCH.most_rms * judged.rms]
     best = min(able, key=lambda one: one.trial.z, default=None)
-    if best is None or best.trial.z > (1.0 - rule.gain) * judged.z:
+    if best is None or best.trial.z > (1.0 - BENCH.gain) * judged.z:
         return None
-    share = 1.0 - rule.excess(best.trial.z) / rule.excess(judged.z)
+    share = 1.0 - BENCH.excess(best.trial.z) / BENCH.excess(judged.z)
     return OtherLaw(best.law, best.trial.z, share)
 
 

@@ -17,7 +17,7 @@ from ..physics.building import Building
 from ..physics.effect import EFFECTS, instrument_of
 from ..physics.laws import law_of_part
 from .effect_limits import detectable
-from .rule import SITE, DecisionRule
+from .rule import SITE
 from .site_diagnosis import SiteDiagnosis
 from .trials import judge
 
@@ -30,7 +30,6 @@ def load_cell(
     train: list[Response],
     holdout: list[Response],
     building: Building,
-    rule: DecisionRule = SITE,
     level: int = 0,
 ) -> tuple[SiteDiagnosis, tuple[list[Response], list[Response]]] | None:
     """Return the finding that the load cell is late or wrongly scaled, with the forces set right.
@@ -43,7 +42,6 @@ def load_cell(
         the trials of its effects
     train, holdout : responses to fit to, and those that decide
     building : whose masses, damping and stiffnesses equilibrium takes
-    rule : the numbers that decide
     level : the one above that layer or storey
 
     Returns
@@ -60,12 +58,12 @@ def load_cell(
     assert best is not None
     z_1, delay, gain, finding = best
     own = min((trial.z for trial in layer.trials), default=np.inf)
-    share = 1.0 - rule.excess(z_1) / rule.excess(layer.z_before)
-    if z_1 >= own or 1.0 - z_1 / layer.z_before < rule.gain:
+    share = 1.0 - SITE.excess(z_1) / SITE.excess(layer.z_before)
+    if z_1 >= own or 1.0 - z_1 / layer.z_before < SITE.gain:
         return None
-    if z_1 > rule.clean and share < rule.share:
+    if z_1 > SITE.clean and share < SITE.share:
         return None
-    if not delay and abs(gain - 1.0) <= rule.mass_doubt:
+    if not delay and abs(gain - 1.0) <= SITE.mass_doubt:
         return None  # masses that are not known better would do the same
     name = instrument_of("force", "delay") if delay else FORCE_GAIN
     right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))

@@ -41,33 +41,27 @@ class ModelBasedFaults:
     trial: Trial
 
 
-def model_based_faults(
-    before: Trial,
-    train: Problem,
-    held_out: Problem,
-    rule: DecisionRule = DRIVE,
-) -> ModelBasedFaults | None:
+def model_based_faults(before: Trial, train: Problem, held_out: Problem) -> ModelBasedFaults | None:
     """Return the fault that explains what a model leaves; None where none does, or physics better.
 
     Parameters
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
     train, held_out : runs to fit to, and those that decide
-    rule : the numbers that decide
     """
-    if before.z < 1.0 + rule.gain:
+    if before.z < 1.0 + DRIVE.gain:
         return None
-    found = _zero_of_force(before, train, held_out, rule)
+    found = _zero_of_force(before, train, held_out)
     if (
         found
-        and explains(found.trial, before, rule)
-        and not has_rival(found, before, train, "force_bias", rule)
+        and explains(found.trial, before, DRIVE)
+        and not has_rival(found, before, train, "force_bias", DRIVE)
     ):
         return found
-    found = _late_drive(before, train, held_out, rule)
-    if found and explains(found.trial, before, rule):
-        sure = before.z > rule.late_drive_z
-        return found if sure or not has_rival(found, before, train, "late_drive", rule) else None
+    found = _late_drive(before, train, held_out)
+    if found and explains(found.trial, before, DRIVE):
+        sure = before.z > DRIVE.late_drive_z
+        return found if sure or not has_rival(found, before, train, "late_drive", DRIVE) else None
     return None
 
 
@@ -114,16 +108,14 @@ def _loss(model: Model, problem: Problem) -> float:
 # --- the zero of the force ----------------------------------------------------------------------
 
 
-def _zero_of_force(
-    before: Trial, train: Problem, held_out: Problem, rule: DecisionRule
-) -> ModelBasedFaults | None:
+def _zero_of_force(before: Trial, train: Problem, held_out: Problem) -> ModelBasedFaults | None:
     """Return the offset of the force that fits best, as a preload without stiffness."""
     carrier = _carrier(before.model.base_law)
     if carrier is None or any(EFFECTS[name].offset for name in before.effects):
         return None  # an offset of its own would be that one
     base = before.model
     offset = float(np.median(_left(base, train)))
-    if promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < rule.promise:
+    if promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < DRIVE.promise:
         return None
     own = f"{carrier.name}.{carrier.offset}"
     others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
@@ -172,9 +164,7 @@ def _deviation(left: Array) -> float:
 # --- a late voltage -----------------------------------------------------------------------------
 
 
-def _late_drive(
-    before: Trial, train: Problem, held_out: Problem, rule: DecisionRule
-) -> ModelBasedFaults | None:
+def _late_drive(before: Trial, train: Problem, held_out: Problem) -> ModelBasedFaults | None:
     """Return the delay of the voltage's record that fits best, the law refitted to it."""
     if steady(train):
         return None
@@ -186,11 +176,11 @@ def _late_drive(
     for turn in range(3):
         cost = _cost_of_delay(model, train)
         late = _between(cost, grid, int(np.argmin([cost(delay) for delay in grid])))
-        if late < rule.least_delay * dt:
+        if late < DRIVE.least_delay * dt:
             return None
         moved = _moved(train, late)
         model = refine(model, moved, 4)
-        if turn == 0 and promise(_loss(model, moved), at_first) < rule.promise:
+        if turn == 0 and promise(_loss(model, moved), at_first) < DRIVE.promise:
             return None
     bend = cost(late + dt) + cost(late - dt) - 2.0 * cost(late)
     std = dt * float(np.sqrt(2.0 / max(bend, 1e-12)))

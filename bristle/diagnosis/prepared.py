@@ -273,9 +273,7 @@ def median_noise(runs: Sequence[Measurement]) -> dict[str, float]:
     }
 
 
-def lacking_on_bench(
-    runs: Sequence[Measurement], faults: Sequence[Finding], rule: DecisionRule = BENCH
-) -> list[str]:
+def lacking_on_bench(runs: Sequence[Measurement], faults: Sequence[Finding]) -> list[str]:
     """Return what keeps the runs of a bench from carrying a verdict, in sentences."""
     out = []
     force = np.concatenate([run["force"] for run in runs if run.has("force")] or [np.zeros(1)])
@@ -287,10 +285,10 @@ def lacking_on_bench(
             f"The force is constant ({plain(float(force[0]))} N) {where}: there is nothing to "
             "explain. Look at its column and unit:  bristle study channels ; or measure it."
         )
-    elif spread < rule.quietest * noise:
+    elif spread < BENCH.quietest * noise:
         out.append(
             f"The force's noise, {plain(noise)} N, is nearly the force itself, {plain(spread)} N "
-            f"RMS, {where}: the force must be at least {rule.quietest:g} times its noise. Measure "
+            f"RMS, {where}: the force must be at least {BENCH.quietest:g} times its noise. Measure "
             "with larger motions or a quieter load cell, or give the noise in study.toml if it is "
             "less."
         )
@@ -307,12 +305,10 @@ def lacking_on_bench(
         for fault in faults
         if fault.kind == "unrelated"
     ]
-    return [*out, *_saturated(runs, faults, rule)]
+    return [*out, *_saturated(runs, faults)]
 
 
-def _saturated(
-    runs: Sequence[Measurement], faults: Sequence[Finding], rule: DecisionRule = BENCH
-) -> list[str]:
+def _saturated(runs: Sequence[Measurement], faults: Sequence[Finding]) -> list[str]:
     """Return that the force is too often at the ends of its range, in a sentence."""
     cut = [fault for fault in faults if fault.channel == "force" and fault.kind == "clipping"]
     there = [run for run in runs if run.has("force")]
@@ -322,10 +318,10 @@ def _saturated(
     # Of each run at its own ends: ranges may differ between runs.
     at_ends = [np.isin(run["force"], ends_of(run, "force")) for run in there]
     count = sum(int(np.count_nonzero(one)) for one in at_ends)
-    if count <= rule.cut * total:
+    if count <= BENCH.cut * total:
         return []
     return [
         f"The force is saturated in {count:,} of {total:,} samples ({percent(count / total, 0)}) "
-        f"{_where(runs, cut[0].runs)}; {percent(rule.cut, 0)} is the most. Measure "
+        f"{_where(runs, cut[0].runs)}; {percent(BENCH.cut, 0)} is the most. Measure "
         "with a wider range, or leave these runs out."
     ]

@@ -24,7 +24,7 @@ from ..data.channels import channel_unit
 from ..data.cut_off import CHANNELS, LATE, derived_velocity, ends_of, outermost
 from ..data.measurement import Measurement
 from ..physics.effect import instrument_of
-from .rule import SENSOR, DecisionRule
+from .rule import SENSOR
 
 # Sensor faults as they are told.
 
@@ -115,7 +115,7 @@ FEWEST = 3
 """Pieces from which on their spread means anything."""
 
 
-def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
+def sensor_faults(runs: Sequence[Measurement]) -> list[Finding]:
     """Return the faults that the channels show of each other, over all runs."""
     found = clipped(runs)
     cut = {fault.channel for fault in found}
@@ -124,8 +124,8 @@ def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> l
     found += _computed(pairs, computed)
     pairs = [run for run in pairs if run.name not in computed]
     if pairs and not cut & {"displacement", "velocity"}:
-        found += kinematic(pairs, rule)
-    return found + signs(runs, found, rule)
+        found += kinematic(pairs)
+    return found + signs(runs, found)
 
 
 def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[Finding]:
@@ -143,7 +143,7 @@ def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[Findi
     return [_fault("derived", "velocity", value, 0.0, text)]
 
 
-def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Finding]:
+def kinematic(runs: Sequence[Measurement]) -> list[Finding]:
     """Return what is wrong between displacement and velocity.
 
     In pieces of `WINDOW`, by least squares on signals low-passed alike,
@@ -156,7 +156,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     """
     if sum(len(_begins(run)) for run in runs) < FEWEST:
         return []  # the spread over pieces is what says how sure a fault is
-    if _unrelated_share(runs) > rule.unrelated:
+    if _unrelated_share(runs) > SENSOR.unrelated:
         text = (
             "Velocity is not the rate of displacement, whatever gain and delay it is given: one of "
             "the two belongs to another motion, or is not connected."
@@ -166,10 +166,10 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     gain = 1.0 / theta[0]
     found = []
     if gain < 0.0:
-        found.append(_turned(runs, rule))
+        found.append(_turned(runs))
         theta = -theta
         gain = -gain
-    if abs(theta[4]) > max(rule.fault_sigma * std[4], rule.least_corner):
+    if abs(theta[4]) > max(SENSOR.fault_sigma * std[4], SENSOR.least_corner):
         corner = theta[4] * gain
         text = (
             "Velocity lacks the low frequencies of the rate of displacement, like a geophone with "
@@ -179,27 +179,27 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
     theta, std = _pooled(runs, slow=False)
     theta, gain = theta * np.sign(theta[0]), 1.0 / abs(theta[0])
     spread = std[0] * gain * gain
-    if abs(gain - 1.0) > max(rule.fault_sigma * spread, rule.least_gain):
+    if abs(gain - 1.0) > max(SENSOR.fault_sigma * spread, SENSOR.least_gain):
         text = (
             f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is off, "
             "and neither motion nor force shows which one. If velocity is right, displacement "
             f"shows {1.0 / gain:.3f} of what it should."
         )
         found.append(_fault("gain", "velocity", gain, spread, text, "displacement"))
-    found += _late(theta * gain, std * gain, _mean_step(runs), rule)
+    found += _late(theta * gain, std * gain, _mean_step(runs))
     bias, bias_std = -theta[5] * gain, std[5] * gain
     rms = float(np.sqrt(np.mean(np.concatenate([run["velocity"] for run in runs]) ** 2)))
-    if abs(bias) > max(rule.fault_sigma * bias_std, rule.least_bias * rms):
+    if abs(bias) > max(SENSOR.fault_sigma * bias_std, SENSOR.least_bias * rms):
         text = f"Velocity shows {plain(bias)} m/s too much: its integral drifts away from "
         found.append(_fault("bias", "velocity", bias, bias_std, f"{text}displacement."))
     return found
 
 
-def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> Finding:
+def _turned(runs: Sequence[Measurement]) -> Finding:
     """Return which of displacement and velocity is turned: the velocity if the force speeds it."""
     power = _power(runs)
     begin = "Displacement and velocity have opposite signs: "
-    if abs(power) < rule.resists:
+    if abs(power) < SENSOR.resists:
         text = f"{begin}one of the two is reversed."
         return _fault("sign", "velocity", -1.0, 0.0, text, "displacement")
     channel = "velocity" if power < 0.0 else "displacement"
@@ -226,12 +226,12 @@ def _mean_step(runs: Sequence[Measurement]) -> float:
     return float(np.average([run.step for run in runs], weights=samples))
 
 
-def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[Finding]:
+def _late(theta: Array, std: Array, step: float) -> list[Finding]:
     """Return a delay of one channel, or a lag of the velocity's instrument."""
     late, late_std = float(theta[1]), float(std[1])
-    if abs(late) <= max(rule.fault_sigma * late_std, rule.least_delay * step):
+    if abs(late) <= max(SENSOR.fault_sigma * late_std, SENSOR.least_delay * step):
         return []
-    order = _order(theta, std, rule) if late > 0.0 else 0
+    order = _order(theta, std) if late > 0.0 else 0
     if order:
         text = (
             f"Velocity lags the rate of displacement by {1e3 * late:.2f} ms and rounds it, as an "
@@ -243,7 +243,7 @@ def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[Fin
     return [_fault("delay", channel, abs(late), late_std, text)]
 
 
-def _order(theta: Array, std: Array, rule: DecisionRule) -> int:
+def _order(theta: Array, std: Array) -> int:
     """Return the order of an instrument that lags, 0 for a plain delay.
 
     A delay D has E = D^2/2 and F = D^3/6; an instrument v + D v' + E v'' of what it shows has F = 0
@@ -257,10 +257,10 @@ def _order(theta: Array, std: Array, rule: DecisionRule) -> int:
         return 1
     # The series ends at F: of a long delay E is off by some hundredths.
     bent = (
-        abs(second - 0.5) > 0.06 + rule.fault_sigma * second_std
+        abs(second - 0.5) > 0.06 + SENSOR.fault_sigma * second_std
         and abs(third) < 1.0 / 12.0 + third_std
     )
-    ends = 1.0 / 6.0 - third > 0.5 * rule.fault_sigma * third_std and abs(third) < 0.05
+    ends = 1.0 / 6.0 - third > 0.5 * SENSOR.fault_sigma * third_std and abs(third) < 0.05
     return 2 if bent or ends else 0
 
 
@@ -319,13 +319,11 @@ def _integral(values: Array, dt: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * dt * (values[1:] + values[:-1]))])
 
 
-def signs(
-    runs: Sequence[Measurement], known: Sequence[Finding], rule: DecisionRule = SENSOR
-) -> list[Finding]:
+def signs(runs: Sequence[Measurement], known: Sequence[Finding]) -> list[Finding]:
     """Return force or motion that is turned: a damper that yields energy; a voltage below zero."""
     found = []
     turned = any(fault.kind == "sign" for fault in known)
-    if not turned and _power(runs) < -rule.resists:
+    if not turned and _power(runs) < -SENSOR.resists:
         text = (
             "Force times velocity is negative on average: a damper would feed energy in. The sign "
             "of the force, or of the motion, is reversed."
@@ -337,7 +335,7 @@ def signs(
             continue
         V = np.concatenate(drives)
         low, high = np.quantile(V, [0.02, 0.98])
-        if low < 0.0 and -low > rule.turned * max(high, 0.0):
+        if low < 0.0 and -low > SENSOR.turned * max(high, 0.0):
             text = f"The {drive} is negative nearly always: its sign is reversed."
             found.append(_fault("sign", drive, -1.0, 0.0, text))
     return found

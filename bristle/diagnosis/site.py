@@ -375,16 +375,13 @@ class Trials:
 # the zero free.
 
 
-def free_zero(
-    prepared: Prepared, decision: Decision, rule: DecisionRule = SENSOR
-) -> Prepared | None:
+def free_zero(prepared: Prepared, decision: Decision) -> Prepared | None:
     """Return what a diagnosis begins with where the zero of the force is to be fitted along.
 
     Parameters
     ----------
     prepared : runs and the present model, the zero taken as right
     decision : what followed from that
-    rule : the numbers that decide
 
     Returns
     -------
@@ -396,10 +393,10 @@ def free_zero(
     known = problem.free_zero or problem.reconstructed
     if known or decision.kind in ("none", "insufficient"):
         return None
-    if has_offset(prepared.before.model) or not _significant(problem, prepared.before.model, rule):
+    if has_offset(prepared.before.model) or not _significant(problem, prepared.before.model):
         return None
     if not has_offset(decision.best.model):
-        if not _significant(problem, decision.best.model, rule):
+        if not _significant(problem, decision.best.model):
             return None
         return prepared.freed
     alone = len(decision.effects) == 1
@@ -415,17 +412,17 @@ def with_zero_free(prepared: Prepared) -> Prepared:
     problem, model = prepared.problem, prepared.before.model
     if problem.free_zero or problem.reconstructed or not prepared.held_out.noise_known:
         return prepared
-    if has_offset(model) or not _significant(problem, model, SENSOR):
+    if has_offset(model) or not _significant(problem, model):
         return prepared
     return prepared.freed
 
 
-def zero_fault(problem: Problem, decision: Decision, rule: DecisionRule = SENSOR) -> Finding | None:
+def zero_fault(problem: Problem, decision: Decision) -> Finding | None:
     """Return the zero of the force beside what was decided with the zero free, None without one."""
     model = decision.best.model
     if decision.kind in ("unknown", "insufficient") or has_offset(model):
         return None
-    if not _significant(problem, model, rule):
+    if not _significant(problem, model):
         return None
     return _fault(*zero_of(problem, model), decision, problem.runs[0].drive)
 
@@ -454,12 +451,12 @@ def _fault(zero: float, std: float, decision: Decision, drive: str) -> Finding:
     )  # fmt: skip
 
 
-def _significant(problem: Problem, model: Model, rule: DecisionRule) -> bool:
+def _significant(problem: Problem, model: Model) -> bool:
     """Return whether a model leaves a constant force that is large enough to matter."""
     zero, std = zero_of(problem, model)
     force = np.concatenate([run.force for run in problem.runs])
-    least = rule.least_bias * float(np.sqrt(np.mean(force**2)))
-    return abs(zero) > max(rule.fault_sigma * std, least)
+    least = SENSOR.least_bias * float(np.sqrt(np.mean(force**2)))
+    return abs(zero) > max(SENSOR.fault_sigma * std, least)
 
 
 # What the law of a damper lacks, on a bench or inside a building.
@@ -576,9 +573,7 @@ def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:
     return p <= rule.chance and share > rule.organised
 
 
-def excused_by_sensor(
-    found: SiteDiagnosis, most: float, reason: str, rule: DecisionRule = BENCH
-) -> SiteDiagnosis:
+def excused_by_sensor(found: SiteDiagnosis, most: float, reason: str) -> SiteDiagnosis:
     """Return a damper's finding, none where an instrument already known explains it.
 
     Neither unknown nor, for what it leaves of some runs, contradicted. What an effect of the
@@ -589,23 +584,20 @@ def excused_by_sensor(
     found : the finding at the damper, with its trial before
     most : z that the instrument accounts for
     reason : what the instrument does, as a sentence for the verdict
-    rule : the numbers that decide
     """
     before = found.before
     assert before is not None
     worst = max(before.z, before.train)
     gains = found.kind == "unknown" and any(
-        1.0 - trial.z / before.z >= rule.gain for trial in found.trials
+        1.0 - trial.z / before.z >= BENCH.gain for trial in found.trials
     )
-    if found.kind not in ("unknown", "none") or gains or not rule.clean < worst <= most:
+    if found.kind not in ("unknown", "none") or gains or not BENCH.clean < worst <= most:
         return found
     why = f"{reason} This explains the error, {worst:.2f} {NOISE}."
     return replace(found, kind="none", reasons=(why,))
 
 
-def left_by_filter(
-    law: str, train: StructureProblem, held_out: StructureProblem, rule: DecisionRule = BENCH
-) -> float:
+def left_by_filter(law: str, train: StructureProblem, held_out: StructureProblem) -> float:
     """Return the z that a late and rounded force may leave once our delay is in the model.
 
     As for any effect of another form: it must explain `rule.share` of the excess without.
@@ -614,15 +606,12 @@ def left_by_filter(
     ----------
     law : name of the damper's law
     train, held_out : the damper's runs to fit to, and those that decide
-    rule : the numbers that decide
     """
     bare = judge(fit_damper(train, Model(law)).model, train, held_out)
-    return float(np.sqrt(1.0 + (1.0 - rule.share) * rule.excess(bare.z)))
+    return float(np.sqrt(1.0 + (1.0 - BENCH.share) * BENCH.excess(bare.z)))
 
 
-def _rare(
-    before: Trial, trials: list[Trial], rule: DecisionRule = BENCH, site: DecisionRule = SITE
-) -> Decision | None:
+def _rare(before: Trial, trials: list[Trial], rule: DecisionRule = BENCH) -> Decision | None:
     """Return the decision for an effect of the layer or a stop that acts in a few samples, if any.
 
     A stop that is met once or twice is seen in no resampling of blocks; its likelihood tells, where
@@ -630,11 +619,11 @@ def _rare(
     """
     best = trials[0]
     name = best.effects[-1]
-    if not (EFFECTS[name].site == "structure" or EFFECTS[name].contact) or best.z > site.clean:
+    if not (EFFECTS[name].site == "structure" or EFFECTS[name].contact) or best.z > SITE.clean:
         return None
-    if 1.0 - best.z / before.z < rule.gain or not better(before, best, site):
+    if 1.0 - best.z / before.z < rule.gain or not better(before, best, SITE):
         return None
-    rivals = [other.effects[-1] for other in trials[1:] if equals(best, other, site)]
+    rivals = [other.effects[-1] for other in trials[1:] if equals(best, other, SITE)]
     explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
     kind = "ambiguous" if rivals else "effect"
     names = (name, *rivals)[: rule.most_alternatives]

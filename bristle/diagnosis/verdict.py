@@ -20,7 +20,7 @@ from .decision import missing
 from .effect_limits import EffectLimit
 from .experiments import Experiment
 from .law_choice import LawVerdict
-from .rule import BENCH, DecisionRule
+from .rule import BENCH
 from .sensor_faults import as_json
 from .site_diagnosis import SiteDiagnosis, without_z
 from .trials import Trial
@@ -29,7 +29,7 @@ from .words import TONES
 # What known effects gain where none of them, nor a pair, explains what is missing.
 
 
-def gains_of(found: SiteDiagnosis, rule: DecisionRule = BENCH) -> list[dict[str, Any]]:
+def gains_of(found: SiteDiagnosis) -> list[dict[str, Any]]:
     """Return the effects that lower a site's held-out error by enough, and beyond chance.
 
     Single ones, the best first; last the pair that gains most, if it gains more than the best one.
@@ -37,10 +37,10 @@ def gains_of(found: SiteDiagnosis, rule: DecisionRule = BENCH) -> list[dict[str,
     before = found.before
     if found.kind != "unknown" or before is None:
         return []
-    able = [trial for trial in found.trials if missing(before, trial, rule)]
-    rows = [_row(trial, before, found.site) for trial in able[: rule.most_alternatives]]
+    able = [trial for trial in found.trials if missing(before, trial, BENCH)]
+    rows = [_row(trial, before, found.site) for trial in able[: BENCH.most_alternatives]]
     pair = found.together
-    if able and pair is not None and missing(able[0], pair, rule):
+    if able and pair is not None and missing(able[0], pair, BENCH):
         rows.append(_row(pair, before, found.site))
     return rows
 

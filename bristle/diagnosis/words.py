@@ -18,7 +18,7 @@ from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS, instrument_of
 from ..physics.forms import LINEAR_FORM
 from .decision import NOISE
-from .rule import BENCH, DecisionRule
+from .rule import BENCH
 from .sensor_faults import size_text
 from .site_diagnosis import SiteDiagnosis
 
@@ -236,7 +236,7 @@ def _limits(verdict: Verdict) -> list[str]:
     return [f"No other effect of the library is above {100.0 * share:.2g} % of the force."]
 
 
-def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
+def _remaining(verdict: Verdict) -> list[str]:
     """Return the sentence about the coordinate of what no effect explains."""
     coordinate = str(verdict.get("coordinate") or "")
     if verdict.get("kind") != "unknown" or not coordinate:
@@ -246,7 +246,7 @@ def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
     organised, name = at.get("organised"), name_of(coordinate, at.get("site", ""))
     sure = organised is None or coordinate == "frequency"
     sure = sure or any(
-        one["p"] <= rule.chance for one in organised or [] if one["coordinate"] == coordinate
+        one["p"] <= BENCH.chance for one in organised or [] if one["coordinate"] == coordinate
     )
     if sure and (beside := at.get("coordinate_beside")):
         return [

@@ -21,7 +21,7 @@ from ..user_code.load import defined
 from .curve import Curve, CurveFormula
 from .effect_file import effect_text
 from .fit import SWEEPS, LearnedCurve
-from .rule import LEARN, LearnRule
+from .rule import LEARN
 
 # The formulas that a learned curve may follow.
 
@@ -273,14 +273,14 @@ _POWERS = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3, **dict.fro
 """By which power of the signal's unit the slope of a form is divided."""
 
 
-def name_of(forms: Sequence[ClosedForm], rule: LearnRule = LEARN) -> ClosedForm | None:
+def name_of(forms: Sequence[ClosedForm]) -> ClosedForm | None:
     """Return the form that names a curve, the first of `forms`; None where it leaves too much."""
-    return forms[0] if forms and forms[0].left <= rule.follows else None
+    return forms[0] if forms and forms[0].left <= LEARN.follows else None
 
 
-def nearest_of(forms: Sequence[ClosedForm], rule: LearnRule = LEARN) -> ClosedForm | None:
+def nearest_of(forms: Sequence[ClosedForm]) -> ClosedForm | None:
     """Return the first of `forms`; None where it leaves most of the curve's variation."""
-    return forms[0] if forms and forms[0].left <= rule.near_form else None
+    return forms[0] if forms and forms[0].left <= LEARN.near_form else None
 
 
 def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
@@ -483,9 +483,7 @@ class Closed:
     std: dict[str, float]
 
 
-def close(
-    prepared: Prepared, found: LearnedCurve, forms: Sequence[ClosedForm], rule: LearnRule = LEARN
-) -> Closed | None:
+def close(prepared: Prepared, found: LearnedCurve, forms: Sequence[ClosedForm]) -> Closed | None:
     """Fit the closed forms that may name a curve in its place; return the first that does as well.
 
     Parameters
@@ -493,15 +491,12 @@ def close(
     prepared : runs and the fitted model, as a diagnosis begins with them
     found : the curve, with the name of its effect
     forms : fitted to the curve, the best first
-    rule : the numbers that decide between curves
     """
-    able = [one for one in forms if one.left <= rule.resembles][:CLOSED]
-    return next(filter(None, (fit_closed(prepared, found, one, rule) for one in able)), None)
+    able = [one for one in forms if one.left <= LEARN.resembles][:CLOSED]
+    return next(filter(None, (fit_closed(prepared, found, one) for one in able)), None)
 
 
-def fit_closed(
-    prepared: Prepared, found: LearnedCurve, form: ClosedForm, rule: LearnRule = LEARN
-) -> Closed | None:
+def fit_closed(prepared: Prepared, found: LearnedCurve, form: ClosedForm) -> Closed | None:
     """Fit a closed form in the place of a learned curve; None where it is clearly worse.
 
     It has fewer numbers, and holds between and beyond the knots: as good is good enough, and better
@@ -512,7 +507,6 @@ def fit_closed(
     prepared : runs and the fitted model, as a diagnosis begins with them
     found : the curve, with the name of its effect
     form : fitted to the curve
-    rule : the numbers that decide between curves
     """
     assert found.curve is not None
     assert found.after is not None
@@ -528,7 +522,7 @@ def fit_closed(
         held_out = prepared.held_out.of(prepared.held_out.runs)
         model = refine(replace(base, values=values), train, SWEEPS)
         trial = judge(model, train, held_out)
-        worst = (rule.as_good if form.left <= rule.follows else 1.0) * found.after.train
+        worst = (LEARN.as_good if form.left <= LEARN.follows else 1.0) * found.after.train
         if trial.train > worst or not missing(found.before, trial, prepared.rule):
             return None
         std = intervals_of(train, model).std

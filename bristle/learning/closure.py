@@ -26,7 +26,6 @@ from ..core.text import percent, plain, quantity, scale
 from ..data.corrections import jumps
 from ..data.run_labels import labels_of
 from ..diagnosis.prepared import Prepared
-from ..diagnosis.rule import DecisionRule
 from ..diagnosis.trials import Trial, judge
 from ..identification.problem import Problem, Run, has_offset, sensors, zero_of
 from ..identification.start_grid import refine
@@ -221,24 +220,21 @@ class LearnedClosure(Viewable):
         }  # fmt: skip
 
 
-def learn_closure(
-    prepared: Prepared, name: str, rule: DecisionRule | None = None, *, names: bool = True
-) -> LearnedClosure:
+def learn_closure(prepared: Prepared, name: str, *, names: bool = True) -> LearnedClosure:
     """Learn what the model of an opening misses, as a network in parallel with the damper.
 
     Parameters
     ----------
     prepared : runs and the fitted model, as a diagnosis begins with them
     name : of the effect that the network becomes
-    rule : the numbers that decide; None takes the opening's
     names : whether the effect of the library that comes nearest is looked for
     """
-    rule, before, train = rule or prepared.rule, prepared.before, prepared.problem
+    before, train = prepared.before, prepared.problem
     alike = one_amplitude(train.runs)
     stroke = float(np.mean([np.std(run.x) for run in train.runs])) if alike else 0.0
     single = train.runs[0].name if len(train.runs) == 1 else ""
     found = LearnedClosure(name, None, before, stroke=stroke, single=single)
-    if before.z <= rule.clean:
+    if before.z <= prepared.rule.clean:
         why = f"The model leaves {before.z:.2f} times the noise (z): nothing is missing."
         return replace(found, refused=why)
     trained = trained_beside(train, before.model)
@@ -264,7 +260,7 @@ def learn_closure(
         share=float(np.sqrt(np.mean(own**2) / np.mean(force**2))),
         lives_on=_lives_on(closure, told, own, held.runs), outside=float(np.mean(inside < 0.5)),
     )  # fmt: skip
-    if not lowers(errors[0], errors[1], rule.gain):
+    if not lowers(errors[0], errors[1], prepared.rule.gain):
         rms = [float(np.sqrt(np.mean(np.concatenate(one) ** 2))) for one in errors]
         why = (
             "A network lowers the error on parts of the training runs, but not over the held-out "

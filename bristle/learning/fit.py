@@ -19,7 +19,7 @@ from ..user_code.load import defined
 from .curve import Curve
 from .effect_file import effect_text
 from .normal import Normal, Residual, residual_of
-from .rule import LEARN, LearnRule
+from .rule import LEARN
 from .screen import FINE, Promise, distinct, promises
 from .signals import RING, SLIP
 from .surface import continued, surfaces
@@ -69,13 +69,7 @@ class LearnedCurve:
 
 
 def learn(
-    prepared: Prepared,
-    name: str,
-    *,
-    parts: Sequence[str] = (),
-    along: Sequence[str] = (),
-    rule: DecisionRule | None = None,
-    learning: LearnRule = LEARN,
+    prepared: Prepared, name: str, *, parts: Sequence[str] = (), along: Sequence[str] = ()
 ) -> LearnedCurve:
     """Learn what the model of an opening misses at its site.
 
@@ -84,38 +78,35 @@ def learn(
     prepared : runs and the fitted model, as a diagnosis begins with them
     name : of the effect that the curve becomes
     parts, along : names of `PARTS` and `ALONG` that are tried; empty for all
-    rule : the numbers that decide whether a curve is kept; None takes the opening's
-    learning : those that decide which one is tried
     """
-    rule = rule or prepared.rule
     before, train = prepared.before, prepared.searched
     residual = residual_of(train, before.model)
-    worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
-    promised = promises(residual, parts, along, learning)
+    worth = (1.0 - prepared.rule.gain) ** 2 * Normal(residual).without_curve()
+    promised = promises(residual, parts, along)
     if len(along) > 1:
-        promised += surfaces(residual, parts, along, learning)
-        promised.sort(key=lambda one: learning.weighed(one.loss, one.curve))
-    chosen = distinct([one for one in promised if one.loss <= worth], TRIED, learning.near)
+        promised += surfaces(residual, parts, along)
+        promised.sort(key=lambda one: LEARN.weighed(one.loss, one.curve))
+    chosen = distinct([one for one in promised if one.loss <= worth], TRIED)
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
         return LearnedCurve(name, None, (), before, None, (), why)
-    fitted = _best_first(_fitted(chosen, name, before.model, prepared), learning)
-    if fitted[0].trial.train > rule.clean:
+    fitted = _best_first(_fitted(chosen, name, before.model, prepared))
+    if fitted[0].trial.train > prepared.rule.clean:
         model = with_law_of(before.model, fitted[0])
-        surface = _explained(before, fitted[0], rule) < learning.enough
-        tried = _second_look(residual_of(train, model), fitted, (parts, along), surface, learning)
+        surface = _explained(before, fitted[0], prepared.rule) < LEARN.enough
+        tried = _second_look(residual_of(train, model), fitted, (parts, along), surface)
         more = _fitted(tried, name, model, prepared)
-        fitted = _best_first([*fitted, *more], learning)
-    fitted[0] = _finer(fitted[0], name, prepared, learning)
-    refusals = [_refusal(before, one, rule, learning) for one in fitted]
+        fitted = _best_first([*fitted, *more])
+    fitted[0] = _finer(fitted[0], name, prepared)
+    refusals = [_refusal(before, one, prepared.rule) for one in fitted]
     place = refusals.index("") if "" in refusals else 0
     kept = fitted[place]
     others = tuple(one for one in fitted if one is not kept)
     return LearnedCurve(name, kept.curve, kept.std, before, kept.trial, others, refusals[place])
 
 
-def _best_first(fitted: Sequence[Fitted], learning: LearnRule) -> list[Fitted]:
-    return sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve))
+def _best_first(fitted: Sequence[Fitted]) -> list[Fitted]:
+    return sorted(fitted, key=lambda one: LEARN.weighed(one.loss, one.curve))
 
 
 def with_law_of(base: Model, best: Fitted) -> Model:
@@ -131,8 +122,7 @@ def with_law_of(base: Model, best: Fitted) -> Model:
 
 def _second_look(
     residual: Residual, fitted: Sequence[Fitted], asked: tuple[Sequence[str], Sequence[str]],
-    surface: bool, learning: LearnRule,
-) -> list[Promise]:  # fmt: skip
+    surface: bool) -> list[Promise]:  # fmt: skip
     """Return what promises most beside a law that was fitted together with a curve.
 
     Parameters
@@ -141,35 +131,32 @@ def _second_look(
     fitted : the curves that were fitted before; their parts and signals are not tried again
     asked : names of the parts and signals that are tried
     surface : whether surfaces over two signals are tried as well
-    learning : the numbers that decide
     """
-    found = _not_yet(promises(residual, *asked, learning), fitted, TRIED, learning)
+    found = _not_yet(promises(residual, *asked), fitted, TRIED)
     if surface:
-        found += _not_yet(surfaces(residual, *asked, learning), fitted, SURFACES, learning)
+        found += _not_yet(surfaces(residual, *asked), fitted, SURFACES)
     return found
 
 
-def _finer(best: Fitted, name: str, prepared: Prepared, learning: LearnRule) -> Fitted:
+def _finer(best: Fitted, name: str, prepared: Prepared) -> Fitted:
     """Return a curve with twice the knots where it does better with them, else as it is.
 
     How many it has is what the scan makes of it; what depends steeply on a signal may need more.
     """
     curve = best.curve
     is_table = not curve.across and curve.part not in (SLIP, RING) and len(curve.knots) <= FINE
-    if best.trial.train <= learning.coarse or not is_table:
+    if best.trial.train <= LEARN.coarse or not is_table:
         return best
     again = Promise(curve.finer(), best.loss)
     model = with_law_of(prepared.before.model, best)
     (found,) = _fitted([again], name, model, prepared)
-    return found if found.loss <= learning.finer * best.loss else best
+    return found if found.loss <= LEARN.finer * best.loss else best
 
 
-def _not_yet(
-    found: Sequence[Promise], fitted: Sequence[Fitted], count: int, learning: LearnRule
-) -> list[Promise]:
+def _not_yet(found: Sequence[Promise], fitted: Sequence[Fitted], count: int) -> list[Promise]:
     """Return the best `count` promises of parts and signals that no curve was fitted to."""
     done = {one.curve.kind for one in fitted}
-    return distinct([one for one in found if one.curve.kind not in done], count, learning.near)
+    return distinct([one for one in found if one.curve.kind not in done], count)
 
 
 def _explained(before: Trial, one: Fitted, rule: DecisionRule) -> float:
@@ -177,12 +164,12 @@ def _explained(before: Trial, one: Fitted, rule: DecisionRule) -> float:
     return 1.0 - rule.excess(one.trial.z) / max(rule.excess(before.z), 1e-300)
 
 
-def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRule) -> str:
+def _refusal(before: Trial, best: Fitted, rule: DecisionRule) -> str:
     """Return why a curve is not kept; "" where it is."""
     why = ""
     if not missing(before, best.trial, rule):
         why = "does not lower the error on held-out runs beyond chance"
-    elif _explained(before, best, rule) < learning.worth:
+    elif _explained(before, best, rule) < LEARN.worth:
         why = "explains too little of the error on held-out runs"
     numbers = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
     return f"The best curve, {best.curve.words()}, {why} {numbers}." if why else ""

@@ -10,10 +10,7 @@ from .signals import GIVEN
 
 @dataclass(frozen=True)
 class LearnRule:
-    """What decides between curves; whether one is kept is decided by a `DecisionRule`.
-
-    A rule of your own is `dataclasses.replace(LEARN, follows=0.05)`.
-    """
+    """What decides between curves; whether one is kept is decided by a `DecisionRule`."""
 
     near: float = 1.25
     """Largest mean squared residual that a curve promises, over that of the best one, to be tried.

@@ -15,7 +15,7 @@ import numpy as np
 from ..core.arrays import Array
 from .curve import Curve, inside, may_change
 from .normal import Hats, Normal, Residual, hats_at
-from .rule import LEARN, LearnRule
+from .rule import LEARN
 from .signals import (
     ALONG,
     GIVEN,
@@ -144,10 +144,7 @@ STEPS = (2.0, 1.4, 1.2)
 
 
 def promises(
-    residual: Residual,
-    parts: Sequence[str] = (),
-    along: Sequence[str] = (),
-    rule: LearnRule = LEARN,
+    residual: Residual, parts: Sequence[str] = (), along: Sequence[str] = ()
 ) -> list[Promise]:
     """Return the curves that lower the residual where they were not fitted, the best first.
 
@@ -155,7 +152,6 @@ def promises(
     ----------
     residual : of a fitted model
     parts, along : names of `PARTS` and `ALONG` that are looked at; empty for all
-    rule : the numbers that decide between curves
     """
     known = Normal(residual)
     found = []
@@ -177,7 +173,7 @@ def promises(
         if set(dict(one.curve.memory)).difference(GIVEN) and one.curve.part != RING
     ][:TUNED]
     kept += [_tuned(known, one) for one in remembering]
-    return sorted(kept, key=lambda one: rule.weighed(one.loss, one.curve))
+    return sorted(kept, key=lambda one: LEARN.weighed(one.loss, one.curve))
 
 
 def _tuned(known: Normal, one: Promise) -> Promise:

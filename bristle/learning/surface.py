@@ -16,7 +16,7 @@ import numpy as np
 from ..core.arrays import Array
 from .curve import Curve, inside, may_change
 from .normal import Hats, Normal, Residual, hats_at, products
-from .rule import LEARN, LearnRule
+from .rule import LEARN
 from .screen import SMOOTH, Promise, distinct, knots_of, signals, smoothest
 from .signals import Along
 
@@ -69,10 +69,7 @@ class _Pair(NamedTuple):
 
 
 def surfaces(
-    residual: Residual,
-    parts: Sequence[str] = (),
-    along: Sequence[str] = (),
-    rule: LearnRule = LEARN,
+    residual: Residual, parts: Sequence[str] = (), along: Sequence[str] = ()
 ) -> list[Promise]:
     """Return the surfaces that lower the residual of a damper where they were not fitted.
 
@@ -83,7 +80,6 @@ def surfaces(
     residual : of a fitted model
     parts, along : names of `PARTS` and `ALONG` that are looked at; empty for all, and then for
         signals without a time or travel of their own
-    rule : the numbers that decide between surfaces
     """
     if residual.place.is_line:
         return []
@@ -97,10 +93,10 @@ def surfaces(
                 if promise is not None and promise.loss < without:
                     found.append((promise, pair))
     found.sort(key=lambda one: one[0].loss)
-    best = distinct([promise for promise, _ in found], RESOLVED, rule.near)
+    best = distinct([promise for promise, _ in found], RESOLVED)
     pairs = [next(pair for one, pair in found if one is promise) for promise in best]
     resolved = [_resolved(known, *one) for one in zip(best, pairs, strict=True)]
-    return sorted(resolved, key=lambda one: rule.weighed(one.loss, one.curve))
+    return sorted(resolved, key=lambda one: LEARN.weighed(one.loss, one.curve))
 
 
 def _pairs(residual: Residual, names: Sequence[str]) -> Iterator[_Pair]:

@@ -288,7 +288,7 @@ def seen(
     ]  # fmt: skip
 
 
-def separated(known: Sequence[Information], rule: DecisionRule = BENCH) -> list[AskedFigure]:
+def separated(known: Sequence[Information]) -> list[AskedFigure]:
     """Return by how much rivals are too near to be told apart: 1 where a verdict just can."""
     apart: dict[str, float] = {}
     for one in known:
@@ -296,7 +296,7 @@ def separated(known: Sequence[Information], rule: DecisionRule = BENCH) -> list[
             apart[name] = min(apart.get(name, inf), distance)
     return [
         AskedFigure(
-            "separate", name, rule.separating_sigma / distance if distance else inf, 1.0 / ENOUGH
+            "separate", name, BENCH.separating_sigma / distance if distance else inf, 1.0 / ENOUGH
         )
         for name, distance in apart.items()
     ]

@@ -13,7 +13,6 @@ from bristle.diagnosis.trials import Trial
 from bristle.learning import fit
 from bristle.learning.curve import Curve
 from bristle.learning.fit import Fitted
-from bristle.learning.rule import LEARN
 from bristle.learning.signals import SLIP
 from bristle.model.model import Model
 
@@ -54,7 +53,7 @@ def test_it_is_taken_where_it_does_better(
     opened: Any = SimpleNamespace(
         before=fitted(CURVE, 3.0, 9.0).trial, searched=None, held_out=None
     )
-    found = fit._finer(fitted(CURVE, z, 1.4), "learned_1", opened, LEARN)
+    found = fit._finer(fitted(CURVE, z, 1.4), "learned_1", opened)
     assert len(found.curve.knots) == knots
 
 
@@ -68,4 +67,4 @@ def test_what_has_no_table_of_few_knots_is_left_as_it_is(monkeypatch: pytest.Mon
     ):
         best = fitted(curve, 1.5, 2.0)
         opened: Any = SimpleNamespace(before=best.trial, searched=None, held_out=None)
-        assert fit._finer(best, "learned_1", opened, LEARN) is best
+        assert fit._finer(best, "learned_1", opened) is best
