@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
-from ..view.blocks import Block, Next, Text
+from ..view.blocks import Next, Text
 from ._options import Parser, print_study_answer
 
 if TYPE_CHECKING:
@@ -63,9 +63,7 @@ def main(arguments: argparse.Namespace) -> int:
         "picture": str(picture.absolute()),
     }  # fmt: skip
     then = Next(command("diagnose", study.folder), "finds what is missing")
-    blocks: tuple[Block, ...] = (*(Text(note, "note") for note in notes), then)
-    view = comparison.view()
-    view = view._replace(blocks=(*view.blocks, *blocks))
+    view = comparison.view().then(*(Text(note, "note") for note in notes), then)
     print_study_answer(arguments, answer, view, picture)
     return 0
 

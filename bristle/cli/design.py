@@ -54,8 +54,7 @@ def main(arguments: argparse.Namespace) -> int:
     answer["files"] = [str(path.absolute()) for path in written]
     component = _COMPONENTS[result.controller.kind].split()[0]
     bake = Next(command("build", component, "--controller", out), "bakes it in")
-    view = result.view()
-    print_answer(arguments, answer, view._replace(blocks=(*view.blocks, bake)), written)
+    print_answer(arguments, answer, result.view().then(bake), written)
     return 0
 
 

@@ -51,7 +51,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..core.progress import tell
     from ..study.identify import identify_study
     from ..study.study import Study
-    from ..study.view import identified_with_next
+    from ..study.view import identified_view
 
     study = Study(arguments.folder)
     if not arguments.dry_run:
@@ -75,7 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
         picture = study.write_report("identify.png", png(draw_identified(found), 110))
         study.write_report("identify.json", json_text(found.as_dict()) + "\n")
     answer = {**found.as_dict(), "picture": str(picture.absolute()) if picture else None}
-    print_study_answer(arguments, answer, identified_with_next(found, study.folder), picture)
+    print_study_answer(arguments, answer, identified_view(found, study.folder), picture)
     return 0
 
 

@@ -132,6 +132,6 @@ def text(found: Plan, study: Path | None, folder: Path | None, *, details: bool 
         then = command("study", "new", "my_rig", "--data", "MEASURED.csv")
         if study is not None:
             then = command("study", "extend", study, "MEASURED.csv", "--plan", folder)
-        view = view._replace(blocks=(*view.blocks, Next(then, "once they are measured")))
+        view = view.then(Next(then, "once they are measured"))
     told = terminal.text(view, details=details)
     return told if folder is None else f"{told}\nFiles: {folder}"

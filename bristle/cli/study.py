@@ -400,9 +400,7 @@ def _check(arguments: argparse.Namespace) -> int:
         Next(command("identify", study.folder), "fits the model"),
         Next(command("study", "auto", study.folder), "takes all steps from here on"),
     )
-    view = found.view()
-    view = view._replace(blocks=(*view.blocks, *(then if found.ok else ())))
-    print_answer(arguments, answer, view)
+    print_answer(arguments, answer, found.view().then(*(then if found.ok else ())))
     if not arguments.json:
         print(f"Picture: {picture}")
     return 0 if found.ok else StudyError.exit_code

@@ -103,8 +103,7 @@ class RunwiseFit:
         root = np.sqrt(np.minimum(1.0, far / np.maximum(np.abs(r), 1e-12)))
         self.names, self.scale = search.names, search.scale
         J, r = J * root[:, None], r * root
-        ends = np.cumsum([len(run.force) - run.skip for run in problem.runs])[:-1]
-        parts = list(zip(np.split(J, ends), np.split(r, ends), strict=True))
+        parts = list(zip(problem.by_run(J), problem.by_run(r), strict=True))
         self._normal = np.array([own.T @ own for own, _ in parts])  # (k, p, p)
         self._right = np.array([-own.T @ left for own, left in parts])  # (k, p)
         self._loss = float(r @ r)

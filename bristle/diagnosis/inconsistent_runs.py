@@ -130,9 +130,7 @@ def _unexplained(model: Model, others: Problem, expected: Expected, rule: Decisi
 
 def _z_of_runs(model: Model, problem: Problem, expected: Expected) -> Array:
     """Return z of each run (k,)."""
-    edges = np.cumsum([len(run.force) - run.skip for run in problem.runs])[:-1]
-    left = residuals(problem, model, expected)
-    return np.array([z_scale(part) for part in np.split(left, edges)])
+    return np.array([z_scale(part) for part in problem.by_run(residuals(problem, model, expected))])
 
 
 def _amount(

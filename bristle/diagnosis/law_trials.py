@@ -278,6 +278,5 @@ def _joins(effect: str, law: str) -> bool:
 def _row(law: str, model: Model, train: Problem, held_out: Problem) -> LawTrial:
     expected = train.expectation(model), held_out.expectation(model)
     trial = replace(judge(model, train, held_out, expected), refined=True)
-    edges = np.cumsum([len(run.force) - run.skip for run in held_out.runs])[:-1]
-    z_runs = tuple(z_scale(part) for part in np.split(trial.residual, edges))
+    z_runs = tuple(map(z_scale, held_out.by_run(trial.residual)))
     return LawTrial(law, trial, force_error([(train, model)]), z_runs)

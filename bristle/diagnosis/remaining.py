@@ -25,15 +25,14 @@ def patterns_of(trial: Trial, held_out: Problem) -> list[ResidualPattern]:
 
     Samples that were not measured are left out: their residual is 0.
     """
-    normalised, raw, coordinates, begin = [], [], [], 0
-    for run in held_out.runs:
-        size, kept = len(run.force) - run.skip, run.judged
-        normalised.append(trial.residual[begin : begin + size][kept])
+    normalised, raw, coordinates = [], [], []
+    for run, own in zip(held_out.runs, held_out.by_run(trial.residual), strict=True):
+        kept = run.judged
+        normalised.append(own[kept])
         raw.append(normalised[-1] * run.noise)
         along = coordinates_of_run(run)
         along["rest"] = late_speed_of(run)
         coordinates.append({name: values[run.skip :][kept] for name, values in along.items()})
-        begin += size
     return residual_patterns(normalised, raw, coordinates, flips=FLIPS)
 
 
@@ -144,11 +143,8 @@ def _spectra(trial: Trial, held_out: Problem) -> tuple[Array, Array, Array]:
     f = np.asarray(np.fft.rfftfreq(round(seconds * rate), 1.0 / rate), float)
     powers: list[Array] = []
     motions: list[Array] = []
-    begin = 0
-    for run in runs:
-        count = len(run.force) - run.skip
-        residual = np.clip(trial.residual[begin : begin + count], -50.0, 50.0)
-        begin += count
+    for run, left in zip(runs, held_out.by_run(trial.residual), strict=True):
+        residual = np.clip(left, -50.0, 50.0)
         for values, found in ((residual, powers), (run.v[run.skip :], motions)):
             own, power = welch(values, 1.0 / run.dt, nperseg=round(seconds / run.dt))
             found.append(np.interp(f, own, power, right=0.0))

@@ -15,29 +15,10 @@ from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..view.blocks import Block, Figure, Table, Text, View, view_of
 from ..view.style import BLUE, FLOOR, GREY, INK, PALE, Page, look
+from . import words
 from .by_label import EXTRAPOLATED, NOT_SEPARABLE
 from .law_trials import FORM_ALONE
 from .verdict import Diagnosis
-from .words import (
-    FAULTS,
-    HEADER,
-    LIMITS,
-    LIMITS_NOTES,
-    TABLE_NOTE,
-    TONES,
-    Verdict,
-    about,
-    drive_of,
-    fault_rows,
-    fault_texts,
-    headline,
-    law_name,
-    law_table,
-    limit_rows,
-    reasons,
-    separating,
-    untestable,
-)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,9 +38,9 @@ def diagnosis_view(found: Diagnosis) -> View:
     return verdict_view(found.as_dict())
 
 
-def verdict_view(verdict: Verdict) -> View:
+def verdict_view(verdict: words.Verdict) -> View:
     """Return the view of the content of verdict.json."""
-    kind, why = str(verdict["kind"]), reasons(verdict)
+    kind, why = str(verdict["kind"]), words.reasons(verdict)
     # Never left to the details: what is to be done before there is a verdict, that another law
     # explains what is named, and which runs say less of a label than they seem to.
     seen = ("study.toml", FORM_ALONE, EXTRAPOLATED, NOT_SEPARABLE)
@@ -67,14 +48,14 @@ def verdict_view(verdict: Verdict) -> View:
     told = [text for text in why if text not in asks]
     shown, apart = told[:_WHY], told[_WHY:]
     named = [_about(str(name), verdict) for name in verdict.get("effects") or []]
-    hidden = untestable(verdict)
-    notes = [*fault_texts(verdict, " ".join(why)), *_errors_beside(verdict)]
+    hidden = words.untestable(verdict)
+    notes = [*words.fault_texts(verdict, " ".join(why)), *_errors_beside(verdict)]
     notes += [*asks, *(verdict.get("notes") or [])]
     if hidden:
         notes.append(f"Not testable with these runs: {', '.join(hidden)}.")
-    separate = separating(verdict)
+    separate = words.separating(verdict)
     return View(
-        headline(verdict),
+        words.headline(verdict),
         (
             *map(Text, named),
             Text(error_text(verdict)),
@@ -85,13 +66,13 @@ def verdict_view(verdict: Verdict) -> View:
         (
             *map(Text, apart), *_tables(verdict),
         ),
-        TONES[kind],
+        words.TONES[kind],
     )  # fmt: skip
 
 
-def _about(name: str, verdict: Verdict) -> str:
+def _about(name: str, verdict: words.Verdict) -> str:
     """Return what an effect is, and its parameters with their 95 % intervals."""
-    known, drive = EFFECTS[name].parameters if name in EFFECTS else {}, drive_of(verdict)
+    known, drive = EFFECTS[name].parameters if name in EFFECTS else {}, words.drive_of(verdict)
     values = {
         own: (one["value"], one["std"], unit_for(known[own].unit, drive) if own in known else "1")
         for found in verdict.get("findings") or []
@@ -125,10 +106,10 @@ def effect_text(
         spread = "" if half == "-" else f" {half}"
         parts.append(f"{key} = {text}{spread}" + ("" if unit == "1" else f" {unit}") + what)
     sizes = f" {', '.join(parts)} (95 %)." if parts else ""
-    return about(name, drive) + sizes
+    return words.about(name, drive) + sizes
 
 
-def worst(verdict: Verdict) -> Mapping[str, Any]:
+def worst(verdict: words.Verdict) -> Mapping[str, Any]:
     """Return the finding at the site whose model errs the most; first one whose noise is unknown.
 
     Such a site has no z: what effects gain there is told first.
@@ -138,7 +119,7 @@ def worst(verdict: Verdict) -> Mapping[str, Any]:
     return max(z_before, key=lambda pair: pair[0], default=(0.0, verdict))[1]
 
 
-def _gain(verdict: Verdict) -> str:
+def _gain(verdict: words.Verdict) -> str:
     """Return how the error falls with what is named; "" where nothing is, or that is not known."""
     at = worst(verdict)
     both = [at.get(f"error_holdout_{when}") for when in ("before", "after")]
@@ -149,7 +130,7 @@ def _gain(verdict: Verdict) -> str:
     return f"; fitted again{where} {before}, with {effect_names(at['effects'])} {after}"
 
 
-def error_text(verdict: Verdict) -> str:
+def error_text(verdict: words.Verdict) -> str:
     """Return the error of the model as the study has it, which every command prints alike."""
     role = _judged(verdict)
     if not role:
@@ -162,46 +143,46 @@ def error_text(verdict: Verdict) -> str:
     return f"{which}: {error}{more}{_gain(verdict)}."
 
 
-def _error_of_law(verdict: Verdict) -> str:
+def _error_of_law(verdict: words.Verdict) -> str:
     """Return the error of the law of a verdict, where a study's own model has none."""
     at = worst(verdict)
     before, after = (at.get(f"error_holdout_{when}") for when in ("before", "after"))
     if not before:
         return ""
-    own = law_name(verdict) if verdict.get("laws") else "the model"
+    own = words.law_name(verdict) if verdict.get("laws") else "the model"
     then = ""
     if after and at.get("kind") == "effect":
         then = f", with {effect_names(at['effects'])} {ForceError.of(after).text()}"
     return f"Force error of {own} on the held-out runs: {ForceError.of(before).text()}{then}."
 
 
-def _errors_beside(verdict: Verdict) -> list[str]:
+def _errors_beside(verdict: words.Verdict) -> list[str]:
     role = _judged(verdict)
     return ForceError.of(verdict["error"][role]).beside() if role else []
 
 
-def _judged(verdict: Verdict) -> str:
+def _judged(verdict: words.Verdict) -> str:
     return next((role for role in _ROLES if role in (verdict.get("error") or {})), "")
 
 
-def _tables(verdict: Verdict) -> list[Block]:
+def _tables(verdict: words.Verdict) -> list[Block]:
     """Return the evidence: faults, laws, trials, limits, and what could not be tested."""
     blocks: list[Block] = []
-    if faults := fault_rows(verdict):
-        blocks.append(Table(FAULTS, faults, title="Faults of channels"))
+    if faults := words.fault_rows(verdict):
+        blocks.append(Table(words.FAULTS, faults, title="Faults of channels"))
     if laws := verdict.get("laws"):
         blocks.append(law_block(laws))
-    alt = f"error / noise (z) with each effect: {headline(verdict)}"
+    alt = f"error / noise (z) with each effect: {words.headline(verdict)}"
     blocks.append(Figure(lambda: draw_verdict(verdict), alt))
     blocks += _trials(verdict)
-    if limits := limit_rows(verdict):
-        title, note = "How large each effect may still be", " ".join(LIMITS_NOTES)
-        blocks.append(Table(LIMITS, limits, (2, 3), title, note=note))
-    if hidden := untestable(verdict):
-        drive, rows = drive_of(verdict), []
+    if limits := words.limit_rows(verdict):
+        title, note = "How large each effect may still be", " ".join(words.LIMITS_NOTES)
+        blocks.append(Table(words.LIMITS, limits, (2, 3), title, note=note))
+    if hidden := words.untestable(verdict):
+        drive, rows = words.drive_of(verdict), []
         for effect, name in zip(hidden, map(str, verdict["untestable"]), strict=True):
             expect = text_for(EFFECTS[name].expect, drive) if name in EFFECTS else ""
-            rows.append([effect, about(name, drive), expect])
+            rows.append([effect, words.about(name, drive), expect])
         header = ("effect", "what it does", "what it would look like")
         note = "They may be present: these runs do not excite them, or the model hides them."
         blocks.append(Table(header, rows, title="Not testable with these runs", note=note))
@@ -213,20 +194,20 @@ def _tables(verdict: Verdict) -> list[Block]:
     return [*blocks, Text(f"Noise floor of the verdict: {', '.join(floor)}." if floor else "")]
 
 
-def law_block(rows: Sequence[Verdict]) -> Table:
+def law_block(rows: Sequence[words.Verdict]) -> Table:
     """Return the table of laws, from its rows as verdict.json has them.
 
     Without the form of the command where laws without one were tried: nothing commands the damper.
     """
-    told, laws = [*range(len(HEADER))], [LAWS.get(str(row["law"])) for row in rows]
+    told, laws = [*range(len(words.HEADER))], [LAWS.get(str(row["law"])) for row in rows]
     if any(law is not None and not law.own and not law.has("command") for law in laws):
-        told.remove(HEADER.index("command"))
-    cells = [[row[k] for k in told] for row in law_table(rows)]
+        told.remove(words.HEADER.index("command"))
+    cells = [[row[k] for k in told] for row in words.law_table(rows)]
     right = range(len(told) - 6, len(told))
-    return Table([HEADER[k] for k in told], cells, right, "The laws", note=TABLE_NOTE)
+    return Table([words.HEADER[k] for k in told], cells, right, "The laws", note=words.TABLE_NOTE)
 
 
-def _trials(verdict: Verdict) -> list[Block]:
+def _trials(verdict: words.Verdict) -> list[Block]:
     """Return the table of what each effect leaves of the error, the largest gain first."""
     ranking, known = verdict.get("ranking") or [], verdict.get("noise_known", True)
     if not ranking:
@@ -264,7 +245,7 @@ def _z(value: float | None) -> str:
     return "not known" if value is None else f"{value:.3f}"
 
 
-def draw_verdict(verdict: Verdict) -> Page:
+def draw_verdict(verdict: words.Verdict) -> Page:
     """Return the figure of a verdict: what each effect that was tried leaves of the error.
 
     Of a building it shows the site where the model errs the most, the best effect first, with the
@@ -279,18 +260,18 @@ def draw_verdict(verdict: Verdict) -> Page:
     ][:MOST]
     with look():
         if not rows or before is None or not verdict.get("noise_known", True):
-            return Page(7.6, 0.0, headline(verdict), " ".join(reasons(verdict)))
+            return Page(7.6, 0.0, words.headline(verdict), " ".join(words.reasons(verdict)))
         own = [str(name) for name in at.get("effects") or []]
         if at.get("kind") == "effect" and len(own) > 1 and at.get("z_holdout_after") is not None:
             rows.append((" and ".join(own), float(at["z_holdout_after"])))
         rows.sort(key=lambda row: row[1])
         without = "the present model"
         if verdict.get("laws"):
-            without = f"{law_name(verdict)}, the law of this verdict, alone"
+            without = f"{words.law_name(verdict)}, the law of this verdict, alone"
         if at.get("site") not in (None, "damper"):
             without += f" at {site_name(at['site'])}"
         page = Page(
-            7.6, ROW * len(rows) + 1.0, headline(verdict),
+            7.6, ROW * len(rows) + 1.0, words.headline(verdict),
             "Each bar: the model with that effect, fitted again. Green: the noise floor.",
         )  # fmt: skip
         grid = page.grid(1, 1, top=0.3, bottom=0.5, left=1.9, right=0.7)

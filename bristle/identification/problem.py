@@ -452,6 +452,11 @@ class Problem:
     def _made_of(self, runs: list[Run]) -> Problem:
         return Problem(runs)
 
+    def by_run(self, values: Array) -> list[Array]:
+        """Return what all samples behind the runs' starts have (n, ...) as one part per run."""
+        ends = np.cumsum([len(run.force) - run.skip for run in self.runs])[:-1]
+        return np.split(values, ends)
+
     def planned(self, runs: list[Run]) -> Problem:
         """Return a problem for runs that were not measured yet: this rig's sizes are theirs.
 

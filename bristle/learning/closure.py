@@ -20,22 +20,23 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 
+from ..comparison.names import effect_name
 from ..core.arrays import Array, Flags, Indices
 from ..core.progress import tell
 from ..core.text import percent, plain, quantity, scale
 from ..data.corrections import jumps
 from ..data.run_labels import labels_of
 from ..diagnosis.prepared import Prepared
-from ..diagnosis.trials import Trial, judge
+from ..diagnosis.trials import Trial, guesses_of, joinable, judge, short_search
 from ..identification.problem import Problem, Run, has_offset, sensors, zero_of
-from ..identification.start_grid import refine
+from ..identification.search import in_threads
+from ..identification.start_grid import SearchContext, refine
 from ..model.model import Model
-from ..physics.drive import DRIVES
-from ..physics.effect import CLOSURE
+from ..physics.drive import DRIVES, unit_for
+from ..physics.effect import CLOSURE, EFFECTS
 from ..user_code.load import defined
 from ..view import Viewable
 from .closure_file import Closure, Input, Region, Store, closure_text, evened, rounded
-from .closure_names import Nearest, nearest_effect
 from .signals import faded
 
 SPREAD = (0.05, 0.2, 0.8, 3.2)
@@ -788,3 +789,96 @@ def _lives_on(
         changed = float(np.mean((np.concatenate(rest) - own) ** 2))
         out.append((words, min(changed / total, 1.0)))
     return tuple(sorted(out, key=lambda pair: -pair[1]))
+
+
+# The effect of the library that comes nearest to what a closure carries.
+
+LOOKED = 3
+"""Effects that are searched, of those whose first steps come nearest."""
+
+NEAREST_SWEEPS = 12
+"""Jacobians of the refit of the nearest one to the runs themselves."""
+
+NEAR = 0.3
+"""Share of what a closure carries from which on an effect is named as near to it."""
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The effect that comes nearest to what a network carries, and how it does in its place.
+
+    `explains` its share of the network's squared force that the model alone cannot take over;
+    `trial` the model with it, fitted to the runs.
+    """
+
+    effect: str
+    explains: float
+    trial: Trial
+
+    def sentence(self, drive: str) -> str:
+        """Return what is said of it; `drive` is the command's channel."""
+        share, name = f"{100.0 * self.explains:.0f} %", effect_name(self.effect)
+        if self.explains < NEAR:
+            return (
+                f"No effect of the library is near: the nearest, {name}, explains {share} of what "
+                "the network carries."
+            )
+        effect, values = EFFECTS[self.effect], self.trial.model
+        sizes = ", ".join(
+            f"{own} = {quantity(values.value(f'{self.effect}.{own}'), unit)}"
+            for own, one in effect.parameters.items()
+            if own not in effect.assumed
+            for unit in (unit_for(one.unit, DRIVES[drive]),)
+        )
+        error = self.trial.error
+        left = f" leaves {percent(error.headline[1])} of the force" if error is not None else ""
+        return (
+            f"Nearest in the library: {name}, which explains {share} of what the network carries. "
+            f"In its place, fitted to the runs, it{left or ' was tried'} ({sizes})."
+        )
+
+
+def nearest_effect(
+    prepared: Prepared, base: Model, train: Problem, carried: Sequence[Array]
+) -> Nearest | None:
+    """Return the effect of the library that comes nearest to what a network carries.
+
+    Every effect that can join is fitted, with the model, to the model's force with the network's.
+
+    Parameters
+    ----------
+    prepared : the runs that judge
+    base : the model that the network is beside
+    train : runs of the training
+    carried : per run of them the network's force (n,) [N]
+    """
+    forces = [train.predict(base, run) for run in train.runs]
+    runs = [
+        replace(run, force=force + own)
+        for run, force, own in zip(train.runs, forces, carried, strict=True)
+    ]
+    told = train.of(runs)
+    told.free_zero = False
+    tell("comparing the closure with the effects of the library")
+    context, alone = (
+        SearchContext(base, told),
+        _squares_left(told, refine(base, told, NEAREST_SWEEPS)),
+    )
+    names = joinable(base, prepared.shown, told)
+    if not names or alone <= 0.0:
+        return None
+    guesses = guesses_of(names, context)
+    able = sorted(names, key=lambda name: guesses[name][0].cost)[:LOOKED]
+    ends = in_threads(lambda name: short_search(name, context, guesses[name], True).model, able)
+    left = [_squares_left(told, end) for end in ends]
+    k = int(np.argmin(left))
+    trial = judge(refine(ends[k], train, NEAREST_SWEEPS), train, prepared.held_out)
+    return Nearest(able[k], max(0.0, 1.0 - left[k] / alone), trial)
+
+
+def _squares_left(problem: Problem, model: Model) -> float:
+    """Return the sum of the squared errors of a model over the samples that count [N2]."""
+    errors = [(run.force - problem.predict(model, run))[run.skip :] for run in problem.runs]
+    return float(
+        sum(np.sum(one[run.judged] ** 2) for one, run in zip(errors, problem.runs, strict=True))
+    )

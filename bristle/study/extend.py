@@ -23,7 +23,7 @@ from .run_facts import RunChoices, facts_of, of_columns, roles_by_name
 from .runs import read_runs
 from .study import FILE as ADDED
 from .study import Study, note_addition
-from .study_file import EXCLUDE, RunFile, read_draft, with_runs
+from .study_file import EXCLUDE, RunFile, draft_of, read_draft, with_runs
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def _written(study: Study, paths: Sequence[Path], runs: tuple[RunFile, ...]) -> 
     """Copy the files, check the study that they make, then write its study.toml."""
     placed: list[Path] = []
     folder, kept = study.folder, False
-    draft = folder / ".study.toml"
+    file = folder / "study.toml"
     with study.writing():
         added = folder / ADDED
         before = added.read_bytes() if added.is_file() else None
@@ -168,14 +168,12 @@ def _written(study: Study, paths: Sequence[Path], runs: tuple[RunFile, ...]) -> 
             for path in paths:
                 placed.append(folder / "data" / path.name)
                 write_whole(placed[-1], path.read_bytes())
-            text = (folder / "study.toml").read_text(encoding="utf-8-sig")
-            write_whole(draft, with_runs(text, runs))
-            _refuse_wrong(folder, draft, runs)
-            note_addition(study, [run.file for run in runs if run.role != EXCLUDE])
-            draft.replace(folder / "study.toml")
+            text = file.read_text(encoding="utf-8-sig")
+            with draft_of(file, with_runs(text, runs)) as draft:
+                _refuse_wrong(folder, draft, runs)
+                note_addition(study, [run.file for run in runs if run.role != EXCLUDE])
             kept = True
         finally:
-            draft.unlink(missing_ok=True)
             if not kept:
                 for path in placed:
                     path.unlink(missing_ok=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.config import toml_content
-from ..core.files import write_whole
 from ..core.progress import tell
 from ..data.building_file import read_building
 from ..data.channels import (
@@ -30,7 +29,7 @@ from ..units import canonical, same_dimension
 from .history import Step
 from .new import refuse_other_columns
 from .runs import read_runs
-from .study_file import TEST, RunFile, Settings, read_settings, spec_text, with_channels
+from .study_file import TEST, RunFile, Settings, draft_of, read_settings, spec_text, with_channels
 
 if TYPE_CHECKING:
     from .study import Study
@@ -356,19 +355,15 @@ def correct_channels(
         If a file has no such column, or cannot be read by it.
     """
     with study.writing():
-        file, draft = study.folder / "study.toml", study.folder / ".study.toml"
+        file = study.folder / "study.toml"
         made = proposed(study.folder, read_settings(file), channels, without)
         gone = tuple(study.history.of_data())
         if made.changes:
             _refuse_unreadable(study.folder, made)
         if not (made.changes and write):
             return CorrectedChannels(made.changes, made.notes, gone)
-        try:
-            write_whole(draft, made.text)
+        with draft_of(file, made.text) as draft:
             _refuse_other(draft, made)
-            draft.replace(file)
-        finally:
-            draft.unlink(missing_ok=True)
         step = study.history.begin_anew(", ".join(one.channel for one in made.changes))
     return CorrectedChannels(made.changes, made.notes, gone, step)
 

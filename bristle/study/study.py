@@ -30,11 +30,10 @@ from ..version import __version__
 from ..view import Viewable
 from .history import ANEW, History, Step, building_in
 from .new import make_folder, parse_channel
-from .run_facts import refuse_too_few, roles_by_place
+from .run_facts import roles_by_place
 from .runs import (
     Runs,
     joined_corrections,
-    place_of_run,
     read_runs,
     refuse_twins,
     split_in_time,
@@ -42,11 +41,11 @@ from .runs import (
     usable,
 )
 from .study_file import (
-    EXCLUDE,
     ROLES,
     TEST,
     Settings,
     channel_as_toml,
+    draft_of,
     read_draft,
     read_settings,
     with_corrections,
@@ -356,25 +355,6 @@ class Study(Viewable):
         places = {run.place: run.corrections for run in joined}
         return self._with_settings(lambda text: with_corrections(text, places))
 
-    def with_excluded(self, names: Sequence[str]) -> Study:
-        """Write `role = "exclude"` for runs into study.toml, and return the study as it is then.
-
-        Parameters
-        ----------
-        names : of the runs, or of parts of them
-
-        Raises
-        ------
-        StudyError
-            If no run has such a name, or none would be left for training or held out.
-        """
-        places = [place_of_run(self.folder, self.settings, name) for name in names]
-        path = self.folder / "study.toml"
-        if len({*places}) == len(self.settings.runs):
-            raise StudyError(f"{path}: these are all runs; some for training are needed.")
-        refuse_too_few(path, self.settings, dict.fromkeys(places, EXCLUDE))
-        return self._with_settings(lambda text: with_roles(text, dict.fromkeys(places, EXCLUDE)))
-
     def with_roles(self, roles: Mapping[str, str]) -> Study:
         """Write what runs are for into study.toml, and return the study as it is then.
 
@@ -426,14 +406,10 @@ class Study(Viewable):
 
         A verdict on other data than there are then is set aside.
         """
-        path, draft = self.folder / "study.toml", self.folder / ".study.toml"
+        path = self.folder / "study.toml"
         with self.writing():
-            try:
-                write_whole(draft, change(path.read_text(encoding="utf-8-sig")))
+            with draft_of(path, change(path.read_text(encoding="utf-8-sig"))) as draft:
                 now = read_draft(draft, path)
-                draft.replace(path)
-            finally:
-                draft.unlink(missing_ok=True)
             if now.data != self.settings.data:
                 self.history.set_verdict_aside()
         return Study(self.folder)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -433,6 +434,18 @@ _SPEC = Spec({
     "mask": Key(bool, False), "split": Key(_split, ""),
     "runs": RUNS, "channels": CHANNELS, "extra": EXTRA,
 })  # fmt: skip
+
+
+@contextmanager
+def draft_of(path: Path, text: str) -> Iterator[Path]:
+    """Write another text of a study.toml as a draft, which takes its place if nothing is raised."""
+    draft = path.with_name(".study.toml")
+    try:
+        write_whole(draft, text)
+        yield draft
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
 
 
 def read_draft(draft: Path, path: Path) -> Settings:

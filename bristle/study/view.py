@@ -41,8 +41,7 @@ from ..diagnosis.view import error_text as verdict_error
 from ..errors import RecordError
 from ..identification.low_passed import force_budget
 from ..identification.rig import DAMPER, ROLES
-from ..learning.closure import LearnedClosure
-from ..learning.closure_names import NEAR
+from ..learning.closure import NEAR, LearnedClosure
 from ..learning.result import LearnedEffect
 from ..model.equations import equations, symbols
 from ..model.model import Model
@@ -78,16 +77,25 @@ _NAMES = dict(zip(ROLES, ("training runs", "held-out runs"), strict=True))
 
 
 @view_of(Identified)
-def identified_view(found: Identified) -> View:
-    """Return the view of an identification."""
+def identified_view(found: Identified, folder: Path | None = None) -> View:
+    """Return the view of an identification; of a study in a folder with the commands that follow.
+
+    Parameters
+    ----------
+    found : what was identified
+    folder : of the study, as it is typed
+    """
     title = title_of(found)
     told, knots = equations(found.model), split_form(found.model.law)[2]
     unit = DRIVES[found.model.drive].unit
-    said = (
-        error_text(found), z_text(found),
+    points = (
         f"Knots of the command: {', '.join(map(plain, knots))} {unit}. [1] is the value at the "
-        "first one, each other the rise from the knot before." if knots else "",
+        "first one, each other the rise from the knot before." if knots else ""
     )  # fmt: skip
+    better, then, budget = list[Block](), list[Next](), list[Text]()
+    if folder is not None:
+        better, then = _better(found, folder), _next(found, folder)
+        budget = [Text(budget_text(found.holdout or found.train, found.at.model))]
     hidden = f"These runs do not identify {joined(found.unidentified)}."
     laws: tuple[Table, ...] = ()
     if found.laws:
@@ -99,14 +107,15 @@ def identified_view(found: Identified) -> View:
     return View(
         f"Identified: {title}.",
         (
-            *map(Text, said), *(Formula(one.numbers, one.intervals) for one in told),
+            Text(error_text(found)), Text(z_text(found)), *better, Text(points),
+            *(Formula(one.numbers, one.intervals) for one in told),
             Text(symbols(found.model, told) if told else "", "soft"), parameter_table(found),
             *laws, *([_forms(found)] if found.forms else ()),
             *([Text(hidden, "note")] if found.unidentified else ()), *left_out(found),
-            *(Text(note, "note") for note in found.notes),
+            *(Text(note, "note") for note in found.notes), *then,
         ),
         (
-            Text(starts), errors_beside(found),
+            *budget, Text(starts), errors_beside(found),
             Figure(lambda: draw_identified(found), f"{title}: force measured and predicted"),
         ),
     )  # fmt: skip
@@ -282,24 +291,6 @@ def _headings(found: Identified, role: str) -> tuple[str, str]:
 
 BETTER = 0.9
 """What part of the error another form must leave to be worth a word."""
-
-
-def identified_with_next(found: Identified, folder: Path) -> View:
-    """Return the view of an identification with the commands that follow.
-
-    Parameters
-    ----------
-    found : the identification
-    folder : of the study, as it is typed
-    """
-    view, better = found.view(), _better(found, folder)
-    answer = [error_text(found), z_text(found)]
-    said = [one for one in view.blocks if isinstance(one, Text) and one.text in answer]
-    rest = [one for one in view.blocks if one not in said]
-    budget = Text(budget_text(found.holdout or found.train, found.at.model))
-    return view._replace(
-        blocks=(*said, *better, *rest, *_next(found, folder)), details=(budget, *view.details)
-    )
 
 
 def _better(found: Identified, folder: Path) -> list[Block]:
@@ -569,17 +560,15 @@ def first_run_page(study: Study) -> Page:
     return draw_data_check(runs[:1])
 
 
-def diagnosed_view(verdict: Mapping[str, Any], folder: Path, known: Sequence[str] = ()) -> View:
+def diagnosed_view(verdict: Mapping[str, Any], folder: Path) -> View:
     """Return the view of a verdict on a study's model, with the commands that follow.
 
     Parameters
     ----------
     verdict : as verdict.json has it
     folder : of the study, as it is typed
-    known : the effects that its model has by now
     """
-    view = verdict_view(verdict)
-    return view._replace(blocks=(*view.blocks, *next_steps(verdict, folder, known)))
+    return verdict_view(verdict).then(*next_steps(verdict, folder))
 
 
 def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
@@ -598,9 +587,8 @@ def story_view(study: Study, verdict: Mapping[str, Any]) -> View:
     other = verdict.get("law", model.law) not in (model.law, split_form(model.law)[0])
     advised = [] if other or (doubtful and not halves(doubtful[0])) else new
     known = verdict["effects"] if other else model.effects
-    view = verdict_view({**verdict, "gains": new})
     then = next_steps({**verdict, "gains": advised}, study.folder, known)
-    view = view._replace(blocks=(*view.blocks, *then))
+    view = verdict_view({**verdict, "gains": new}).then(*then)
     steps = history_steps(study.steps())
     measured = [one for one in steps if one.rms is not None]
     if not measured:
@@ -634,8 +622,7 @@ def learned_with_next(found: LearnedEffect, folder: Path) -> View:
             Next(command("compare", folder), "shows where the error is"),
             Next(closure, "carries it without a formula"),
         )
-    view = found.view()
-    return view._replace(blocks=(*view.blocks, *then))
+    return found.view().then(*then)
 
 
 def closure_with_next(found: LearnedClosure, folder: Path) -> View:
@@ -646,8 +633,7 @@ def closure_with_next(found: LearnedClosure, folder: Path) -> View:
     if found.nearest is not None and found.nearest.explains >= NEAR:
         name = found.nearest.effect
         then = (*then, Next(command("add", folder, name), "takes the effect in its place"))
-    view = found.view()
-    return view._replace(blocks=(*view.blocks, *then))
+    return found.view().then(*then)
 
 
 PAYS = 0.9

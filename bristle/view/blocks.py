@@ -68,21 +68,25 @@ class View(NamedTuple):
     details: tuple[Block, ...] = ()
     tone: str = ""
 
+    def then(self, *blocks: Block) -> View:
+        """Return the view with more blocks behind its answer."""
+        return self._replace(blocks=(*self.blocks, *blocks))
+
     def every(self, kind: type[Shown]) -> Iterator[Shown]:
         """Yield the blocks of a kind, those of the answer first."""
         yield from (one for one in (*self.blocks, *self.details) if isinstance(one, kind))
 
 
 Shown = TypeVar("Shown", Text, Table, Figure, Formula, Next)
-Result = TypeVar("Result")
+Made = TypeVar("Made", bound=Callable[..., View])
 VIEWS: dict[type, Callable[[Any], View]] = {}
 """What makes the view of each kind of result."""
 
 
-def view_of(kind: type[Result]) -> Callable[[Callable[[Result], View]], Callable[[Result], View]]:
+def view_of(kind: type[Any]) -> Callable[[Made], Made]:
     """Register the function that follows as what makes the view of a kind of result."""
 
-    def register(made: Callable[[Result], View]) -> Callable[[Result], View]:
+    def register(made: Made) -> Made:
         VIEWS[kind] = made
         return made
 

@@ -20,11 +20,11 @@ from bristle.learning.closure import (
     label_inputs,
     learn_closure,
     lowers,
+    nearest_effect,
     one_amplitude,
     promised,
 )
 from bristle.learning.closure_file import Closure, closure_text
-from bristle.learning.closure_names import nearest_effect
 from bristle.model.model import Model
 from bristle.physics.damper import DamperModel, functions_of, room, setup_of
 from bristle.physics.generate import Link

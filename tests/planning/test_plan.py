@@ -472,7 +472,7 @@ def test_a_plan_says_that_its_model_or_verdict_is_of_other_data(
     model, verdict = notes_of_change(bristle.Study(study.folder))
     assert "present model was identified with. Identify it again:" in model
     assert "no longer those of this verdict. Diagnose again:" in verdict
-    bristle.Study(study.folder).with_excluded([study.files("train")[1].stem])
+    bristle.Study(study.folder).with_roles({study.files("train")[1].stem: "exclude"})
     with pytest.raises(StudyError, match="have been changed meanwhile"):
         bristle.plan(opened, see="coil_lag")
 

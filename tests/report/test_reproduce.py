@@ -71,7 +71,7 @@ def test_the_commands_make_the_same_study(study: Study, capsys: pytest.CaptureFi
 
 
 def test_a_run_that_is_left_out_is_there_again(study: Study) -> None:
-    study = study.with_excluded(["run 1"])
+    study = study.with_roles({"run 1": "exclude"})
     (study.folder / "data" / "run 1.csv").write_text("no table\n")
     lines = commands(study)
     for line in lines[: [" study check " in line for line in lines].index(True)]:

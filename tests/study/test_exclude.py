@@ -22,7 +22,7 @@ def test_an_excluded_run_is_read_by_nothing_and_said_to_be_left_out(folder, caps
     path = folder / "study.toml"
     before = path.read_text(encoding="utf-8")
     capsys.readouterr()
-    Study(folder).with_excluded(["run_3"])
+    Study(folder).with_roles({"run_3": "exclude"})
     assert main(["study", "check", str(folder)]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert 'Left out by role = "exclude" in study.toml: data/run_3.csv.' in told
@@ -42,7 +42,7 @@ def test_an_excluded_run_is_read_by_nothing_and_said_to_be_left_out(folder, caps
 
 
 def test_corrections_reach_their_run_behind_one_that_is_left_out(folder):
-    study = Study(folder).with_excluded(["run_1"])
+    study = Study(folder).with_roles({"run_1": "exclude"})
     from bristle.data.corrections import Correction
 
     study = study.with_corrections({"run_4": [Correction("force", "gain", 1.2)]})
@@ -52,9 +52,9 @@ def test_corrections_reach_their_run_behind_one_that_is_left_out(folder):
 def test_names_that_are_no_run_and_leaving_out_all_are_refused(folder):
     study = Study(folder)
     with pytest.raises(StudyError, match='no run is called "run_9"; there are run_1'):
-        study.with_excluded(["run_9"])
-    with pytest.raises(StudyError, match="these are all runs"):
-        study.with_excluded(["run_1", "run_2", "run_3", "run_4"])
+        study.with_roles({"run_9": "exclude"})
+    with pytest.raises(StudyError, match="no run would be left"):
+        study.with_roles(dict.fromkeys(["run_1", "run_2", "run_3", "run_4"], "exclude"))
     path = folder / "study.toml"
     text = path.read_text(encoding="utf-8")
     every = text.replace('role = "train"', 'role = "exclude"')
@@ -82,7 +82,7 @@ def test_a_table_of_runs_leaves_runs_out(tmp_path):
 def test_leaving_out_the_last_run_held_out_is_refused_before_it_is_written(folder):
     before = (folder / "study.toml").read_bytes()
     with pytest.raises(StudyError, match="no run would be held out") as refused:
-        Study(folder).with_excluded(["run_2"])
+        Study(folder).with_roles({"run_2": "exclude"})
     assert (folder / "study.toml").read_bytes() == before
     words = str(refused.value)
     assert "one of run_1, run_3, run_4 as RUN" in words

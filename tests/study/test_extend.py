@@ -117,7 +117,7 @@ def test_a_step_with_the_number_of_an_undone_one_knows_the_runs(rig: Path, tmp_p
 
 def test_a_run_that_was_taken_out_again_is_not_told(rig: Path, tmp_path: Path) -> None:
     extended = extend_study(identified(rig), [new_run(tmp_path)])
-    study = extended.study.with_excluded(["day_2"])
+    study = extended.study.with_roles({"day_2": "exclude"})
     assert behind_data(study) == ""
 
 

@@ -114,7 +114,7 @@ def notes(study: Study) -> str:
     "change",
     [
         lambda study: study.with_roles({"run_3": "holdout"}),
-        lambda study: study.with_excluded(["run_3"]),
+        lambda study: study.with_roles({"run_3": "exclude"}),
         lambda study: study.with_mask(),
         lambda study: study.with_corrections({"run_1": [Correction("force", "bias", 1.0)]}),
     ],

@@ -45,7 +45,7 @@ def test_a_correction_is_of_the_run_that_is_named(study: Study):
     assert [run.name for run in study.read()] == ["run_1.csv", "run_2", "run_3", "run_1.txt"]
     study = study.with_corrections({"run_1.txt": [Correction("force", "gain", 1.25)]})
     assert [len(run.corrections) for run in study.settings.runs] == [0, 0, 0, 1]
-    study = study.with_excluded(["run_1.csv"])
+    study = study.with_roles({"run_1.csv": "exclude"})
     assert [run.file for run in study.settings.excluded] == ["data/run_1.csv"]
     # The others keep their names, and so does the one that is left out.
     assert [run.name for run in study.read()] == ["run_2", "run_3", "run_1.txt"]
@@ -62,7 +62,7 @@ def test_a_name_that_could_be_either_is_refused(study: Study):
     with pytest.raises(StudyError, match=there):
         study.with_corrections({"run_1": [Correction("force", "gain", 1.25)]})
     with pytest.raises(StudyError, match=there):
-        study.with_excluded(["run_1"])
+        study.with_roles({"run_1": "exclude"})
     with pytest.raises(StudyError, match=there):
         study.with_roles({"run_1": "test"})
 
