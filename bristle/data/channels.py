@@ -232,12 +232,13 @@ _PLACES = {
     "base": "base isolator isolation isol slab layer bearing basis",
     "floor": "floor storey story level fl roof stockwerk etage andar",
     "damper": "damper mr fluid friction rod dampfer amortecedor coil measured meas",
-    "other": "normal axial spring preload holding extra command cmd setpoint soll ref reference "
-    "desired target vertical lateral temperature torque",
+    "other": "normal axial spring preload holding extra command cmd set setpoint soll ref "
+    "reference desired demand target vertical lateral temperature torque",
     "sensed": "temperature temp temperatur temperatura thermocouple thermoelement termopar tc "
     "pt100 pressure druck pression presion pressao torque drehmoment strain dehnung humidity "
     "feuchte accelerometer gauge dms",  # commands nothing, whatever unit its signal has
-    "commanding": "coil damper mr mrf cmd command setpoint soll ref reference desired target drive",
+    "commanding": "coil damper mr mrf cmd command set setpoint soll ref reference desired demand "
+    "target drive",
 }
 _GROUND, _BASE, _FLOOR, _DAMPER, _OTHER, _SENSED, _COMMANDING = (
     frozenset(ws.split()) for ws in _PLACES.values()

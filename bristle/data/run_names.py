@@ -29,7 +29,8 @@ DOUBTFUL = f"_- xXdD'~=;#^:+\u2013\u2014\u00f7!$&@\u00a7`\u00b4\u2019\ufffd{_HAR
 SPELLED = {
     "pct": "%", "percent": "%", "C": "degC", "inch": "in", "PSI": "psi", "Nm": "N.m", "hz": "Hz",
     "HZ": "Hz", "MM": "mm",
-    **{word: word[0].upper() for word in ("amp", "Amp", "AMP", "ampere", "Ampere", "volt", "Volt")},
+    "volt": "V", "Volt": "V",
+    **dict.fromkeys(("amp", "Amp", "AMP", "AMPS", "ampere", "Ampere"), "A"),
 }  # fmt: skip
 """Units as names spell them."""
 
@@ -42,7 +43,7 @@ _OF_LABELS = {"pressure": "psi|PSI|mbar|bar|hPa|kPa|MPa|Pa", "load": "kN|lbf", "
 """Units that tell a label by themselves, which is then called by both: pressure_psi."""
 _UNITS_IN_NAMES = "|".join(
     [
-        "mA|[aA]mperes?|[aA]mps?|AMP|A|mV|[vV]olts?|V|mT|pct|percent|%|Hz|hz|HZ|mm|MM|cm|um|inch|in",
+        "mA|[aA]mperes?|[aA]mps?|AMPS?|A|mV|[vV]olts?|V|mT|pct|percent|%|Hz|hz|HZ|mm|MM|cm|um|inch|in",
         "degC|degF|C",
         *_OF_LABELS.values(),
     ]

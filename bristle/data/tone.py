@@ -107,10 +107,10 @@ def amplitude_fits(stated: float, found: Tone, told: Sequence[float] = TOLD) -> 
     return amplitude_off(stated, found, told) <= log(FULLY)
 
 
-def label_doubts(labels: Sequence[Labels], found: Sequence[Tone | None]) -> list[str]:
-    """Return which labels of each run its motion contradicts, in words; "" where none.
+def times_told(labels: Sequence[Labels], found: Sequence[Tone | None]) -> float:
+    """Return of how many amplitudes those that runs are labelled with are: 1, or 2 for strokes.
 
-    All amplitudes of a campaign are told in one way: as amplitudes, or as strokes.
+    All of a campaign are told in one way.
 
     Parameters
     ----------
@@ -121,7 +121,17 @@ def label_doubts(labels: Sequence[Labels], found: Sequence[Tone | None]) -> list
         for one, tone in zip(labels, found, strict=True)
         if tone is not None and isinstance(size := one.get("amplitude"), float)
     ]
-    told = max(TOLD, key=lambda times: sum(amplitude_fits(*one, (times,)) for one in known))
+    return max(TOLD, key=lambda times: sum(amplitude_fits(*one, (times,)) for one in known))
+
+
+def label_doubts(labels: Sequence[Labels], found: Sequence[Tone | None]) -> list[str]:
+    """Return which labels of each run its motion contradicts, in words; "" where none.
+
+    Parameters
+    ----------
+    labels, found : (n,) of the runs, None where a motion is not known
+    """
+    told = times_told(labels, found)
     return [
         "" if tone is None else _label_doubt(one, tone, told)
         for one, tone in zip(labels, found, strict=True)

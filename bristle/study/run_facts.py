@@ -32,7 +32,7 @@ from ..data.run_names import (
 )
 from ..data.table import Table
 from ..data.titles import Column, title, unit_or_none
-from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubts
+from ..data.tone import Tone, amplitude_fits, frequency_fits, label_doubts, times_told
 from ..errors import RecordError, StudyError, UnitError
 from ..units import convert, same_dimension
 from .runs import names_of_runs
@@ -166,7 +166,7 @@ def facts_of(
     if len({file.parent for file in files}) > 1:  # lab/0.5A/run_1.csv
         files = [Path(f"{one.parent.name}_{one.name}") for one in files]
     reading = reading_of([*files, *others], [*tones, *([None] * len(others))])
-    found, notes = _offered(files, choices, commanded, reading)
+    found, notes = _offered(files, choices, commanded, reading, tones)
     found = [one.and_(other) for one, other in zip(columns or found, found, strict=True)]
     for pattern in choices.levels:
         rows = [_matched(file, pattern, reading, level=True) for file in files]
@@ -266,8 +266,9 @@ def _texts(name: str, values: Iterable[Label], *, level: bool) -> list[str]:
 
 
 def _offered(
-    files: Sequence[Path], choices: RunChoices, commanded: bool, reading: Reading
-) -> tuple[list[Facts], list[str]]:
+    files: Sequence[Path], choices: RunChoices, commanded: bool, reading: Reading,
+    tones: Sequence[Tone | None],
+) -> tuple[list[Facts], list[str]]:  # fmt: skip
     """Return what all names tell without being asked, and the sentences that say so."""
     tokens = [tokens_of(file, reading) for file in files]
     shared = [name for name in tokens[0] if all(name in one for one in tokens)] if tokens else []
@@ -294,11 +295,15 @@ def _offered(
             takes = takes if _fits(files, pattern, reading) else ""
             notes.append(f'"{seen}" and the like in the names may count the files{takes}')
             continue
+        told = times_told([{name: one} for one in values], tones)
+        values = [one / told for one in values]
         more = [_fact(name, value, level=drive) for value in values]
         text = (
             f'{label_name(name)} of each run: from the names of the files, as in "{seen}": '
             f"{', '.join(_texts(name, sorted({*values}), level=drive))}"
         )
+        if told != 1.0:
+            text += f'. By the measured motion "{seen}" is the stroke, twice of it'
         if name in reading.doubts:
             text += f". Doubtful: {reading.doubts[name]}"
         if drive:

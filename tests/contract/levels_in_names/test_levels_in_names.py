@@ -130,7 +130,7 @@ def test_a_unit_may_stand_for_the_decimal_mark(tmp_path) -> None:
         (("500mA", "1000mA", "0mA"), (0.5, 1.0, 0.0)),
         (("I0_5A", "I1A", "I0_25A"), (0.5, 1.0, 0.25)),
         (("20C2A", "40C1A", "60C0A"), (2.0, 1.0, 0.0)),
-        (("0.5Amps_a", "1Amp_b", "0Amps_c"), (0.5, 1.0, 0.0)),
+        (("0.5Amps_a", "1AMP_b", "0AMPS_c"), (0.5, 1.0, 0.0)),
         (("0.8712V_ensaio1_2_2", "0.0000V_ensaio10_1", "3.2120V_A_10"), (0.8712, 0.0, 3.212)),
     ],
 )  # fmt: skip
@@ -273,7 +273,9 @@ def test_two_names_that_say_the_same_of_different_motions(tmp_path, capsys) -> N
 def test_a_stroke_in_the_name_and_a_rig_that_reaches_less_are_no_contradiction(tmp_path, capsys):
     data = made(tmp_path / "lab", {"20mm_1Hz_1A": (1.0, 1.0), "20mm_2Hz_2A": (1.9, 2.0)}, 0.009)
     assert main(["study", "new", str(tmp_path / "rig"), "--data", data]) == 0
-    assert "by its label" not in " ".join(capsys.readouterr().out.split())
+    said = " ".join(capsys.readouterr().out.split())
+    assert "by its label" not in said
+    assert '"20mm": 10 mm. By the measured motion "20mm" is the stroke, twice of it' in said
 
 
 def test_two_columns_of_one_command_are_refused(tmp_path, capsys) -> None:
