@@ -23,7 +23,7 @@ from .corrections import TIMING, Correction, jumps
 from .noise import SHORTEST, Noise, estimate_noise, is_switched
 from .sampling import Even
 
-# Between the samples of a decimated run: where a model is evaluated, and the filter behind it.
+# Between samples: where a model is evaluated, and the filter behind it where the run is decimated.
 #
 # A force jumps where the motion turns or the command switches, and the measured one went through a
 # short filter before samples were left out. So does a model's: it is evaluated at several moments
@@ -68,14 +68,21 @@ def between(y: Array, rate: Array | None, dt: float, parts: int = 2) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Finer:
-    """How a model of a decimated run is evaluated: at `parts` moments per sample.
+    """How a model of a run is evaluated: at `parts` moments per sample.
 
     `since` (n,) says at how many of the moments up to each sample the command had gone over to its
-    value there, should it jump: a part of one where it jumped about a moment.
+    value there, should it jump: a part of one where it jumped about a moment. `decimated` is
+    whether samples were left out behind a filter.
     """
 
     parts: int
     since: Array
+    decimated: bool = True
+
+    @property
+    def taps(self) -> Array:
+        """The filter (k,) that is between the moments and the samples."""
+        return hann(self.parts) if self.decimated else _NONE
 
     def of(self, part: slice) -> Finer:
         """Return that of some neighbouring samples."""
@@ -83,7 +90,8 @@ class Finer:
 
     def cut(self, parts: int) -> Finer:
         """Return the same with another number of moments per sample."""
-        return Finer(parts, (self.since - 0.5) * parts / self.parts + 0.5)
+        since = (self.since - 0.5) * parts / self.parts + 0.5
+        return replace(self, parts=parts, since=since if self.decimated else self.since)
 
     def motion(self, x: Array, v: Array, a: Array, dt: float) -> tuple[Array, Array, Array]:
         """Return a motion (n,) at all moments (m,): Hermite's cubics, that of `a` by its slope.
@@ -109,13 +117,35 @@ class Finer:
 
     def filtered(self, force: Array) -> Array:
         """Return what the filter leaves at the samples (n,) of a force at all moments (m,)."""
-        half = self.parts - 1
+        taps = self.taps
+        half = len(taps) // 2
         with np.errstate(invalid="ignore"):  # a force that is not finite stays so, and is refused
             begin = 2.0 * force[0] - force[half:0:-1]
             end = 2.0 * force[-1] - force[-2 : -half - 2 : -1]
             around = np.concatenate([begin, force, end])
             rows = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1)[:: self.parts]
-            return np.asarray(rows @ hann(self.parts))
+            return np.asarray(rows @ taps)
+
+
+TURN = 0.03
+"""Change of a velocity from one moment to the next, over its RMS, that a model's states follow."""
+
+
+def slow(v: Array, a: Array, dt: float) -> Finer | None:
+    """Return how a model is evaluated between the samples of a run that was sampled slowly.
+
+    What a law's states do from one sample to the next, where the motion turns or oil gives way, is
+    lost in one step: a true model then errs by more than noise. So it goes on by `RATE` at the
+    least, or by less where the motion hardly changes over a step. None where samples suffice.
+
+    Parameters
+    ----------
+    v, a : velocity and acceleration (n,) [m/s, m/s2]
+    dt : s between samples
+    """
+    turns = dt * float(np.linalg.norm(a)) / max(float(np.linalg.norm(v)), 1e-300)
+    parts = int(min(np.ceil(RATE * dt - 1e-6), np.ceil(turns / TURN), MOST))
+    return Finer(parts, np.ones(len(v)), decimated=False) if parts > 1 else None
 
 
 # Channels whose clock is late, or runs fast or slow, at the times of the others.

@@ -140,15 +140,21 @@ def _with_intervals(found: SiteDiagnosis, prepared: Prepared) -> SiteDiagnosis:
         fitted = multistart_refit(prepared.problem, after.model, SWEEPS)
     else:
         fitted = intervals_of(prepared.problem, after.model)
-    if prepared.bench and is_rough(after.model):
-        again = judge(fitted.model, prepared.problem, prepared.held_out)
-        after = min(after, again, key=lambda one: one.z)
+    model = fitted.model
+    rough = is_rough(model)
+    if prepared.bench and (rough or found.effects):
+        again = judge(model, prepared.problem, prepared.held_out)
+        if rough:
+            after = min(after, again, key=lambda one: one.z)
+            model = after.model
+        else:  # the error is that of the values which are told
+            after = replace(after, error=again.error)
     identifiable = {
         name: max(std, found.std.get(name, 0.0))  # that over runs, where runs were left out
         for name, std in fitted.std.items()
         if name not in fitted.unidentified
     }
-    return replace(found, model=fitted.model, after=after, z_after=after.z, std=identifiable)
+    return replace(found, model=model, after=after, z_after=after.z, std=identifiable)
 
 
 @with_labels

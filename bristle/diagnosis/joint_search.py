@@ -131,8 +131,8 @@ def _sought(
     """Search the effects that laws lack; return the pair that the runs ask for, and the others.
 
     Where no pair explains the runs, what the nearest one misses counts beside the noise for all.
-    The one that is chosen is looked at in full, on all runs: where it explains them no more, the
-    next one is.
+    The one that is chosen is looked at in full, on all runs: where it explains them no more, or
+    another one then comes nearer, the next one is.
     """
     with counted(MOST_SPENT) as by_law.effort:
         pairs = search(rows, by_law, by_law.enough, by_law.promise)
@@ -152,7 +152,7 @@ def _sought(
         chosen = replace(chosen, finding=confirmed(chosen.finding, chosen.prepared))
         whole[found.row.law] = chosen
         pairs = [chosen if pair is found else pair for pair in pairs]
-        if chosen.explains or not found.explains:
+        if chosen.explains:
             break
     else:
         chosen = found

@@ -9,6 +9,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..data.corrections import LEFT_OUT
 from ..data.cut_off import derived_velocity
+from ..data.decimate import slow
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.drive import VOLTAGE
@@ -67,7 +68,8 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, start.first, measurement.left_out(*needed),
         drive or VOLTAGE.name, measurement.labels, start.rest, start.opening, measurement.extra,
-        finer=measurement.finer, untold=untold(measurement, ("force",)),
+        finer=measurement.finer or slow(motion.v, motion.a, dt),
+        untold=untold(measurement, ("force",)),
     )  # fmt: skip
 
 

@@ -302,10 +302,10 @@ class Run:
     motion remembers what was before, 0 where it begins otherwise; `extra` its channels
     besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
     was not measured and follows from the motion, beside `noise` and each with its draw of `draws`;
-    `finer` how models are evaluated between the samples of a decimated run, None for others;
-    `untold` names the channels of the force whose noise cannot be told from their signal: `noise`
-    is then a lower limit; `pulse` (2 k + 1,) is what a force that was not measured shows of a
-    pulse, None where it shows all.
+    `finer` how models are evaluated between the samples of a decimated or slow run, None for
+    others; `untold` names the channels of the force whose noise cannot be told from their signal:
+    `noise` is then a lower limit; `pulse` (2 k + 1,) is what a force that was not measured shows
+    of a pulse, None where it shows all.
     """
 
     name: str

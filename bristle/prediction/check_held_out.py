@@ -41,11 +41,11 @@ def force_of(proof: dict[str, Any], run: str, parts: int) -> Any:
     pulse = np.array(proof["pulse_response"][run])  # of the load cell; before, the force was held
     begun = np.concatenate([np.full(len(pulse) - 1, force[0]), force])
     force = np.convolve(begun, pulse, "valid")
-    half = parts - 1  # a Hann window as long as two samples; it goes on point-symmetrically
-    taps = np.hanning(2 * parts + 1)[1:-1]
+    taps = np.array(proof["filter"][run])
+    half = len(taps) // 2  # it goes on point-symmetrically
     begin, end = 2 * force[0] - force[half:0:-1], 2 * force[-1] - force[-2 : -half - 2 : -1]
     around = np.concatenate([begin, force, end]) if half else force
-    return np.convolve(around, taps / taps.sum(), "valid")[::parts] + proof["load_cell_zero"]
+    return np.convolve(around, taps, "valid")[::parts] + proof["load_cell_zero"]
 
 
 def main() -> None:

@@ -601,6 +601,7 @@ def write_proof(proof: Proof, held: HeldOut, fmu: Path, folder: Path) -> list[Pa
         "moments_per_sample": {
             run.name: run.finer.parts if run.finer else 1 for run in held.runs
         },
+        "filter": {run.name: run.finer.taps.tolist() if run.finer else [1.0] for run in held.runs},
         "start_values": {
             run.name: start_values(held.damper, fed, run)
             for run, fed in zip(held.runs, held.fed, strict=True)

@@ -251,6 +251,7 @@ def _with_law_taken(
     if taken is None or found.laws is None:
         return found
     stepped(taken.step)
-    found = replace(found, laws=replace(found.laws, before=found.law))
+    # The error is that of the model which the study keeps, fitted by its own weights.
+    found = replace(found, laws=replace(found.laws, before=found.law), error=taken.errors.at)
     study.write_verdict(verdict_of(study, found))
     return found

@@ -270,6 +270,10 @@ def test_auto_takes_the_law_and_adds_the_effect(hidden):
     assert (study.model().law, list(study.model().effects)) == ("bingham", ["gas_spring"])
     assert done.verdict.kind == "none"
     assert [step.what for step in done.steps] == ["identify bingham", "add gas_spring"]
+    taken = done.steps[0]
+    kept = json.loads((hidden / "history" / f"{taken.number:03}" / "verdict.json").read_text())
+    error = kept["error"]["holdout"]["share"]
+    assert error == taken.after["error_share_holdout"]  # of the model that the step keeps
 
 
 @pytest.mark.slow  # law free: every law with every effect
