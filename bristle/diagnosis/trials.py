@@ -38,7 +38,8 @@ from .rule import BENCH
 
 SCORED, ABLE = 0.04, 4
 """Share of the best score from which on an effect is screened from all its starts, and how many are
-whatever they score; the others begin at their best start."""
+whatever they score; the others begin at their best start. None is that scores so little beside what
+a verdict asks for: that is chance."""
 
 SCREENING = 3
 """Jacobians of the search that decides which effects could win, from the best start of each."""
@@ -192,6 +193,7 @@ def guesses_of(names: Sequence[str], context: SearchContext) -> dict[str, list[C
     )
     ranked = sorted((score for score, _ in scores.values()), reverse=True)
     least = min(SCORED * ranked[0], ranked[min(ABLE, len(ranked)) - 1]) if ranked else 0.0
+    least = max(least, SCORED * (1.0 - (1.0 - BENCH.gain) ** 2))
 
     def look(name: str) -> list[Candidate]:
         score, starts = scores[name]

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from scipy.ndimage import convolve1d
@@ -430,7 +430,7 @@ class Problem:
 
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
-        self._benches: dict[tuple[str, tuple[str, ...]], DamperForces] = {}
+        self._benches: dict[tuple[Any, ...], DamperForces] = {}
         self._sizes: dict[str, float] = {}
 
     @property
@@ -446,7 +446,7 @@ class Problem:
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""
         made = self._made_of(runs)
-        made.free_zero, made.excess = self.free_zero, self.excess
+        made.free_zero, made.excess, made._benches = self.free_zero, self.excess, self._benches
         return made
 
     def _made_of(self, runs: list[Run]) -> Problem:
@@ -465,7 +465,7 @@ class Problem:
         own = [run.extra for run in self.runs]
         made = self.of([replace(run, extra=at_means(own, len(run.x))) for run in runs])
         self.size("N")
-        made._sizes, made._benches = self._sizes, self._benches
+        made._sizes = self._sizes
         return made
 
     def with_free_zero(self) -> Problem:
@@ -483,7 +483,7 @@ class Problem:
             return self
         made = self.of(self.runs)
         made.excess = excess
-        made._sizes, made._benches = self._sizes, self._benches
+        made._sizes = self._sizes
         return made
 
     def damper_effects(self, law: str) -> list[str]:
@@ -546,7 +546,8 @@ class Problem:
 
     def bench(self, model: Model) -> DamperForces:
         """Return what predicts a model's force, made once."""
-        key = (model.law, model.effects)
+        # By their classes: another effect may have the name of one that was learned before.
+        key = (LAWS[model.base_law], *(EFFECTS.get(name, name) for name in model.effects))
         if key not in self._benches:
             self._benches[key] = DamperForces(model.base_law, list(model.effects))
         return self._benches[key]

@@ -115,6 +115,7 @@ class Study(Viewable):
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
         self._seen_data = ""
+        self._read: dict[str | None, tuple[Any, list[Measurement]]] = {}
 
     own_effects: list[Loaded]
     """The files of effects/, each with its effect or why it is left out."""
@@ -181,12 +182,17 @@ class Study(Viewable):
     def read(self, role: str | None = None) -> list[Measurement]:
         """Return the measurements as they are in the files, without a look at what they are for.
 
+        Files are read again where their content or the settings are others.
+
         Raises
         ------
         RecordError
             If a file cannot be read.
         """
-        return read_runs(self.folder, self.settings, role)
+        now = self.settings, [_of_file(file) for file in self.files(role)]
+        if role not in self._read or self._read[role][0] != now:
+            self._read[role] = now, read_runs(self.folder, self.settings, role)
+        return [*self._read[role][1]]
 
     def runs(self) -> Runs:
         """Return the measurements for training and those held out; test runs are not read.
