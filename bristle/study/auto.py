@@ -176,12 +176,12 @@ def _gained(
 
     Return the step, why there is none or not all was compared, and what the look began with.
     """
-    say("effects that improve the prediction")
     before = fitted = study.model()
     known = found.before.model if found.before is not None else before
     if (known.law, known.effects) == (before.law, before.effects):
         fitted = replace(before, values={**before.values, **known.values})
     opened = opened_at(study, "", fitted)[1]
+    say("effects that improve the prediction")
     laws = found.laws.rows if found.laws is not None and not before.effects else ()
     refuted = ""
     for labels in (True, False):  # a law of a label may fail at a level that no training run had
