@@ -290,7 +290,8 @@ def serve() -> None:
     """Try the files that stand on the standard input; `trial.tried` starts a child for it."""
 
     def run(order: dict[str, Any]) -> None:
-        made = _made(order["text"], Path(order["path"]), Path(order["shown"]), order["word"])
+        path, shown = Path(order["path"]), Path(order["shown"])
+        made = _made(order["text"], path, shown, order["word"], alone=True)
         _KINDS[order["word"]].probe(made)
 
     trial.serve(run)
@@ -317,8 +318,11 @@ def _refuse_coding(text: str) -> None:
             raise FlawError(f"coding {named[1]}; utf-8 is right.", number)
 
 
-def _made(text: str, path: Path, shown: Path, word: str) -> Any:
-    """Return the effect or law that a file's text defines, registered; FlawError if not right."""
+def _made(text: str, path: Path, shown: Path, word: str, *, alone: bool = False) -> Any:
+    """Return the effect or law that a file's text defines, registered; FlawError if not right.
+
+    Where it is read `alone`, the user's own law or effect that it may change is not there.
+    """
     kind = _KINDS[word]
     tree = _parsed(text, shown, word)
     other = kind.known.get(path.stem)
@@ -334,7 +338,7 @@ def _made(text: str, path: Path, shown: Path, word: str) -> Any:
     try:
         exec(compile(tree, str(path), "exec"), module.__dict__)
         made = _only_one(module, path, tree, kind)
-        _check(made, tree, kind)
+        _check(made, tree, kind, alone=alone)
     except BaseException as error:
         kind.known.clear()
         kind.known.update(before)
@@ -383,12 +387,12 @@ def _only_one(module: ModuleType, path: Path, tree: ast.Module, kind: _Kind) -> 
     return made
 
 
-def _check(made: Any, tree: ast.Module, kind: _Kind) -> None:
+def _check(made: Any, tree: ast.Module, kind: _Kind, *, alone: bool) -> None:
     """Refuse class data that the rest of the package could not work with."""
     line = next(node.lineno for node in tree.body if isinstance(node, ast.ClassDef))
     try:
         if kind.base is Effect:
-            _check_effect(made)
+            _check_effect(made, anywhere=alone and bool(made.changes))
         else:
             _check_law(made)
         if made.name in kind.others:
@@ -409,13 +413,14 @@ def _check(made: Any, tree: ast.Module, kind: _Kind) -> None:
         raise FlawError(str(error), line) from None
 
 
-def _check_effect(effect: type[Effect]) -> None:
+def _check_effect(effect: type[Effect], *, anywhere: bool) -> None:
     for name in effect.fields():
         if not name.isidentifier() or name == "on" or name.endswith("_0"):
             raise FlawError(f'a parameter cannot be named "{name}"; a word such as "k" is right.')
-    if effect.site == "damper" and not laws_joined(effect):
-        parts = ", ".join(effect.acts_on)
-        raise FlawError(f"no law has the parts that it acts on ({parts}): it would join none.")
+    if effect.site == "damper" and not anywhere and not laws_joined(effect):
+        what = "the parts that it acts on ({})".format(", ".join(effect.acts_on))
+        what = f'"{effect.changes}", which it changes' if effect.changes else what
+        raise FlawError(f"no law has {what}: it would join none.")
 
 
 def _check_law(law: type[Law]) -> None:

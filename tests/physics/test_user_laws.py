@@ -147,6 +147,50 @@ def test_an_effect_whose_parts_no_law_has_is_refused(tmp_path: Path) -> None:
     assert "acts_on ['charm']" in loaded.error
 
 
+OWN = '''"""A coefficient of my own law, by the label oil of the runs."""
+
+from bristle.physics.effect import Effect, Parameter
+
+
+class Thinner(Effect):
+    """The coefficient depends on the oil."""
+
+    name = "thinner"
+    sites = ("damper",)
+    needs = ("value",)
+    changes = "c_own"
+    passive = True
+    source = expect = "-"
+    assumed = ("oil",)
+    labels = {"oil": "oil"}
+    parameters = {
+        "slope": Parameter(2.0, "N.s/m", (-9.0, 9.0), "per unit"),
+        "oil": Parameter(1.0, "1", (0.0, 9.0), "of the run"),
+    }
+
+    @staticmethod
+    def changed(q, z, p):
+        return q.value + p.slope * p.oil
+'''
+
+
+def test_an_effect_may_change_a_parameter_that_only_an_own_law_has(tmp_path: Path) -> None:
+    effects, laws = tmp_path / "effects", tmp_path / "laws"
+    effects.mkdir()
+    (effects / "thinner.py").write_text(OWN, encoding="utf-8")
+    (loaded,) = load.load(effects)
+    assert loaded.error.endswith('no law has "c_own", which it changes: it would join none.')
+    written(laws, **{VISCOUS: "return p.c_own * q.v", '"c": Parameter': '"c_own": Parameter'})
+    load.load(laws, "law")
+    (effects / "thinner.py").write_text(OWN.replace("2.0", "3.0"), encoding="utf-8")
+    (loaded,) = load.load(effects)
+    assert loaded.error == ""
+    own = damper.DamperModel("rubbing", {}, ["thinner"])
+    plain = damper.DamperModel("rubbing", {}, [])
+    forces = [one.force(0.0, 0.03, 0.0, 0.0, 0.002, 0.0, 0.0, False) for one in (own, plain)]
+    assert forces[0] - forces[1] == pytest.approx(3.0 * 0.03)
+
+
 @pytest.mark.parametrize("gap", ["0.012", "0.5", "1e-5"])
 def test_what_begins_behind_a_knot_moves_something(gap: str, tmp_path: Path) -> None:
     text = file_text("effect", "stop").replace("from math import tanh\n\n", "")
