@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
+from ..version import __version__
 from ._options import Parser
 
 _BLAS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -82,7 +83,7 @@ def build_parser(only: str = "") -> Parser:
         epilog="Exit codes: 0 done, 1 failed during the work, 2 the input is wrong, 130 "
         "interrupted.",
     )
-    parser.add_argument("--version", action="version", version=_version())
+    parser.add_argument("--version", action="version", version=f"bristle {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for found in pkgutil.iter_modules(__path__):
         if found.name.startswith("_"):
@@ -228,9 +229,3 @@ def run_and_exit() -> NoReturn:
         sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
-
-
-def _version() -> str:
-    from ..version import __version__
-
-    return f"bristle {__version__}"

@@ -201,7 +201,7 @@ def draw_comparison(comparison: Comparison) -> Page:
     rows = [bool(loops) and not cycles, bool(telling), True]
     with look():
         sites = comparison.sites
-        begin = sites_height(len(sites)) if sites else 0.0
+        begin = 0.95 + 0.25 * len(sites) if sites else 0.0  # with title and axis
         height = begin + _HISTORY + LOOPS * bool(cycles) + _PANELS * sum(rows)
         page = Page(9.6, height, headline(comparison), " ".join(comparison.sentences))
         if sites:
@@ -302,11 +302,6 @@ def headline(comparison: Comparison) -> str:
         along = name_of(comparison.first.coordinate, comparison.site)
         text += f"; the error depends mainly on {along}"
     return text
-
-
-def sites_height(count: int) -> float:
-    """Return the height [in] of a panel of so many sites, with its title and axis."""
-    return 0.95 + 0.25 * count
 
 
 def draw_sites(axes: Axes, sites: Sequence[SiteMisfit]) -> None:

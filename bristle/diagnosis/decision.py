@@ -89,7 +89,9 @@ def decide(
     """
     ranked = sorted(trials, key=lambda trial: trial.z)
     if not ranked or not missing(before, ranked[0], rule):
-        return _without_effect(before, ranked, organised, rule)
+        if before.z <= rule.clean and not organised:
+            return as_noise(before, ranked)
+        return Decision("unknown", (), before, 0.0, (unexplained(before, rule),))
     best = ranked[0]
     if before.z < rule.noise_overestimated:
         return _too_loud(before, best, where)
@@ -135,14 +137,6 @@ def missing(before: Trial, after: Trial, rule: DecisionRule = BENCH) -> bool:
     if larger and not after.rms_bulk <= rule.most_rms * before.rms_bulk:
         return False
     return paired(before.losses, after.losses, rule.chance) > 0.0
-
-
-def _without_effect(
-    before: Trial, ranked: Sequence[Trial], organised: bool, rule: DecisionRule
-) -> Decision:
-    if before.z <= rule.clean and not organised:
-        return as_noise(before, ranked)
-    return Decision("unknown", (), before, 0.0, (unexplained(before, rule),))
 
 
 def as_noise(before: Trial, ranked: Sequence[Trial]) -> Decision:

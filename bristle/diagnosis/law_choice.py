@@ -276,16 +276,12 @@ def _equals_with_less(simpler: LawTrial, row: LawTrial) -> bool:
 
 
 def _could_be_simpler(row: LawTrial, found: Sequence[LawAndEffects]) -> bool:
-    """Return whether a law, with an effect, could be simpler than what explains the runs."""
+    """Return whether a law, with the smallest effect, could be simpler than what explains runs."""
     known = [pair.fitted for pair in found if pair.explains and pair.after.z <= BENCH.complete]
-    return not known or min(known) > _least_with_effect(row)
-
-
-def _least_with_effect(row: LawTrial) -> int:
-    """Return how many parameters a law has with the smallest effect that can join it."""
     model = row.trial.model
     joined = [replace(model, effects=(*model.effects, name)) for name in joinable(model)]
-    return min((len(one.free()) for one in joined), default=row.fitted)
+    least = min((len(one.free()) for one in joined), default=row.fitted)
+    return not known or min(known) > least
 
 
 def choose(pairs: Sequence[LawAndEffects]) -> LawAndEffects:

@@ -37,10 +37,9 @@ from .building_numbers import (
     within_prior,
 )
 from .clocks import clock_faults
-from .command_range import limited_drive
 from .conclusion import VerdictContext
 from .load_cell import load_cell
-from .model_faults import model_based_faults
+from .model_faults import limited_drive, model_based_faults
 from .prepared import (
     DRAWS,
     Insufficient,

@@ -49,7 +49,9 @@ def verdict_view(verdict: words.Verdict) -> View:
     shown, apart = told[:_WHY], told[_WHY:]
     named = [_about(str(name), verdict) for name in verdict.get("effects") or []]
     hidden = words.untestable(verdict)
-    notes = [*words.fault_texts(verdict, " ".join(why)), *_errors_beside(verdict)]
+    notes = words.fault_texts(verdict, " ".join(why))
+    if role := _judged(verdict):
+        notes += ForceError.of(verdict["error"][role]).beside()
     notes += [*asks, *(verdict.get("notes") or [])]
     if hidden:
         notes.append(f"Not testable with these runs: {', '.join(hidden)}.")
@@ -154,11 +156,6 @@ def _error_of_law(verdict: words.Verdict) -> str:
     if after and at.get("kind") == "effect":
         then = f", with {effect_names(at['effects'])} {ForceError.of(after).text()}"
     return f"Force error of {own} on the held-out runs: {ForceError.of(before).text()}{then}."
-
-
-def _errors_beside(verdict: words.Verdict) -> list[str]:
-    role = _judged(verdict)
-    return ForceError.of(verdict["error"][role]).beside() if role else []
 
 
 def _judged(verdict: words.Verdict) -> str:

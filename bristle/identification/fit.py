@@ -26,7 +26,8 @@ from .starts import start_models
 # How well data determine a model's parameters: covariance, and what they do not identify.
 
 _WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the largest is none
-_MISFIT = 1.15  # z above which a residual is more than noise
+MISFIT = 1.15
+"""z above which an error is more than noise."""
 
 
 def covariance_of(scaled: Search, theta: Array) -> tuple[Array, tuple[str, ...]]:
@@ -58,7 +59,7 @@ def covariance_of(scaled: Search, theta: Array) -> tuple[Array, tuple[str, ...]]
         scores = np.array([J.T @ np.clip(e, -2.0, 2.0) for e in drawn])
         scores -= scores.mean(axis=0)
         B = B + scores.T @ scores / (len(drawn) - 1)
-    if scaled.problem.excess or mean_loss(loss(r)) > _MISFIT**2 * HUBER_AT_ONE:
+    if scaled.problem.excess or mean_loss(loss(r)) > MISFIT**2 * HUBER_AT_ONE:
         B = _scores_of_blocks(J, r)
     covariance = inverse @ B @ inverse
     size = scaled.scale / safe

@@ -77,10 +77,10 @@ def _within(A: Array, b: Array, bounds: Array) -> Array:
     return np.asarray(lsq_linear(R, Q.T @ b, (bounds[0], bounds[1]), method="bvls").x)
 
 
-def at_bound(model: Model, name: str = DAMPING) -> bool:
-    """Return whether a line's parameter is at its lower bound."""
-    low, _ = model.bounds(name)
-    return bool(np.isfinite(low) and model.value(name) <= low + 1e-9 * abs(low))
+def at_bound(model: Model) -> bool:
+    """Return whether a line's damping is at its lower bound."""
+    low, _ = model.bounds(DAMPING)
+    return bool(np.isfinite(low) and model.value(DAMPING) <= low + 1e-9 * abs(low))
 
 
 def _line_covariance(problem: StructureProblem, model: Model, columns: list[Array]) -> Array:

@@ -237,9 +237,10 @@ def _fields(curve: Curve) -> list[str]:
     needs = [name for along in curve.signals for name in along.needs]
     states = [state for along in curve.signals for state in along.states]
     starts = [start for along in curve.signals for start in along.starts]
+    numbered = ("storey",) if curve.place.storey else ()  # which tells one storey from another
     given: dict[str, object] = {
         "channels": {FOLLOWING: curve.across or curve.along} if curve.measured else {},
-        "needs": tuple(dict.fromkeys((*needs, *part.needs, *_numbered(curve)))),
+        "needs": tuple(dict.fromkeys((*needs, *part.needs, *numbered))),
         "states": {name: unit_for(unit, drive) for name, unit in states},
         "starts": dict(starts),
         "passive": curve.passive,
@@ -293,11 +294,6 @@ def _only_value(curve: Curve) -> list[str]:
     return [
         f'        "{part.parameter}": Parameter({value:.6g}, "{part.unit}", {bounds}, "{text}"),'
     ]
-
-
-def _numbered(curve: Curve) -> tuple[str, ...]:
-    """Return the signal that tells one storey from another, for a curve of a storey."""
-    return ("storey",) if curve.place.storey else ()
 
 
 def _only_storey(curve: Curve) -> list[str]:

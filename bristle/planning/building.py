@@ -367,7 +367,10 @@ def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Information]]
     for site, one in stand.items():
         rows += at_site(site, outcomes(one.purposes, one.asked, one.known, then[site]))
     alike = {f"{DAMPER}: {pair}" for pair in of_one_force(stand)}
-    return [_of_one_force(one) if one.name in alike else one for one in rows]
+    # Rivals that no motion tells apart.
+    return [
+        replace(one, what=ONE_FORCE, settled=False) if one.name in alike else one for one in rows
+    ]
 
 
 def at_site(site: str, rows: Sequence[Outcome]) -> list[Outcome]:
@@ -378,8 +381,3 @@ def at_site(site: str, rows: Sequence[Outcome]) -> list[Outcome]:
 def place_of(level: str) -> str:
     """Return a level of a building in words."""
     return "the base" if level == "base" else f"floor {level.removeprefix('floor')}"
-
-
-def _of_one_force(row: Outcome) -> Outcome:
-    """Return the outcome of rivals that no motion tells apart."""
-    return replace(row, what=ONE_FORCE, settled=False)

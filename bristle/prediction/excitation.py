@@ -170,11 +170,7 @@ def trials_in(
                 f"{name}: {moving} is not at rest when the run begins, and what was before is not "
                 "known. Give a record that begins at rest."
             )
-    return [_at_level(trial, level or 0.0) for trial in trials]
-
-
-def _at_level(trial: PredictedRun, level: float) -> PredictedRun:
-    return replace(trial, shaking=replace(trial.shaking, level=level))
+    return [replace(one, shaking=replace(one.shaking, level=level or 0.0)) for one in trials]
 
 
 def _of_record(name: str, time: Array, ground: Array, level: float) -> PredictedRun:

@@ -566,8 +566,9 @@ def _proof(held: HeldOut, fmu: Path, step: float, most: int) -> Proof:
                 TIMEOUT,
             )
             for errors, rows in zip((own, raw), found, strict=False):
-                force = _padded(rows["force"][:: of_moment[k]], len(fed.moments.x))
-                shown = held.shown(k, force)
+                force = rows["force"][:: of_moment[k]]
+                missing = len(fed.moments.x) - len(force)  # which the last one stands in for
+                shown = held.shown(k, np.append(force, np.full(missing, force[-1])))
                 errors.append(error_on(*_first(run, shown, samples[k])))
     except FmuError as error:  # such as a library for another platform
         return Proof(told, step, training=held.training, why=str(error))
@@ -692,11 +693,6 @@ def _between(column: Array | None, fitted: Array, per: int) -> Array:
         return fitted
     places = np.arange(len(fitted)) / per
     return np.interp(places, np.arange(len(column)), column)
-
-
-def _padded(force: Array, length: int) -> Array:
-    """Return a force with its last value held up to a length."""
-    return np.concatenate([force, np.full(length - len(force), force[-1])])
 
 
 def _first(run: Run, force: Array, samples: int) -> tuple[Run, Array]:

@@ -72,7 +72,8 @@ def _setting(found: ControllerComparison) -> str:
         [m.name, f"{plain(m.peak, 3)} m/s²", f"{m.stop:g} s", m.source] for m in setting.motions
     ]
     candidates = [
-        [one.name, one.about, _settings(one.part.parameters)] for one in setting.candidates
+        [one.name, one.about, ", ".join(f"{n} = {v}" for n, v in one.part.parameters.items())]
+        for one in setting.candidates
     ]
     return html.section(
         "What was compared",
@@ -80,10 +81,6 @@ def _setting(found: ControllerComparison) -> str:
         html.table(["Ground motion", "peak as run", "run to", "source"], motions, [1, 2]),
         html.table(["Controller", "what it is", "values"], candidates),
     )
-
-
-def _settings(values: dict[str, object]) -> str:
-    return ", ".join(f"{name} = {value}" for name, value in values.items())
 
 
 def _motion(found: ControllerComparison, motion: str) -> str:

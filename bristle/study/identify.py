@@ -18,7 +18,7 @@ from ..data.measurement import Measurement
 from ..diagnosis.by_label import extrapolated
 from ..errors import StudyError
 from ..identification.error import ForceError
-from ..identification.fit import Fit
+from ..identification.fit import MISFIT, Fit
 from ..identification.histories import compile_ahead
 from ..identification.problem import Problem, robust_z, uncommanded
 from ..identification.rig import DAMPER, Rig
@@ -226,7 +226,6 @@ class Identified(Viewable):
 
 # What there is to say of a fit: doubts about its runs, and how far its numbers can be trusted.
 
-_MISFIT = 1.15  # z above which an error is more than noise
 _SATURATED = 0.95  # share of samples at the extremes of a force above which it tells nothing else
 
 
@@ -297,7 +296,7 @@ def by_site(models: SiteModels) -> list[str]:
 
 def weighing(z: float) -> list[str]:
     """Return what a model does to intervals whose z on training runs is more than that of noise."""
-    if z <= _MISFIT:
+    if z <= MISFIT:
         return []
     lead = "The error exceeds the noise"
     if z != z:
@@ -529,15 +528,13 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
         for form, other in others.items():
             tell(f"identifying with the form {form} of the command")
             in_forms[form] = identify_on_rig(rig, runs, other, alone)
-        found = replace(found, forms=tuple(_form_error(form, in_forms[form]) for form in forms))
+        rows = [(form, in_forms[form]) for form in forms]
+        errors = tuple(FormError(f, one.model, one.after, len(one.fit.std)) for f, one in rows)
+        found = replace(found, forms=errors)
     if task.laws:
         notes += left_out_notes(rig, given)
         found = replace(found, laws=all_laws(rig, runs, given), notes=tuple(notes))
     return found
-
-
-def _form_error(form: str, found: Identified) -> FormError:
-    return FormError(form, found.model, found.after, len(found.fit.std))
 
 
 def _lines_alone(models: SiteModels) -> bool:

@@ -28,10 +28,10 @@ from ..learning.closure import (
 )
 from ..learning.closure_file import closure_text
 from ..learning.curve import CurvePlace, refuse_elsewhere
-from ..learning.curve_picture import curve_png
 from ..learning.effect_file import effect_text
 from ..learning.fit import learn
 from ..learning.result import LearnedEffect
+from ..learning.view import curve_png
 from ..model.model import Model
 from ..physics.effect import EFFECTS
 from ..trust import remember_made

@@ -39,6 +39,7 @@ from ..diagnosis.effect_limits import NO_AMOUNT
 from ..diagnosis.view import effect_text, verdict_view
 from ..diagnosis.view import error_text as verdict_error
 from ..errors import RecordError
+from ..identification.fit import MISFIT
 from ..identification.low_passed import force_budget
 from ..identification.rig import DAMPER, ROLES
 from ..learning.closure import NEAR, LearnedClosure
@@ -185,7 +186,7 @@ def z_text(found: Identified) -> str:
         return "How much of it is noise is not known: the force does not tell."
     z = {role: found.after[f"z_{role}"] for role in reversed(ROLES) if f"z_{role}" in found.after}
     told = joined([f"{short_z(one)} on the {_NAMES[role]}" for role, one in z.items()])
-    begin = "The noise explains it. " if all(one <= 1.15 for one in z.values()) else ""
+    begin = "The noise explains it. " if all(one <= MISFIT for one in z.values()) else ""
     return f"{begin}Error / noise (z; a true model has 1): {told}."
 
 
@@ -314,7 +315,7 @@ def _next(found: Identified, folder: Path) -> list[Next]:
     z = max(found.after.get("z_holdout", 0.0), found.after["z_train"])
     compare = Next(command("compare", folder), "shows where the error is")
     then = Next(command("diagnose", folder), "finds what the model misses")
-    return [then, compare] if z > 1.15 else [then]
+    return [then, compare] if z > MISFIT else [then]
 
 
 def added_view(added: Added, folder: Path) -> View:

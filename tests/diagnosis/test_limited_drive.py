@@ -9,7 +9,7 @@ import pytest
 
 from bristle.core.finding import Finding
 from bristle.data.corrections import Correction, limited, set_right, wrong_value
-from bristle.diagnosis.command_range import limited_drive
+from bristle.diagnosis.model_faults import limited_drive
 from bristle.diagnosis.prepared import corrected
 from bristle.diagnosis.trials import judge
 from bristle.identification.fit import fit

@@ -17,8 +17,8 @@ from bristle.errors import StudyError
 from bristle.identification.problem import Problem
 from bristle.learning.closed_forms import Closed, formula_of
 from bristle.learning.curve import Curve
-from bristle.learning.curve_picture import draw_curve
 from bristle.learning.fit import LearnedCurve
+from bristle.learning.view import draw_curve
 from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.study import learn as curves
