@@ -243,7 +243,4 @@ def under_load_text(loads: Mapping[str, float]) -> str:
         return ""
     begun = ", ".join(f"{name} ({quantity(load, 'N')})" for name, load in loads.items())
     one = len(loads) == 1
-    return (
-        f"{begun} begin{'s' * one} at rest under load: the state of the model that carries a force "
-        "at rest begins where it gives the measured one."
-    )
+    return f"{begun} begin{'s' * one} at rest under load: the model begins there with that force."

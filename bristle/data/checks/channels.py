@@ -150,14 +150,15 @@ def _noise(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
         return  # a command that keeps its level shows nothing else
     share = std / rms if rms else 0.0
     unit = run.units[channel]
+    level = quantity(std, unit, size=rms)
     if facts is None:
         part = plain(100 * share, 2)
-        text = f"noise of {channel}: {plain(std)} {unit}, as given ({part} % of its RMS)."
+        text = f"noise of {channel}: {level}, as given ({part} % of its RMS)."
         yield Finding("noise", "note", text, "", run.name, channel, share)
         return
-    text = f"noise of {channel}: {plain(std)} {unit}, {plain(100 * share, 2)} % of its RMS"
+    text = f"noise of {channel}: {level}, {plain(100 * share, 2)} % of its RMS"
     if facts.quantum and facts.quantum > 2.0 * std:
-        text += f"; it is written in steps of {plain(facts.quantum)} {unit}"
+        text += f"; it is written in steps of {quantity(facts.quantum, unit, size=rms)}"
     yield from _coloured(run, channel, text, facts, share)
 
 
