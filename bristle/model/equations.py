@@ -156,7 +156,8 @@ def _filled(formula: str, texts: Mapping[str, str]) -> str:
         alone = text[0].isdigit() or text.startswith("(")
         return text if (alone and " " not in text) or text.startswith("(") else f"({text})"
 
-    return re.sub(r"(?<![\w.])[A-Za-z]\w*", number, formula)
+    filled = re.sub(r"(?<![\w.])[A-Za-z]\w*", number, formula)
+    return re.sub(r"(?<=\d) (?=\d)", " \u00b7 ", filled)  # two numbers side by side
 
 
 def _indent(line: str) -> int:

@@ -763,7 +763,10 @@ def _with_law(verdict: Mapping[str, Any], folder: Path, known: Sequence[str]) ->
     if not verdict.get("laws") or verdict["kind"] == "insufficient":
         return then
     law = joined_form(verdict["law"], verdict["command"])
-    return then if law == verdict["law_before"] else [Next(law_command(folder, law)), *then]
+    if law == verdict["law_before"]:
+        return then
+    why = "fits the law that comes nearest" if verdict["kind"] == "unknown" else "takes that law"
+    return [Next(law_command(folder, law), why), *then]
 
 
 def _then(verdict: Mapping[str, Any], folder: Path, known: Sequence[str]) -> list[Next]:
