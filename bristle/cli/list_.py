@@ -79,7 +79,10 @@ def main(arguments: argparse.Namespace) -> int:
         _print(title, rows)
     if switches:
         effects = ", ".join(switch.removesuffix(".on") for switch in switches)
-        _say(f"Effects, each with a switch EFFECT.on and parameters of its own: {effects}.")
+        _say(
+            "Effects, each with a switch EFFECT.on and parameters of its own, in an FMU those of "
+            f"build --effects: {effects}."
+        )
         print("All of one:  bristle list effects NAME")
     return 0
 

@@ -139,7 +139,7 @@ function evidence(verdict) {
   const rows = verdict.ranking.filter((row) => Number.isFinite(row.z_holdout));
   const before = verdict.before ?? Math.max(...rows.map((row) => row.z_holdout), 1);
   const log = (value) => Math.log10(Math.max(value, 1) * 1.02);
-  return [h("h2", {}, "The evidence"),
+  return [h("h2", {}, "What each effect leaves"),
     rows.length ? bars("z with each effect", rows.slice(0, 20).map((row) => ({
       name: row.site && row.site !== "damper" ? `${row.name} (${row.site})` : row.name, value: log(row.z_holdout),
       strong: verdict.effects.includes(row.effect), good: row.z_holdout <= 1.1 && row.gain > 0.02,
