@@ -18,10 +18,13 @@ from typing import Any
 import braced
 import numpy as np
 import shaken
+from made import write
 from numpy.typing import NDArray
 
 from bristle.cli import main
 from bristle.data.channels import channel_unit
+from bristle.study.steps import create_study
+from bristle.study.study import Study
 from tests.independent.generate import UNITS, Case, make_case
 
 FOLDER = "BRISTLE_TEST_STUDIES"
@@ -43,6 +46,7 @@ DEVICES: list[dict[str, Any]] = [
     {"name": "tie", "between": ["ground", "floor2"]},
 ]
 STIFFENING = 1.5e7  # N/m3, of the springs below the house
+Force = Callable[[Any, Any], Any]
 
 
 def study(name: str, folder: Path) -> Path:
@@ -62,13 +66,6 @@ def made(name: str) -> Path:
             MADE[name](unfinished)
             unfinished.rename(kept / name)
     return kept / name
-
-
-def write(path: Path, columns: dict[str, NDArray[np.float64]]) -> Path:
-    """Write columns, by their titles, as CSV."""
-    rows = np.column_stack(list(columns.values()))
-    np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
-    return path
 
 
 def titled(channels: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
@@ -99,29 +96,43 @@ def _bench(folder: Path) -> None:
     _order("diagnose", folder / "rig")
 
 
-def house(folder: Path) -> Path:
-    """Write runs of a house whose isolation stiffens, and its file; return that."""
+def stiffening(x: Any, v: Any) -> list[float]:
+    """Return the forces [N] of isolation springs that grow stiffer with displacement."""
+    return [STIFFENING * x[0] ** 3, 0.0]
+
+
+def house(
+    folder: Path, damper: Force | None = None, hidden: Force | None = stiffening
+) -> tuple[Path, list[Path]]:
+    """Write runs of a house of one floor, the last to be held out; return its file and theirs."""
     building = shaken.building(1, True, 6)
+    runs = []
     for k, role in enumerate(("train", "train", "holdout")):
-        clean = shaken.shake(
-            building, 20 + k, None, lambda x, v: [STIFFENING * x[0] ** 3, 0.0], samples=2500
-        )
+        clean = shaken.shake(building, 20 + k, damper, hidden, samples=2500)
         random = np.random.default_rng(k)
         noisy = {
             name: values + (name != "time") * 0.01 * np.std(values) * random.normal(size=2500)
             for name, values in clean.items()
         }
-        write(folder / f"{role}_{k}.csv", titled(noisy))
+        runs.append(write(folder / f"{role}_{k}.csv", titled(noisy)))
     file = folder / "house.toml"
     file.write_text(
         'schema = 1\nname = "house"\nbase = "isolated"\ndamping_ratio = 0.02\n'
         f"masses = {np.diag(building.M).tolist()}\nstiffnesses = {list(building.stiffnesses)}\n"
     )
-    return file
+    return file, runs
+
+
+def house_study(
+    folder: Path, damper: Force | None = None, hidden: Force | None = stiffening
+) -> Study:
+    """Return a study of the runs of a house."""
+    file, runs = house(folder, damper, hidden)
+    return create_study(folder / "rig", runs, rig="structure", building=file, law="bingham").study
 
 
 def _building(folder: Path) -> None:
-    rig = ("--rig", "structure", "--building", house(folder), "--law", "bingham")
+    rig = ("--rig", "structure", "--building", house(folder)[0], "--law", "bingham")
     _order("study", "new", folder / "rig", *rig, "--data", folder / "*.csv")
     _order("identify", folder / "rig", "--json")
     _order("diagnose", folder / "rig")

@@ -20,7 +20,7 @@ from ..system.model import System
 from ..system.parameters import told_over_step
 from ..system.toml import STEP_TOLERANCE, scenario_text
 from . import Engine
-from .results import judged_by, reals, to_frame
+from .results import judged_by, reals, statistic_of, to_frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -229,11 +229,11 @@ def _judged(
         return CouplingError(0.0, 0.0, 0.0, nan, True, 0.0)
     order = log2(wrong / better) if better > 0.0 else nan
     along = factor * wrong
-    peak, rms = largest(other), _rms(other)
+    peak, rms = largest(other), statistic_of(other, "rms")
     return CouplingError(
         along=along,
         peak=factor * (largest(h) / peak - 1.0) if peak > 0.0 else nan,
-        rms=factor * (_rms(h) / rms - 1.0) if rms > 0.0 else nan,
+        rms=factor * (statistic_of(h, "rms") / rms - 1.0) if rms > 0.0 else nan,
         order=order,
         worth=along <= MOST_ERROR and LEAST_ORDER <= order <= MOST_ORDER,
         least=least,
@@ -265,10 +265,6 @@ def coupled_run(scenario: System, again: Again) -> pd.DataFrame | None:
 def largest(values: Array) -> float:
     """Return the largest absolute value, 0 where there is none."""
     return float(np.abs(values).max(initial=0.0))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 # The largest step of a scenario at which its coupling error stays below a tolerance.

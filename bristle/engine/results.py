@@ -600,7 +600,6 @@ def summarise(frame: pd.DataFrame, everything: bool = False) -> list[Summary]:
     for name in names:
         values = frame[name].to_numpy()
         at = int(np.argmax(np.abs(values)))
-        rms = float(np.sqrt(np.mean(np.square(values))))
-        peak = float(abs(values[at]))
+        peak, rms = float(abs(values[at])), statistic_of(values, "rms")
         found.append(Summary(name, units.get(name), peak, float(time[at]), rms))
     return found

@@ -247,28 +247,10 @@ def design_file(component: str, kind: type[Slave], controller: Path) -> str:
     return f"{wanted}.json"
 
 
-def check_controller(
-    component: str, controller: Path | None = None, building: Path | None = None
-) -> None:
-    """Refuse a controller, by default the component's own, on a building it is not designed for.
-
-    A component without a design suits any building.
-
-    Raises
-    ------
-    DesignError, PhysicsError
-        Naming both; if the building is wrong.
-    """
-    from ..component.controller_file import read_controller
-    from ..data.building_file import read_building
-    from ..physics.building import paper_building
-
-    kind = component_class(source(component))
-    if getattr(kind, "design", ""):
-        file = controller or _PACKAGE / kind.files[0]
-        where = str(controller) if controller else f"the design that {component} carries"
-        on = read_building(building) if building else paper_building()
-        read_controller(file).check_building(on, where)
+def own_design(component: str) -> Path | None:
+    """Return the controller file that a component carries; None where it has no design."""
+    kind: Any = component_class(source(component))
+    return _PACKAGE / kind.files[0] if getattr(kind, "design", "") else None
 
 
 def describe(

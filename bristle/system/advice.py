@@ -12,11 +12,10 @@ from math import sqrt
 from ..core.config import Document
 from ..core.graph import loop_in, reached
 from ..errors import BristleError, PhysicsError
-from ..fmu.catalogue import check_controller
 from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, laws_of
-from .library import check_carried, driven_mass
+from .library import check_design, driven_mass
 from .model import Connection, Part, RunSettings
 from .parameters import check_rod
 
@@ -250,10 +249,7 @@ def _designs(network: Network, document: Document) -> None:
         if structure is None or structure.kind != "Structure":
             continue
         try:
-            if part.file:
-                check_carried(part.file, structure.building)
-            else:
-                check_controller(part.kind, part.controller, structure.building)
+            check_design(part, structure.building)
         except PhysicsError:
             continue  # the building is no building: its own check has said so
         except BristleError as error:

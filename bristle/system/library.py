@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-from ..component.controller_file import KINDS, Controller, parse_controller
+from ..component.controller_file import KINDS, Controller, parse_controller, read_controller
 from ..core.text import unknown
 from ..core.toml_lines import KeyPath
 from ..data.building_file import read_building
@@ -19,7 +19,7 @@ from ..physics.building import paper_building
 from ..physics.forms import joined_form
 from ..physics.laws import LAWS, laws_of
 from ..user_code.load import load_file
-from .model import FILE_PARAMETERS, Component, DamperLaw
+from .model import FILE_PARAMETERS, Component, DamperLaw, Part
 from .overrides import MADE_FROM
 
 
@@ -69,20 +69,25 @@ def driven_mass(building: Path | None, port: str = "damper_force", attached: flo
     return building_mass(found.with_attached_mass(attached).M, pushed)
 
 
-def check_carried(file: Path, building: Path | None) -> None:
-    """Refuse a building that the controller in an FMU is not designed for.
+def check_design(part: Part, building: Path | None) -> None:
+    """Refuse a building, None for the built-in one, that a component's design is not made for.
 
-    An FMU without a design suits any building.
+    A component without a design suits any building.
 
     Raises
     ------
     DesignError, PhysicsError
-        Naming both; if the building is wrong.
+        Naming both; if the building or the controller is wrong.
     """
-    controller = controller_in(file)
+    where = f"the design that {part.file.name if part.file else part.kind} carries"
+    if part.file:
+        controller = controller_in(part.file)
+    else:
+        own = catalogue.own_design(part.kind)
+        controller = read_controller(part.controller or own) if own else None
+        where = str(part.controller) if part.controller else where
     if controller is not None:
-        on = read_building(building) if building else paper_building()
-        controller.check_building(on, f"the design that {file.name} carries")
+        controller.check_building(read_building(building) if building else paper_building(), where)
 
 
 def controller_in(file: Path) -> Controller | None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made import write
 
 from bristle import run
 from bristle.comparison.predictions import run_predictions
@@ -35,10 +36,7 @@ def measured(path: Path, factor: float, seed: int, *, force: bool) -> Path:
         name: y + 0.005 * np.std(y) * random.standard_normal(len(y)) for name, y in columns.items()
     }
     noisy["voltage [V]"] = frame["voltage.voltage"].to_numpy()
-    table = np.column_stack([frame.index.to_numpy(), *noisy.values()])
-    header = ",".join(["time [s]", *noisy])
-    np.savetxt(path, table, fmt="%.9g", delimiter=",", header=header, comments="")
-    return path
+    return write(path, {"time [s]": frame.index.to_numpy(), **noisy})
 
 
 @pytest.mark.parametrize("force", [True, False])

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from house_made import study_of
 from made import write_runs
 from page.served import page_on
+from studies import house_study
 
 from bristle.page import control_views
 from bristle.page.orders import order_of
@@ -124,7 +124,7 @@ def test_a_comparison_is_run_and_shown(home: Path) -> None:
 
 def test_buildings_are_those_of_the_studies(home: Path, tmp_path: Path) -> None:
     assert control_views.controllers_view(home / "rig", {})["buildings"] == []
-    house = study_of(tmp_path)
+    house = house_study(tmp_path)
     create_study(tmp_path / "bench", write_runs(tmp_path / "lab", 3, seconds=3.0), law="bingham")
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "study.toml").write_text("= no TOML")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made import write
 from numpy.typing import NDArray
 
 from bristle.cli import main
@@ -133,10 +134,8 @@ def test_runs_are_paired_by_name_then_by_motion() -> None:
 
 def written(path: Path, run: Measurement) -> Path:
     columns = {"displacement": (1e3, "mm"), "voltage": (1.0, "V"), "force": (1.0, "N")}
-    rows = [run.time, *(factor * run[name] for name, (factor, _) in columns.items())]
-    titles = ["time [s]", *(f"{name} [{unit}]" for name, (_, unit) in columns.items())]
-    np.savetxt(path, np.column_stack(rows), delimiter=",", header=",".join(titles), comments="")
-    return path
+    rows = {f"{name} [{unit}]": factor * run[name] for name, (factor, unit) in columns.items()}
+    return write(path, {"time [s]": run.time, **rows})
 
 
 @pytest.fixture

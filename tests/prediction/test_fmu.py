@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made import write
 
 from bristle import units
 from bristle.cli import main
@@ -43,12 +44,6 @@ def columns(seed=3, noise=0.01):
         "time [s]": t, "displacement [mm]": 1e3 * measured(x), "velocity [m/s]": measured(v),
         "voltage [V]": V, "force [N]": measured(force),
     }  # fmt: skip
-
-
-def write(path: Path, data) -> Path:
-    table = np.column_stack(list(data.values()))
-    np.savetxt(path, table, fmt="%.9g", delimiter=",", header=",".join(data), comments="")
-    return path
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from house_made import study_of
 from made import write_runs
 from shaken import building, shake
+from studies import house_study
 
 from bristle.cli import main
 from bristle.errors import StudyError
@@ -52,7 +52,7 @@ def damper(model: Model, drag: float, spread: float = 0.05) -> Model:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study whose model was wrong in step 1 and is right in step 2."""
-    study = study_of(tmp_path_factory.mktemp("house"), viscous, None)
+    study = house_study(tmp_path_factory.mktemp("house"), viscous, None)
     study.add_step("identify bingham", "to see", damper(study.model(), 2.0 * DRAG))
     study.add_step("identify again", "to see", damper(study.model(), DRAG))
     return study.folder
@@ -144,7 +144,7 @@ def test_the_command_tells_it_in_tables_and_json(
 
 
 def test_test_runs_are_counted_here_too(tmp_path: Path) -> None:
-    study = study_of(tmp_path, viscous, None)
+    study = house_study(tmp_path, viscous, None)
     toml = study.folder / "study.toml"
     toml.write_text(toml.read_text().replace('role = "train"', 'role = "test"', 1))
     study = Study(study.folder)
@@ -197,7 +197,7 @@ def test_a_single_run_is_simulated_whole_and_judged_on_its_end(made: Path, tmp_p
 def test_what_cannot_be_is_refused(
     made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    study = study_of(tmp_path, viscous, None)
+    study = house_study(tmp_path, viscous, None)
     with pytest.raises(StudyError, match=r"model\.toml: no covariance .* bristle identify"):
         closed_loop(study)
     assert len(closed_loop(study, draws=0).rows) == 12

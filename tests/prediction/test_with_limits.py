@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from house_made import study_of
 from prediction.test_in_closed_loop import DRAG, damper, viscous
 from shaken import building, shake
+from studies import house_study
 
 from bristle.cli import main
 from bristle.errors import RunError, StudyError
@@ -49,7 +49,7 @@ HIDDEN = {"effect": "coil_lag", "why": "the command is constant"}
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    study = study_of(tmp_path_factory.mktemp("limits"), viscous, None)
+    study = house_study(tmp_path_factory.mktemp("limits"), viscous, None)
     study.add_step("identify bingham", "to see", damper(study.model(), DRAG, spread=1e-3))
     return study.folder
 

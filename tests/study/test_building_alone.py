@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made import write
 
 from bristle import cli
 from bristle.data.building_file import read_building
@@ -68,14 +69,11 @@ def files(folder, masses, stiffnesses, base, samples, ratio=0.03):
             named[f"{level}_displacement [m]"] = own
             named[f"{level}_acceleration_absolute [m/s2]"] = shaken
         random = np.random.default_rng(seed + 99)
-        columns = [
-            y + (name != "time [s]") * 0.01 * np.std(y) * random.standard_normal(len(y))
+        noisy = {
+            name: y + (name != "time [s]") * 0.01 * np.std(y) * random.standard_normal(len(y))
             for name, y in named.items()
-        ]
-        out.append(folder / f"{role}.csv")
-        np.savetxt(
-            out[-1], np.column_stack(columns), "%.9g", ",", header=",".join(named), comments=""
-        )
+        }
+        out.append(write(folder / f"{role}.csv", noisy))
     file = folder / "guess.toml"
     file.write_text(
         f'schema = 1\nname = "tower"\nbase = "{base}"\ndamping_ratio = 0.01\n'
@@ -155,11 +153,8 @@ def test_what_is_no_building_is_refused(tmp_path, capsys):
     assert cli.main(["identify", str(tmp_path / "rig"), "--structure", "--law", "lugre"]) == 2
     assert "without one" in capsys.readouterr().err
     t = np.arange(600) * DT
-    bench = tmp_path / "bench.csv"
-    np.savetxt(
-        bench, np.column_stack([t, np.sin(t), np.cos(t)]), delimiter=",", comments="",
-        header="time [s],displacement [m],force [N]",
-    )  # fmt: skip
+    columns = {"time [s]": t, "displacement [m]": np.sin(t), "force [N]": np.cos(t)}
+    bench = write(tmp_path / "bench.csv", columns)
     assert cli.main(["study", "new", str(tmp_path / "b"), "--data", str(bench)]) == 0
     assert cli.main(["identify", str(tmp_path / "b"), "--structure"]) == 2
     assert "no building" in capsys.readouterr().err

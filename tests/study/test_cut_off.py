@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made import write
 
 from bristle.study.identify import identify_study
 from bristle.study.steps import compare_study
@@ -24,11 +25,9 @@ def written(folder, name: str, seed: int, end: float = 0.0):
     shown = force + rng.normal(0.0, 0.05, len(T))
     if end:
         shown = np.clip(shown, -end, end)
-    columns = [T, 1e3 * (x + rng.normal(0.0, 2e-6, len(T))), 1e3 * v, shown]
-    path = folder / f"{name}.csv"
-    titles = "time [s],x [mm],v [mm/s],force [N]"
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=titles, comments="")
-    return path
+    x = 1e3 * (x + rng.normal(0.0, 2e-6, len(T)))
+    columns = {"time [s]": T, "x [mm]": x, "v [mm/s]": 1e3 * v, "force [N]": shown}
+    return write(folder / f"{name}.csv", columns)
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made import write
 
 from bristle.cli import main
 from bristle.diagnosis.conclusion import lookalikes
@@ -137,12 +138,9 @@ def study(tmp_path: Path) -> Study:
     """Return a bench's study, its damper with a stop."""
     for k, role in enumerate(("train", "holdout")):
         run = bench_run(["end_stop"], {"end_stop.clearance": 0.006, "end_stop.k": 4e3}, 0.5 * k)
-        columns = [DT * np.arange(len(run.x)), run.x, run.v, run.V, run.force]
-        header = "time [s],displacement [m],velocity [m/s],voltage [V],force [N]"
-        np.savetxt(
-            tmp_path / f"{role}_1.csv", np.column_stack(columns), delimiter=",", header=header,
-            comments="",
-        )  # fmt: skip
+        columns = {"displacement [m]": run.x, "velocity [m/s]": run.v, "voltage [V]": run.V}
+        time = DT * np.arange(len(run.x))
+        write(tmp_path / f"{role}_1.csv", {"time [s]": time, **columns, "force [N]": run.force})
     return Study.create(tmp_path / "rig", sorted(tmp_path.glob("*.csv")))
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from house_made import study_of
 from made import bench_run, write_runs
 from matplotlib.figure import Figure
+from studies import house_study
 
 import bristle
 from bristle.core.finding import Finding
@@ -140,7 +140,7 @@ def test_a_model_file_is_a_model(study, files):
 
 
 def test_a_building_needs_no_study(tmp_path):
-    study = study_of(tmp_path)
+    study = house_study(tmp_path)
     runs = [str(path) for path in study.files("train")]
     held_out, house = str(study.files("holdout")[0]), study.folder / "house.toml"
     of_study = bristle.identify(study)
@@ -158,7 +158,7 @@ def test_a_building_needs_no_study(tmp_path):
 
 
 def test_a_buildings_channels_are_guessed_too(tmp_path):
-    study = study_of(tmp_path)
+    study = house_study(tmp_path)
     house = study.folder / "house.toml"
     frames = [pd.read_csv(path) for path in study.files()]
     other = [

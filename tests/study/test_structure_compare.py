@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from house_made import STIFF, study_of
+from studies import STIFFENING, house_study
 
 from bristle.report.study_page import study_report
 from bristle.study.identify import identify_study
@@ -22,7 +22,7 @@ SITES = {"damper", "layer", "storey1"}
 @pytest.fixture(scope="module")
 def stiff(tmp_path_factory) -> Study:
     """Return an identified study of a house whose isolation springs grow stiffer."""
-    study = study_of(tmp_path_factory.mktemp("stiff"), dashpot)
+    study = house_study(tmp_path_factory.mktemp("stiff"), dashpot)
     identify_study(study, starts=2)
     return study
 
@@ -30,7 +30,7 @@ def stiff(tmp_path_factory) -> Study:
 @pytest.fixture(scope="module")
 def clean(tmp_path_factory) -> Study:
     """Return an identified study of a house that is as its model says."""
-    study = study_of(tmp_path_factory.mktemp("clean"), dashpot, None)
+    study = house_study(tmp_path_factory.mktemp("clean"), dashpot, None)
     identify_study(study, starts=2)
     return study
 
@@ -69,7 +69,7 @@ def test_a_storey_that_softens_is_named_along_its_drift(tmp_path):
         force = -3.0e7 * (x[1] - x[0]) ** 3
         return [-force, force]
 
-    study = study_of(tmp_path, dashpot, softening)
+    study = house_study(tmp_path, dashpot, softening)
     identify_study(study, starts=2)
     found = compare_study(study)
     assert {one.site for one in found.sites if one.fails} == {"storey1"}
@@ -88,7 +88,7 @@ def test_a_wrong_damper_is_the_worst_site_of_a_clean_building(clean):
 def test_the_site_stays_the_same_for_all_models_of_a_history(stiff):
     against = comparer(stiff)
     better = stiff.model().with_effect("duffing")
-    better = better.with_values({"duffing.k_3": STIFF, "duffing.shape": 3.0})
+    better = better.with_values({"duffing.k_3": STIFFENING, "duffing.shape": 3.0})
     found = against.compare(better)
     assert (against.site, found.site) == ("layer", "layer")
     assert not any(one.fails for one in found.sites)

@@ -6,8 +6,8 @@ import json
 from dataclasses import replace
 
 import pytest
-from house_made import study_of
 from shaken import building, friction
+from studies import house_study
 
 from bristle.diagnosis.conclusion import VerdictContext, conclude
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
@@ -19,7 +19,7 @@ from bristle.study.identify import identify_study
 
 
 def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):
-    study = study_of(tmp_path, friction)
+    study = house_study(tmp_path, friction)
     model = study.model().with_effect("duffing")
     found = identify_study(study, model=model, starts=1, write=False)
     assert found.before == {}  # of the law at its defaults nobody asks
@@ -30,7 +30,7 @@ def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):
 
 
 def test_effect_without_a_site_is_refused(tmp_path):
-    study = study_of(tmp_path)
+    study = house_study(tmp_path)
     model = study.model().with_effect("gas_spring")
     with pytest.raises(StudyError, match=r"gas_spring: acts at no site.*storey1, layer"):
         identify_study(study, model=model)

@@ -18,7 +18,6 @@ from ..bench import GOOD, Bench, good, not_finite, status_name
 from ..probe import Probe, failed, passed
 
 INPUT, STEP, ORDER, PARAMETER = 1, 2, 3, 5
-_REFUSED = (DISCARD, ERROR)
 _RULE = (
     "bristle's rule, since this is a bristle FMU (FMI leaves it open): one line of log, a refusal, "
     "fault = {}, outputs finite, until reset or an earlier state"
@@ -35,20 +34,22 @@ def _check(bench: Bench, instance: Handle, code: int, what: str) -> None:
         raise UnexpectedError(f"{what}: fault = {fault}, outputs {bad or 'finite'}")
 
 
+def _refused(status: int, what: str) -> None:
+    """Raise UnexpectedError unless a call was refused."""
+    if status not in (DISCARD, ERROR):
+        raise UnexpectedError(f"{what}: answered {status_name(status)}")
+
+
 def _faulted(bench: Bench, act: Callable[[Handle], int], code: int, what: str) -> Handle:
     """Return an instance after two steps, a fault and a step that must be refused."""
     instance = bench.instance(logging=True)
     bench.ready(instance)
     bench.run(instance, 0, 2)
     before = len(bench.library.messages)
-    status = act(instance)
-    if status not in _REFUSED:
-        raise UnexpectedError(f"{what}: answered {status_name(status)}")
+    _refused(act(instance), what)
     _check(bench, instance, code, what)
     bench.move(instance, 3)
-    status = instance.step(bench.time(3), bench.plan.step)
-    if status not in _REFUSED:
-        raise UnexpectedError(f"the step after {what}: answered {status_name(status)}")
+    _refused(instance.step(bench.time(3), bench.plan.step), f"the step after {what}")
     _check(bench, instance, code, f"the step after {what}")
     lines = len(bench.library.messages) - before
     if lines != 1:
@@ -125,9 +126,7 @@ def fault_order(bench: Bench) -> Finding:
             good(instance.terminate(), "Terminate")
         if when == "in initialisation":
             bench.entered(instance)
-        status = instance.step(plan.start, plan.step)
-        if status not in _REFUSED:
-            raise UnexpectedError(f"a step {when}: answered {status_name(status)}")
+        _refused(instance.step(plan.start, plan.step), f"a step {when}")
         _check(bench, instance, ORDER, f"a step {when}")
         _mended(bench, instance, f"a step {when}")
     return passed("three steps out of order")
@@ -151,9 +150,7 @@ def fault_parameter(bench: Bench) -> Finding:
         reals = bench.plan.variables("output", "Real")
         if any(bench.read(instance, reals)):
             return failed(f"{what}: real outputs are not 0")
-        status = instance.step(bench.time(0), bench.plan.step)
-        if status not in _REFUSED:
-            return failed(f"the first step with {what}: answered {status_name(status)}")
+        _refused(instance.step(bench.time(0), bench.plan.step), f"the first step with {what}")
         _mended(bench, instance, what)
     return passed(f"{len(parameters)} parameters")
 
@@ -171,9 +168,7 @@ def fault_earlier_state(bench: Bench) -> Finding:
     rows = [bench.read(instance), *bench.run(instance, 0, half)]
     state = c_void_p()
     good(instance.save(state), "GetFMUstate")
-    status = instance.step(bench.time(half), math.nan)
-    if status not in _REFUSED:
-        return failed(f"a step of NaN: answered {status_name(status)}")
+    _refused(instance.step(bench.time(half), math.nan), "a step of NaN")
     good(instance.restore(state), "SetFMUstate")
     rows += bench.run(instance, half)
     bench.same(rows, bench.reference())

@@ -30,10 +30,11 @@ def reset(bench: Bench) -> Finding:
         if situation != "in mid-run":
             good(instance.terminate(), "Terminate")
         good(instance.reset(), f"Reset {situation}")
-        difference = bench.differs(bench.whole_run(instance), bench.reference())
-        if difference:
-            return judged(bench, f"reset {situation}: {difference}")
-    return passed(f"equal to a fresh instance, twice ({changed} parameters changed before)")
+        alike = f"equal to a fresh instance, twice ({changed} parameters changed before)"
+        found = judged(bench, bench.whole_run(instance), f"reset {situation}", alike)
+        if found.level != "pass":
+            break
+    return found
 
 
 def _disturb_parameters(bench: Bench, instance: Handle) -> int:
@@ -47,11 +48,14 @@ def _disturb_parameters(bench: Bench, instance: Handle) -> int:
     return taken
 
 
-def judged(bench: Bench, difference: str) -> Finding:
-    """Judge a difference between two runs: a failure, or a note where the FMU repeats no run."""
+def judged(bench: Bench, rows: list[Values], where: str, alike: str) -> Finding:
+    """Judge a run by the reference: another one fails, or is noted where the FMU repeats none."""
+    difference = bench.differs(rows, bench.reference())
+    if not difference:
+        return passed(alike)
     if bench.plan.repeatable:
-        return failed(difference)
-    return noted(f"cannot be judged, since no two runs are equal: {difference}")
+        return failed(f"{where}: {difference}")
+    return noted(f"cannot be judged, since no two runs are equal: {where}: {difference}")
 
 
 @Probe(
@@ -65,10 +69,9 @@ def many_instances(bench: Bench) -> Finding:
     """Live many lives one after the other; the last run equals the first."""
     for _ in range(bench.plan.instances):
         _life(bench)
-    difference = bench.differs(bench.whole_run(), bench.reference())
-    if difference:
-        return judged(bench, f"after {bench.plan.instances} instances: {difference}")
-    return passed(f"{bench.plan.instances} instances, the last run equals the first")
+    many = f"{bench.plan.instances} instances"
+    alike = f"{many}, the last run equals the first"
+    return judged(bench, bench.whole_run(), f"after {many}", alike)
 
 
 @Probe(
@@ -96,10 +99,7 @@ def two_instances(bench: Bench) -> Finding:
             bench.move(second, k + 11)
         second.step(bench.time(k), bench.plan.step)
     second.free()
-    difference = bench.differs(rows, bench.reference())
-    if difference:
-        return judged(bench, f"beside another instance: {difference}")
-    return passed("the first runs as if it were alone")
+    return judged(bench, rows, "beside another instance", "the first runs as if it were alone")
 
 
 @Probe(
@@ -160,10 +160,7 @@ def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
         rows += bench.run(mine, k, k + 1)
     companion.free()
     name = "its copy" if other.plan.fmu == bench.plan.fmu else other.plan.about.name
-    difference = bench.differs(rows, bench.reference())
-    if difference:
-        return judged(bench, f"beside {name}: {difference}")
-    return passed(f"runs beside {name} exactly as alone")
+    return judged(bench, rows, f"beside {name}", f"runs beside {name} exactly as alone")
 
 
 @Probe(
@@ -182,14 +179,13 @@ def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
 def bare_interpreter(bench: Bench) -> Finding:
     """Run where nothing but the standard library can be imported."""
     try:
-        difference = bench.differs(bench.whole_run(), bench.reference())
+        rows = bench.whole_run()
     except UnexpectedError as error:
         return noted(f"needs something that is installed here: {error}")
     except FatalAnswerError as error:
         return noted(f"needs something that is installed here: {error} answered Fatal")
-    if difference:
-        return judged(bench, f"without installed packages: {difference}")
-    return passed("needs nothing that is installed here")
+    alike = "needs nothing that is installed here"
+    return judged(bench, rows, "without installed packages", alike)
 
 
 @Probe(

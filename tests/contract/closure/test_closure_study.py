@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from answers import Capture, asked, told
+from made import write
 
 from bristle.cli import main
 
@@ -29,9 +30,8 @@ def measured(path: Path, seed: int, samples: int = 1500) -> None:
         now = goal[k] + (now - goal[k]) * np.exp(-STEP / 0.02)
         late[k] = now
     force = 60.0 * v + late + 0.03 * draw.standard_normal(len(t))
-    header = "time [s],displacement [m],velocity [m/s],voltage [V],force [N]"
-    table = np.column_stack([t, x, v, V, force])
-    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
+    titles = ("time [s]", "displacement [m]", "velocity [m/s]", "voltage [V]", "force [N]")
+    write(path, dict(zip(titles, (t, x, v, V, force), strict=True)))
 
 
 def made(folder: Path, train: int, samples: int = 1500) -> Path:

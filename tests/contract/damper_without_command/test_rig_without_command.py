@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made import write
 
 from bristle.cli import main
 from bristle.study.study import Study
@@ -32,12 +33,8 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     files = []
     for k in (1, 2, 3):
         x, force = orifice(k)
-        file = folder / f"run_{k}.csv"
-        np.savetxt(
-            file, np.stack([T, x, force], axis=1), fmt="%.7g", delimiter=",", comments="",
-            header="time [s],displacement [mm],force [N]",
-        )  # fmt: skip
-        files.append(str(file))
+        columns = {"time [s]": T, "displacement [mm]": x, "force [N]": force}
+        files.append(str(write(folder / f"run_{k}.csv", columns)))
     assert main(["study", "new", str(folder / "rig"), "--data", *files]) == 0
     return folder / "rig"
 

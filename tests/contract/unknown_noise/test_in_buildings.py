@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made import write
 from scipy.signal import butter, sosfiltfilt
 from shaken import building, friction, shake
 
@@ -31,9 +32,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
             columns[name] = (values + noise * random.standard_normal(len(values)))[BEGIN:]
         corner = butter(4, CORNER, fs=RATE, output="sos")
         columns["force"] = sosfiltfilt(corner, columns["force"])
-        header = ",".join(f"{name} [{channel_unit(name)}]" for name in columns)
-        rows = np.column_stack([*columns.values()])
-        np.savetxt(folder / f"run{seed}.csv", rows, "%.9g", ",", header=header, comments="")
+        titled = {f"{name} [{channel_unit(name)}]": y for name, y in columns.items()}
+        write(folder / f"run{seed}.csv", titled)
     masses = [HOUSE.M[i][i] for i in range(HOUSE.size)]
     (folder / "house.toml").write_text(
         'schema = 1\nname = "house"\nbase = "isolated"\ndamping_ratio = 0.02\n'
