@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core.text import command, listed, quantity
 from ..data.channels import DRIVE, PLAIN, TEMPERATURE, UNITS, Label, label_name, label_text, meaning
-from ..data.extra_channels import as_word
+from ..data.extra_channels import ABSURD, as_word
 from ..data.formats.delimited import decoded
 from ..data.run_names import (
     DOUBTFUL,
@@ -416,22 +416,24 @@ def of_columns(
     open_ = [k for k in range(len(tables)) if not (closed and closed[k])]
     for column in tables[0].columns:
         unit = column.unit.name if column.unit else ""
-        name = as_word(column.name) + (f"_{unit}" if unit.isalpha() else "")
+        word = as_word(column.name)
+        name = f"{word}_{unit}" if unit.isalpha() else word
         own = [one.values[column.text] for one in tables if column.text in one.values]
+        own = [values[np.abs(values) < ABSURD] for values in own]
         if (
-            column.text in taken or len(own) < len(tables) or name in (*DRIVE, *UNITS, "")
+            column.text in taken or word in (*DRIVE, *UNITS, "") or _in(column, UNITS["frequency"])
             or any(column.text in one.not_numeric for one in tables)
-            or not all(np.isfinite(values).any() for values in own)
+            or sum(len(values) > 0 for values in own) < len(tables)
         ):  # fmt: skip
             continue
-        within = max(float(np.nanmax(values) - np.nanmin(values)) for values in own)
-        levels = [float(np.nanmean(values)) for values in own]
+        within = max(float(np.ptp(values)) for values in own)
+        levels = [float(np.mean(values)) for values in own]
         levels = [float(f"{y:.{4 if within else 9}g}") for y in levels]
         between = float(np.std([levels[k] for k in open_]))
         if known is not None:
             tells = name in known
         elif unit:
-            tells = max(float(np.nanstd(one)) for one in own) <= STILL * between and between > 0.0
+            tells = max(float(np.std(one)) for one in own) <= STILL * between and between > 0.0
         else:  # without a unit a number that no run shares only names the runs
             tells = within == 0.0 and 1 < len({*levels}) < len(levels)
         if tells:

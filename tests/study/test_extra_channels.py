@@ -129,7 +129,8 @@ def test_a_column_that_stands_still_in_each_file_is_a_label_of_the_runs(tmp_path
         columns |= {
             "Gas [bar]": np.full(rows, 10.0 + 2.5 * (seed % 2)), "RH [%]": gauge,
             "oil": np.full(rows, seed % 2 + 1.0), "test": np.full(rows, 7.0 + seed),
-            "gain [V/N]": np.full(rows, 5.0),
+            "gain [V/N]": np.full(rows, 5.0), "f [Hz]": np.full(rows, 1.0 + seed % 2),
+            "status": np.full(rows, np.inf if seed % 2 else 1e38),
         }  # fmt: skip
         files.append(write(tmp_path / "lab" / f"{name}.csv", columns))
     rig = tmp_path / "rig"
