@@ -133,8 +133,9 @@ def complete(
             say("learning a curve")
             learned.append(learn_effect(study))
             names = (learned[-1].name,) if learned[-1].file is not None else ()
-        if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
-            done = Completed(found, (), tuple(learned), tuple(gained), anew=anew)
+        cut = NOT_COMPARED if found.kind == "effect" and left() < 0.0 else ""
+        if not names or cut or len(study.model().effects) + len(names) > MOST_EFFECTS:
+            done = Completed(found, (), tuple(learned), tuple(gained), cut, anew)
             if _open(found) and not proven and not study.settings.has_building:
                 step, refuted, opened = _gained(study, found, say, stepped)
                 if step is not None:

@@ -178,6 +178,19 @@ def test_what_is_explained_gets_no_further_effect(folder, monkeypatch):
     assert folder.names == []
 
 
+@pytest.mark.parametrize("most", [inf, -1.0])
+def test_a_named_effect_is_added_unless_enough_was_spent(folder, monkeypatch, most):
+    first = verdict("effect", 6.0)
+    first.effects = ("stribeck",)
+    told(monkeypatch, [first, verdict("none", 1.0)])
+    with counted(most):
+        done = complete(folder, say=print)
+    enough = most < 0.0
+    assert folder.names == ([] if enough else ["stribeck"])
+    assert done.verdict.kind == ("effect" if enough else "none")
+    assert bool(done.refuted) is enough
+
+
 def test_folds_of_the_training_runs_choose_what_lowers_their_error(bench_study):
     study = Study(bench_study)
     opened = opened_at(study, "", with_law(study.model(), "bingham_standard"))[1]
