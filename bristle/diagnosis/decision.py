@@ -17,6 +17,7 @@ from ..comparison.names import effect_name
 from ..core.text import joined, plain
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem
+from ..identification.error import held_out_apart
 from ..identification.problem import Problem
 from ..identification.rig import DAMPER
 from ..physics.effect import EFFECTS
@@ -315,11 +316,12 @@ def decide_by_gains(
     not_known = noise_not_known(held_out)
     able = sorted((one for one in trials if _gains(before, one, rule)), key=lambda trial: trial.rms)
     if not able:
+        apart = held_out_apart(before.train, before.z, before.rms / size)
         return Decision(
             "insufficient", (), before, 0.0,
             (
                 f"No effect of the library lowers the error; {share(before)} of the force is "
-                f"unexplained, noise included. {not_known}",
+                f"unexplained, noise included. {apart or not_known}",
             ),
         )  # fmt: skip
     best = able[0]

@@ -31,6 +31,12 @@ TOO_MANY = 0.2
 MIN_SAMPLES = 100
 """Samples of all runs together that a fit, or a judgement, needs at the least."""
 
+APART = 3.0
+"""Ratio of the errors of held-out and training runs from which these are not of one kind."""
+
+MUCH = 0.1
+"""Share of the force below which it is not worth a word."""
+
 
 @dataclass(frozen=True)
 class ForceError:
@@ -289,3 +295,20 @@ def _rms(values: Array) -> float:
 def _few(share: float) -> str:
     """Return a share in per cent with two digits."""
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.1f} %"
+
+
+def held_out_apart(train: float, holdout: float, share: float) -> str:
+    """Return what to do where held-out runs err far more than training runs; "" where not so.
+
+    Parameters
+    ----------
+    train, holdout : the errors, both over the force or over the noise
+    share : that of the held-out runs over their force
+    """
+    if not (holdout > APART * train and share > MUCH):
+        return ""
+    return (
+        "The held-out runs err far more than the training runs: they do what no training run does, "
+        "in motion, command or device. bristle compare shows in which, bristle study roles makes "
+        "it a training run."
+    )

@@ -17,7 +17,7 @@ from ..data.cut_off import saturated_share
 from ..data.measurement import Measurement
 from ..diagnosis.by_label import extrapolated
 from ..errors import StudyError
-from ..identification.error import ForceError
+from ..identification.error import ForceError, held_out_apart
 from ..identification.fit import MISFIT, Fit
 from ..identification.histories import compile_ahead
 from ..identification.problem import Problem, robust_z, uncommanded
@@ -520,6 +520,9 @@ def identify_on_rig(rig: Rig, runs: Runs, model: Model, task: FitTask) -> Identi
         *by_site(models),
         *weighing(after.numbers["z_train"]),
     ]
+    if "error_share_holdout" in after.numbers:
+        train, holdout = (after.numbers[f"error_share_{role}"] for role in ("train", "holdout"))
+        notes += filter(None, [held_out_apart(train, holdout, holdout)])
     notes += [*rig.notes, *under_load(at)]
     found = Identified(fit, task.cutoff, before, after, tuple(notes), None, at)
     if others:

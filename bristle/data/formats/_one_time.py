@@ -23,6 +23,7 @@ AnyArray: TypeAlias = NDArray[Any]
 SECOND, HERTZ = parse_unit("s").dimension, parse_unit("Hz").dimension
 SAME = 0.02
 """Share of the step by which samples may be apart and are taken as simultaneous."""
+_LITTLE = 0.01  # share of a record that may be cut off at its ends without a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,8 @@ def on_one_time(series: Sequence[Series], name: str) -> Joined:
         remarks += _notes_on(one, chosen, interpolated)
     slowest = max(one.step for one in series)
     spans = [one.span for one in series]
-    if max(max(begin - first, last - end) for first, last in spans) > 1.5 * slowest:
+    lost = max(max(begin - first, last - end) for first, last in spans)
+    if lost > min(1.5 * slowest, _LITTLE * (end - begin)):
         remarks.append(
             f"only the part that all channels have is read: {plain(time[0], 5)} s to "
             f"{plain(time[-1], 5)} s"

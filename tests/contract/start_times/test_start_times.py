@@ -122,6 +122,12 @@ def test_increments_in_ms_and_rates_of_loggers(tmp_path: Path, told) -> None:
     )
 
 
+def test_what_a_slow_channel_cuts_off_is_said(tmp_path: Path) -> None:
+    slow = channel("temperature", lambda t: 25.0 + t, "degC", step=1.0, size=6)
+    table = read_table(tdms(tmp_path / "run.tdms", MOTION, channel("force", force, "N"), slow))
+    assert "only the part that all channels have is read: 0 s to 5 s" in " ".join(table.remarks)
+
+
 def test_a_group_of_another_run_is_named_and_not_read(tmp_path: Path) -> None:
     both = [channel("force", force, "N"), channel("force", force, "N", start=60.0, group="second")]
     table = read_table(tdms(tmp_path / "run.tdms", MOTION, *both))

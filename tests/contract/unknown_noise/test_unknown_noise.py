@@ -70,6 +70,21 @@ def study_of(
     return copy
 
 
+def test_a_held_out_run_of_another_device_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_runs(tmp_path, 0.0)
+    run = np.loadtxt(tmp_path / "run2.csv", delimiter=",", skiprows=1)
+    run[:, 2] += 8.0 * np.abs(run[:, 1]) * np.sign(run[:, 2])
+    title = "time [s],displacement [mm],force [N]"
+    np.savetxt(tmp_path / "run2.csv", run, delimiter=",", header=title, comments="", fmt="%.9g")
+    study, data = str(tmp_path / "rig"), str(tmp_path / "*.csv")
+    assert main(["study", "new", study, "--data", data, "--law", "tanh"]) == 0
+    assert main(["identify", study, "--starts", "2"]) == 0
+    told = "The held-out runs err far more than the training runs: they do what no training run"
+    assert told in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_held_out_run_of_unknown_noise_explains_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
