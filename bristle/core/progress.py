@@ -201,19 +201,16 @@ class Progress:
         The number of steps.
     wanted : bool
         False shows nothing.
-    even : bool
-        Whether the steps are alike, so that those done tell how long the rest takes.
 
     Notes
     -----
     In a pipe it tells now and then. What is told meanwhile (`tell`) stands before the bar.
     """
 
-    def __init__(self, title: str, total: int, wanted: bool, even: bool = True) -> None:
+    def __init__(self, title: str, total: int, wanted: bool) -> None:
         self._title = title
         self._total = total
         self._wanted = wanted
-        self._even = even
         self._live = wanted and sys.stderr.isatty() and _teller.get() is not None
         self._began = time.perf_counter()
         self._pace = _Pace()
@@ -238,7 +235,7 @@ class Progress:
             return
         spent = time.perf_counter() - self._began
         if not self._live:
-            left = self._pace.left(done, self._total) if done and self._even else ""
+            left = self._pace.left(done, self._total) if done else ""
             share = f"{self._title}: {100 * done // max(1, self._total)} %"
             tell(", ".join(filter(None, (share, left))))
             return
@@ -260,9 +257,8 @@ class Progress:
         from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
         from rich.progress import Progress as Bar
 
-        columns = [TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()]
-        columns += [TimeRemainingColumn()] if self._even else []
-        bar = Bar(*columns, console=Console(stderr=True), transient=True)
+        columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()
+        bar = Bar(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
         bar.add_task(self._title, total=self._total)
         bar.start()
         return bar

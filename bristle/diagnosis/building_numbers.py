@@ -25,7 +25,7 @@ from ..identification.building_sites import (
     problems_of,
 )
 from ..identification.rig_fit import fit_line, line_columns
-from ..identification.search import HUBER
+from ..identification.search import HUBER, weighed
 from ..identification.start_grid import Search
 from ..model.model import Model
 from ..physics.building import Building
@@ -410,9 +410,7 @@ def _step(
         [s[run.skip :] for run, (_, s, _) in zip(problem.runs, expected, strict=True)]
     )
     U = np.stack([np.concatenate(one) / sigma for one in slopes], axis=1)
-    whole = np.hstack([J, U])
-    weight = np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-12))
-    normal, gradient = (whole * weight[:, None]).T @ whole, (whole * weight[:, None]).T @ r
+    normal, gradient = weighed(np.hstack([J, U]), r)
     p = J.shape[1]
     normal[p:, p:] += np.eye(len(shift))
     gradient[p:] += shift

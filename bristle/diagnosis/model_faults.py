@@ -19,10 +19,10 @@ from ..data.corrections import LIMITS, limited
 from ..data.left_out import MISSING, merged
 from ..identification.problem import Expected, Problem, Run, residuals, steady
 from ..identification.search import (
-    HUBER,
     HUBER_AT_ONE,
     descend,
     in_threads,
+    linear_step,
     loss,
     losses,
     mean_loss,
@@ -369,11 +369,7 @@ def _looked_at(kind: str, model: Model, train: Problem, expected: Expected) -> _
         limit = _Limit(kind, value, model, np.inf)
         search = Search(_felt(train, limit, draws=False), model, expected, model.free())
         here, J = search.residuals(search.start), search.sensitivities()
-        weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
-        normal, gradient = (J * weight[:, None]).T @ J, (J * weight[:, None]).T @ here
-        size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
-        theta = np.clip(search.start - step, search.low, search.high)
+        theta = np.clip(search.start - linear_step(J, here), search.low, search.high)
         cost = mean_loss(loss(here + J @ (theta - search.start)))
         if best is None or cost < best.cost:
             best = replace(limit, model=search.at(theta), cost=cost)

@@ -857,12 +857,9 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
     return np.concatenate(parts)
 
 
-def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:
+def robust_z(problem: Problem, model: Model, expected: Expected | None = None) -> float:
     """Return z, the robust RMS of residual over expected noise: 1 for a true model."""
-    return _robust_z(problem, model, problem.expectation(model, draws))
-
-
-def _robust_z(problem: Problem, model: Model, expected: Expected) -> float:
+    expected = expected or problem.expectation(model)
     return z_scale(in_noises(problem, residuals(problem, model, expected), expected))
 
 
@@ -896,7 +893,7 @@ def excess_of(problem: Problem, model: Model) -> float:
     0 with z.
     """
     expected = problem.expectation(model)
-    z = _robust_z(problem, model, expected)
+    z = robust_z(problem, model, expected)
     if not z > EXPLAINS:
         return 0.0
     pairs = zip(errors(problem, model, expected), problem.runs, strict=True)

@@ -94,6 +94,20 @@ def z_scale(z: Array) -> float:
     return z_of(mean_loss(losses(z))) if len(z) else float("nan")
 
 
+def weighed(J: Array, r: Array) -> tuple[Array, Array]:
+    """Return the normal equations (p, p), (p,) of residuals (n,) by Huber's weights."""
+    weighted = J * np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-12))[:, None]
+    return weighted.T @ J, weighted.T @ r
+
+
+def linear_step(J: Array, r: Array) -> Array:
+    """Return by how much parameters (p,) are too large, to first order; the least where open."""
+    normal, gradient = weighed(J, r)
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scaled = normal / np.outer(size, size), gradient / size
+    return np.asarray(np.linalg.lstsq(*scaled, rcond=1e-8)[0] / size)
+
+
 def descend(
     residuals: Callable[[Array], Array],
     theta: Array,
@@ -130,9 +144,7 @@ def descend(
     damping, small, sweep, secants = 1e-3, 0, 1, 0
     J = jacobian(residuals, theta, r, low, high, rough)
     while True:
-        weight = np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-12))
-        weighted = J * weight[:, None]
-        normal, gradient = weighted.T @ J, weighted.T @ r
+        normal, gradient = weighed(J, r)
         tried = _try(
             residuals, (theta, cost, judged), normal, gradient, damping, (low, high), not secants
         )

@@ -16,7 +16,7 @@ from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS, Sizes
 from ..physics.laws import LAWS
 from .problem import Expected, Problem, residuals
-from .search import HUBER, Descent, descend, jacobian, loss, mean_loss
+from .search import HUBER, Descent, descend, jacobian, linear_step, loss, mean_loss
 
 # A model's parameters as a search sees them: numbers of order one, and the residuals over them.
 
@@ -411,11 +411,7 @@ def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
     here = own.residuals(own.start)
     slopes = own.jacobian(own.start, here)
     moves = not added or bool(slopes.any())
-    J = np.hstack([screening.known, slopes])
-    weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
-    normal, gradient = (J * weight[:, None]).T @ J, (J * weight[:, None]).T @ here
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
+    step = linear_step(np.hstack([screening.known, slopes]), here)
     whole = Search(screening.problem, start, screening.expected, [*base, *added])
     best = Candidate(start, mean_loss(loss(here)), moves)
     for share in STEPS:

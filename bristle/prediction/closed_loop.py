@@ -17,7 +17,6 @@ from ..identification.problem import following
 from ..identification.run_start import MOVING
 from ..model.draws import OpenEffect, has_covariance, left_open
 from ..model.model import Model
-from ..model.model_file import read_model
 from ..study.history import history_steps
 from ..study.rig import building_of
 from ..study.steps import count_test_set_use, opened_text, runs_for_test, uses_of_test_set
@@ -243,6 +242,4 @@ def _before(study: Study) -> tuple[Model | None, str]:
     numbers = [step.number for step in study.steps()]
     if len(numbers) < 3:
         return None, ""
-    file = study.history.model_file(numbers[-2])
-    model = read_model(file, study.folder)
-    return model.with_drive(study.drive or model.drive), study.history.step(numbers[-1]).what
+    return study.model_of(numbers[-2]), study.history.step(numbers[-1]).what

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -171,7 +171,7 @@ def write_editable(study: Study, folder: Path) -> Editable:
     measurement = _one_run(study, runs)
     notes: list[str] = []
     own = _bare(study, model, notes)
-    values = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
+    values = _own_values(own)
     found = _range(study, model, runs, ranges_of(study, model, runs), notes)
     limit = drive_named(measurement.drive).limit
     values |= {VOLTAGE.limit if name == limit else name: value for name, value in found.items()}
@@ -224,9 +224,10 @@ def _bare(study: Study, model: Model, notes: list[str]) -> Model:
     return model.at("damper", bench)
 
 
-def _signals(damper: Model) -> Collection[str]:
-    """Return the parameters that follow a measured channel: they are inputs of the damper."""
-    return following(damper.effects)
+def _own_values(damper: Model) -> Parameters:
+    """Return the values of a damper but for those that follow a channel: these are its inputs."""
+    inputs = following(damper.effects)
+    return {name: value for name, value in values_of(damper).items() if name not in inputs}
 
 
 def _damper(
@@ -234,9 +235,8 @@ def _damper(
 ) -> BuildPlan:
     """Plan the damper with the model's values as its defaults."""
     own = _bare(study, model, notes)
-    starts = {name: value for name, value in values_of(own).items() if name not in _signals(own)}
     ranges = ranges_of(study, model, runs)
-    starts |= _range(study, model, runs, ranges, notes)
+    starts = _own_values(own) | _range(study, model, runs, ranges, notes)
     files = own_effects()
     return plan(
         component_of_law(own.base_law),

@@ -23,8 +23,7 @@ from ..comparison.view import (
     under,
 )
 from ..core.progress import tell
-from ..core.text import command, percent, plain, short_z
-from ..core.text import with_interval as with_interval
+from ..core.text import command, percent, plain, short_z, with_interval
 from ..data.channels import label_text
 from ..errors import BristleError
 from ..model.equations import equations
@@ -339,22 +338,12 @@ def _equations(content: Content) -> list[str]:
     return [*parts, html.paragraphs(note, kind="soft")]
 
 
-def study_report(study: Study) -> str:
+def render(content: Content) -> str:
     """Return a study's report as one HTML document.
 
     It is the same for the same study, whenever and wherever it is made, but for the number of times
     that its test runs have been opened.
-
-    Raises
-    ------
-    StudyError, RecordError
-        If the study or its files cannot be read.
     """
-    return render(gather(study))
-
-
-def render(content: Content) -> str:
-    """Return the HTML document."""
     study = content.study
     settings = study.settings
     rig = "structure" if settings.has_building else "test bench"

@@ -229,12 +229,11 @@ class LawFits:
         """Write the values of laws [SI] by law and name, beside those that are there."""
         with self._lock:
             self.known |= {law: dict(values) for law, values in fitted.items()}
-            self._write()
-        self._tell()
+        self._written()
 
     def ends_of(self, law: str) -> _Ends:
         """Return where the trials of effects beside a law are kept."""
-        return _Ends(self._effects.setdefault(law, []), self._keep_effects)
+        return _Ends(self._effects.setdefault(law, []), self._written)
 
     def stands(self, law: str, effects: Sequence[str], z: float) -> None:
         """Take note of what comes nearest so far, and its z on held-out runs."""
@@ -245,17 +244,14 @@ class LawFits:
         )
         self._tell()
 
-    def _keep_effects(self) -> None:
+    def _written(self) -> None:
         with self._lock:
-            self._write()
+            content = {
+                "schema": 1, "key": self._key, "laws": self.known,
+                "effects": {law: own for law, own in self._effects.items() if own},
+            }  # fmt: skip
+            self._study.write_report(NAME, json.dumps(content, indent=1) + "\n")
         self._tell()
-
-    def _write(self) -> None:
-        content = {
-            "schema": 1, "key": self._key, "laws": self.known,
-            "effects": {law: own for law, own in self._effects.items() if own},
-        }  # fmt: skip
-        self._study.write_report(NAME, json.dumps(content, indent=1) + "\n")
 
     def _tell(self) -> None:
         count, searched = len(self.known), sum(map(bool, self._effects.values()))

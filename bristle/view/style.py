@@ -79,8 +79,6 @@ FLOOR = "#d9efe6"
 PALE = "#b8b8b8"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 
-MINUS = "\u2212"
-
 _TOGETHER = "\0"  # a blank at which no line is broken; no heading has this character
 MARGIN = 0.16
 """Space between text and the edge of a figure [in]."""

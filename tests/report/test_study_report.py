@@ -15,7 +15,7 @@ from made import write_runs
 from bristle.cli import main
 from bristle.core.text import with_interval
 from bristle.model.model import Fact, Model
-from bristle.report.study_page import curves_section, gather, parameter_table, render, study_report
+from bristle.report.study_page import curves_section, gather, parameter_table, render
 from bristle.study import Study, create_study
 
 VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.01, "v_n": 5.0, "exponent": 0.0}
@@ -93,7 +93,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(folder) -> str:
-    return study_report(Study(folder))
+    return render(gather(Study(folder)))
 
 
 def text_of(page: str) -> str:
@@ -154,7 +154,7 @@ def test_the_sentences_are_those_of_the_comparison(page, folder):
 def test_a_new_study_has_a_report_too(tmp_path):
     files = write_runs(tmp_path / "lab", 3, seconds=4.0)
     study = create_study(tmp_path / "fresh", files, law="bingham").study
-    page = study_report(study)
+    page = render(gather(study))
     checked(page)
     text = text_of(page)
     assert "No diagnosis has been made of the present model." in text
@@ -164,7 +164,7 @@ def test_a_new_study_has_a_report_too(tmp_path):
 
 def test_a_single_run_is_said_to_be_weaker(tmp_path):
     files = write_runs(tmp_path / "lab", 1, seconds=8.0)
-    page = study_report(create_study(tmp_path / "one", files, law="bingham").study)
+    page = render(gather(create_study(tmp_path / "one", files, law="bingham").study))
     checked(page)
     assert "weaker than a separate run" in text_of(page)
 

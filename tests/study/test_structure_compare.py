@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from studies import STIFFENING, house_study
 
-from bristle.report.study_page import study_report
+from bristle.report.study_page import gather, render
 from bristle.study.identify import identify_study
 from bristle.study.steps import compare_study, comparer
 from bristle.study.study import Study
@@ -97,6 +97,6 @@ def test_the_site_stays_the_same_for_all_models_of_a_history(stiff):
 
 
 def test_the_report_tells_of_every_site(stiff):
-    page = study_report(stiff)
+    page = render(gather(stiff))
     for name in ("isolation layer", "storey 1", "damper"):
         assert f">{name}</td>" in page

@@ -12,7 +12,7 @@ from made import bench_run, write, write_runs
 import bristle
 from bristle.cli import main
 from bristle.errors import RecordError, StudyError
-from bristle.report.study_page import study_report
+from bristle.report.study_page import gather, render
 from bristle.study import Study, create_study
 from bristle.study.data_check import check_data
 from bristle.study.run_facts import RunChoices
@@ -171,7 +171,7 @@ def test_the_report_opens_them_unless_they_are_to_stay_closed(
     assert main(["report", str(study.folder), "--keep-test-closed", "--out", str(page)]) == 0
     assert "They stay closed." in page.read_text()
     assert uses_of_test_set(study) == ()
-    text = study_report(study)
+    text = render(gather(study))
     assert "Error on the test runs" in text
     assert "opened for the first time" in text
     assert "1 test run" in text
