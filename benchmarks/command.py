@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def run() -> list[Row]:
     """Return the wall time of a whole run, FMUs already built, and of `--help`."""
     for component in load_scenario(SCENARIO).components.values():
-        ensure(component.kind, component.building, component.controller)
+        ensure(component.made_of(), **component.made_with())
     jobs = {"run": lambda: command("run", SCENARIO), "help": lambda: command("--help")}
     times = interleave(jobs, 5)
     return [

@@ -67,7 +67,7 @@ def _against(name: str, master: Times, other: Times, goal: float | None = None) 
 def find_fmus(scenario: System, ensure: Callable[..., Path] = ensure) -> Fmus:
     """Return files, descriptions and parameters of a scenario's FMUs, in Python or native."""
     there = scenario.components
-    paths = {n: c.path or ensure(c.kind, c.building, c.controller) for n, c in there.items()}
+    paths = {n: c.path or ensure(c.made_of(), **c.made_with()) for n, c in there.items()}
     descriptions = {name: read_description(path) for name, path in paths.items()}
     return paths, descriptions, {name: one.taken_values() for name, one in there.items()}
 

@@ -444,10 +444,7 @@ class Cosimulation:
                 from ..native.build import ensure as make
         paths, descriptions = {}, {}
         for name, component in system.components.items():
-            path = component.path or make(
-                component.made_of(), component.building, component.controller, component.effects,
-                component.ranged,
-            )  # fmt: skip
+            path = component.path or make(component.made_of(), **component.made_with())
             # A missing binary is explained when the FMU is loaded, with the way out.
             paths[name], descriptions[name] = path, read_description(path, any_platform=True)
         return paths, descriptions

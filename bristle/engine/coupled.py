@@ -521,12 +521,9 @@ def instantiated(component: Component, only_on: bool = False) -> Slave:
     """
     slave = catalogue.instantiate(
         component.made_of(),
-        component.building,
-        component.name,
-        component.controller,
-        component.effects,
+        instance=component.name,
         offers=component.effects_on() if only_on else None,
-        ranged=component.ranged,
+        **component.made_with(),
     )
     for name, value in component.taken_values(only_on).items():
         index = slave._index[name]

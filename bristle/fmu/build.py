@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 from uuid import UUID, uuid5
 
 from ..core.child import in_child
@@ -398,61 +398,33 @@ def _pack(loose: Path, target: Path, what: BuildPlan) -> None:
     write_archive(target, {**members, **documentation.members(root, what)})
 
 
-def ensure(
-    component: str,
-    building: catalogue.BuildingData | None = None,
-    controller: Path | None = None,
-    effects: Iterable[Path] = (),
-    ranged: bool = False,
-) -> Path:
+def ensure(component: str, **made: Unpack[catalogue.Made]) -> Path:
     """Return a built-in component's FMU, built on first use and reused while its digest holds.
 
     One that is made from a building, a controller file or effects is named by their content.
-
-    Parameters
-    ----------
-    component : str
-        A built-in component.
-    building, controller : path or None
-        Building file of a Structure; file of a designed controller; None: the component's own,
-        if it has one.
-    effects : iterable of path
-        Files with effects of the user's own.
-    ranged : bool
-        As in `plan`.
 
     Raises
     ------
     BuildError, DesignError, PhysicsError
         If a name or a file is wrong, or the FMU cannot be built.
     """
-    return build(planned(component, building, controller, effects, ranged), fmus_folder())
+    return build(planned(component, **made), fmus_folder())
 
 
-def planned(
-    component: str,
-    building: catalogue.BuildingData | None = None,
-    controller: Path | None = None,
-    effects: Iterable[Path] = (),
-    ranged: bool = False,
-) -> BuildPlan:
-    """Return the plan of what `ensure` builds.
-
-    Parameters
-    ----------
-    component, building, controller, effects, ranged
-        As in `ensure`, and what is raised too.
-    """
-    effects = tuple(effects)
-    what = plan(component, building=building, controller=controller, effects=effects, ranged=ranged)
-    if building is None and controller is None and not effects and not what.laws and not ranged:
+def planned(component: str, **made: Unpack[catalogue.Made]) -> BuildPlan:
+    """Return the plan of what `ensure` builds; what is raised is the same too."""
+    what = plan(component, **made)
+    building, controller = made.get("building"), made.get("controller")
+    own = (*made.get("effects", ()), *what.laws)
+    ranged = made.get("ranged", False)
+    if building is None and controller is None and not own and not ranged:
         return what
     named = hashlib.sha256(b"ranged" if ranged else b"")
     if building is not None:
         named.update(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
     if controller is not None:
         named.update(controller.read_bytes())
-    for path in (*effects, *what.laws):
+    for path in own:
         named.update(path.name.encode() + path.read_bytes())
     name = f"{what.name}_{named.hexdigest()[:8]}"
     return replace(what, name=name, baked={**what.baked, "name": name})

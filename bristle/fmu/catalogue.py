@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypedDict
 
 from ..core.config import toml_content
 from ..core.files import cache_folder, components_folder, reading, write_whole
@@ -158,6 +158,15 @@ def _class_of(path: Path, content: bytes) -> type[Slave]:
     if len(own) != 1:
         raise BuildError(f"{path}: {len(own)} component classes; one per file is right.")
     return own[0]
+
+
+class Made(TypedDict, total=False):
+    """What a built-in component is made with: see `build.plan`."""
+
+    building: BuildingData | None
+    controller: Path | None
+    effects: tuple[Path, ...]
+    ranged: bool
 
 
 def instantiate(

@@ -7,9 +7,10 @@ import os
 import struct
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Unpack
 from uuid import UUID, uuid5
 from xml.etree.ElementTree import Element, SubElement, fromstring
 
@@ -19,7 +20,7 @@ from ..errors import BuildError
 from ..fmu import documentation
 from ..fmu.archive import write_archive
 from ..fmu.build import BuildPlan, built_guid, planned
-from ..fmu.catalogue import BuildingData
+from ..fmu.catalogue import Made
 from . import zig
 from .description import text_of
 from .entrance import GUID, compile_functions, prepare
@@ -306,22 +307,10 @@ def build(
     return target
 
 
-def ensure(
-    component: str,
-    building: BuildingData | None = None,
-    controller: Path | None = None,
-    effects: Iterable[Path] = (),
-    ranged: bool = False,
-    fmi: int = 2,
-) -> Path:
+def ensure(component: str, *, fmi: int = 2, **made: Unpack[Made]) -> Path:
     """Return a built-in component's native FMU for this machine, built on first use.
 
-    Parameters
-    ----------
-    component, building, controller, effects, ranged
-        As in `fmu.build.ensure`.
-    fmi : int
-        2 or 3: the version of FMI that it follows.
+    It follows FMI 2.0 or 3.0; what it is made with is as for `fmu.build.ensure`.
 
     Raises
     ------
@@ -330,7 +319,7 @@ def ensure(
     """
     from filelock import FileLock
 
-    what = planned(component, building, controller, effects, ranged)
+    what = planned(component, **made)
     folder = zig.folder() / ("fmus_fmi3" if fmi == 3 else "fmus")
     with writing(folder, BuildError):
         folder.mkdir(exist_ok=True)

@@ -18,7 +18,7 @@ from ..core.text import LIST_AT_MOST, command, nearest, number, unknown, written
 from ..core.toml_lines import KeyPath
 from ..data import ground_motion_file
 from ..errors import PhysicsError, ScenarioError
-from ..fmu.catalogue import BuildingData
+from ..fmu.catalogue import BuildingData, Made
 from ..fmu.component import OUTSIDE, SWITCH
 from ..fmu.description import Description, Value, Variable
 from ..physics.building import PAPER, from_data
@@ -173,6 +173,13 @@ class Component:
 
             load_file(self.law.file, "law")
         return self.law.component
+
+    def made_with(self) -> Made:
+        """Return what the catalogue makes it with."""
+        return {
+            "building": self.building, "controller": self.controller, "effects": self.effects,
+            "ranged": self.ranged,
+        }  # fmt: skip
 
     @property
     def plays(self) -> str:

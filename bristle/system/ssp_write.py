@@ -274,14 +274,11 @@ def _fmu(component: Component, folder: Path, name: str, build: Build) -> Path:
     what = plan(
         component.made_of(),
         name=name,
-        building=component.building,
-        controller=component.controller,
-        effects=component.effects,
         record=files.get("record"),
         samples=files.get("file"),
         starts=values,
         offers=component.effects_on(),
-        ranged=component.ranged,
+        **component.made_with(),
     )
     return build(what, folder)
 

@@ -414,10 +414,10 @@ def test_ensure_keeps_one_file_per_building(
     write: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path / "cache"))
-    first = ensure("Structure", write(BUILDING, "a.toml"))
+    first = ensure("Structure", building=write(BUILDING, "a.toml"))
     assert first.parent == tmp_path / "cache" / "fmus"
-    assert ensure("Structure", write(BUILDING + "# the same\n", "b.toml")) == first
-    other = ensure("Structure", write(FIXED, "c.toml"))
+    assert ensure("Structure", building=write(BUILDING + "# the same\n", "b.toml")) == first
+    other = ensure("Structure", building=write(FIXED, "c.toml"))
     plain = ensure("Structure")
     assert len({first, other, plain}) == 3
     assert built_guid(plain) == plan("Structure").guid()

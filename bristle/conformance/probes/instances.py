@@ -31,7 +31,7 @@ def reset(bench: Bench) -> Finding:
             good(instance.terminate(), "Terminate")
         good(instance.reset(), f"Reset {situation}")
         alike = f"equal to a fresh instance, twice ({changed} parameters changed before)"
-        found = judged(bench, bench.whole_run(instance), f"reset {situation}", alike)
+        found = _judged(bench, bench.whole_run(instance), f"reset {situation}", alike)
         if found.level != "pass":
             break
     return found
@@ -48,7 +48,7 @@ def _disturb_parameters(bench: Bench, instance: Handle) -> int:
     return taken
 
 
-def judged(bench: Bench, rows: list[Values], where: str, alike: str) -> Finding:
+def _judged(bench: Bench, rows: list[Values], where: str, alike: str) -> Finding:
     """Judge a run by the reference: another one fails, or is noted where the FMU repeats none."""
     difference = bench.differs(rows, bench.reference())
     if not difference:
@@ -71,7 +71,7 @@ def many_instances(bench: Bench) -> Finding:
         _life(bench)
     many = f"{bench.plan.instances} instances"
     alike = f"{many}, the last run equals the first"
-    return judged(bench, bench.whole_run(), f"after {many}", alike)
+    return _judged(bench, bench.whole_run(), f"after {many}", alike)
 
 
 @Probe(
@@ -99,7 +99,7 @@ def two_instances(bench: Bench) -> Finding:
             bench.move(second, k + 11)
         second.step(bench.time(k), bench.plan.step)
     second.free()
-    return judged(bench, rows, "beside another instance", "the first runs as if it were alone")
+    return _judged(bench, rows, "beside another instance", "the first runs as if it were alone")
 
 
 @Probe(
@@ -160,7 +160,7 @@ def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
         rows += bench.run(mine, k, k + 1)
     companion.free()
     name = "its copy" if other.plan.fmu == bench.plan.fmu else other.plan.about.name
-    return judged(bench, rows, f"beside {name}", f"runs beside {name} exactly as alone")
+    return _judged(bench, rows, f"beside {name}", f"runs beside {name} exactly as alone")
 
 
 @Probe(
@@ -185,7 +185,7 @@ def bare_interpreter(bench: Bench) -> Finding:
     except FatalAnswerError as error:
         return noted(f"needs something that is installed here: {error} answered Fatal")
     alike = "needs nothing that is installed here"
-    return judged(bench, rows, "without installed packages", alike)
+    return _judged(bench, rows, "without installed packages", alike)
 
 
 @Probe(
