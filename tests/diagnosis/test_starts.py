@@ -120,3 +120,22 @@ def test_what_cannot_win_is_not_searched_further(springy, monkeypatch):
     assert "gas_spring" in searched
     assert len(searched) < len(found) / 2
     assert not any(one.refined for one in found if one.effects[-1] not in searched)
+
+
+def test_where_nothing_is_missing_hardly_an_effect_is_screened(springy, monkeypatch):
+    looked = []
+    plain = trials.screened
+
+    def noted(name, *given):
+        looked.append(name)
+        return plain(name, *given)
+
+    monkeypatch.setattr(trials, "screened", noted)
+    trials.guesses_of(["gas_spring", "delay"], springy)
+    assert "gas_spring" in looked
+    looked.clear()
+    whole = refine(springy.base.with_effect("gas_spring"), springy.train)
+    names = joinable(whole, problem=springy.train)
+    found = trials.guesses_of(names, SearchContext(whole, springy.train))
+    assert set(found) == set(names)
+    assert len(looked) < len(names) / 2
