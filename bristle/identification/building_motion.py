@@ -139,7 +139,7 @@ PULSE = 1001
 
 
 def smoothed_level(
-    m: Measurement, name: str, looser: float, forced: Array | float = 0.0
+    m: Measurement, name: str, looser: float, forced: Array | float = 0.0, least: float = 0.0
 ) -> dict[str, Any]:
     """Return the smoothed motion of one level by name, in SI.
 
@@ -157,6 +157,7 @@ def smoothed_level(
     name : of the level
     looser : factor of the jerk's likeliest intensity [1]
     forced : (n,) m/s2, what ground and measured forces make, or 0
+    least : m2/s5, of the jerk
     """
     n, dt = len(m.time), m.step
     y, r, have = np.zeros((n, 3)), np.zeros(3), np.zeros(3, dtype=np.bool_)
@@ -179,7 +180,7 @@ def smoothed_level(
         path[:, 0] = cumulative_trapezoid(path[:, 1], dx=dt, initial=0.0)
         y -= path * have
     added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
-    jerk = looser * _likeliest(y, seen, r, have, dt, added)
+    jerk = max(looser * _likeliest(y, seen, r, have, dt, added), least)
     out = room(n)
     kalman_smooth(_samples(y, r, have, dt, seen), jerk + added, out)
     std = np.sqrt(np.maximum(out.cov, 0.0))
@@ -643,13 +644,7 @@ def responses(
     device = building.device(building.studied)
     for measurement in measurements:
         check_channels(measurement, building)
-    smoothed = [
-        [
-            smoothed_level(m, name, looser, forced)
-            for name, forced in zip(building.levels(), _forced(m, building, device), strict=True)
-        ]
-        for m in measurements
-    ]
+    smoothed = [_smoothed(m, building, device, looser) for m in measurements]
     across = measured_across(measurements, building, device, draws, seed + building.size, looser)
     ends = {0}.union(*(one.levels for one in building.devices))  # where accelerations may jump
     first = ends <= {GROUND, 0}  # forces that jump act on the first level alone
@@ -672,6 +667,24 @@ def responses(
         )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
     return out
+
+
+def _smoothed(
+    m: Measurement, building: Building, device: Device, looser: float
+) -> list[dict[str, Any]]:
+    """Return the smoothed motion of all levels of a run, see `smoothed_level`.
+
+    A displacement alone may be likeliest under far less jerk than its level has: one without an
+    accelerometer has at least the jerk of the smoothest level that has one.
+    """
+    forced = dict(zip(building.levels(), _forced(m, building, device), strict=True))
+    shown = {one for one in forced if m.has(f"{one}_acceleration_absolute")}
+    found = {one: smoothed_level(m, one, looser, forced[one]) for one in forced if one in shown}
+    least = min((level["jerk"] for level in found.values()), default=0.0)
+    for one in forced:
+        if one not in shown:
+            found[one] = smoothed_level(m, one, looser, forced[one], least)
+    return [found[one] for one in forced]
 
 
 def _forced(m: Measurement, building: Building, device: Device) -> Array:
