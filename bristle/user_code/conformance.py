@@ -201,6 +201,10 @@ def _corners(effect: type[Effect]) -> Iterator[dict[str, float]]:
             yield {f"{effect.name}.{name}": bound}
 
 
+def _text(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in values.items()) or "defaults"
+
+
 def _rests(effect: type[Effect]) -> Check:
     asked = "no force at rest" if effect.zero_at_rest else "a force at rest, as declared"
     most, at = 0.0, ""
@@ -210,7 +214,7 @@ def _rests(effect: type[Effect]) -> Check:
                 model = DamperModel(law, values, [effect.name])
                 force = abs(model.force(0.0, 0.0, 0.0, V, inf, 0.0, 0.0, False))
                 if force > most:
-                    most, at = force, f"{force:g} N at {V:g} V, {law}, {values or 'defaults'}"
+                    most, at = force, f"{force:.3g} N at {V:g} V, {law}, {_text(values)}"
     return Check(asked, (most == 0.0) == effect.zero_at_rest, at or "none at any bound")
 
 
@@ -251,7 +255,7 @@ def _bounds(effect: type[Effect]) -> Check:
         for values in _corners(effect):
             forces = _cycle(law, [effect.name], values, 0.01, 3.0, 8.0)[1]
             if not all(isfinite(force) for force in forces):
-                return Check("it can be simulated at every bound", False, f"{law}, {values}")
+                return Check("it can be simulated at every bound", False, f"{law}, {_text(values)}")
     return Check("it can be simulated at every bound", True)
 
 
@@ -269,7 +273,7 @@ def _energy(effect: type[Effect]) -> Check:
                 scale = amplitude * max(1e-9, float(np.abs(force).max()))
                 if work < -1e-3 * scale:
                     where = f"{law}, {1e3 * amplitude:g} mm at {frequency:g} Hz, {V:g} V"
-                    text = f"{work:.3g} J at {where}, {values or 'defaults'}"
+                    text = f"{work:.3g} J at {where}, {_text(values)}"
                     return Check(asked, False, text)
     return Check(asked, True)
 
@@ -307,7 +311,7 @@ def _building_bounds(effect: type[Effect]) -> Check:
         for k in range(200):
             model.step(0.002, 4.0 * sin(0.02 * k), 4.0 * sin(0.02 * k + 0.02), 0.0)
         if not all(isfinite(x) and abs(x) < 10.0 for x in model.x):
-            return Check(asked, False, f"the base leaves 10 m at {values}")
+            return Check(asked, False, f"the base leaves 10 m at {_text(values)}")
     return Check(asked, True)
 
 
@@ -316,7 +320,7 @@ def _shows(effect: type[Effect]) -> Check:
     for values in _corners(effect):
         own = {name.partition(".")[2]: value for name, value in values.items()}
         if not np.isfinite(shown(effect, own, signal, 0.002)).all():
-            return Check("what it shows is finite at every bound", False, f"{values}")
+            return Check("what it shows is finite at every bound", False, _text(values))
     return Check("what it shows is finite at every bound", True)
 
 
