@@ -18,7 +18,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from ..core.text import did_you_mean
-from ..errors import TrustError
+from ..errors import StudyError, TrustError
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec
@@ -175,7 +175,6 @@ def instead(word: str, names: Iterable[str]) -> str:
 
 def test_files(patterns: list[str], files: list[str]) -> list[str]:
     """Return the files of the test runs: names among the files of --data, or files of their own."""
-    from ..errors import StudyError
 
     found: list[str] = []
     for pattern in patterns:
@@ -193,7 +192,6 @@ def test_files(patterns: list[str], files: list[str]) -> list[str]:
 def channels_of(texts: list[str], step: float | None = None) -> dict[str, ChannelSpec]:
     """Return where channels are, as --channel and --step say; StudyError where one is twice."""
     from ..data.channels import ChannelSpec
-    from ..errors import StudyError
     from ..study.new import parse_channel
 
     channels = {} if step is None else {"time": ChannelSpec(step=step)}
@@ -224,7 +222,6 @@ def files_of(patterns: list[str], option: str = "--data ") -> list[str]:
     option : what stands before them on the command line, for messages
     """
     from ..data.read import files_in
-    from ..errors import StudyError
 
     found: list[str] = []
     for pattern in patterns:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.text import command
+from ..errors import StudyError
 from ..view.blocks import Next
 from ._options import (
     Parser,
@@ -54,16 +56,20 @@ def _channels(arguments: argparse.Namespace) -> int:
         return 0
     dry = arguments.dry_run
     done = correct_channels(study, channels, without=arguments.without, write=not dry)
-    if arguments.json:
-        _print_channels_json(study, done)
-    else:
+    if not arguments.json:
         _print(study, done, dry)
+        return 0
+    print_json({
+        "folder": str(study.folder.absolute()),
+        "changes": [asdict(one) for one in done.changes],
+        "notes": list(done.notes),
+        "of_before": [one.what for one in done.of_before],
+        "step": done.step.number if done.step else None,
+    })  # fmt: skip
     return 0
 
 
 def _print_channels(study: Study, *, as_json: bool) -> None:
-    from dataclasses import asdict
-
     from ..study.study_file import spec_text
 
     listed = study.settings.channels
@@ -72,19 +78,6 @@ def _print_channels(study: Study, *, as_json: bool) -> None:
         return
     for name, spec in listed.items():
         print(f"{name:28} {spec_text(spec)}")
-
-
-def _print_channels_json(study: Study, done: CorrectedChannels) -> None:
-    from dataclasses import asdict
-
-    answer = {
-        "folder": str(study.folder.absolute()),
-        "changes": [asdict(one) for one in done.changes],
-        "notes": list(done.notes),
-        "of_before": [one.what for one in done.of_before],
-        "step": done.step.number if done.step else None,
-    }
-    print_json(answer)
 
 
 def _print(study: Study, done: CorrectedChannels, dry: bool) -> None:
@@ -149,35 +142,27 @@ def print_added(
     extended: Extended, by_plan: Performed | None = None, *, as_json: bool = False
 ) -> None:
     """Print the runs that were added, what differs from their plan, and the next command."""
-    if as_json:
-        _print_extended_json(extended, by_plan)
-        return
     from ..core.text import capital, command
     from ..study.study import unknown_to_model
 
     folder, runs = extended.study.folder, extended.runs
+    notes = [*extended.notes, *(by_plan.notes if by_plan else ())]
+    if as_json:
+        return print_json({
+            "folder": str(folder.absolute()),
+            "added": [asdict(run) for run in runs],
+            "notes": notes,
+            "plan": [asdict(pair) for pair in by_plan.pairs] if by_plan else None,
+        })  # fmt: skip
     print(f"{folder}: {len(runs)} run{'s' * (len(runs) != 1)} added.")
     for run in runs:
         print(f"  {run.name:28} {run.role}")
-    notes = [*extended.notes, *(by_plan.notes if by_plan else ())]
     for note in notes:
         print(f"{capital(note, [run.file for run in runs])}.")
     for text in by_plan.differences if by_plan else ():
         print(f"Warning: {text}.")
     then = "identify" if unknown_to_model(extended.study) else "diagnose"
     print(f"Next:  {command(then, folder)}")
-
-
-def _print_extended_json(extended: Extended, by_plan: Performed | None) -> None:
-    from dataclasses import asdict
-
-    answer = {
-        "folder": str(extended.study.folder.absolute()),
-        "added": [asdict(run) for run in extended.runs],
-        "notes": [*extended.notes, *(by_plan.notes if by_plan else ())],
-        "plan": [asdict(pair) for pair in by_plan.pairs] if by_plan else None,
-    }
-    print_json(answer)
 
 
 # `bristle study roles`: what the runs of a study are for.
@@ -205,7 +190,6 @@ def add_roles(parser: Parser) -> None:
 
 def _roles(arguments: argparse.Namespace) -> int:
     """Change the roles that are named; print those of all runs."""
-    from ..errors import StudyError
     from ..study.study import Study, behind_data
 
     study = Study(arguments.folder)
@@ -319,7 +303,6 @@ def _add_runs(parser: Parser) -> None:
 
 
 def _new(arguments: argparse.Namespace) -> int:
-    from ..errors import StudyError
     from ..physics.laws import law_names
     from ..study.run_facts import RunChoices
     from ..study.steps import create_study
@@ -357,8 +340,6 @@ def _new(arguments: argparse.Namespace) -> int:
 
 
 def _created_answer(created: Created) -> dict[str, Any]:
-    from dataclasses import asdict
-
     settings = created.study.settings
     return {
         "folder": str(created.study.folder.absolute()),
@@ -373,7 +354,6 @@ def _created_answer(created: Created) -> dict[str, Any]:
 
 def _check(arguments: argparse.Namespace) -> int:
     from ..core.progress import Progress
-    from ..errors import StudyError
     from ..study.data_check import check_data
     from ..study.study import Study
     from ..view.style import png
