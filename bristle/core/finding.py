@@ -17,6 +17,7 @@ _OF_ONE_RUN = ("run gain", "run sign", "run zero")
 """Kinds that say how one run differs from the others."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\d)")
 """A number of a sentence, and no part of a name."""
+_POWER = re.compile(" \u00d7 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 _WORD = re.compile(r"(?: to -?[\d.]+)? ([^\s,;:()]*[^\s,;:().])")
 """What stands behind a number, or behind the range that begins with it."""
 _ORDER = {"error": 0, "warning": 1, "note": 2}
@@ -110,12 +111,14 @@ def _range_text(group: Sequence[Finding]) -> str:
 
 def _unit(number: re.Match[str]) -> str:
     """Return the unit behind a number of a sentence, a blank before it, "" where none is there."""
-    word = _WORD.match(number.string, number.end())
+    power = _POWER.match(number.string, number.end())
+    before, begin = (power.group(), power.end()) if power else ("", number.end())
+    word = _WORD.match(number.string, begin)
     text = word.group(1) if word else ""
     if text == "in":  # the preposition: readers convert inches
-        return ""
+        return before
     try:
         parse(text)
     except UnitError:
-        return f" {text}" if text in ("ppm", "times") else ""
-    return f" {text}" if text else ""
+        return f"{before} {text}" if text in ("ppm", "times") else before
+    return f"{before} {text}" if text else before

@@ -17,7 +17,7 @@ from ..core.finding import Finding
 from ..core.text import plain, quantity
 from ..data.corrections import LIMITS, limited
 from ..data.left_out import MISSING, merged
-from ..identification.problem import Expected, Problem, Run, residuals, steady
+from ..identification.problem import Expected, Problem, Run, moved_by, residuals, steady
 from ..identification.search import (
     HUBER_AT_ONE,
     descend,
@@ -141,8 +141,7 @@ def _zero_of_force(before: Trial, train: Problem, held_out: Problem) -> ModelBas
     trial = judge(replace(base, values=plain), *right)
     fault = Finding(
         "bias", "warning",
-        f"Force shows {quantity(offset, 'N')} whatever the motion and the "
-        f"{train.runs[0].drive}, without the "
+        f"Force shows {quantity(offset, 'N')} whatever the {moved_by(train)}, without the "
         "stiffness of a spring: the zero of the load cell is off, or a preload acts on the rod.",
         channel="force", value=offset, std=_deviation(_left(trial.model, right[0])),
     )  # fmt: skip

@@ -17,7 +17,7 @@ from ..core.finding import Finding
 from ..identification.building_sites import StructureProblem, StructureRun
 from ..identification.fit import fit
 from ..identification.histories import Effort, left
-from ..identification.problem import Expected, Problem, Run, has_offset, zero_of
+from ..identification.problem import Expected, Problem, Run, has_offset, moved_by, zero_of
 from ..identification.rig import acts_at
 from ..identification.rig_fit import fit_damper, fit_line, joined
 from ..identification.search import in_threads
@@ -424,7 +424,7 @@ def zero_fault(problem: Problem, decision: Decision) -> Finding | None:
         return None
     if not _significant(problem, model):
         return None
-    return _fault(*zero_of(problem, model), decision, problem.runs[0].drive)
+    return _fault(*zero_of(problem, model), decision, problem)
 
 
 def renewed_zero(prepared: Prepared, decision: Decision) -> tuple[Finding, ...]:
@@ -437,15 +437,14 @@ def renewed_zero(prepared: Prepared, decision: Decision) -> tuple[Finding, ...]:
     if not first or not prepared.problem.free_zero or has_offset(model):
         return ()
     more, std = zero_of(prepared.problem, model)
-    drive = prepared.problem.runs[0].drive
-    return (_fault(first[0].value + more, std, decision, drive),)
+    return (_fault(first[0].value + more, std, decision, prepared.problem),)
 
 
-def _fault(zero: float, std: float, decision: Decision, drive: str) -> Finding:
+def _fault(zero: float, std: float, decision: Decision, problem: Problem) -> Finding:
     beside = f" beside {' and '.join(decision.effects)}" if decision.kind == "effect" else ""
     return Finding(
         "bias", "warning",
-        f"Force shows {zero:.3g} N{beside} whatever the motion and the {drive}: the zero of the "
+        f"Force shows {zero:.3g} N{beside} whatever the {moved_by(problem)}: the zero of the "
         "load cell is off. A static preload on the rod would look the same.",
         channel="force", value=zero, std=std,
     )  # fmt: skip

@@ -720,6 +720,11 @@ def uncommanded(problem: Problem) -> bool:
     return not any(np.any(run.V) for run in problem.runs)
 
 
+def moved_by(problem: Problem) -> str:
+    """Return the words for what acts on the damper: its motion, and its command if it has one."""
+    return "motion" if uncommanded(problem) else f"motion and the {problem.runs[0].drive}"
+
+
 def suited(problem: Problem, laws: Sequence[str]) -> tuple[str, ...]:
     """Return those of some laws, by name, that are tried on runs where nobody names one.
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..comparison.names import site_name
 from ..core.progress import tell
-from ..core.text import percent, short_z, unknown
+from ..core.text import listed, percent, short_z, unknown
+from ..data.checks.motion import check_force, velocity_of_run
 from ..data.cut_off import saturated_share
 from ..data.measurement import Measurement
 from ..diagnosis.by_label import extrapolated
@@ -251,6 +252,17 @@ def doubts(runs: list[Measurement]) -> list[str]:
             notes.append(
                 f"{run.name}: {percent(share)} of the force's samples are at its extremes."
             )
+    driven = [
+        run.name
+        for run in runs
+        if (velocity := velocity_of_run(run)) is not None
+        and any(one.level == "error" for one in check_force(run, velocity))
+    ]
+    if driven:
+        notes.append(
+            f"The force drives the motion in {listed(driven)}, as no damper does: its sign is "
+            "wrong there. bristle study check shows how it is read right."
+        )
     doubtful: dict[str, int] = {}
     for run in runs:
         for channel, fact in run.noise_facts.items():

@@ -57,6 +57,10 @@ def test_runs_that_each_differ_in_their_own_way_are_told_one_by_one():
         (("3 in it", "4 in it"), "3 to 4 in 2 runs"),
         (("1 (± 0.2) by 7 %", "1 (± 0.3) by 8 %"), "7 to 8 % in 2 runs"),
         (("off by 3 %, late", "off by 4 %, late"), "3 to 4 % in 2 runs"),
+        (
+            ("1.2 \u00d7 10⁻¹⁰ m, low", "1.3 \u00d7 10⁻¹⁰ m, low"),
+            "1.2 to 1.3 \u00d7 10⁻¹⁰ m in 2 runs",
+        ),
         (("1.18 times as much", "1.2 times as much"), "1.18 to 1.2 times in 2 runs"),
     ],
 )

@@ -113,6 +113,18 @@ def test_a_force_saturated_in_more_than_half_is_told_and_carries_no_verdict(
     assert (rig / "model.toml").read_bytes() == model
 
 
+def test_a_force_that_drives_the_motion_is_told_where_a_model_is_fitted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [bench_run(seed) for seed in (1, 2, 3)]
+    runs[1]["F [N]"] *= -1.0
+    rig = study_of(tmp_path, runs)
+    capsys.readouterr()
+    assert main(["identify", str(rig), "--starts", "1"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "The force drives the motion in run_1, as no damper does: its sign is wrong" in said
+
+
 BURST = """from math import exp
 
 from bristle.physics.law import Constant, Law, Parameter
