@@ -20,11 +20,17 @@ from ..physics.law import Shape
 from .problem import Problem
 
 _NEAR_REST = 3.0  # errors of the velocity within which a sign law tells nothing
+SEVERAL = 2
+"""Starts beyond which the last one is another look from the best."""
+
 _AT_LEAST = 1e-3  # of the typical size: what a start gives a parameter that came out as zero
 
 
 def start_models(problem: Problem, model: Model, count: int) -> list[Model]:
     """Return up to `count` starts for a model's law, best first, apart from each other.
+
+    Of several the last one is the best once more, with what came out as zero there at its usual
+    size: from nothing a spring behind a dashpot does not grow.
 
     Parameters
     ----------
@@ -40,7 +46,11 @@ def start_models(problem: Problem, model: Model, count: int) -> list[Model]:
             picked.append(node)
         if len(picked) == count:
             break
-    return [net.model(node, linear[node]) for node in picked]
+    found = [net.model(node, linear[node]) for node in picked]
+    if count > SEVERAL and (lost := net.lost(linear[picked[0]])):
+        usual = {name: problem.scaled(model.law, name) for name in lost}
+        found[count - 1 :] = [replace(found[0], values={**found[0].values, **usual})]
+    return found
 
 
 Node = tuple[int, ...]
@@ -155,6 +165,17 @@ class _Net:
         own = theta[free]
         return self.square - 2.0 * float(b @ own) + float(own @ G @ own), theta
 
+    def lost(self, theta: Array) -> list[str]:
+        """Return the linear parameters that came out as nothing and are not fixed."""
+        return [
+            name
+            for name, value in zip(self.linear, theta.tolist(), strict=True)
+            if name not in self.model_0.fixed and 0.0 <= value <= self._least(name)
+        ]
+
+    def _least(self, name: str) -> float:
+        return _AT_LEAST * self.problem.size(self.law.parameters[name].unit)
+
     def model(self, node: Node, theta: Array) -> Model:
         """Return the start at a node: within the bounds, no parameter exactly at zero."""
         model = self.model_0
@@ -164,10 +185,8 @@ class _Net:
             values[name] = float(grid[k])
         for name in (*self.linear, *self.grids):
             if name not in model.fixed:
-                unit = self.law.parameters[name].unit
                 low, high = model.bounds(name)
-                least = _AT_LEAST * self.problem.size(unit)
                 if values[name] >= 0.0:
-                    values[name] = max(values[name], least)
+                    values[name] = max(values[name], self._least(name))
                 values[name] = min(max(values[name], low), high)
         return replace(model, values=values)
