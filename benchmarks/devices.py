@@ -91,7 +91,9 @@ def _read(study: Study, said: dict[str, object], rig: _odd_devices.Rig) -> Answe
     assert isinstance(verdict, dict)
     study.usable_effects()
     model = study.model()
-    errors = [one.after["error_share_holdout"] for one in steps]
+    errors = [
+        one.after["error_share_holdout"] for one in steps if "error_share_holdout" in one.after
+    ]
     closed = said.get("closure")
     kept = isinstance(closed, dict) and bool(closed.get("file"))
     labels = {

@@ -283,7 +283,7 @@ def lacking_on_bench(runs: Sequence[Measurement], faults: Sequence[Finding]) -> 
     if spread <= 0.0:
         out.append(
             f"The force is constant ({plain(float(force[0]))} N) {where}: there is nothing to "
-            "explain. Look at its column and unit:  bristle study channels ; or measure it."
+            "explain. Look at its column and unit (bristle study channels), or measure it."
         )
     elif spread < BENCH.quietest * noise:
         out.append(
@@ -297,11 +297,11 @@ def lacking_on_bench(runs: Sequence[Measurement], faults: Sequence[Finding]) -> 
         if able and float(np.ptp(np.concatenate(able))) == 0.0:
             out.append(
                 f"The {channel} does not change {where}: without motion no damper shows anything. "
-                "Look at its column:  bristle study channels ; or measure with motion."
+                "Look at its column (bristle study channels), or measure with motion."
             )
     out += [
-        f"{fault.text} That is so {where}. Look at the two columns:  bristle study channels ; or "
-        "leave one of them out."
+        f"{fault.text} That is so {where}. Look at the two columns (bristle study channels), "
+        "or leave one of them out."
         for fault in faults
         if fault.kind == "unrelated"
     ]

@@ -56,7 +56,7 @@ from .auto import Completed, halves
 from .data_check import DataCheck
 from .forms import law_command
 from .history import HistoryStep, Step, history_steps
-from .identify import Identified
+from .identify import Identified, is_identified
 from .pictures import draw_data_check
 from .steps import NOT_PROVEN, Added, Created, IdentifiedBuilding, unproven_of
 from .study import Study
@@ -662,7 +662,8 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     if done.promise <= PAYS:
         gain = f"a network: error {100.0 * (1.0 - done.promise):.0f} % lower, on training runs"
         then = [Next(command("learn", study.folder, "--closure"), gain)]
-    return view._replace(blocks=(first, *learned, *rest, table, *then))
+    shown = [table] if is_identified(study.model()) else []
+    return view._replace(blocks=(first, *learned, *rest, *shown, *then))
 
 
 def _unproven(study: Study, done: Completed, step: Step) -> str:
