@@ -135,7 +135,7 @@ def _floors(study: Study, rig: _odd_devices.Rig) -> dict[str, float]:
     commanded = rig.device in _odd_devices.COMMANDED
     law = Model("modified_bouc_wen" + ("[quadratic]" if commanded else ""))
     site = Site(DAMPER, lambda _: problem)
-    begun = fit_site(law, site, {DAMPER: site}, 2).model
+    begun = fit_site(law, site, {DAMPER: site}, 2, {}).model
     found["modified Bouc-Wen"] = least_squares(begun, problem, judging)
     return found
 
