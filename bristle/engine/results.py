@@ -367,7 +367,7 @@ def feeds_of(scenario: str) -> dict[str, Feed]:
     told = tomllib.loads(scenario).get("connections", {})
     return {
         target: Feed(said) if isinstance(said, str) else Feed(
-            said["from"], said["factor"], said["offset"]
+            said["from"], said.get("factor", 1.0), said.get("offset", 0.0)
         )
         for target, said in told.items()
     }  # fmt: skip

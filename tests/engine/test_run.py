@@ -176,6 +176,17 @@ def test_notes_on_units_that_check_shows_are_shown_and_logged(
         assert name in done.stdout
 
 
+@pytest.mark.parametrize("more", ["factor = 1.0", "factor = 2.0", "offset = 0.5"])
+def test_a_run_with_a_scaled_connection_draws_its_figure(
+    tmp_path: Path, command: Command, more: str
+) -> None:
+    scaled = f'{{ from = "signal.value", {more} }}'
+    (tmp_path / "bench.toml").write_text(NOTED.replace('"signal.value"', scaled))
+    done = command("bench.toml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "results" / "bench" / "figure.png").stat().st_size > 10_000
+
+
 def test_json_gives_peaks_and_rms_with_units(fine: Path, tmp_path: Path, command: Command) -> None:
     done = command(fine, "--json", "--no-figure", "--set", "sum.gain=3")
     answer = json.loads(done.stdout)
