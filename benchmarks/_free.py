@@ -103,7 +103,6 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
 
     by_law = TrialsByLaw(data, say)
     chosen = by_law.settled(choose(search(rows, by_law)), data)
-    assert chosen.prepared is not None
     finding, opened = _with_effects(split, chosen.finding, chosen.prepared, say)
     free = _found(_with_unproven(opened, finding.trials, rows), ())
     return (free, *_with_curves(opened, say))
@@ -115,7 +114,7 @@ def _laws(
     """Return training runs split in two, prepared, and the trials of all laws on them."""
     split = runs_of(list(train), [])
     data = BenchRuns(split.train, split.holdout, Model(DEFAULT), say=say)
-    if data.damper is None:
+    if data.lacking is not None:
         raise ValueError(str(data.lacking))
     say("trying every law")
     return split, data, try_laws(*data.damper, Model(DEFAULT), bends=data.bends)
@@ -129,8 +128,6 @@ def _with_effects(
         say(f"{finding.model.law} + {' + '.join(finding.model.effects)}")
         model = _identified(finding.model, opened.problem)
         again = BenchRuns(split.train, split.holdout, model, identified=True).prepare(DAMPER)
-        if again is None:
-            break
         opened = again
         if len(model.effects) >= MOST_EFFECTS:
             break

@@ -309,10 +309,9 @@ def _of_bench(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
     def learned() -> Answer:
         case = cases.load(task)
         runs = BenchRuns(*halves(case), Model(task.law))
-        opened = runs.prepare(DAMPER)
-        if opened is None:
-            return {"learned": False, "why": list(runs.lacking.reasons if runs.lacking else ())}
-        return _learned(opened, task.form)
+        if runs.lacking is not None:
+            return {"learned": False, "why": list(runs.lacking.reasons)}
+        return _learned(runs.prepare(DAMPER), task.form)
 
     return about, learned
 
@@ -328,7 +327,7 @@ def _of_building(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
         made = house(SEED + number, one, share)
         runs = BuildingRuns(made.train, made.holdout, Model(LAW), made.building)
         sites = [site for site in runs.sites() if site != DAMPER]
-        able = {site: opened for site in sites if (opened := runs.prepare(site)) is not None}
+        able = {site: runs.prepare(site) for site in sites}
         if one is None:
             told = [_learned(opened, "") for opened in able.values()]
             return {"learned": any(answer["learned"] for answer in told)}

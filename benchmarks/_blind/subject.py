@@ -78,10 +78,9 @@ def prepared(train: list[Measurement], held: list[Measurement], law: str) -> Pre
         If something is lacking: what.
     """
     runs = BenchRuns(train, held, Model(law))
-    found = runs.prepare(DAMPER)
-    if found is None:
+    if runs.lacking is not None:
         raise RuntimeError(str(runs.lacking))
-    return found
+    return runs.prepare(DAMPER)
 
 
 def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) -> Diagnosis:

@@ -127,10 +127,10 @@ def made(task: Task) -> list[Stored]:
             Stored(task, site, code, before=one.before, single=list(one.trials))
             for site, one in found.items()
         ]
-    opened = BenchRuns(train, holdout, Model(task.law)).prepare(DAMPER)
-    if opened is None:
+    runs = BenchRuns(train, holdout, Model(task.law))
+    if runs.lacking is not None:
         return [Stored(task, "", code, "insufficient")]
-    trials = Trials(opened)
+    trials = Trials(opened := runs.prepare(DAMPER))
     first = trials.patterns[0] if trials.patterns else None
     stored = Stored(
         task, "", code, "", instruments_of(opened.faults), trials.before, trials.single,

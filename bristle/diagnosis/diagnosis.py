@@ -10,6 +10,7 @@ from ..comparison.conditions import label_errors, label_sentence, with_levels
 from ..comparison.predictions import run_predictions
 from ..data.channels import Labels, varying
 from ..data.measurement import Measurement
+from ..errors import RecordError
 from ..identification.fit import intervals_of, multistart_refit
 from ..identification.histories import counted
 from ..identification.problem import Run
@@ -23,7 +24,8 @@ from .conclusion import conclude, insufficient
 from .effect_limits import EffectLimit, detectable, effect_limits, untestable
 from .experiments import separating
 from .inconsistent_runs import contradicted
-from .law_trials import OtherLaw, better_law, try_laws
+from .joint_search import law_and_effects
+from .law_trials import KeptFits, OtherLaw, better_law, try_laws
 from .prepared import Prepared, Progress, of_layer, silent
 from .remaining import patterns_of, remaining_residual
 from .rig_runs import RigRuns, runs_of_rig
@@ -165,6 +167,9 @@ def diagnose_rig(
     building: Building | None = None,
     *,
     identified: bool = False,
+    any_law: bool = False,
+    named: str = "",
+    kept: KeptFits | None = None,
     say: Progress = silent,
 ) -> Diagnosis:
     """Return what a rig's model is missing, and at which of its sites.
@@ -177,54 +182,65 @@ def diagnose_rig(
         known, stiffnesses and damping are fitted anew
     identified : whether the law was fitted on this bench before: it is then refined, not sought
         anew; in a building it always is
+    any_law : whether the law is sought together with its effects; laws have those of the present
+        effects that can join them
+    named : the present law with its variant, "" where nobody chose one
+    kept : fits of laws that are known already, and where those that are made go
     say : called with a few words at each stage
 
     Raises
     ------
     RecordError
         If a run lacks a channel that is needed, is too short for a fit, or the building has other
-        levels than were measured.
+        levels than were measured; if a law is sought and no run shows a damper.
     """
-    runs = runs_of_rig(train, holdout, present, building, identified=identified, say=say)
+    runs = runs_of_rig(
+        train, holdout, present, building, identified=identified, any_law=any_law, say=say
+    )
     if runs.lacking is not None:
         return insufficient(runs.lacking)
-    findings = diagnose_lines(runs, say)
-    runs.correct(findings)
-    prepared = runs.prepare(DAMPER)
-    if prepared is None:
-        return conclude(findings, runs.context(None))
-    found, prepared = _at_damper(prepared, runs, say)
-    found = confirmed(found, prepared)
+    shown = DAMPER in runs.sites()
+    if any_law and not shown:
+        raise RecordError(
+            "no law of a damper can be sought: the runs have neither its force nor its command."
+        )
+    findings, laws = diagnose_lines(runs, say), None
+    if any_law:
+        found, prepared, laws = law_and_effects(runs, findings, named, kept, say)
+    else:
+        runs.correct(findings)
+        if not shown:
+            return conclude(findings, runs.context(None))
+        found, prepared = _at_damper(runs, say)
     say("whether runs contradict each other")
     found = settled(found, prepared, runs, findings)
-    say(f"verdict {found.briefly}")
-    if prepared.bench:
+    law = f"on {laws.name}, " if laws is not None else ""
+    say(f"verdict {law}{found.briefly}")
+    if laws is None and prepared.bench:
         found = _beside_other_laws(found, prepared, runs.bends, say)
     findings[DAMPER] = with_evidence(found, prepared)
-    return conclude(findings, runs.context(prepared))
+    return replace(conclude(findings, runs.context(prepared)), laws=laws)
 
 
-def _at_damper(prepared: Prepared, runs: RigRuns, say: Progress) -> tuple[SiteDiagnosis, Prepared]:
+def _at_damper(runs: RigRuns, say: Progress) -> tuple[SiteDiagnosis, Prepared]:
     """Return what a damper lacks, beside the numbers of a building that its force follows from.
 
     They are adjusted beside the best single effect: what a second one does they may do as well.
     """
-    if noise_is_all(prepared):
-        return diagnose_damper(prepared, say)
+    prepared = runs.prepare(DAMPER)
     with counted(MOST_SPENT if prepared.before.model.effects else inf) as effort:
-        made = Trials(prepared, say, effort=effort)
+        made = None if noise_is_all(prepared) else Trials(prepared, say, effort=effort)
         suits = False
         if prepared.problem.reconstructed:
             single, _ = diagnose_damper(prepared, say, made, pairs=False, excess=0.0)
             suits = runs.suit(single)
         if not suits:
             found, prepared = diagnose_damper(prepared, say, made)
-            if found.kind == "unknown" and effort.spent and not made.pairs:
+            if found.kind == "unknown" and effort.spent and made and not made.pairs:
                 found = replace(found, reasons=(*found.reasons, NO_PAIRS))
-            return found, prepared
-    again = runs.prepare(DAMPER)
-    assert again is not None
-    return diagnose_damper(again, say)
+    if suits:
+        found, prepared = diagnose_damper(runs.prepare(DAMPER), say)
+    return confirmed(found, prepared), prepared
 
 
 def diagnose_lines(runs: RigRuns, say: Progress = silent) -> dict[str, SiteDiagnosis]:
@@ -233,7 +249,6 @@ def diagnose_lines(runs: RigRuns, say: Progress = silent) -> dict[str, SiteDiagn
     for site in runs.lines():
         say(f"{site}: effects of the structure")
         prepared = runs.prepare(site)
-        assert prepared is not None
         found = settled(diagnose_line(site, prepared), prepared, runs, findings)
         findings[site] = with_evidence(found, prepared)
     return findings

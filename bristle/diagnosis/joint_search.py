@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
-from ..data.measurement import Measurement
 from ..data.run_labels import labels_of
-from ..errors import RecordError
 from ..identification.histories import Effort, counted
 from ..identification.rig import DAMPER
 from ..identification.start_grid import is_rough
 from ..model.model import Model
-from ..physics.building import Building
-from .by_label import confirmed, with_labels
-from .conclusion import conclude, insufficient
-from .diagnosis import diagnose_lines, settled, with_evidence
+from .by_label import confirmed
 from .law_choice import (
     LawAndEffects,
     LawVerdict,
@@ -28,127 +23,66 @@ from .law_choice import (
 )
 from .law_trials import KeptFits, LawTrial, fitted_anew, not_finite, try_laws
 from .prepared import Prepared, Progress, silent
-from .rig_runs import RigRuns, runs_of_rig
+from .rig_runs import RigRuns
 from .site import Trials, diagnose_damper, noise_is_all, with_zero_free
+from .site_diagnosis import SiteDiagnosis
 from .trials import Trial, missed_by, promised
-from .verdict import Diagnosis
 
 
-@with_labels
-def diagnose_laws(
-    train: Sequence[Measurement],
-    holdout: Sequence[Measurement],
-    present: Model,
-    building: Building | None = None,
-    *,
-    named: str = "",
-    kept: KeptFits | None = None,
-    say: Progress = silent,
-) -> Diagnosis:
-    """Return which law a damper has, and which effects that law misses.
+def law_and_effects(
+    runs: RigRuns,
+    findings: dict[str, SiteDiagnosis],
+    named: str,
+    kept: KeptFits | None,
+    say: Progress,
+) -> tuple[SiteDiagnosis, Prepared, LawVerdict]:
+    """Return what the law that a damper has misses, what its look began with, and how all laws do.
 
     Parameters
     ----------
-    train, holdout : measurements to fit to, and those that decide
-    present : the model as it is; laws have those of its effects that can join them
-    building : the building that the damper is in, None for a test bench
-    named : the present law with its variant, "" where nobody chose one
-    kept : fits of laws that are known already, and where those that are made go
-    say : called with a few words at each stage
-
-    Raises
-    ------
-    RecordError
-        If a run lacks a channel that is needed, is too short for a fit, or no run shows a damper.
+    runs : of the rig, which show a damper
+    findings : what the lines lack; what they tell of the rig is set right
+    named, kept, say : as `diagnose_rig` takes them
     """
-    runs = runs_of_rig(train, holdout, present, building, any_law=True, say=say)
-    if runs.lacking is not None:
-        return insufficient(runs.lacking)
-    if runs.damper is None:
-        raise RecordError(
-            "no law of a damper can be sought: the runs have neither its force nor its command."
-        )
-    present, bends = runs.part(DAMPER), runs.bends
-    findings = diagnose_lines(runs, say)
-    if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law at hand
+    present = runs.part(DAMPER)
+    if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law
         say("trying every law, with the building as its file has it")
-        first = try_laws(*runs.damper, present, bends=bends)
+        first = try_laws(*runs.damper, present, bends=runs.bends)
         runs.suppose(simplest(first).trial.model)
     runs.correct(findings)
-
-    def searched(kept: KeptFits | None) -> _Sought:
-        there = runs.in_part()
-        assert there.damper is not None
-        say("trying every law")
-        rows = try_laws(*there.damper, present, bends=bends, kept=kept)
-        if kept:
-            kept.stands(rows[0].law, rows[0].trial.effects, rows[0].trial.z)
-        sought = _sought(rows, TrialsByLaw(there, say, kept), runs, say)
-        runs.suppose(sought.chosen.row.trial.model)
-        return sought
-
-    sought = searched(kept)
-    if runs.suit(sought.chosen.finding):
-        sought = searched(None)  # what was kept was fitted to the force of the file's numbers
-    prepared = sought.prepared
-    say("whether runs contradict each other")
-    found = settled(sought.chosen.finding, prepared, runs, findings)
-    say(f"verdict on {sought.chosen.row.law}, {found.briefly}")
-    findings[DAMPER] = with_evidence(found, prepared)
-    laws = sought.verdict(named, present)
-    return replace(conclude(findings, runs.context(prepared)), laws=laws)
+    chosen, laws = _searched(runs, present, named, kept, say)
+    if runs.suit(chosen.finding):  # what was kept was fitted to the force of the file's numbers
+        chosen, laws = _searched(runs, present, named, None, say)
+    return chosen.finding, chosen.prepared, laws
 
 
-@dataclass(frozen=True)
-class _Sought:
-    """What the search for law and effects came to: `chosen` of `pairs`, and how all laws do."""
-
-    chosen: LawAndEffects
-    pairs: tuple[LawAndEffects, ...]
-    rows: tuple[LawTrial, ...]
-    by_law: TrialsByLaw
-    equivalents: tuple[tuple[str, tuple[str, ...], float], ...]
-
-    @property
-    def prepared(self) -> Prepared:
-        """What the diagnosis with the chosen law began with."""
-        assert self.chosen.prepared is not None
-        return self.chosen.prepared
-
-    def verdict(self, named: str, present: Model) -> LawVerdict:
-        """Return what a verdict tells of the laws."""
-        assert self.by_law.runs.damper is not None
-        unfit = tuple(not_finite(self.by_law.runs.damper[0], present))
-        return LawVerdict(
-            self.chosen.row, named, self.rows, self.pairs, self.equivalents, unfit,
-            self.by_law.not_tried,
-        )  # fmt: skip
-
-
-def _sought(
-    rows: tuple[LawTrial, ...], by_law: TrialsByLaw, runs: RigRuns, say: Progress
-) -> _Sought:
-    """Search the effects that laws lack; return the pair that the runs ask for, and the others.
+def _searched(
+    runs: RigRuns, present: Model, named: str, kept: KeptFits | None, say: Progress
+) -> tuple[LawAndEffects, LawVerdict]:
+    """Return the law that the runs ask for, with its effects, and how all laws do; suppose it.
 
     Where no pair explains the runs, what the nearest one misses counts beside the noise for all.
     The one that is chosen is looked at in full, on all runs: where it explains them no more, or
     another one then comes nearer, the next one is.
     """
+    there = runs.in_part()
+    say("trying every law")
+    rows = try_laws(*there.damper, present, bends=runs.bends, kept=kept)
+    if kept:
+        kept.stands(rows[0].law, rows[0].trial.effects, rows[0].trial.z)
+    by_law = TrialsByLaw(there, say, kept)
     with counted(MOST_SPENT) as by_law.effort:
         pairs = search(rows, by_law, by_law.enough, by_law.promise)
         nearest = min(pairs, key=lambda pair: pair.reach().z)
-        assert nearest.prepared is not None
-        assert by_law.runs.damper is not None
         by_law.excess = missed_by(nearest.reach(), nearest.prepared.problem)
         if by_law.excess:
             say("what no law explains counts beside the noise: fitting the laws anew")
-            train, held_out = (one.with_excess(by_law.excess) for one in by_law.runs.damper)
+            train, held_out = (one.with_excess(by_law.excess) for one in there.damper)
             rows = fitted_anew(rows, train, held_out)
             pairs = search(by_law.left_of(rows, pairs), by_law, by_law.enough)
     whole: dict[str, LawAndEffects] = {}
     while (found := choose(pairs)).row.law not in whole:
         chosen = by_law.settled(found, runs)
-        assert chosen.prepared is not None
         chosen = replace(chosen, finding=confirmed(chosen.finding, chosen.prepared))
         whole[found.row.law] = chosen
         pairs = [chosen if pair is found else pair for pair in pairs]
@@ -158,8 +92,11 @@ def _sought(
         chosen = found
     of_all = {row.law: row for row in (*rows, *(pair.row for pair in pairs))}
     ranked = tuple(sorted(of_all.values(), key=lambda row: row.trial.z))
-    equal = tuple(equivalents(chosen, pairs, ranked))
-    return _Sought(chosen, tuple(pairs), ranked, by_law, equal)
+    runs.suppose(chosen.row.trial.model)
+    equal, unfit = equivalents(chosen, pairs, ranked), not_finite(there.damper[0], present)
+    return chosen, LawVerdict(
+        chosen.row, named, ranked, tuple(pairs), tuple(equal), tuple(unfit), by_law.not_tried
+    )
 
 
 MOST_SPENT = 250e6
@@ -227,7 +164,6 @@ class TrialsByLaw:
             self._two |= {row.law} if pairs else set()
         if made is None:
             prepared = self.runs.prepare(DAMPER, row.trial)
-            assert prepared is not None
             if noise_is_all(prepared):
                 return LawAndEffects(
                     row, *diagnose_damper(prepared, self.say, pairs=pairs, excess=0.0)
@@ -263,11 +199,9 @@ class TrialsByLaw:
             return found
         row = found.row
         if self.runs is not runs:
-            assert runs.damper is not None
             self.say(f"fitting {law} to all runs")
             (row,) = fitted_anew([row], *runs.damper)
         prepared = runs.prepare(DAMPER, row.trial)
-        assert prepared is not None
         # What explains nothing with the zero free explains no more without, but for a dependence on
         # a label, which the free zero may hide: else no search begins anew.
         anew = found.explains or labels_of([run.labels for run in prepared.problem.runs])

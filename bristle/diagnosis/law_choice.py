@@ -34,7 +34,7 @@ class LawAndEffects:
 
     row: LawTrial
     finding: SiteDiagnosis
-    prepared: Prepared | None = None
+    prepared: Prepared
 
     @property
     def after(self) -> Trial:
@@ -45,9 +45,7 @@ class LawAndEffects:
     @property
     def fitted(self) -> int:
         """How many parameters are fitted."""
-        return len(self.after.model.free()) + bool(
-            self.prepared and self.prepared.problem.free_zero
-        )
+        return len(self.after.model.free()) + self.prepared.problem.free_zero
 
     @property
     def explains(self) -> bool:

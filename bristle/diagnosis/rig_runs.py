@@ -8,10 +8,10 @@ layer and the damper are one unknown, and effects that act alike are named toget
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Protocol
 
 from ..core.finding import Finding
 from ..core.text import joined
@@ -176,35 +176,39 @@ SEARCHED = 12.0
 shaking is over. The best are then fitted to all that was recorded; held-out runs stay whole."""
 
 
-class RigRuns(Protocol):
+class RigRuns(ABC):
     """The runs of a rig as a diagnosis takes them, in turn: the lines first, then the damper.
 
     Attributes
     ----------
     lacking : why the runs carry no verdict, None where they do; else nothing more is asked of them
+    bends : whether the command has levels enough for a parabola
     """
 
     lacking: Insufficient | None
+    bends: bool
+    _present: Model
 
     @property
-    def damper(self) -> tuple[Problem, Problem] | None:
-        """The damper's runs for training and held out, None where no damper was measured."""
-
-    @property
-    def bends(self) -> bool:
-        """Whether the command has levels enough for a parabola."""
+    @abstractmethod
+    def damper(self) -> tuple[Problem, Problem]:
+        """The damper's runs for training and held out, where the rig shows that site."""
 
     def sites(self) -> tuple[str, ...]:
         """Return the names of the sites that the runs show."""
+        return (DAMPER,)
 
     def lines(self) -> tuple[str, ...]:
         """Return the sites beside the damper, whose models are lines."""
+        return tuple(site for site in self.sites() if site != DAMPER)
 
     def part(self, site: str) -> Model:
         """Return the part of the model at a site."""
+        return at_site(self._present, site, self.sites())
 
-    def prepare(self, site: str, before: Trial | None = None) -> Prepared | None:
-        """Return what the diagnosis of a site begins with, None where the runs do not show it.
+    @abstractmethod
+    def prepare(self, site: str, before: Trial | None = None) -> Prepared:
+        """Return what the diagnosis of a site that the runs show begins with.
 
         Parameters
         ----------
@@ -215,25 +219,32 @@ class RigRuns(Protocol):
 
     def in_part(self) -> RigRuns:
         """Return the same with a part of the training runs, where that says nearly as much."""
+        return self
 
     def suppose(self, damper: Model) -> None:
         """Take a damper's law, fitted, in the place of the model's, whose other effects stay."""
+        self._present = damper
 
-    def correct(self, findings: dict[str, SiteDiagnosis]) -> None:
+    def correct(self, findings: dict[str, SiteDiagnosis]) -> None:  # noqa: B027  # a bench has none
         """Set right what the lines tell of the load cell, and of the building's numbers."""
 
-    def suit(self, found: SiteDiagnosis) -> bool:
+    def suit(self, _found: SiteDiagnosis) -> bool:
         """Adjust the rig's numbers beside what was found at the damper; return whether so."""
+        return False
 
-    def excused(self, found: SiteDiagnosis, findings: Mapping[str, SiteDiagnosis]) -> SiteDiagnosis:
+    def excused(
+        self, found: SiteDiagnosis, _findings: Mapping[str, SiteDiagnosis]
+    ) -> SiteDiagnosis:
         """Return a site's diagnosis, none where instruments explain what is left.
 
         Parameters
         ----------
         found : what the site lacks
-        findings : what the other sites lack, as far as they were diagnosed
+        _findings : what the other sites lack, as far as they were diagnosed
         """
+        return found
 
+    @abstractmethod
     def context(self, damper: Prepared | None) -> VerdictContext:
         """Return what the verdict tells beside the sites, from what the damper's began with."""
 
@@ -263,7 +274,7 @@ def runs_of_rig(
     return BuildingRuns(train, holdout, present, building, any_law=any_law, say=say)
 
 
-class BuildingRuns:
+class BuildingRuns(RigRuns):
     """The runs of a building.
 
     Parameters
@@ -319,14 +330,6 @@ class BuildingRuns:
     def sites(self) -> tuple[str, ...]:
         """Return the names of the sites that the runs show."""
         return tuple(self._problems)
-
-    def lines(self) -> tuple[str, ...]:
-        """Return the sites beside the damper, whose models are lines."""
-        return tuple(site for site in self._problems if site != DAMPER)
-
-    def part(self, site: str) -> Model:
-        """Return the part of the model at a site."""
-        return at_site(self._present, site, self._problems)
 
     def correct(self, findings: dict[str, SiteDiagnosis]) -> None:
         """Set right what the lines tell of the load cell, and of the building's numbers."""
@@ -423,13 +426,9 @@ class BuildingRuns:
         return {site: pair[0] for site, pair in made.items()}
 
     @property
-    def damper(self) -> StructurePair | None:
-        """The damper's runs for training and held out, None where no damper was measured."""
-        return self._problems.get(DAMPER)
-
-    def in_part(self) -> BuildingRuns:
-        """Return these runs: of a building's the begins are searched, see `shortened`."""
-        return self
+    def damper(self) -> StructurePair:
+        """The damper's runs for training and held out, where the rig shows that site."""
+        return self._problems[DAMPER]
 
     def suppose(self, damper: Model) -> None:
         """Take a damper's law, fitted, in the place of the model's, whose other effects stay."""
@@ -439,10 +438,8 @@ class BuildingRuns:
         effects = (*damper.effects, *elsewhere)
         self._present = replace(damper, effects=effects, values={**values, **damper.values})
 
-    def prepare(self, site: str, before: Trial | None = None) -> Prepared | None:
+    def prepare(self, site: str, before: Trial | None = None) -> Prepared:
         """Return what the diagnosis of a site begins with; see `RigRuns`."""
-        if site not in self._problems:
-            return None
         train, held_out = self._problems[site]
         if site != DAMPER:
             return prepare_line(site, train, held_out, self.part(site), self._sensors, self._noise)
@@ -497,7 +494,7 @@ def _late(present: Model, layer: SiteDiagnosis) -> Model:
     return replace(present, effects=effects, values={**present.values, **late_values(layer)})
 
 
-class BenchRuns:
+class BenchRuns(RigRuns):
     """The runs of a damper on a bench: one site, the damper.
 
     Parameters
@@ -511,8 +508,6 @@ class BenchRuns:
     ----------
     lacking : why the runs carry no verdict, None where they do
     faults : those that channels show of each other
-    damper : the runs as every model is held against them, freed of these faults, and smoothed
-    bends : whether the command has levels enough for a parabola
     """
 
     def __init__(
@@ -532,7 +527,6 @@ class BenchRuns:
         say("looking for sensor faults")
         self.faults = tuple(sensor_faults(recorded))
         self._noise = median_noise(recorded)
-        self.damper: tuple[Problem, Problem] | None = None
         reasons = lacking_on_bench(recorded, self.faults)
         if not reasons:
             say("smoothing the motion")
@@ -543,28 +537,23 @@ class BenchRuns:
             reasons += [fault.text for fault in self.faults] if reasons else []
         self.lacking = Insufficient(tuple(reasons), self.faults, self._noise) if reasons else None
         if not reasons:
-            self.damper = bench_rig(*used, DRAWS).sites(present)[DAMPER].pair
+            self._damper = bench_rig(*used, DRAWS).sites(present)[DAMPER].pair
         redundant = any(
             run.has("displacement", "velocity") and not derived_velocity(run) for run in train
         )
         self._shown = SHOWN if redundant else (*SHOWN, "velocity")
 
-    def sites(self) -> tuple[str, ...]:
-        """Return the names of the sites that the runs show."""
-        return (DAMPER,)
-
-    def lines(self) -> tuple[str, ...]:
-        """Return no site: a bench has none beside the damper."""
-        return ()
+    @property
+    def damper(self) -> tuple[Problem, Problem]:
+        """The runs as every model is held against them, freed of the faults, and smoothed."""
+        return self._damper
 
     def part(self, _site: str) -> Model:
-        """Return the part of the model at a site."""
+        """Return the model: a bench has one site."""
         return self._present
 
-    def prepare(self, site: str, before: Trial | None = None) -> Prepared | None:
-        """Return what the diagnosis of a site begins with; see `RigRuns`."""
-        if site != DAMPER or self.damper is None:
-            return None
+    def prepare(self, _site: str, before: Trial | None = None) -> Prepared:
+        """Return what the diagnosis begins with; see `RigRuns`."""
         problem, held_out = self.damper
         if before is None:
             self._say("fitting the present model")
@@ -594,29 +583,13 @@ class BenchRuns:
 
     def in_part(self) -> BenchRuns:
         """Return the same with a part of the training runs, where that says nearly as much."""
-        part = part_of(self.damper[0]) if self.damper else None
-        if self.damper is None or part is None:
+        train, held_out = self.damper
+        part = part_of(train)
+        if part is None:
             return self
         made = copy(self)
-        made.damper = part, self.damper[1]
+        made._damper = part, held_out
         return made
-
-    def suppose(self, damper: Model) -> None:
-        """Take a damper's law, fitted, in the place of the model's."""
-        self._present = damper
-
-    def correct(self, _findings: dict[str, SiteDiagnosis]) -> None:
-        """Do nothing: on a bench no equilibrium tells of the load cell."""
-
-    def suit(self, _found: SiteDiagnosis) -> bool:
-        """Return that a bench has no numbers to adjust."""
-        return False
-
-    def excused(
-        self, found: SiteDiagnosis, _findings: Mapping[str, SiteDiagnosis]
-    ) -> SiteDiagnosis:
-        """Return a diagnosis as it is."""
-        return found
 
     def context(self, damper: Prepared | None) -> VerdictContext:
         """Return what the verdict tells beside the sites."""

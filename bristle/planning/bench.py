@@ -289,7 +289,6 @@ def _opened(study: Study) -> Prepared:
     rig = BenchRuns(runs.train, runs.holdout, model, identified=is_identified(model), say=tell)
     refuse_lacking(study.folder, rig.lacking)
     opened = rig.prepare(DAMPER)
-    assert opened is not None
     refuse_unknown_noise(study.folder, opened.held_out)
     return opened
 

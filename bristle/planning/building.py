@@ -287,7 +287,7 @@ def _opened(study: Study, found: BuildingRuns) -> dict[str, Prepared]:
     for site in found.sites():
         tell(f"fitting {site}")
         opened = found.prepare(site)
-        if opened is not None and opened.held_out.runs:
+        if opened.held_out.runs:
             sites[site] = opened
     for opened in sites.values():
         refuse_unknown_noise(study.folder, opened.held_out)

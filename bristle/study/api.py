@@ -14,7 +14,6 @@ from ..comparison.comparison import RigComparer
 from ..comparison.result import Comparison
 from ..core.text import written
 from ..diagnosis import Diagnosis, diagnose_rig
-from ..diagnosis.joint_search import diagnose_laws
 from ..diagnosis.law_choice import simplest
 from ..errors import StudyError
 from ..identification.histories import compile_ahead
@@ -302,11 +301,9 @@ def diagnose(
     free = _is_all(model) or (model is None and not effects and house is None)
     compile_ahead()
     runs = _runs(given, holdout, channels, house)
-    if free:
-        return diagnose_laws(runs.train, runs.holdout, chosen, house)
     known = is_identified(chosen)
-    found = diagnose_rig(runs.train, runs.holdout, chosen, house, identified=known)
-    if not known:
+    found = diagnose_rig(runs.train, runs.holdout, chosen, house, identified=known, any_law=free)
+    if free or not known:
         return found
     return replace(found, error=force_errors(site_models(_rig(runs, house), chosen)))
 

@@ -218,13 +218,10 @@ def opened_at(
         raise StudyError(
             f"--at: these runs do not show the site {at}; they show {', '.join(there)}."
         )
-    if fitted is not None and rig.damper is not None:
+    if fitted is not None:
         fitted = replace(fitted, law=fitted.base_law)  # its variant is among the values
-        opened = rig.prepare(DAMPER, judge(fitted, *rig.damper))
-        assert opened is not None
-        return DAMPER, opened
-    wanted = [at] if at else _wanted(study, there)
-    prepared = {site: one for site in wanted if (one := rig.prepare(site)) is not None}
+        return DAMPER, rig.prepare(DAMPER, judge(fitted, *rig.damper))
+    prepared = {site: rig.prepare(site) for site in ([at] if at else _wanted(study, there))}
     able = [pair for pair in prepared.items() if pair[1].held_out.noise_known or not noise]
     if not able:
         why = dict.fromkeys(noise_not_known(one.held_out) for one in prepared.values())

@@ -21,7 +21,6 @@ from ..core.progress import tell, telling
 from ..core.text import command, percent, plain, unknown
 from ..data.channels import ChannelSpec
 from ..diagnosis import Diagnosis, diagnose_rig
-from ..diagnosis.joint_search import diagnose_laws
 from ..errors import StudyError
 from ..identification.building_fit import (
     StructureFit,
@@ -104,15 +103,14 @@ def diagnose_study(
         )
     networks = closures(model.effects)
     physics = model.only([one for one in model.effects if one not in networks])
-    known = runs.train, runs.holdout, physics, building_of(study, model)
+    identified = is_identified(model)
     with telling(say) if say is not tell else nullcontext():
-        if law == ALL:
-            kept = LawFits(study, physics) if write else None
-            found = diagnose_laws(*known, named=model.law, kept=kept, say=say)
-        else:
-            fitted = is_identified(model) and not networks
-            found = diagnose_rig(*known, identified=fitted, say=say)
-    if is_identified(model):
+        found = diagnose_rig(
+            runs.train, runs.holdout, physics, building_of(study, model), any_law=law == ALL,
+            identified=identified and not networks, named=model.law,
+            kept=LawFits(study, physics) if write and law == ALL else None, say=say,
+        )  # fmt: skip
+    if identified:
         rig = rig_of(study, model, runs)
         found = replace(found, error=force_errors(site_models(rig, model)))
     if write:

@@ -63,7 +63,7 @@ def pair(law, z_alone, kind="none", effects=(), z=None, **choices):
     gone = SiteDiagnosis(
         "damper", kind, tuple(effects), z_alone, after.z, 0.0, float("nan"), after=after
     )
-    return LawAndEffects(first, gone)
+    return LawAndEffects(first, gone, Prepared(after, Problem([]), Problem([])))
 
 
 def looker(*pairs):

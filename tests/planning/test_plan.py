@@ -295,7 +295,6 @@ def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Stu
     told = {one.effect: one for one in bristle.diagnose(rig, write=False).limits["damper"]}
     runs, model = rig.runs(), rig.model()
     opened = BenchRuns(runs.train, runs.holdout, model, identified=True).prepare("damper")
-    assert opened is not None
     names = ["delay", "stribeck", "saturation"]
     fitted = opened.known(opened.before.model)
     purposes = Purposes(fitted.model, tuple(sized_rival(name, fitted) for name in names))
