@@ -25,13 +25,13 @@ from .effect_limits import EffectLimit, detectable, effect_limits, untestable
 from .experiments import separating
 from .inconsistent_runs import contradicted
 from .joint_search import law_and_effects
-from .law_trials import KeptFits, OtherLaw, better_law, try_laws
+from .law_trials import OtherLaw, better_law, try_laws
 from .prepared import Prepared, Progress, of_layer, silent
 from .remaining import patterns_of, remaining_residual
 from .rig_runs import RigRuns, runs_of_rig
 from .site import Trials, diagnose_damper, diagnose_line, joinable_at, noise_is_all
 from .site_diagnosis import SiteDiagnosis
-from .trials import SHOWN, Trial, joinable, judge
+from .trials import SHOWN, KeptFits, Trial, joinable, judge
 from .verdict import Diagnosis
 
 MOST_SPENT = 60e6

@@ -21,12 +21,12 @@ from .law_choice import (
     simplest,
     survivors,
 )
-from .law_trials import KeptFits, LawTrial, fitted_anew, not_finite, try_laws
+from .law_trials import LawTrial, fitted_anew, not_finite, try_laws
 from .prepared import Prepared, Progress, silent
 from .rig_runs import RigRuns
 from .site import Trials, diagnose_damper, noise_is_all, with_zero_free
 from .site_diagnosis import SiteDiagnosis
-from .trials import Trial, missed_by, promised
+from .trials import KeptFits, Trial, missed_by, promised
 
 
 def law_and_effects(
@@ -172,8 +172,7 @@ class TrialsByLaw:
             free = with_zero_free(prepared)
             if free is not prepared:
                 self._shortened.add(row.law)
-            ends = self.kept.ends_of(row.law) if self.kept else None
-            made = self.made[row.law] = Trials(free, self.say, ends=ends)
+            made = self.made[row.law] = Trials(free, self.say, kept=self.kept, law=row.law)
         elif pairs:
             self.say(f"two effects that {row.law} lacks")
             if self.effort.spent and any(is_rough(one.model) for one in made.single[:2]):

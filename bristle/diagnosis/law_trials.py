@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
@@ -22,7 +22,7 @@ from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form,
 from ..physics.laws import base_and_variant, law_names
 from .decision import NOISE
 from .rule import BENCH
-from .trials import KeptEnds, Trial, judge
+from .trials import End, KeptFits, Trial, judge
 
 STARTS = 2
 """Starting points of each law."""
@@ -86,22 +86,6 @@ class LawTrial:
             "z_above_best": round(above, 4),
             "interval95": round(half, 4) if np.isfinite(half) else None,
         }  # fmt: skip
-
-
-class KeptFits(Protocol):
-    """Where a search for the law keeps its fits, and takes up those of one that was interrupted."""
-
-    known: dict[str, dict[str, float]]
-    """Values [SI] by law, then by name."""
-
-    def keep(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
-        """Keep the values of more laws."""
-
-    def ends_of(self, law: str) -> KeptEnds:
-        """Return where the trials of effects beside a law are kept."""
-
-    def stands(self, law: str, effects: Sequence[str], z: float) -> None:
-        """Take note of what comes nearest so far, and its z on held-out runs."""
 
 
 def try_laws(
@@ -228,10 +212,8 @@ def _fitted(
     """Return a law fitted to the training runs, and the same with a bent command where it may."""
     model = _model(name, train, present)
     bent = joined_form(name, QUADRATIC_FORM) if bends and choosable(model.law_class) else ""
-    known = kept.known if kept is not None else {}
-    if name in known and (not bent or bent in known):
-        of_both = [(name, model)] + ([(bent, _model(bent, train, present))] if bent else [])
-        return [(law, replace(one, values=known[law])) for law, one in of_both if known[law]]
+    if kept is not None and (known := kept.found(name)):
+        return [(law, end.model) for law, end in zip((name, bent), known, strict=False)]
     starts = start_models(train, model, STARTS)
     expected = train.expectation(starts[0])
     ends = [Search(train, one, expected, one.free()).run(OUTSET) for one in starts]
@@ -244,8 +226,7 @@ def _fitted(
         if set(begin.effects) == set(model.effects):
             fitted.append((bent, refine(begin, train, JACOBIANS)))
     if kept is not None:
-        none: dict[str, dict[str, float]] = {bent: {}} if bent else {}  # it may not join
-        kept.keep({**none, **{law: one.values for law, one in fitted}})
+        kept.keep(name, [End(one, True) for _, one in fitted])
     return fitted
 
 

@@ -44,7 +44,18 @@ from .prepared import Prepared, Progress, of_layer, silent
 from .remaining import patterns_of
 from .rule import BENCH, SENSOR, SITE, DecisionRule
 from .site_diagnosis import SiteDiagnosis, of_decision
-from .trials import SECONDS, End, KeptEnds, Trial, judge, missed_by, paired, try_all, try_members
+from .trials import (
+    BESIDE,
+    SECONDS,
+    End,
+    KeptFits,
+    Trial,
+    judge,
+    missed_by,
+    paired,
+    try_all,
+    try_members,
+)
 
 
 def diagnose_line(site: str, prepared: Prepared) -> SiteDiagnosis:
@@ -208,7 +219,8 @@ class Trials:
     say : is told what is being done
     earlier : the same trials by other weights or of fewer runs, whose ends are where these begin
     free : those with the zero of the force fitted along, where they were made of fewer runs
-    ends : where trials that are made from the very start are kept, and taken up
+    kept, law : where trials that are made from the very start are kept, and taken up, as those of
+        which law
     effort : once it is spent no pairs are tried any more
 
     Attributes
@@ -222,7 +234,8 @@ class Trials:
         say: Progress = silent,
         earlier: Trials | None = None,
         free: Trials | None = None,
-        ends: KeptEnds | None = None,
+        kept: KeptFits | None = None,
+        law: str = "",
         effort: Effort | None = None,
     ) -> None:
         self.prepared, self.say = prepared, say
@@ -232,7 +245,7 @@ class Trials:
         self._found: dict[tuple[str, ...], list[Trial]] = {}
         self._alone: dict[tuple[str, ...], list[Trial]] = {}
         self._earlier = earlier
-        self._ends = ends
+        self._kept, self._law = kept, law
         self._effort = effort
         self._begun_free = free or (earlier._freed if earlier else None)
         self._freed: Trials | None = None
@@ -308,8 +321,8 @@ class Trials:
         if most is None or self._may_be_needed(trials[0]):
             trials = self._on_all_runs(trials)
         self._found[first.effects] = trials
-        if self._ends and not known:
-            self._ends.keep(first.effects, trials)
+        if self._kept and not known:
+            self._kept.keep(self._named(first), trials)
         return [*trials]
 
     @property
@@ -322,9 +335,13 @@ class Trials:
         """Return where the trials of effects beside a model ended before, none if they are new."""
         if self._earlier and first.effects in self._earlier._found:
             return self._earlier._found[first.effects]
-        kept = self._ends.found.get(first.effects, ()) if self._ends else ()
+        kept = self._kept.found(self._named(first)) if self._kept else ()
         defined = all(name in EFFECTS for end in kept for name in end.model.effects)
         return kept if defined else ()
+
+    def _named(self, first: Trial) -> str:
+        """Return the name by which the trials of effects beside a model are kept."""
+        return " + ".join((self._law, *first.effects)) + BESIDE
 
     def _may_be_needed(self, pair: Trial) -> bool:
         """Return whether two effects leave as little as `decide` asks of them, or nearly so."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Protocol
@@ -107,21 +107,30 @@ class Trial:
 
 @dataclass(frozen=True)
 class End:
-    """Where a trial's search ended, as it is kept; see `Trial`."""
+    """Where a fit ended, as it is kept; see `Trial`."""
 
     model: Model
     refined: bool
 
 
-class KeptEnds(Protocol):
-    """Where the trials of effects beside a law are kept, for a search that is interrupted."""
+BESIDE = " + one more"
+"""Behind a law, with its effects, of which one effect more was tried; see `KeptFits`."""
 
-    @property
-    def found(self) -> Mapping[tuple[str, ...], Sequence[End]]:
-        """What was kept, by the effects that the model had before."""
 
-    def keep(self, before: tuple[str, ...], trials: Sequence[Trial]) -> None:
-        """Keep the trials of all effects beside a model with these."""
+class KeptFits(Protocol):
+    """Where a search for the law keeps its fits, and takes up those of one that was interrupted.
+
+    They are of a law, straight and bent, or of one effect more beside a law: see `BESIDE`.
+    """
+
+    def found(self, of: str) -> Sequence[End]:
+        """Return the fits that are kept, none if they are new."""
+
+    def keep(self, of: str, ends: Sequence[End | Trial]) -> None:
+        """Keep fits."""
+
+    def stands(self, law: str, effects: Sequence[str], z: float) -> None:
+        """Take note of what comes nearest so far, and its z on held-out runs."""
 
 
 def judge(

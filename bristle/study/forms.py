@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from ..core.progress import tell
 from ..core.text import command, joined, short_z, unknown
 from ..data.checks.runs import LEAST_LEVELS, command_levels, drives_of, tells_a_bend
 from ..data.measurement import Measurement
+from ..diagnosis.law_trials import LawTrial, not_finite, try_laws
+from ..diagnosis.trials import BESIDE, End, Trial
+from ..diagnosis.words import left_out
 from ..errors import BristleError, PhysicsError, StudyError
 from ..identification.rig import DAMPER, Rig
 from ..model.model import Model
@@ -31,11 +34,6 @@ from ..version import __version__
 from .runs import Runs
 from .study import Study
 from .study_file import ALL
-
-if TYPE_CHECKING:
-    from ..diagnosis.law_trials import LawTrial
-    from ..diagnosis.trials import End, Trial
-
 
 _MOVING_KNOTS = 5  # of a table where the command moves continuously
 _TAIL = 0.005  # share of the samples beyond either end of such a table
@@ -221,19 +219,22 @@ class LawFits:
     def __init__(self, study: Study, model: Model) -> None:
         self._study = study
         self._key = _key(study, model)
-        self.known, self._effects = _read(study, self._key)
+        self._ends = _read(study, self._key)
         self._nearest = ""
         self._lock = threading.Lock()
 
-    def keep(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
-        """Write the values of laws [SI] by law and name, beside those that are there."""
-        with self._lock:
-            self.known |= {law: dict(values) for law, values in fitted.items()}
-        self._written()
+    def found(self, of: str) -> Sequence[End]:
+        """Return the fits that are kept of a law, or of one effect more beside it, none if new."""
+        return self._ends.get(of, ())
 
-    def ends_of(self, law: str) -> _Ends:
-        """Return where the trials of effects beside a law are kept."""
-        return _Ends(self._effects.setdefault(law, []), self._written)
+    def keep(self, of: str, ends: Sequence[End | Trial]) -> None:
+        """Write the fits of a law, or of one effect more beside it, with those that are there."""
+        with self._lock:
+            self._ends[of] = [End(one.model, one.refined) for one in ends]
+            fits = {of: list(map(_as_dict, own)) for of, own in self._ends.items()}
+            content = json.dumps({"schema": 1, "key": self._key, "fits": fits}, indent=1)
+            self._study.write_report(NAME, content + "\n")
+        self._tell()
 
     def stands(self, law: str, effects: Sequence[str], z: float) -> None:
         """Take note of what comes nearest so far, and its z on held-out runs."""
@@ -244,17 +245,9 @@ class LawFits:
         )
         self._tell()
 
-    def _written(self) -> None:
-        with self._lock:
-            content = {
-                "schema": 1, "key": self._key, "laws": self.known,
-                "effects": {law: own for law, own in self._effects.items() if own},
-            }  # fmt: skip
-            self._study.write_report(NAME, json.dumps(content, indent=1) + "\n")
-        self._tell()
-
     def _tell(self) -> None:
-        count, searched = len(self.known), sum(map(bool, self._effects.values()))
+        count = sum(len(own) for of, own in self._ends.items() if BESIDE not in of)
+        searched = len({of.partition(BESIDE)[0] for of in self._ends if BESIDE in of})
         effects = (
             f"and the effects tried of {searched} of them" if searched else "no effects were tried"
         )
@@ -265,61 +258,30 @@ class LawFits:
         )
 
 
-class _Ends:
-    """The trials of effects beside a law: what is `found` of them, and where more go.
-
-    Parameters
-    ----------
-    kept : what the file has of them, one entry for the effects that the model had before
-    write : writes the file
-    """
-
-    def __init__(self, kept: list[dict[str, Any]], write: Callable[[], None]) -> None:
-        self._kept, self._write = kept, write
-        self.found: dict[tuple[str, ...], list[End]] = {}
-        for one in kept:
-            self.found[tuple(one["before"])] = [_end(end) for end in one["ends"]]
-
-    def keep(self, before: tuple[str, ...], trials: Sequence[Trial]) -> None:
-        """Keep the trials of all effects beside a model with these."""
-        self._kept.append({"before": before, "ends": [_end_as_dict(one) for one in trials]})
-        self._write()
-
-
 _OF_MODEL = ("law", "effects", "values", "fixed", "limits")
 
 
-def _end_as_dict(trial: Trial) -> dict[str, Any]:
-    return {name: getattr(trial.model, name) for name in _OF_MODEL} | {"refined": trial.refined}
+def _as_dict(end: End) -> dict[str, Any]:
+    return {name: getattr(end.model, name) for name in _OF_MODEL} | {"refined": end.refined}
 
 
 def _end(kept: Mapping[str, Any]) -> End:
-    from ..diagnosis.trials import End
-
     law, effects, values, fixed, limits = (kept[name] for name in _OF_MODEL)
     pairs = {name: (float(low), float(high)) for name, (low, high) in limits.items()}
-    return End(Model(law, tuple(effects), values, tuple(fixed), pairs), kept["refined"])
+    values = {str(name): float(value) for name, value in values.items()}
+    return End(Model(law, tuple(effects), values, tuple(fixed), pairs), bool(kept["refined"]))
 
 
-def _read(
-    study: Study, key: str
-) -> tuple[dict[str, dict[str, float]], dict[str, list[dict[str, Any]]]]:
-    """Return the laws' values that were kept, and the trials of effects beside them."""
+def _read(study: Study, key: str) -> dict[str, list[End]]:
+    """Return the fits that were kept."""
     path = study.reports_folder / NAME
     try:
         found = read_json(path) if path.is_file() else {}
         if found.get("key") != key:
-            return {}, {}
-        laws = {
-            str(law): {str(n): float(v) for n, v in values.items()}
-            for law, values in found["laws"].items()
-        }
-        effects = {str(law): [*own] for law, own in found.get("effects", {}).items()}
-        for own in effects.values():
-            _Ends(own, lambda: None)  # refuses what is none
-        return laws, effects
+            return {}
+        return {str(of): list(map(_end, own)) for of, own in found["fits"].items()}
     except (BristleError, KeyError, TypeError, ValueError, AttributeError):
-        return {}, {}  # a file that somebody changed: the fits are made anew
+        return {}  # a file that somebody changed: the fits are made anew
 
 
 def _key(study: Study, model: Model) -> str:
@@ -375,8 +337,6 @@ def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
     StudyError
         If the rig is a building.
     """
-    from ..diagnosis.law_trials import try_laws  # takes long: most identify one law
-
     refuse_in_building(ALL, rig.building is not None)
     tell("trying every law")
     site = rig.sites(present)[DAMPER]
@@ -392,9 +352,6 @@ def left_out_notes(rig: Rig, present: Model) -> tuple[str, ...]:
     rig : the bench with its runs
     present : the model as it is
     """
-    from ..diagnosis.law_trials import not_finite
-    from ..diagnosis.words import left_out
-
     unfit = not_finite(rig.sites(present)[DAMPER].train, present)
     return (left_out(unfit),) if unfit else ()
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from ..data.checks.motion import check_force, velocity_of_run
 from ..data.cut_off import saturated_share
 from ..data.measurement import Measurement
 from ..diagnosis.by_label import extrapolated
+from ..diagnosis.law_choice import rows_of
+from ..diagnosis.law_trials import LawTrial
 from ..errors import StudyError
 from ..identification.error import ForceError, held_out_apart
 from ..identification.fit import MISFIT, Fit
@@ -53,9 +55,6 @@ from .rig import rig_of
 from .runs import Runs
 from .study import Study, behind_data
 from .study_file import ALL
-
-if TYPE_CHECKING:
-    from ..diagnosis.law_trials import LawTrial
 
 
 def is_identified(model: Model) -> bool:
@@ -172,11 +171,6 @@ class Identified(Viewable):
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         rows = {row["name"]: row for row in self.parameters()}
-        laws: dict[str, Any] = {}
-        if self.laws:
-            from ..diagnosis.law_choice import rows_of  # takes long: most identify one law
-
-            laws["laws"] = rows_of(self.laws)
         return {
             "schema": 1,
             "law": split_form(self.model.law)[0],
@@ -199,7 +193,7 @@ class Identified(Viewable):
                 for role, sites in self.errors.at.items()
             },
             "forms": [row.as_dict() for row in self.forms],
-            **laws,
+            **({"laws": rows_of(self.laws)} if self.laws else {}),
             "notes": list(self.notes),
             "step": self.step.number if self.step else None,
         }

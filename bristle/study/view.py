@@ -36,7 +36,8 @@ from ..data.guess import Guess
 from ..data.measurement import Measurement
 from ..diagnosis.conclusion import is_correctable
 from ..diagnosis.effect_limits import NO_AMOUNT
-from ..diagnosis.view import effect_text, verdict_view
+from ..diagnosis.law_choice import rows_of
+from ..diagnosis.view import effect_text, law_block, verdict_view
 from ..diagnosis.view import error_text as verdict_error
 from ..errors import RecordError
 from ..identification.fit import MISFIT
@@ -98,12 +99,7 @@ def identified_view(found: Identified, folder: Path | None = None) -> View:
         better, then = _better(found, folder), _next(found, folder)
         budget = [Text(budget_text(found.holdout or found.train, found.at.model))]
     hidden = f"These runs do not identify {joined(found.unidentified)}."
-    laws: tuple[Table, ...] = ()
-    if found.laws:
-        from ..diagnosis.law_choice import rows_of  # takes long: most identify one law
-        from ..diagnosis.view import law_block
-
-        laws = (law_block(rows_of(found.laws)),)
+    laws = (law_block(rows_of(found.laws)),) if found.laws else ()
     starts = f"{found.fit.agreed} of {found.fit.starts} starts of the fit agree."
     return View(
         f"Identified: {title}.",

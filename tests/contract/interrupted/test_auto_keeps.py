@@ -58,9 +58,9 @@ def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, mo
         return whole(model, *given, **named)
 
     monkeypatch.setattr(law_trials, "refine", refine)
-    monkeypatch.setattr(joint_search, "_sought", interrupt)  # the search for effects
+    monkeypatch.setattr(joint_search, "search", interrupt)  # the search for effects
     told = auto(rig, capsys)
-    known = json.loads((rig / "reports" / NAME).read_text())["laws"]
+    known = json.loads((rig / "reports" / NAME).read_text())["fits"]
     assert len(known) == len(fitted) > 5
     assert told.startswith("interrupted. Nearest so far: "), told
     assert f" on held-out runs (bristle identify {rig} --law " in told
@@ -75,7 +75,7 @@ def test_the_laws_that_were_fitted_are_kept_and_not_fitted_again(rig, capsys, mo
     assert fitted == []
     path = rig / "reports" / NAME
     content = json.loads(path.read_text())
-    del content["laws"]["bingham"]
+    del content["fits"]["bingham"]
     path.write_text(json.dumps(content))
     auto(rig, capsys)
     assert fitted == ["bingham"]
@@ -101,8 +101,9 @@ def test_the_effects_that_were_tried_of_a_law_are_kept_and_not_searched_again(
         stopped.setattr(site, "try_all", try_all)
         told = auto(rig, capsys)
     assert " and the effects tried of 2 of them: the same command goes on there." in told
-    kept = json.loads((rig / "reports" / NAME).read_text())["effects"]
-    first = [(own[0]["ends"][0]["law"], *own[0]["before"]) for own in kept.values()]
+    kept = json.loads((rig / "reports" / NAME).read_text())["fits"]
+    tried = [(own[0]["law"], of.split(" + ")[1:-1]) for of, own in kept.items() if " + " in of]
+    first = [(law, *before) for law, before in tried]
     assert first == searched
 
     def go_on(base, *_given, **_named):
