@@ -24,6 +24,7 @@ from ..identification.building_sites import (
     damper_run,
     problems_of,
 )
+from ..identification.problem import noise_of
 from ..identification.rig_fit import fit_line, line_columns
 from ..identification.search import HUBER, weighed
 from ..identification.start_grid import Search
@@ -174,11 +175,9 @@ def _rows(
     for site, (train, _) in lines.items():
         law = law_of_part(site)
         expected = train.expectation(fit_line(train, law.name).model)
-        weight = np.concatenate(
-            [1.0 / e[1][run.skip :] for e, run in zip(expected, train.runs, strict=True)]
-        )
+        weight = 1.0 / noise_of(train, expected)
         columns = [line_columns(run, LAWS[law.name])[run.skip :] for run in train.runs]
-        here, above = _target(train), _above(building, train)
+        here, above = train.force, _above(building, train)
         carried = _carried(shaken, building, train)
         slopes = [
             (here + _carried(shaken, one, train) - carried) * above / _above(one, train) - here
@@ -238,7 +237,7 @@ def _level(building: Building, problem: StructureProblem) -> int:
 
 
 def _carried(shaken: Shaken, building: Building, problem: StructureProblem) -> Array:
-    """Return what is carried below a site's level with a building's masses, as `_target` has it."""
+    """Return what a building's masses carry below a site's level, as `Problem.force` has it."""
     level, parts = _level(building, problem), []
     for run in problem.runs:
         assert isinstance(run, StructureRun)
@@ -262,25 +261,16 @@ def _determined(n: int, lowest: int, measured: bool) -> Array:
     return np.asarray(np.linalg.svd(moved)[0][:, : n - lowest - 1])
 
 
-def _target(problem: StructureProblem) -> Array:
-    """Return the forces that a line is fitted to, all runs one after the other."""
-    return np.concatenate([run.force[run.skip :] for run in problem.runs])
-
-
 # How well a building is known, where its numbers make the damper's force.
 #
 # Without a load cell the force is what equilibrium leaves: inertia, less the springs. A stiffness
 # that is 2 % off in the building's file then acts like a linear spring beside the damper, a mass
-# like
-# a fluid's. So the file's numbers are taken as a laboratory knows them, and move within that
-# together
-# with the law; what they cannot absorb is left for the effects.
+# like a fluid's. So the file's numbers are taken as a laboratory knows them, and move within that
+# together with the law; what they cannot absorb is left for the effects.
 #
 # The first level's mass stays: the scale of all forces is not told by motion, and a residual
-# shrinks
-# with it. By how much all that stands on it is heavier and stiffer alike is therefore a number of
-# its
-# own; the storeys' stiffnesses beside that are told by their lines.
+# shrinks with it. By how much all that stands on it is heavier and stiffer alike is therefore a
+# number of its own; the storeys' stiffnesses beside that are told by their lines.
 
 TURNS, SETTLED = 3, 0.1
 """How often law and building are fitted in turn at most, and the step that ends it, in standard
@@ -406,9 +396,7 @@ def _step(
     expected = problem.expectation(model)
     search = Search(problem, model, expected, model.free())
     r, J = search.residuals(search.start), search.sensitivities()
-    sigma = np.concatenate(
-        [s[run.skip :] for run, (_, s, _) in zip(problem.runs, expected, strict=True)]
-    )
+    sigma = noise_of(problem, expected)
     U = np.stack([np.concatenate(one) / sigma for one in slopes], axis=1)
     normal, gradient = weighed(np.hstack([J, U]), r)
     p = J.shape[1]

@@ -96,7 +96,7 @@ def decide(
     best = ranked[0]
     if before.z < rule.noise_overestimated:
         return _too_loud(before, best, where)
-    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    explained = rule.explained(before.z, best.z)
     if best.z > rule.adequate:
         pair = _pair(before, ranked, grow, rule)
         if pair is not None and reduce is not None:
@@ -112,15 +112,14 @@ def decide(
             return pair
     if not suffices(before, best, rule):
         return Decision(
-            "unknown", (), before, explained, (in_part(_new(best, before)[0], best, explained),)
+            "unknown", (), before, explained, (in_part(best.beyond(before)[0], best, explained),)
         )
     return _effect_or_ambiguous(before, best, ranked[1:], rule)
 
 
 def suffices(before: Trial, best: Trial, rule: DecisionRule) -> bool:
     """Return whether one effect is enough, be its form another one."""
-    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
-    return best.z <= rule.adequate or explained >= rule.share
+    return best.z <= rule.adequate or rule.explained(before.z, best.z) >= rule.share
 
 
 def missing(before: Trial, after: Trial, rule: DecisionRule = BENCH) -> bool:
@@ -187,8 +186,8 @@ def _too_loud(before: Trial, best: Trial, where: str) -> Decision:
         "insufficient", (), before, 0.0,
         (
             f"The error on held-out runs is {before.z:.2f} {NOISE}: the noise of {where} was "
-            "estimated too high, as happens where a force turns within a few samples. "
-            f"With {effect_name(_new(best, before)[0])} the error is lower still, but against this "
+            "estimated too high, as happens where a force turns within a few samples. With "
+            f"{effect_name(best.beyond(before)[0])} the error is lower still, but against this "
             "noise that proves nothing. State the noise in study.toml, noise = ... in "
             "[channels.NAME] of what was measured, or sample faster.",
         ),
@@ -204,7 +203,7 @@ def _pair(
     """Return the decision for two effects, None where two do not explain it much better."""
     best = ranked[0]
     single = suffices(before, best, rule)
-    alone = {_new(trial, before)[0]: trial for trial in ranked}
+    alone = {trial.beyond(before)[0]: trial for trial in ranked}
     grown: list[Trial] = []
     for first in ranked[: 1 if single else 2]:
         if missing(before, first, rule) and rule.excess(first.z) <= (
@@ -214,14 +213,14 @@ def _pair(
     if not grown:
         return None
     pair = min(grown, key=lambda trial: trial.z)
-    names = _new(pair, before)
+    names = pair.beyond(before)
     if not _needed(best, pair, rule):
         return None
     without = [alone[name] for name in names if name in alone]
     parts = [
         (rule.excess(other.z) - rule.excess(pair.z)) / rule.excess(before.z) for other in without
     ]
-    explained = 1.0 - rule.excess(pair.z) / rule.excess(before.z)
+    explained = rule.explained(before.z, pair.z)
     nearly = pair.z <= rule.adequate and rule.excess(pair.z) <= rule.rest * rule.excess(best.z)
     closes = best.z > rule.clean and (pair.z <= rule.complete or nearly)
     if min(parts, default=0.0) < rule.pair_part and not closes:
@@ -232,7 +231,7 @@ def _pair(
         "effect", names, pair, explained,
         (
             f"No single effect explains the error on held-out runs, {before.z:.2f} {NOISE}: the "
-            f"best, {effect_name(_new(best, before)[0])}, leaves {best.z:.2f}; "
+            f"best, {effect_name(best.beyond(before)[0])}, leaves {best.z:.2f}; "
             f"{effect_name(names[0])} and {effect_name(names[1])} together leave {pair.z:.2f}.",
         ),
     )  # fmt: skip
@@ -247,8 +246,8 @@ def _needed(single: Trial, pair: Trial, rule: DecisionRule) -> bool:
 def _effect_or_ambiguous(
     before: Trial, best: Trial, others: Sequence[Trial], rule: DecisionRule
 ) -> Decision:
-    name = _new(best, before)[0]
-    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    name = best.beyond(before)[0]
+    explained = rule.explained(before.z, best.z)
     rivals = [
         other
         for other in others
@@ -256,12 +255,18 @@ def _effect_or_ambiguous(
         and _rivals(best, other, rule)
         and not _same(name, other, before)
     ]
-    names = (name, *(_new(other, before)[0] for other in rivals))[: rule.most_alternatives]
     reasons = [gained(name, before, best, explained)]
     if best.z > rule.adequate:
         reasons.append(OTHER_FORM)
+    return named([name, *(o.beyond(before)[0] for o in rivals)], best, explained, reasons, rule)
+
+
+def named(
+    names: Sequence[str], best: Trial, explained: float, reasons: Sequence[str], rule: DecisionRule
+) -> Decision:
+    """Return the decision for the first of some effects, the others being its rivals."""
     kind = "ambiguous" if len(names) > 1 else "effect"
-    return Decision(kind, names, best, explained, tuple(reasons))
+    return Decision(kind, (*names[: rule.most_alternatives],), best, explained, (*reasons,))
 
 
 def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
@@ -276,23 +281,16 @@ def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
 
 def _same(name: str, other: Trial, before: Trial) -> bool:
     """Return whether small motion cannot tell an effect from that of another trial."""
-    family = _family(name)
-    return bool(family) and family == _family(_new(other, before)[0])
-
-
-def _family(name: str) -> str:
-    return EFFECTS[name].family if name in EFFECTS else ""
-
-
-def _new(trial: Trial, before: Trial) -> tuple[str, ...]:
-    return tuple(name for name in trial.effects if name not in before.effects)
+    first, second = (
+        EFFECTS[one].family if one in EFFECTS else "" for one in (name, other.beyond(before)[0])
+    )
+    return bool(first) and first == second
 
 
 # The decision where the force's noise is not known: by what effects gain on held-out runs.
 #
 # No z can be told then, and nothing says how much of an error is noise. So an effect is named for
-# the
-# part of the whole error that it takes, beyond chance, and "none" is not among the answers.
+# the part of the whole error that it takes, beyond chance, and "none" is not among the answers.
 
 
 def decide_by_gains(
@@ -307,8 +305,7 @@ def decide_by_gains(
     held_out : the runs that decide
     rule : the numbers that decide
     """
-    force = np.concatenate([run.force[run.skip :][run.judged] for run in held_out.runs])
-    size = float(np.sqrt(np.mean(force**2)))
+    size = float(np.sqrt(np.mean(held_out.force[held_out.judged] ** 2)))
 
     def share(trial: Trial) -> str:
         return f"{plain(100.0 * trial.rms / size, 2)} %"
@@ -336,9 +333,7 @@ def decide_by_gains(
             (f"{gained} How much of the rest is noise cannot be told. {not_known}",),
         )  # fmt: skip
     rivals = [one.effects[-1] for one in able[1:] if _equals(best, one, rule)]
-    names = (name, *rivals)[: rule.most_alternatives]
-    kind = "ambiguous" if rivals else "effect"
-    return Decision(kind, names, best, explained, (gained, not_known))
+    return named([name, *rivals], best, explained, [gained, not_known], rule)
 
 
 def noise_not_known(problem: Problem) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..comparison.predictions import rms
 from ..core.arrays import Array
-from ..identification.problem import Expected, Problem, absorbed, steady
+from ..identification.problem import Expected, Problem, absorbed, noise_of, steady
 from ..identification.search import in_threads
 from ..identification.start_grid import Search, initial_guesses
 from ..model.model import Model
@@ -154,9 +154,9 @@ def detectable(
     z : error over noise of the model; where it is below `BELOW`, the expected noise is too large
         and hides more
     """
-    pairs = zip(problem.runs, expected, strict=True)
-    force = np.concatenate([run.force[run.skip :][run.judged] for run in problem.runs])
-    weight = np.concatenate([1.0 / one[1][run.skip :][run.judged] for run, one in pairs])
+    force, weight = (
+        one[problem.judged] for one in (problem.force, 1.0 / noise_of(problem, expected))
+    )
     # Noise as the residual sees it: a residual of share s has the excess s^2 mean(F^2/sigma^2).
     ratio = float(np.sqrt(np.mean(force**2) * np.mean(weight**2)))
     noise = z if z < BELOW else 1.0
@@ -193,11 +193,7 @@ def untestable(
     base = search.residuals(search.start)
     own = search.sensitivities() if free else np.zeros((len(base), 0))
     basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
-    sigma = np.concatenate(
-        [s[run.skip :] for run, (_, s, _) in zip(problem.runs, expected, strict=True)]
-    )
-    force = np.concatenate([run.force[run.skip :] for run in problem.runs])
-    size = rms(force / sigma)
+    size = rms(problem.force / noise_of(problem, expected))
     out = []
     for name in joinable(model) if able is None else able:
         change = _change(name, model, problem, expected, base)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..data.corrections import jumps
-from ..identification.problem import BLOCK, Expected, Problem, drawn_noise, residuals
+from ..identification.problem import BLOCK, Expected, Problem, drawn_noise, noise_of, residuals
 from ..identification.search import HUBER, losses, mean_loss
 from ..identification.start_grid import Search, initial_guesses
 from ..model.model import Model
@@ -125,11 +125,7 @@ class SizeSearch:
     @cached_property
     def size(self) -> float:
         """The norm of the normalised force."""
-        parts = [
-            (run.force / e[1])[run.skip :]
-            for run, e in zip(self.problem.runs, self.expected, strict=True)
-        ]
-        return float(np.linalg.norm(np.concatenate(parts)))
+        return float(np.linalg.norm(self.problem.force / noise_of(self.problem, self.expected)))
 
     def beyond(self, change: Array) -> Array:
         """Return what of a change (n,) the model's own parameters do not absorb."""

@@ -319,7 +319,9 @@ def _affordable(model: Model, runs: tuple[Problem, Problem]) -> bool:
     return LOOK * sum(problem.steps_of(model) for problem in runs) <= left()
 
 
-def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Trial, list[str]]]:
+def _to_be_explained(
+    found: SiteDiagnosis, prepared: Prepared
+) -> list[tuple[Trial, tuple[str, ...]]]:
     """Return trials that leave more than noise, with the effects that they add, simplest first.
 
     None where the force is no measured one.
@@ -329,9 +331,8 @@ def _to_be_explained(found: SiteDiagnosis, prepared: Prepared) -> list[tuple[Tri
     by_equilibrium = isinstance(problem, StructureProblem) and problem.reconstructed
     if found.site != DAMPER or by_equilibrium or max(after.train, after.z) <= prepared.rule.misfit:
         return []
-    own = prepared.before.model.effects
-    trials = {one.model.effects: one for one in (prepared.before, *found.trials[:1], after)}
-    return [(one, [name for name in one.effects if name not in own]) for one in trials.values()]
+    trials = {one.effects: one for one in (prepared.before, *found.trials[:1], after)}
+    return [(one, one.beyond(prepared.before)) for one in trials.values()]
 
 
 def _with_reason(found: SiteDiagnosis, trial: Trial, text: str) -> SiteDiagnosis:

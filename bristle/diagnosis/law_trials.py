@@ -178,8 +178,7 @@ def better_law(judged: Trial, laws: Sequence[LawTrial]) -> OtherLaw | None:
     best = min(able, key=lambda one: one.trial.z, default=None)
     if best is None or best.trial.z > (1.0 - BENCH.gain) * judged.z:
         return None
-    share = 1.0 - BENCH.excess(best.trial.z) / BENCH.excess(judged.z)
-    return OtherLaw(best.law, best.trial.z, share)
+    return OtherLaw(best.law, best.trial.z, BENCH.explained(judged.z, best.trial.z))
 
 
 def not_finite(problem: Problem, present: Model) -> list[str]:

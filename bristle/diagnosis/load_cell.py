@@ -58,7 +58,7 @@ def load_cell(
     assert best is not None
     z_1, delay, gain, finding = best
     own = min((trial.z for trial in layer.trials), default=np.inf)
-    share = 1.0 - SITE.excess(z_1) / SITE.excess(layer.z_before)
+    share = SITE.explained(layer.z_before, z_1)
     if z_1 >= own or 1.0 - z_1 / layer.z_before < SITE.gain:
         return None
     if z_1 > SITE.clean and share < SITE.share:

@@ -73,8 +73,7 @@ def remaining_residual(
     if _clear(rest, rule) or not missing(before, nearest, rule):
         return most_telling(rest, before, held_out, rule), rest, ()
     rest = patterns_of(nearest, held_out)
-    added = tuple(name for name in nearest.effects if name not in before.effects)
-    return most_telling(rest, nearest, held_out, rule), rest, added
+    return most_telling(rest, nearest, held_out, rule), rest, nearest.beyond(before)
 
 
 def _clear(patterns: Sequence[ResidualPattern], rule: DecisionRule) -> bool:

@@ -422,6 +422,10 @@ class DecisionRule:
         """Return z^2 - 1, never below `least_excess`."""
         return max(z**2 - 1.0, self.least_excess)
 
+    def explained(self, before: float, after: float) -> float:
+        """Return the share of the excess that goes as z falls from one value to another."""
+        return 1.0 - self.excess(after) / self.excess(before)
+
 
 BENCH = DecisionRule()
 """A damper's law on a bench."""

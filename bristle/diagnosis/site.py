@@ -37,6 +37,7 @@ from .decision import (
     gained,
     in_part,
     missing,
+    named,
     suffices,
     unexplained,
 )
@@ -165,15 +166,14 @@ def decide_site(before: Trial, trials: Sequence[Trial], rule: DecisionRule = SIT
         return Decision("unknown", (), before, 0.0, (unexplained(before, rule),))
     best = trials[0]
     name = best.effects[-1]
-    share = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    share = rule.explained(before.z, best.z)
     reasons = [gained(name, before, best, share)]
     if best.z > rule.clean:
         if share < rule.share:
             return Decision("unknown", (), before, share, (in_part(name, best, share),))
         reasons.append(OTHER_FORM)
-    rivals = [name, *(t.effects[-1] for t in trials[1:] if _rivals(best, t, rule))]
-    kind = "effect" if len(rivals) == 1 else "ambiguous"
-    return Decision(kind, tuple(rivals[: rule.most_alternatives]), best, share, tuple(reasons))
+    rivals = [t.effects[-1] for t in trials[1:] if _rivals(best, t, rule)]
+    return named([name, *rivals], best, share, reasons, rule)
 
 
 def lowers(before: Trial, after: Trial, rule: DecisionRule = SITE) -> bool:
@@ -385,11 +385,10 @@ class Trials:
 # The zero of a load cell beside an effect: both are fitted together.
 #
 # A constant force is no effect by itself: the load cell's zero explains it as well as a preload,
-# and
-# needs nothing of the damper. Fitted alone, though, it absorbs part of what an effect does, and an
-# effect fitted without it asks for a second one that has a constant force. So where a constant is
-# left beside what was found, or was absorbed by a second effect, everything is tried once more with
-# the zero free.
+# and needs nothing of the damper. Fitted alone, though, it absorbs part of what an effect does, and
+# an effect fitted without it asks for a second one that has a constant force. So where a constant
+# is left beside what was found, or was absorbed by a second effect, everything is tried once more
+# with the zero free.
 
 
 def free_zero(prepared: Prepared, decision: Decision) -> Prepared | None:
@@ -577,8 +576,7 @@ def beside_yield(
         return decision
     able = [one for one in trials if missing(before, one, rule) and suffices(before, one, rule)]
     names = dict.fromkeys([*decision.effects, *(one.effects[-1] for one in able)])
-    kind = "ambiguous" if len(names) > 1 else decision.kind
-    return replace(decision, kind=kind, effects=tuple(names)[: rule.most_alternatives])
+    return named([*names], decision.best, decision.explained, decision.reasons, rule)
 
 
 def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:
@@ -640,7 +638,6 @@ def _rare(before: Trial, trials: list[Trial], rule: DecisionRule = BENCH) -> Dec
     if 1.0 - best.z / before.z < rule.gain or not better(before, best, SITE):
         return None
     rivals = [other.effects[-1] for other in trials[1:] if equals(best, other, SITE)]
-    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
-    kind = "ambiguous" if rivals else "effect"
-    names = (name, *rivals)[: rule.most_alternatives]
-    return Decision(kind, names, best, explained, (gained(name, before, best, explained),))
+    explained = rule.explained(before.z, best.z)
+    reasons = [gained(name, before, best, explained)]
+    return named([name, *rivals], best, explained, reasons, rule)

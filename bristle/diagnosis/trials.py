@@ -12,7 +12,15 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.progress import Count
 from ..identification.error import ForceError, judged_errors
-from ..identification.problem import EXPLAINS, Expected, Problem, excess_of, in_noises, residuals
+from ..identification.problem import (
+    EXPLAINS,
+    Expected,
+    Problem,
+    excess_of,
+    in_noises,
+    noise_of,
+    residuals,
+)
 from ..identification.search import (
     HUBER_AT_ONE,
     in_threads,
@@ -104,6 +112,10 @@ class Trial:
         """The effects of the model."""
         return self.model.effects
 
+    def beyond(self, before: Trial) -> tuple[str, ...]:
+        """Return the effects that the model has and that of another trial has not."""
+        return tuple(name for name in self.effects if name not in before.effects)
+
 
 @dataclass(frozen=True)
 class End:
@@ -161,9 +173,7 @@ def _rms_bulk(problem: Problem, r: Array, expected: Expected) -> float:
 
     NaN where no sample is judged.
     """
-    pairs = zip(problem.runs, expected, strict=True)
-    sigma = np.concatenate([noise[run.skip :] for run, (_, noise, _) in pairs])
-    size = np.sort(np.abs(r * sigma)[r != 0.0])
+    size = np.sort(np.abs(r * noise_of(problem, expected))[r != 0.0])
     kept = size[: len(size) - round(FEW * len(size))]
     return float(np.sqrt(np.mean(kept**2))) if len(kept) else np.nan
 

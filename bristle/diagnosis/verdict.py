@@ -47,7 +47,7 @@ def gains_of(found: SiteDiagnosis) -> list[dict[str, Any]]:
 
 def _row(trial: Trial, before: Trial, site: str) -> dict[str, Any]:
     return {
-        "effects": [name for name in trial.effects if name not in before.effects],
+        "effects": list(trial.beyond(before)),
         "site": site, "z_holdout": round(trial.z, 4), "gain": round(1.0 - trial.z / before.z, 4),
     }  # fmt: skip
 
@@ -262,8 +262,7 @@ class Diagnosis(Viewable):
         if self.kind == "unknown" and not effects and damper and damper.before and damper.trials:
             best = damper.trials[0]
             if best.refined:
-                known = damper.before.effects
-                effects = [one for one in best.effects if one not in known]
+                effects = [*best.beyond(damper.before)]
                 values |= best.model.values
         return {"effects": effects, "values": values} if effects else {}
 

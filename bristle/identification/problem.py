@@ -434,6 +434,16 @@ class Problem:
         self._sizes: dict[str, float] = {}
 
     @property
+    def force(self) -> Array:
+        """The force (n,) [N] at the samples that residuals have, one run after the other."""
+        return np.concatenate([run.force[run.skip :] for run in self.runs])
+
+    @property
+    def judged(self) -> Flags:
+        """Which of these samples (n,) were measured."""
+        return np.concatenate([run.judged for run in self.runs])
+
+    @property
     def noise_known(self) -> bool:
         """Whether the force's noise is known in most runs, so that z says something."""
         return 2 * sum(not run.untold for run in self.runs) >= len(self.runs)
@@ -796,7 +806,7 @@ def _with_zero(problem: Problem, model: Model, expected: Expected) -> list[Array
     ]
 
 
-def _noise(problem: Problem, expected: Expected) -> Array:
+def noise_of(problem: Problem, expected: Expected) -> Array:
     """Return the noise (n,) expected of a true model's residual, one run after the other."""
     pairs = zip(problem.runs, expected, strict=True)
     return np.concatenate([sigma[run.skip :] for run, (_, sigma, _) in pairs])
@@ -825,7 +835,7 @@ def zero_of(
     expected = expected or problem.expectation(model)
     found = _with_zero(problem, model, expected)
     zero = _constant(problem, found, expected)
-    weight = _noise(problem, expected) ** -2.0
+    weight = noise_of(problem, expected) ** -2.0
     left = (np.concatenate(found) - zero) * weight
     edges = np.arange(0, len(left), min(BLOCK, max(1, len(left) // 20)))
     return zero, float(np.sqrt(np.sum(np.add.reduceat(left, edges) ** 2)) / weight.sum())
@@ -833,7 +843,7 @@ def zero_of(
 
 def _constant(problem: Problem, found: list[Array], expected: Expected) -> float:
     """Return the constant of errors per run (n - skip,) [N] by weighted Huber means."""
-    error, sigma = np.concatenate(found), _noise(problem, expected)
+    error, sigma = np.concatenate(found), noise_of(problem, expected)
     finite = np.isfinite(error)
     error, base = error[finite], sigma[finite] ** -2.0
     if not len(error):
@@ -885,7 +895,7 @@ def in_noises(problem: Problem, r: Array, expected: Expected) -> Array:
     """
     if not problem.excess:
         return r
-    sigma = _noise(problem, expected)
+    sigma = noise_of(problem, expected)
     return np.asarray(r * sigma / np.sqrt(sigma**2 - problem.excess))
 
 
