@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.core.arrays import Array
+from bristle.identification.fit import Search
 from bristle.identification.problem import Problem, Run
-from bristle.identification.start_grid import Search
 from bristle.model.model import Model
 
 FOLDS = 4

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from bristle.core.arrays import Array
+from bristle.identification.fit import Search
 from bristle.identification.problem import Problem, steady, without
 from bristle.identification.rig import DAMPER, ROLES, Site, bench_rig
 from bristle.identification.rig_fit import fit_site
-from bristle.identification.start_grid import Search
 from bristle.identification.starts import start_models
 from bristle.model.model import Model
 from bristle.physics.laws import base_and_variant, law_names

@@ -31,10 +31,11 @@ from bristle.diagnosis import diagnose_rig
 from bristle.diagnosis.law_choice import LawAndEffects
 from bristle.diagnosis.sensor_faults import instruments_of
 from bristle.diagnosis.trials import joinable
+from bristle.identification.fit import Search
 from bristle.identification.histories import DamperForces
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem
-from bristle.identification.start_grid import Search, initial_guesses
+from bristle.identification.start_grid import initial_guesses
 from bristle.model.model import Model
 from bristle.physics.effect import effects_of
 from bristle.physics.forms import split_form

@@ -25,8 +25,8 @@ from bristle.diagnosis.effect_size import Sized, SizeSearch
 from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.site import diagnose_damper
 from bristle.diagnosis.trials import joinable, judge
+from bristle.identification.fit import refine
 from bristle.identification.problem import Problem, Run
-from bristle.identification.start_grid import refine
 from bristle.model.model import Model
 
 from ._answers import Answer, asked

@@ -11,9 +11,8 @@ from bristle.diagnosis import Diagnosis, diagnose_rig
 from bristle.diagnosis.site import try_effect
 from bristle.identification.building_sites import StructurePair
 from bristle.identification.building_sites import structure_problems as problems
-from bristle.identification.fit import fit_from_starts
+from bristle.identification.fit import fit_from_starts, refine
 from bristle.identification.rig_fit import fit_line
-from bristle.identification.start_grid import refine
 from bristle.model.model import Model
 from bristle.physics.building import Building, from_data
 from bristle.physics.effect import EFFECTS

@@ -17,10 +17,10 @@ import numpy as np
 
 from bristle.core.arrays import Array
 from bristle.diagnosis.trials import short_search
-from bristle.identification.fit import fit_from_starts
+from bristle.identification.fit import fit_from_starts, refine
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem, Run
-from bristle.identification.start_grid import SearchContext, ranked_guesses, refine
+from bristle.identification.start_grid import SearchContext, ranked_guesses
 from bristle.model.model import Model
 
 from . import cases, subject

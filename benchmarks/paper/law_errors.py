@@ -14,10 +14,10 @@ import numpy as np
 
 from bristle.core.arrays import Array
 from bristle.identification.error import ForceError, force_error
+from bristle.identification.fit import Search
 from bristle.identification.low_passed import CUTOFF, error_rms, filtered_errors, force_rms
 from bristle.identification.problem import Problem, steady, without
 from bristle.identification.search import descend, in_threads
-from bristle.identification.start_grid import Search
 from bristle.identification.starts import start_models
 from bristle.model.model import Model
 from bristle.physics.laws import base_and_variant

@@ -24,10 +24,10 @@ from ..identification.building_sites import (
     damper_run,
     problems_of,
 )
+from ..identification.fit import Search
 from ..identification.problem import noise_of
 from ..identification.rig_fit import fit_line, line_columns
 from ..identification.search import HUBER, weighed
-from ..identification.start_grid import Search
 from ..model.model import Model
 from ..physics.building import Building
 from ..physics.laws import LAWS, law_of_part

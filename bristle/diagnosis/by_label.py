@@ -28,9 +28,9 @@ from ..data.channels import TEMPERATURE, label_name, label_text, label_unit
 from ..data.extra_channels import as_word
 from ..data.measurement import Measurement
 from ..data.run_labels import LabelOfRuns, labels_of, left_by
+from ..identification.fit import Search, refine
 from ..identification.problem import Problem, Run
 from ..identification.search import HUBER, in_threads
-from ..identification.start_grid import Search, refine
 from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS
 from ..units import canonical

@@ -17,8 +17,8 @@ from ..core.finding import Finding
 from ..core.text import plain
 from ..data.corrections import LEFT_OUT
 from ..data.left_out import MISSING, merged
+from ..identification.fit import refine
 from ..identification.problem import Problem, Run, robust_z
-from ..identification.start_grid import refine
 from ..model.model import Model
 from .model_faults import ModelBasedFaults
 from .rule import SENSOR

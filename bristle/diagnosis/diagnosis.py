@@ -11,11 +11,10 @@ from ..comparison.predictions import run_predictions
 from ..data.channels import Labels, varying
 from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..identification.fit import intervals_of, multistart_refit
+from ..identification.fit import intervals_of, is_rough, multistart_refit
 from ..identification.histories import counted
 from ..identification.problem import Run
 from ..identification.rig import DAMPER
-from ..identification.start_grid import is_rough
 from ..model.model import Model
 from ..physics.building import Building
 from ..physics.effect import exclude

@@ -13,9 +13,10 @@ import numpy as np
 
 from ..comparison.predictions import rms
 from ..core.arrays import Array
+from ..identification.fit import Search
 from ..identification.problem import Expected, Problem, absorbed, noise_of, steady
 from ..identification.search import in_threads
-from ..identification.start_grid import Search, initial_guesses
+from ..identification.start_grid import initial_guesses
 from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of
 from .effect_size import Sized, SizeSearch, largest_allowed, named_size, resolved

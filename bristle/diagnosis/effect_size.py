@@ -14,9 +14,10 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..data.corrections import jumps
+from ..identification.fit import Search
 from ..identification.problem import BLOCK, Expected, Problem, drawn_noise, noise_of, residuals
 from ..identification.search import HUBER, losses, mean_loss
-from ..identification.start_grid import Search, initial_guesses
+from ..identification.start_grid import initial_guesses
 from ..model.model import Model
 from ..physics.drive import DRIVES, unit_for
 from ..physics.effect import EFFECTS

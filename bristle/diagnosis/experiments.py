@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.arrays import Array
+from ..identification.fit import Search
 from ..identification.problem import Problem, Run, at_means
-from ..identification.start_grid import Search
 from ..model.model import Model
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .rule import BENCH

@@ -7,9 +7,9 @@ from dataclasses import replace
 from math import inf
 
 from ..data.run_labels import labels_of
+from ..identification.fit import is_rough
 from ..identification.histories import Effort, counted
 from ..identification.rig import DAMPER
-from ..identification.start_grid import is_rough
 from ..model.model import Model
 from .by_label import confirmed
 from .law_choice import (

@@ -12,9 +12,9 @@ from scipy.stats import t as student
 from ..core.progress import Count
 from ..core.text import short_z
 from ..identification.error import ForceError, force_error
+from ..identification.fit import Search, refine
 from ..identification.problem import Problem, steady, suited, without
 from ..identification.search import in_threads, z_scale
-from ..identification.start_grid import Search, refine
 from ..identification.starts import start_models
 from ..model.model import Model
 from ..physics.effect import EFFECTS

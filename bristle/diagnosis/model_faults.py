@@ -17,6 +17,7 @@ from ..core.finding import Finding
 from ..core.text import plain, quantity
 from ..data.corrections import LIMITS, limited
 from ..data.left_out import MISSING, merged
+from ..identification.fit import Search, refine
 from ..identification.problem import Expected, Problem, Run, moved_by, residuals, steady
 from ..identification.search import (
     HUBER_AT_ONE,
@@ -27,7 +28,7 @@ from ..identification.search import (
     losses,
     mean_loss,
 )
-from ..identification.start_grid import Search, SearchContext, ranked_guesses, refine
+from ..identification.start_grid import SearchContext, ranked_guesses
 from ..model.model import Model
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS, Effect, effects_of

@@ -18,10 +18,10 @@ from ..data.decimate import in_time
 from ..data.left_out import WAYS_OUT
 from ..data.measurement import Measurement
 from ..errors import StudyError
+from ..identification.fit import refine
 from ..identification.prepare import SHORTEST
 from ..identification.problem import Problem, Run
 from ..identification.rig import Seeds
-from ..identification.start_grid import refine
 from ..model.model import Model
 from ..physics.effect import effects_of
 from .decision import TOLD, in_runs

@@ -21,11 +21,10 @@ from ..data.cut_off import derived_velocity
 from ..data.measurement import Measurement
 from ..identification.building_motion import responses
 from ..identification.building_sites import ANY_LAW, StructurePair, StructureProblem, problems_of
-from ..identification.fit import fit_from_starts
+from ..identification.fit import fit_from_starts, refine
 from ..identification.problem import Problem
 from ..identification.rig import DAMPER, at_site, bench_rig, corrected_for_delay, linear_storeys
 from ..identification.rig_fit import fit_damper
-from ..identification.start_grid import refine
 from ..model.model import Model
 from ..physics.building import GROUND, Building, with_damper
 from .building_numbers import (

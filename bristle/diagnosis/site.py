@@ -15,13 +15,12 @@ import numpy as np
 from ..comparison.patterns import ResidualPattern
 from ..core.finding import Finding
 from ..identification.building_sites import StructureProblem, StructureRun
-from ..identification.fit import fit
+from ..identification.fit import fit, is_rough, refine
 from ..identification.histories import Effort, left
 from ..identification.problem import Expected, Problem, Run, has_offset, moved_by, zero_of
 from ..identification.rig import acts_at
 from ..identification.rig_fit import fit_damper, fit_line, joined
 from ..identification.search import in_threads
-from ..identification.start_grid import is_rough, refine
 from ..model.model import Model
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part

@@ -12,6 +12,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.progress import Count
 from ..identification.error import ForceError, judged_errors
+from ..identification.fit import Search, is_rough, refine
 from ..identification.problem import (
     EXPLAINS,
     Expected,
@@ -33,11 +34,8 @@ from ..identification.search import (
 from ..identification.start_grid import (
     Candidate,
     ScreeningData,
-    Search,
     SearchContext,
-    is_rough,
     ranked_guesses,
-    refine,
     scored_guesses,
 )
 from ..model.model import Model

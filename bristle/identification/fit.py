@@ -18,10 +18,100 @@ from ..core.progress import Count, tell
 from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
-from .problem import BLOCK, Expected, Problem, drawn_noise, steady, without
-from .search import HUBER_AT_ONE, in_threads, loss, mean_loss
-from .start_grid import Search
+from .problem import BLOCK, Expected, Problem, drawn_noise, residuals, steady, without
+from .search import HUBER_AT_ONE, Descent, descend, in_threads, jacobian, loss, mean_loss
 from .starts import start_models
+
+# A model's parameters as a search sees them: numbers of order one, and the residuals over them.
+
+
+MOST_TURNS = 5
+"""How often a rough search begins again at most."""
+
+PAYS = 0.95
+"""What the loss must fall to, as a share, for another turn."""
+
+
+def is_rough(model: Model) -> bool:
+    """Return whether events such as impacts make a model's residuals jump."""
+    return any(EFFECTS[name].joint for name in model.effects)
+
+
+class Search:
+    """The search for a model's parameters on runs, as numbers of order one.
+
+    Parameters
+    ----------
+    problem, model : the runs; the model, where the search begins
+    expected : what a true model would show on each run
+    names : of the parameters that it moves
+    logarithms : whether it moves the logarithm of a parameter whose lower bound is above zero
+    """
+
+    def __init__(
+        self, problem: Problem, model: Model, expected: Expected, names: Sequence[str],
+        *, logarithms: bool = True,
+    ) -> None:  # fmt: skip
+        self.problem, self.model, self.expected = problem, model, expected
+        self.names = list(names)
+        # An impact's spike would tell a gap far more sharply than its fit can find it.
+        self.rough = is_rough(model)
+        declared = [parameter(model.law, name) for name in self.names]
+        value = np.array([model.value(name) for name in self.names])
+        bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
+        self.log = logarithms & (bounds[:, 0] > 0.0) & (bounds[:, 1] > 50.0 * bounds[:, 0])
+        sizes = np.array([problem.size(d.unit) for d in declared])
+        self.scale = np.where(self.log, 1.0, np.maximum(np.abs(value), 1e-2 * sizes))
+        self.low, self.high = self._to(bounds[:, 0]), self._to(bounds[:, 1])
+        self.start = self._to(np.clip(value, bounds[:, 0], bounds[:, 1]))
+
+    def _to(self, value: Array) -> Array:
+        safe = np.where(self.log, np.maximum(value, 1e-300), 1.0)
+        return np.where(self.log, np.log(safe), value / self.scale)
+
+    def at(self, theta: Array) -> Model:
+        """Return the model with these parameters."""
+        value = np.where(self.log, np.exp(np.where(self.log, theta, 0.0)), theta * self.scale)
+        return replace(
+            self.model,
+            values={**self.model.values, **dict(zip(self.names, value.tolist(), strict=True))},
+        )
+
+    def residuals(self, theta: Array) -> Array:
+        """Return the normalised residuals of all runs (n,)."""
+        return residuals(self.problem, self.at(theta), self.expected)
+
+    def jacobian(self, theta: Array, r: Array) -> Array:
+        """Return the derivatives (n, p) of the residuals at theta (p,), where they are `r`."""
+        with self.problem.starts_held(self.at(theta), self.problem.runs):
+            return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
+
+    def sensitivities(self) -> Array:
+        """Return how the normalised residuals change with the parameters (n, p), at the start."""
+        return self.jacobian(self.start, self.residuals(self.start))
+
+    def run(self, sweeps: int, tolerance: float = 1e-4) -> tuple[Model, Descent]:
+        """Search from the model's own values."""
+        found = descend(
+            self.residuals, self.start, self.low, self.high, sweeps, tolerance, self.rough
+        )
+        return self.at(found.theta), found
+
+
+def refine(start: Model, train: Problem, sweeps: int = 12) -> Model:
+    """Fit all free parameters, the noise expected of the model renewed on the way.
+
+    Where the way is rough a search ends early: it begins again as long as that pays.
+    """
+    model, cost = start, float("inf")
+    for turn in range(MOST_TURNS):
+        search = Search(train, model, train.expectation(model), model.free())
+        model, ended = search.run(max(3, sweeps // 2) if turn == 0 else sweeps)
+        if turn and not (search.rough and ended.cost < PAYS * cost):
+            break
+        cost = ended.cost
+    return model
+
 
 # How well data determine a model's parameters: covariance, and what they do not identify.
 

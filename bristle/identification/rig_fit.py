@@ -18,11 +18,11 @@ from ..physics.laws import LAWS, Law
 from ..physics.tuples import Inputs
 from .building_sites import StructureProblem, StructureRun, thinned
 from .error import ForceError, errors_by_run, pooled
-from .fit import Fit, fit, fit_from_starts
+from .fit import Fit, fit, fit_from_starts, refine
 from .low_passed import error_rms, force_rms
 from .problem import Problem, Run, excess_of, z_if_known
 from .rig import DAMPER, ROLES, Rig, Site, at_site
-from .start_grid import initial_guesses, refine
+from .start_grid import initial_guesses
 
 # The linear law of a layer or storey fitted to its runs, in closed form.
 

@@ -14,8 +14,7 @@ from ..core.text import plain, quantity, scale
 from ..diagnosis.decision import missing
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import Trial, judge
-from ..identification.fit import intervals_of
-from ..identification.start_grid import refine
+from ..identification.fit import intervals_of, refine
 from ..units import canonical
 from ..user_code.load import defined
 from .curve import Curve, CurveFormula

@@ -28,9 +28,10 @@ from ..data.corrections import jumps
 from ..data.run_labels import labels_of
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import Trial, guesses_of, joinable, judge, short_search
+from ..identification.fit import refine
 from ..identification.problem import Problem, Run, has_offset, sensors, zero_of
 from ..identification.search import in_threads
-from ..identification.start_grid import SearchContext, refine
+from ..identification.start_grid import SearchContext
 from ..model.model import Model
 from ..physics.drive import DRIVES, unit_for
 from ..physics.effect import CLOSURE, EFFECTS

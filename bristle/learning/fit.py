@@ -10,10 +10,9 @@ from ..diagnosis.decision import missing
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.rule import DecisionRule
 from ..diagnosis.trials import Trial, judge
-from ..identification.fit import intervals_of
+from ..identification.fit import intervals_of, refine
 from ..identification.problem import Problem, robust_z
 from ..identification.search import in_threads
-from ..identification.start_grid import refine
 from ..model.model import Model
 from ..user_code.load import defined
 from .curve import Curve

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..core.arrays import Array, Indices
 from ..identification.building_sites import StructureProblem, StructureRun
+from ..identification.fit import Search
 from ..identification.problem import Problem, Run
 from ..identification.rig import DAMPER
 from ..identification.search import HUBER
-from ..identification.start_grid import Search
 from ..model.model import Model
 from ..physics.tuples import Inputs
 from .curve import CurvePlace

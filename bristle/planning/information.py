@@ -14,8 +14,8 @@ import numpy as np
 from ..core.arrays import Array
 from ..data.corrections import jumps
 from ..identification.building_sites import StructureRun
+from ..identification.fit import Search
 from ..identification.problem import Expected, Problem, Run, residuals
-from ..identification.start_grid import Search
 from ..learning.signals import ALONG
 from ..model.model import Model
 from .limits import RESERVE, PrescribedSignals, RigLimits, Test

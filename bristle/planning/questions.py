@@ -22,11 +22,11 @@ from ..diagnosis.site import joinable_at
 from ..diagnosis.trials import LONG, joinable, short_search
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem, StructureRun
-from ..identification.fit import fit_from_starts
+from ..identification.fit import fit_from_starts, refine
 from ..identification.problem import Problem, Run
 from ..identification.rig import DAMPER
 from ..identification.rig_fit import joined
-from ..identification.start_grid import SearchContext, ranked_guesses, refine
+from ..identification.start_grid import SearchContext, ranked_guesses
 from ..learning.curve import CurvePlace
 from ..learning.signals import ALONG
 from ..model.model import Model

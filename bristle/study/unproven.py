@@ -18,10 +18,10 @@ from ..diagnosis.by_label import Dependence, promising
 from ..diagnosis.law_trials import LawTrial
 from ..diagnosis.prepared import Prepared
 from ..diagnosis.trials import LONG, SECONDS, Trial, missed_by, try_all
+from ..identification.fit import refine
 from ..identification.histories import counted, left
 from ..identification.problem import Problem
 from ..identification.search import in_threads
-from ..identification.start_grid import refine
 from ..learning.closure import errors_of, lowers
 from ..model.model import Model
 from ..physics.effect import EFFECTS

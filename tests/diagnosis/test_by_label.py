@@ -13,10 +13,10 @@ from bristle.diagnosis.prepared import Prepared
 from bristle.diagnosis.site_diagnosis import SiteDiagnosis
 from bristle.diagnosis.trials import joinable, judge
 from bristle.errors import PhysicsError, RecordError
-from bristle.identification.fit import fit
+from bristle.identification.fit import fit, refine
 from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Problem, Run
-from bristle.identification.start_grid import initial_guesses, refine
+from bristle.identification.start_grid import initial_guesses
 from bristle.model.model import Model
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import EFFECTS, laws_joined

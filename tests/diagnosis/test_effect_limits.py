@@ -11,10 +11,9 @@ from bristle.diagnosis.effect_limits import NO_AMOUNT, EffectLimit, effect_limit
 from bristle.diagnosis.effect_size import STANDS_OUT, Sized, SizeSearch, resolved
 from bristle.diagnosis.view import verdict_view
 from bristle.diagnosis.words import limit_rows
-from bristle.identification.fit import intervals_of
+from bristle.identification.fit import intervals_of, refine
 from bristle.identification.problem import residuals
 from bristle.identification.search import HUBER
-from bristle.identification.start_grid import refine
 from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 from bristle.view.blocks import Table

@@ -18,10 +18,10 @@ from bristle.diagnosis.trials import joinable, judge
 from bristle.diagnosis.words import effect_words
 from bristle.errors import PhysicsError
 from bristle.fmu.model_description import unit_definitions
-from bristle.identification.fit import fit
+from bristle.identification.fit import fit, refine
 from bristle.identification.histories import DamperForces
 from bristle.identification.problem import Problem, Run
-from bristle.identification.start_grid import initial_guesses, refine
+from bristle.identification.start_grid import initial_guesses
 from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS, Effect
 from bristle.physics.parameter import Parameter

@@ -9,10 +9,10 @@ import pytest
 from bristle.data.measurement import measurements_of_frame
 from bristle.diagnosis import trials
 from bristle.diagnosis.trials import joinable, short_search, try_all
-from bristle.identification.fit import fit_from_starts
+from bristle.identification.fit import fit_from_starts, refine
 from bristle.identification.prepare import prepare
 from bristle.identification.problem import Problem
-from bristle.identification.start_grid import SearchContext, initial_guesses, ranked_guesses, refine
+from bristle.identification.start_grid import SearchContext, initial_guesses, ranked_guesses
 from bristle.model.model import Model
 from bristle.physics.effect import EFFECTS
 

@@ -9,7 +9,7 @@ import pytest
 from known_runs import bench_run, truth_of
 from scipy.optimize import least_squares
 
-from bristle.identification.fit import fit_from_starts
+from bristle.identification.fit import Search, fit_from_starts
 from bristle.identification.problem import (
     EXPLAINS,
     Problem,
@@ -21,7 +21,6 @@ from bristle.identification.problem import (
 )
 from bristle.identification.rig import DAMPER, ROLES, Site
 from bristle.identification.rig_fit import fit_site
-from bristle.identification.start_grid import Search
 from bristle.model.model import Model
 
 LAW = "bingham"
