@@ -286,13 +286,11 @@ def _counted_in(problem: Problem) -> Array:
 
 def _first_guess(name: str, model: Model, problem: Problem) -> Model:
     """Return a model with an effect at its default shape, scaled to the rig."""
-    guess, effect = initial_guesses(name, model, problem)[0], EFFECTS[name]
-    if effect.start_shares:
+    guess = initial_guesses(name, model, problem)[0]
+    if EFFECTS[name].start_shares:
         return guess
-    scaled = {
-        f"{name}.{own}": problem.scaled(model.law, f"{name}.{own}") for own in effect.parameters
-    }
-    return replace(guess, values={**guess.values, **model.values, **scaled})
+    at_size = problem.at_size(model.law, [name])
+    return replace(guess, values={**guess.values, **model.values, **at_size})
 
 
 # From what size on what an effect changes is its own, not that of the integration's steps.

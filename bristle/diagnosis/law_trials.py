@@ -234,12 +234,7 @@ def _model(name: str, problem: Problem, present: Model) -> Model:
     base, variant = base_and_variant(name)
     effects = tuple(one for one in present.effects if _joins(one, base.name))
     own = {name for name in present.values if name.partition(".")[0] in effects}
-    values = {
-        f"{effect}.{part}": problem.scaled(base.name, f"{effect}.{part}")
-        for effect in effects
-        for part in EFFECTS[effect].parameters
-    }
-    values |= {name: present.values[name] for name in own}
+    values = problem.at_size(base.name, effects) | {name: present.values[name] for name in own}
     kept = {n for n in (*present.fixed, *present.limits) if n.partition(".")[0] in effects}
     model = Model(
         base.name, effects, {**values, **variant.values},

@@ -331,12 +331,7 @@ def fit_from_starts(problem: Problem, model: Model, starts: int = 4) -> Fit:
         `unidentified`.
     """
     law, fixed = model.law, model.fixed
-    at_size = {
-        f"{effect}.{own}": problem.scaled(law, f"{effect}.{own}")
-        for effect in model.effects
-        for own in EFFECTS[effect].parameters
-    }
-    model = replace(model, values=at_size | model.values)
+    model = replace(model, values=problem.at_size(law, model.effects) | model.values)
     driven = LAWS[law].driven() if steady(problem) else ()
     silent = tuple(name for name in driven if name not in fixed)
     model = without(model, silent)

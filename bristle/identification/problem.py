@@ -539,6 +539,11 @@ class Problem:
         known = next((one for one in as_voltage if one in self._sizes), "1")
         return self._sizes[known]
 
+    def at_size(self, law: str, effects: Iterable[str]) -> dict[str, float]:
+        """Return the parameters of effects beside a law at the size of this rig, see `scaled`."""
+        names = [f"{effect}.{own}" for effect in effects for own in EFFECTS[effect].parameters]
+        return {name: self.scaled(law, name) for name in names}
+
     def scaled(self, law: str, name: str) -> float:
         """Return a parameter's default brought to the size of this rig, within its bounds."""
         declared = parameter(law, name)
