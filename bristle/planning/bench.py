@@ -24,9 +24,9 @@ from ..model.model import Model
 from ..physics.laws import LAWS
 from ..study.identify import is_identified
 from ..study.study import Study
-from .information import DRAWS, Information, Question
+from .information import DRAWS, Question
 from .limits import RigLimits, Test, limits_given, limits_of_runs, read_sheet, with_given
-from .plan import Outcome, Plan, or_beyond, outcomes
+from .plan import Plan, outcomes, searched
 from .questions import (
     NONE,
     PlanRequest,
@@ -35,7 +35,6 @@ from .questions import (
     SizedRival,
     Stated,
     able_beside,
-    cost_of,
     law_rivals,
     notes_of_error,
     open_parts,
@@ -303,20 +302,13 @@ def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
     planner : finds the tests
     drive : the channel of the command, "" where there is none
     """
-    goal, limits = found.goal, planner.limits
-    tests = planner.plan()
-    after = goal.with_tests(tests)[: goal.count]
-
-    def told(known: Sequence[Information]) -> list[Outcome]:
-        return outcomes(found.purposes, found.asked, found.known, known[: goal.count])
-
-    rows = or_beyond(
-        told(after), lambda: [told(goal.with_pair(one)) for one in planner.looked_at()]
+    tests, rows, gain = searched(
+        {DAMPER: found},
+        planner,
+        lambda then: outcomes(found.purposes, found.asked, found.known, then[DAMPER]),
     )
-    costs = [cost_of(found.purposes.figures(one)) for one in (found.known, after)]
-    gain = float(np.exp(costs[0] - costs[1]))
     return Plan(
         name, tuple(one.test for one in tests),
-        tuple(one.test.signals(limits) for one in tests),
-        tuple(rows), limits, drive, gain, tuple(one.role for one in tests),
+        tuple(one.test.signals(planner.limits) for one in tests),
+        tuple(rows), planner.limits, drive, gain, tuple(one.role for one in tests),
     )  # fmt: skip

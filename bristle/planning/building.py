@@ -27,12 +27,11 @@ from ..study.study import Study
 from .folder import PlannedRun
 from .information import DRAWS, Goal, Information
 from .limits import RESERVE, SLOWEST, ZERO, PrescribedSignals, RigLimits, with_given
-from .plan import Outcome, Plan, or_beyond, outcomes
+from .plan import Outcome, Plan, outcomes, searched
 from .questions import (
     PlanRequest,
     RunsAtHand,
     Stated,
-    cost_of,
     largest_motion,
     notes_of_error,
     of_one_force,
@@ -325,40 +324,17 @@ def _joint(stand: Mapping[str, Stated]) -> Goal:
 
 def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -> BuildingPlan:
     """Return the plan that serves the goals of the sites."""
-    tests = planner.plan()
-    then = _by_site(stand, planner.goal.with_tests(tests))
-    costs = [
-        cost_of(one.purposes.figures(one.known)) - cost_of(one.purposes.figures(then[site]))
-        for site, one in stand.items()
-    ]
-    rows = or_beyond(
-        _rows(stand, then),
-        lambda: [
-            _rows(stand, _by_site(stand, planner.goal.with_pair(one)))
-            for one in planner.looked_at()
-        ],
-    )
+    tests, rows, gain = searched(stand, planner, lambda then: _rows(stand, then))
     shown = [planner.response(one) for one in tests]
     assert planner.table is not None
     level = planner.table.levels[0]
     return BuildingPlan(
         study.name, tuple(one.test for one in tests),
         tuple(one.test.signals(planner.limits) for one in tests), tuple(rows), planner.limits,
-        study.drive, float(np.exp(np.mean(costs))), tuple(one.role for one in tests),
+        study.drive, gain, tuple(one.role for one in tests),
         predicted=tuple(one.columns[f"structure.{level}_displacement"] for one in shown),
         level=level,
     )  # fmt: skip
-
-
-def _by_site(
-    stand: Mapping[str, Stated], found: Sequence[Information]
-) -> dict[str, list[Information]]:
-    """Return what is known of the questions of each site, with the fitted parameters."""
-    out, first = {}, 0
-    for site, one in stand.items():
-        out[site] = list(found[first : first + one.goal.count])
-        first += len(one.goal.asked)
-    return out
 
 
 def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Information]]) -> list[Outcome]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, inf, isfinite
 from pathlib import Path
@@ -21,9 +21,10 @@ from ..physics.drive import DRIVES, VOLTAGE, drive_named, unit_for
 from ..physics.effect import EFFECTS, plain_name
 from ..view import Viewable
 from .folder import PlanFolder, PlannedRun, write_plan
-from .information import Information, PreparedQuestion
+from .information import Information, JudgedTest, PreparedQuestion
 from .limits import PrescribedSignals, RigLimits, Test
-from .questions import Purposes, SizedRival, seen, separated
+from .questions import Purposes, SizedRival, Stated, cost_of, seen, separated
+from .search import Planner
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,20 +103,42 @@ class Outcome:
         }  # fmt: skip
 
 
-def or_beyond(
-    rows: Sequence[Outcome], alone: Callable[[], Sequence[Sequence[Outcome]]]
-) -> list[Outcome]:
-    """Return what a plan comes to, where it is open with whether a test of its own would settle it.
+def searched(
+    stand: Mapping[str, Stated],
+    planner: Planner,
+    told: Callable[[Mapping[str, Sequence[Information]]], list[Outcome]],
+) -> tuple[list[JudgedTest], list[Outcome], float]:
+    """Return tests that serve the goals of sites, what they will show, and by what factor.
+
+    What they leave open is told with whether a test of its own would settle it. The factor is that
+    by which the figures become smaller on average.
 
     Parameters
     ----------
-    rows : what the plan comes to
-    alone : returns the outcomes of each test that was looked at
+    stand : by site what is asked, and what the runs at hand say of it
+    planner : finds the tests for all sites together
+    told : returns the outcomes of what runs would say, by site
     """
-    if all(one.settled for one in rows):
-        return [*rows]
-    able = {one.name for told in alone() for one in told if one.settled}
-    return [one if one.settled or one.name in able else replace(one, beyond=True) for one in rows]
+    tests = planner.plan()
+
+    def shown(known: Sequence[Information]) -> dict[str, Sequence[Information]]:
+        out, first = {}, 0
+        for site, one in stand.items():
+            out[site] = known[first : first + one.goal.count]  # with the fitted parameters
+            first += len(one.goal.asked)
+        return out
+
+    then = shown(planner.goal.with_tests(tests))
+    costs = [
+        cost_of(one.purposes.figures(one.known)) - cost_of(one.purposes.figures(then[site]))
+        for site, one in stand.items()
+    ]
+    rows = told(then)
+    if not all(one.settled for one in rows):
+        alone = (told(shown(planner.goal.with_pair(one))) for one in planner.looked_at())
+        able = {one.name for found in alone for one in found if one.settled}
+        rows = [one if one.settled else replace(one, beyond=one.name not in able) for one in rows]
+    return tests, rows, float(np.exp(np.mean(costs)))
 
 
 def outcomes(
