@@ -416,7 +416,7 @@ def jump(setup: Setup, now: Inputs, z: Row, work: Row) -> float:
     deflection, speed = series_element(setup.on)
     if speed >= 0:
         instant = Inputs(now.x, now.v, now.a, now.V, INSTANT, now.energy, 0.0, False)
-        balance = Balance(instant, now.v, SETTLE, z[deflection], z[speed])
+        balance = Balance(instant, now.v, SETTLE, z[deflection], z[speed], 0.5)
         z[speed] = balanced_speed(setup, balance, z[speed], 0.0, z)[0]
     return evaluate(setup, now, z, rates, after)[0]  # type: ignore[no-any-return]
 

@@ -136,6 +136,7 @@ class Balance(NamedTuple):
     push: float
     deflection: float
     speed: float
+    share: float
 
 
 def advance_series(
@@ -144,8 +145,8 @@ def advance_series(
     """Advance a series element and the law's states over a step, rod and voltage linear.
 
     Implicit Euler for the series mass, the trapezoidal rule for the deflection between rod and
-    fluid, the law's states exactly. Secants, begun with the gain and the slope of the substep
-    before, need two or three trials; what they do not find is bracketed.
+    fluid (but see `damping_share`), the law's states exactly. Secants, begun with the gain and the
+    slope of the substep before, need two or three trials; what they do not find is bracketed.
 
     Parameters
     ----------
@@ -162,10 +163,14 @@ def advance_series(
         v0 = begin.v + k / count * (end.v - begin.v)
         now = between(begin, end, (k + 1.0) / count, h)
         was = z[speed]
-        balance = Balance(now, v0, h, z[deflection], was)
+        balance = Balance(now, v0, h, z[deflection], was, 0.5)
         found, slope = balanced_speed(setup, balance, was + gain, slope, z)
+        share = damping_share(setup, balance, found, z)
+        if share > 0.5:
+            balance = Balance(now, v0, h, z[deflection], was, share)
+            found, slope = balanced_speed(setup, balance, found, 0.0, z)
         gain = found - was
-        z[deflection] += 0.5 * h * (v0 - was + now.v - found)
+        z[deflection] += deflected(balance, found)
         z[speed] = found
         if setup.n_own > 0:
             V = felt_voltage(setup, now, z)
@@ -173,6 +178,32 @@ def advance_series(
                 now.x - z[deflection], 0.5 * (was + found), now.a, V, h, now.energy, 0.0, False
             )
             advance_law(setup.law, setup.p, middle, law_factors(setup, middle, z), z, z)
+
+
+def deflected(balance: Balance, speed: float) -> float:
+    """Return by how much the series element gives way over a substep that ends at a speed [m]."""
+    now, begin, _, _, was, share = balance
+    return now.dt * ((1.0 - share) * (begin - was) + share * (now.v - speed))
+
+
+def damping_share(setup: Setup, balance: Balance, speed: float, z: Row) -> float:
+    """Return the `share` of a substep that ends at a speed: that a stiff element does not ring.
+
+    By the trapezoidal rule what is stiff against the fluid and the mass swings from substep to
+    substep: where it does, it settles within the one. All that is softer keeps the rule.
+    """
+    now, begin, push, apart, was, share = balance
+    if (begin - was) * (now.v - speed) >= 0.0:
+        return share
+    way = 1.0 if speed > 0.0 else -1.0
+    nudge = way * 1e-4 * max(abs(speed), SLOW)
+    bent = Balance(now, begin, push, apart + now.dt * nudge, was, share)
+    excess = speed_excess(setup, balance, speed, way, z)
+    slope = (speed_excess(setup, balance, speed + nudge, way, z) - excess) / nudge
+    stiff = (excess - speed_excess(setup, bent, speed, way, z)) / nudge
+    if stiff <= 0.0:
+        return share
+    return max(share, min(1.0 + share - slope / stiff, 1.0))
 
 
 def balanced_speed(
@@ -272,7 +303,7 @@ def speed_excess(setup: Setup, balance: Balance, speed: float, way: float, z: Ro
     way : direction of the friction, 1 or -1
     z : (k,) state, kept
     """
-    now, begin, push, apart, was = balance
-    deflection = apart + 0.5 * now.dt * (begin - was + now.v - speed)
+    now, _, push, apart, was, _ = balance
+    deflection = apart + deflected(balance, speed)
     force = net_force(setup, now, way, 0.5 * (was + speed), deflection, speed, z)
     return speed - was - push * force  # type: ignore[no-any-return]

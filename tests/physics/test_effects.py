@@ -200,7 +200,7 @@ def test_in_steady_sliding_the_mount_passes_the_fluids_force(law: str) -> None:
     bench = Bench(law, {}, ["mount_compliance"])
     v, dt, x = 0.05, 0.002, 0.0
     for k in range(500):
-        speed = v * min(1.0, k / 50)  # a start at full speed would ring
+        speed = v * min(1.0, k / 50)
         x += speed * dt
         force = bench.move(x, speed, 4.0, dt)
     sliding = force_at("bingham", v=v, V=4.0)
@@ -284,12 +284,13 @@ def largest_mounted(law: str, c: float) -> float:
 
 
 @all_laws
-def test_a_stiff_mount_is_none(law: str) -> None:
+@pytest.mark.parametrize("start", [0.0, 0.1], ids=["at rest", "in motion"])
+def test_a_stiff_mount_is_none(law: str, start: float) -> None:
     times = 0.002 * np.arange(350)
     stiff = Bench(law, on("mount_compliance", k=1e9), ["mount_compliance"])
-    bare = Bench(law).play(from_rest, 8.0, times)
-    error = stiff.play(from_rest, 8.0, times) - bare
-    assert np.sqrt(np.mean(error**2)) < 0.02
+    forces = [one.play(lambda t: from_rest(t + start), 8.0, times) for one in (stiff, Bench(law))]
+    error = np.diff(forces, axis=0)[0, 1:]  # the joint stands at the start
+    assert np.sqrt(np.mean(error**2)) < (0.05 if start else 0.02)
 
 
 def test_two_series_elements_are_refused() -> None:
