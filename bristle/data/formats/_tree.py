@@ -461,7 +461,7 @@ def _name_and_data(node: Mapping[str, Any]) -> tuple[str, AnyArray, str] | None:
     text, array = _get(node, _NAMES), _vector(_get(node, _VALUES))
     if not isinstance(text, str) or not text.strip() or array is None:
         return None
-    return text.strip().strip('"'), array, _unit_of(node)
+    return text.replace('"', "").strip(), array, _unit_of(node)
 
 
 def _add_dspace(found: Found, key: str, node: Mapping[str, Any]) -> None:
@@ -481,8 +481,7 @@ def _add_dspace(found: Found, key: str, node: Mapping[str, Any]) -> None:
             found.loose[called] = array
     for number, y in enumerate(ys, 1):
         text, array, unit = _name_and_data(y)  # type: ignore[misc]  # see _named_all
-        place = f"{key}.Y({number}).{text}" if len(ys) > 1 else f"{key}.Y.{text}"
-        called = found.named(unit, place)
+        called = found.named(unit, text, f"{key}.Y({number}).{text}")
         index = _get(y, ("xindex",))
         at = int(index.array.ravel()[0]) - 1 if isinstance(index, Leaf) and index.array.size else 0
         clock = clocks[at] if 0 <= at < len(clocks) else None
@@ -500,7 +499,7 @@ def _add_signal(found: Found, key: str, node: Mapping[str, Any]) -> None:
     found.scalars |= {
         f"{key}.{one}": v for one, leaf in node.items() if (v := _scalar(leaf)) is not None
     }
-    timed = next((one for one in vectors if _is_time_name(one)), None)
+    timed = next((one for one in vectors if _is_time_name(one)), "Time")
     if named is not None:
         text, array, unit = named
         names = [f"{key}.{text}"]
@@ -513,11 +512,15 @@ def _add_signal(found: Found, key: str, node: Mapping[str, Any]) -> None:
         short = value if isinstance(node, Bare) else f"{key}.{value}"
         names = [key if value.lower() in _VALUES else short, f"{key}.{value}"]
     called = found.named(unit, *names)
-    time = vectors.get(timed or "")
+    info = one if isinstance(one := _get(node, ("timeinfo",)), dict) else {}
+    start, step = (_scalar(info.get(one)) for one in ("Start", "Increment"))
+    time = vectors.get(timed)
+    if time is None and step:  # a time series of even steps
+        time = (start or 0.0) + step * np.arange(len(array))
     if time is not None and len(time) == len(array):
         there = np.isfinite(time)
         if _rises(time[there]):
-            clock = found.free(f"{key}.{timed}")
+            clock = found.named(_unit_of(info), f"{key}.{timed}")
             found.clocks.append((clock, time[there], {called: array[there]}))
             return
         found.remarks.append(
@@ -673,5 +676,6 @@ def _unit_beside(fields: Mapping[str, Any], key: str) -> str:
 def _unit_of(node: Mapping[str, Any]) -> str:
     """Return the unit that a signal states, itself or in the DataInfo of a time series."""
     info = _get(node, ("datainfo",))
-    texts = (_get(one, _UNITS) for one in (node, info) if isinstance(one, dict))
+    texts = [_get(one, _UNITS) for one in (node, info) if isinstance(one, dict)]
+    texts += [_get(one, _NAMES) for one in texts if isinstance(one, dict)]  # an object of MATLAB
     return next((text for text in texts if isinstance(text, str)), "")

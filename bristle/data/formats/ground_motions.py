@@ -184,14 +184,15 @@ def _factor(text: str, where: str) -> float:
     Words may stand behind it, but no factor, as in G (X 1000).
     """
     first, _, rest = text.strip().partition(" ")
-    spelled = (text if _TIMES.match(rest) else first).strip("()[]. ")
-    found = map(unit_or_none, (spelled, spelled.lower(), spelled.capitalize()))
+    spelled = text.strip("()[]. ").replace(" PER ", "/")
+    texts = [spelled] if _TIMES.match(rest) else [spelled, first.strip("()[]. ")]
+    found = (unit_or_none(how(one)) for one in texts for how in (str, str.lower, str.capitalize))
     if (unit := next(filter(None, found), None)) is None:
-        raise PhysicsError(f'{where}: the unit "{spelled}" is not known. G or CM/S2 is right.')
+        raise PhysicsError(f'{where}: the unit "{texts[-1]}" is not known. G or CM/S2 is right.')
     if unit.dimension != parse_unit("m/s2").dimension:
         raise PhysicsError(
             f"{where}: the values are in {spelled}, which is no acceleration. "
-            "Take the file of the accelerations (AT2, not VT2 or DT2)."
+            "Take the file of the accelerations, at PEER AT2 and not VT2 or DT2."
         )
     return unit.factor
 
@@ -199,7 +200,7 @@ def _factor(text: str, where: str) -> float:
 def _not_accelerations(what: str, where: str) -> PhysicsError:
     return PhysicsError(
         f"{where}: the values are a {what}. "
-        "Take the file of the accelerations (AT2, not VT2 or DT2)."
+        "Take the file of the accelerations, at PEER AT2 and not VT2 or DT2."
     )
 
 

@@ -106,6 +106,14 @@ def test_a_factor_and_another_quantity_are_refused(tmp_path: Path, title: str, s
         read_ground_motion("a.AT2", tmp_path)
 
 
+@pytest.mark.parametrize("unit", ["CM S-2", "CM/SEC**2", "CM PER SEC PER SEC", "GALS (CORRECTED)"])
+def test_units_as_archives_spell_them(tmp_path: Path, unit: str) -> None:
+    title = f"ACCELERATION TIME SERIES IN UNITS OF {unit}"
+    (tmp_path / "a.AT2").write_text(f"PEER\nX\n{title}\nNPTS= 4, DT= .01 SEC\n .1 .2 .3 .4\n")
+    found = read_ground_motion("a.AT2", tmp_path).acceleration
+    np.testing.assert_allclose(found, [0.001, 0.002, 0.003, 0.004])
+
+
 def test_a_word_among_the_values_is_told_as_it_is_written(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match='"END" is not a number'):
         at2(tmp_path, end="\nEND OF RECORD\n")

@@ -85,6 +85,22 @@ HELD: dict[str, dict[str, Any]] = {
     "time and data per signal": {
         name: {"time": column(T), "data": column(v), "units": unit} for name, v, unit in SIGNALS
     },
+    "time series of even steps in ms": {
+        n: {
+            "Name": n, "Data": column(v), "DataInfo": {"Units": {"Name": unit}},
+            "TimeInfo": {"Units": "milliseconds", "Start": 0.0, "Increment": 2.0},
+        }
+        for n, v, unit in SIGNALS
+    },
+    "dSPACE, names as paths": {
+        "rec_001": {
+            "X": named("'HostService'", T, "s"),
+            "Y": structures(*(
+                named(f'"Model Root"/"Sensors"/"{n}"/"Out1"', v, u, XIndex=1.0)
+                for n, v, u in (("path", X, "mm"), ("coil", U, "V"), ("load", F, "N"))
+            )),
+        },
+    },
     "dSPACE": {"rec": {"X": named("time", T, "s"), "Y": DSPACE}},
     "channels": {
         "ch": structures(*({"name": n, "values": column(v), "units": u} for n, v, u in SIGNALS)),
