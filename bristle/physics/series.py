@@ -183,7 +183,8 @@ def advance_series(
 def deflected(balance: Balance, speed: float) -> float:
     """Return by how much the series element gives way over a substep that ends at a speed [m]."""
     now, begin, _, _, was, share = balance
-    return now.dt * ((1.0 - share) * (begin - was) + share * (now.v - speed))
+    way: float = now.dt * ((1.0 - share) * (begin - was) + share * (now.v - speed))
+    return way
 
 
 def damping_share(setup: Setup, balance: Balance, speed: float, z: Row) -> float:
