@@ -31,7 +31,8 @@ KNOWN = ("white", "low-passed")
 _DIFFERENCES: tuple[Kernel, ...] = tuple((a, 0) for a in range(2, 10))
 # From half the sampling rate downwards.
 _BANDS: tuple[Kernel, ...] = ((9, 0), (8, 1), (8, 2), (6, 3), (5, 5), (4, 8), (4, 16))
-_BLOCK = 24  # samples; short, so that enough blocks lie between the jumps of a force
+_BLOCKS = (24, 8)  # samples; long ones tell more, short ones lie between frequent jumps
+_JUMPY = 0.8  # share of the long blocks' level below which that of the short ones is the noise
 _CLEANEST = 0.3  # the share of blocks that is taken to be free of jumps, to begin with
 _CHANGES = 6  # of a channel that is switched rather than moved, at most per hundred samples
 _KEPT = 0.97  # the share of blocks of white noise that the final threshold lets pass
@@ -104,14 +105,14 @@ def estimate_noise(y: Array) -> Noise:
     step = quantum(y)
     # Rounding to a step q leaves an error of q/sqrt(12), also where nothing moves.
     rounding = step / sqrt(12.0)
-    std = min(_level(y, kernel) for kernel in _DIFFERENCES)
+    std, block = _of_differences(y)
     # Numbers in double precision are rounded, too: below this nothing was measured.
     if max(std, rounding) < 256.0 * float(np.finfo(float).eps) * largest:
         return Noise(0.0, step, "none")
     if std <= rounding:
         return Noise(rounding, step)
     rough = std > _ROUGH * float(np.std(y))
-    std, colour = (std, "rough") if rough else _in_bands(y, std)
+    std, colour = (std, "rough") if rough else _in_bands(y, std, block)
     if colour == "hidden" or std < _PERFECT * float(np.std(y)):
         colour = "hidden"  # what is flat so far down is the rounding of numbers after a filter
         quiet, at_rest = quietest(y)
@@ -184,12 +185,21 @@ def stretches(flat: Flags) -> Indices:
     return np.asarray(np.flatnonzero(np.diff(padded)).reshape(-1, 2), dtype=np.int64)
 
 
-def _in_bands(y: Array, std: float) -> tuple[float, str]:
+def _of_differences(y: Array) -> tuple[float, int]:
+    """Return the least level of the differences, and the samples of the blocks that tell it.
+
+    Where a slow record's force jumps in most long blocks, those hold jumps, not noise.
+    """
+    long, short = (min(_level(y, k, size) for k in _DIFFERENCES) for size in _BLOCKS)
+    return (short, _BLOCKS[1]) if 0.0 < short < _JUMPY * long else (long, _BLOCKS[0])
+
+
+def _in_bands(y: Array, std: float, block: int) -> tuple[float, str]:
     """Return the standard deviation and the colour that the bands tell.
 
     The highest three neighbouring bands of one level are the noise; what rises below is signal.
     """
-    levels = [_level(y, kernel) for kernel in _BANDS]
+    levels = [_level(y, kernel, block) for kernel in _BANDS]
     wide = _FLAT * (1.0 + 3.0 / sqrt(len(y)))  # levels scatter on short channels
     for first in range(len(levels) - 2):
         three = levels[first : first + 3]
@@ -202,13 +212,13 @@ def _in_bands(y: Array, std: float) -> tuple[float, str]:
     return std, "blue" if levels[0] > wide * levels[2] else "hidden"
 
 
-def _level(y: Array, kernel: Kernel) -> float:
-    """Return the standard deviation of white noise that gives a filter's answer."""
-    weights, freedom = _filter(kernel)
+def _level(y: Array, kernel: Kernel, block: int) -> float:
+    """Return the standard deviation of white noise that gives a filter's answer, from blocks."""
+    weights, freedom = _filter(kernel, block)
     d = np.convolve(y, weights, "valid")
     total = np.concatenate([[0.0], np.cumsum(d * d)])
-    begin = np.arange(0, len(d) - _BLOCK + 1, _BLOCK // 2)
-    squares = (total[begin + _BLOCK] - total[begin]) / _BLOCK
+    begin = np.arange(0, len(d) - block + 1, block // 2)
+    squares = (total[begin + block] - total[begin]) / block
     # Rounding error of the sums aside, a block of zeros holds one level of a coarse instrument.
     moving = squares > 1e-14 * float(squares.max())
     if np.mean(moving) > 0.1 and not is_switched(y):
@@ -228,7 +238,7 @@ def _level(y: Array, kernel: Kernel) -> float:
 
 
 @cache
-def _filter(kernel: Kernel) -> tuple[Array, float]:
+def _filter(kernel: Kernel, block: int) -> tuple[Array, float]:
     """Return the weights (a + b + 1,), of unit gain for white noise, and the freedom of a block.
 
     The freedom is that of chi2 for the mean square over a block of the filter's answers, which
@@ -240,9 +250,9 @@ def _filter(kernel: Kernel) -> tuple[Array, float]:
     for _ in range(kernel[1]):
         weights = np.convolve(weights, [1.0, 1.0])
     weights = weights / sqrt(float(weights @ weights))
-    correlation = np.correlate(weights, weights, "full")[len(weights) :][: _BLOCK - 1]
-    share = 1.0 - np.arange(1, len(correlation) + 1) / _BLOCK
-    return weights, _BLOCK / (1.0 + 2.0 * float(share @ correlation**2))
+    correlation = np.correlate(weights, weights, "full")[len(weights) :][: block - 1]
+    share = 1.0 - np.arange(1, len(correlation) + 1) / block
+    return weights, block / (1.0 + 2.0 * float(share @ correlation**2))
 
 
 def _chi2(share: float, freedom: float) -> float:

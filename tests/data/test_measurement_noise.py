@@ -14,16 +14,18 @@ TIME = np.arange(6000) / 500.0
 
 
 def signal(kind: str) -> NDArray[np.float64]:
-    sine = np.sin(2.0 * np.pi * 2.0 * TIME) + 0.5 * np.sin(2.0 * np.pi * 7.3 * TIME)
+    fast = 2.5 if kind == "hasty" else 1.0  # then it jumps every 14 samples or so
+    phase = 2.0 * np.pi * fast * TIME
+    sine = np.sin(2.0 * phase) + 0.5 * np.sin(7.3 * phase)
     if kind == "smooth":
         return sine
-    if kind == "yield":  # a force that jumps at each reversal
+    if kind in ("yield", "hasty"):  # a force that jumps at each reversal
         return np.sign(np.gradient(sine)) * (1.0 + 0.3 * np.abs(sine))
     levels = np.random.default_rng(1).choice([0.0, 1.0, 3.0], 24)
     return np.repeat(levels, 250)
 
 
-@pytest.mark.parametrize("kind", ["smooth", "yield", "switched"])
+@pytest.mark.parametrize("kind", ["smooth", "yield", "hasty", "switched"])
 @pytest.mark.parametrize("share", [0.01, 0.03])
 @pytest.mark.parametrize("seed", range(4))
 def test_white_noise_within_ten_percent(kind: str, share: float, seed: int) -> None:
