@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import wraps
+from math import inf
 from types import SimpleNamespace
 from typing import Any, TypeVar, cast
 
@@ -33,6 +34,8 @@ from ..identification.problem import Problem, Run
 from ..identification.search import HUBER, in_threads
 from ..model.model import Model, parameter
 from ..physics.effect import EFFECTS
+from ..physics.law import WHOLE
+from ..physics.parameter import Parameter
 from ..units import canonical
 from ..user_code.load import define, defined, undefine
 from .decision import TOLD
@@ -68,6 +71,9 @@ MOTION = "the "
 REFITS = 10
 """Fits without one of the runs, or without a group of them, that give an interval."""
 
+FACTOR = Parameter(1.0, "1", (0.0, inf), "law's force, all that it is linear in by one factor,")
+"""The whole force, as a parameter that depends on a label."""
+
 ZERO_C = 273.15  # K
 NORMAL = 1.96
 """Standard deviations of an interval of 95 % as `with_interval` writes it."""
@@ -89,6 +95,8 @@ class Dependence:
 class RunwiseFit:
     """What each run asks of each free parameter, all others shared by the runs, linearly.
 
+    The last of them is a factor of the law's whole force, where that is more than one parameter.
+
     Parameters
     ----------
     problem : all runs
@@ -99,9 +107,13 @@ class RunwiseFit:
         search = Search(problem, model, problem.expectation(model), model.free(), logarithms=False)
         r = search.residuals(search.start)
         J = search.jacobian(search.start, r)
+        self.names, self.scale = [*search.names], search.scale
+        linear = [k for k, n in enumerate(self.names) if n in model.law_class.linear()]
+        if len(linear) > 1:
+            J = np.column_stack([J, J[:, linear] @ search.start[linear]])
+            self.names, self.scale = [*self.names, WHOLE], np.append(self.scale, 1.0)
         far = HUBER * max(1.0, float(np.median(np.abs(r))) / 0.6745)
         root = np.sqrt(np.minimum(1.0, far / np.maximum(np.abs(r), 1e-12)))
-        self.names, self.scale = search.names, search.scale
         J, r = J * root[:, None], r * root
         parts = list(zip(problem.by_run(J), problem.by_run(r), strict=True))
         self._normal = np.array([own.T @ own for own, _ in parts])  # (k, p, p)
@@ -271,7 +283,7 @@ def _beside(
         fits = RunwiseFit(train.of(runs), whole)
         asked, told = fits.apart(fits.names.index(effect.changes))
         p = {own: whole.value(f"{one.name}.{own}") for own in effect.parameters}
-        value = whole.value(effect.changes)
+        value = _now(whole, effect.changes)
         (word,), codes = effect.labels, label.numbers()
         moved = [
             effect.changed(SimpleNamespace(value=value), None, effect.values_of({**p, word: code}))
@@ -372,11 +384,11 @@ def _text(
     sizes : (c,) to begin with: a slope, or a step for each level but the first
     line : the label's value where the parameter keeps its own, and its values (k,); None for steps
     """
-    declared = parameter(model.law, name)
+    declared = FACTOR if name == WHOLE else parameter(model.law, name)
     unit, word = declared.unit, word_of(label.name)
     owner = name.rpartition(".")[0]
     of = f" of {effect_name(owner)}" if owner else ""
-    about = f"{declared.text}{of} ({name})"
+    about = declared.text if name == WHOLE else f"{declared.text}{of} ({name})"
     what = f"The {about}"
     least = f"{declared.bounds[0]!r}" if declared.bounds[0] >= 0.0 else ""
     told = label_unit(label.name)
@@ -384,12 +396,20 @@ def _text(
     family = f"by_{as_word(label.name)}"
     if line is None:
         parts = _steps_text(label, word, unit, sizes, what)
-    elif label.name == TEMPERATURE and least and model.value(name) > 0.0:
-        parts = _arrhenius_text(word, float(sizes[0]) / model.value(name), line, what)
+    elif label.name == TEMPERATURE and least and (now := _now(model, name)) > 0.0:
+        parts = _arrhenius_text(word, float(sizes[0]) / now, line, what)
     else:
         parts = _line_text(word, unit, float(sizes[0]), line, what, (label.name, told, per))
     formula, given, fields, parameters, value, words, imports = parts
-    if least:
+    if name == WHOLE and "exp(" not in value:
+        change = value.removeprefix("q.value + ")
+        value = f"q.value * max(1.0 + {change}, 0.0)"
+        formula = f"value (1 + {formula.removeprefix('value + ')}), never below zero"
+        words = [
+            re.sub(r"\{(abs\(p\.slope\)|p\.step\[\d+\]):(\+?)\.3g\}", r"{100.0 * \1:\2.3g} %", one)
+            for one in words
+        ]
+    elif least and name != WHOLE:
         value = f"max({value}, min(q.value, {least}))"
         formula = f"{formula}, never below {least}"
     lines = [
@@ -429,6 +449,11 @@ def _text(
         *words,
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def _now(model: Model, name: str) -> float:
+    """Return the value of a parameter, or the factor of the whole force."""
+    return 1.0 if name == WHOLE else model.value(name)
 
 
 _Parts = tuple[str, list[str], list[str], list[str], str, list[str], list[str]]

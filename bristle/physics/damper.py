@@ -30,7 +30,7 @@ from .damper_source import (
     step_law,
 )
 from .generate import Slots
-from .law import LAWS, law_code
+from .law import LAWS, WHOLE, law_code
 from .linear import Row, open_row, packed, place, row
 from .series import INSTANT, SETTLE, Balance, advance_implicit, advance_series, balanced_speed
 from .tuples import Inputs, Setup, record
@@ -93,7 +93,8 @@ def changes_of(law: str, slots: Slots) -> list[float]:
     return [
         float(number)
         for k, effect in enumerate(slots.effects)
-        for slot in places.get(effect.changes, ())
+        for name in (LAWS[law].linear() if effect.changes == WHOLE else (effect.changes,))
+        for slot in places.get(name, ())
         for number in (k, slot)
     ]
 

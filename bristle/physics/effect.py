@@ -19,7 +19,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..errors import PhysicsError
 from . import laws as _laws  # noqa: F401  (importing it registers the laws)
 from .forms import QUADRATIC_FORM, choosable, joined_form
-from .law import LAWS, PARTS, Law, laws_of
+from .law import LAWS, PARTS, WHOLE, Law, laws_of
 from .parameter import (
     ANY_BY_NAME,
     GRIDS,
@@ -319,8 +319,9 @@ class Effect:
         the place of the run's word among them, from 1 on.
     changes
         Of an effect of the damper that says how another parameter depends on a label: that
-        parameter, "f_0" of the law or "gas_spring.k" of an effect that is on. The hook `changed`
-        gives its value from `q.value`, which it has without; it is called once, before a run.
+        parameter, "f_0" of the law or "gas_spring.k" of an effect that is on, or "force" for each
+        parameter in which the law's force is linear. The hook `changed` gives the value from
+        `q.value`, which it has without; it is called once, before a run.
     channels
         Parameters of an effect of the damper that follow a channel measured beside motion, command
         and force: {parameter: name in [extra] of study.toml}. No fit moves them, so `assumed` names
@@ -528,7 +529,8 @@ class Effect:
         other, _, own = cls.changes.rpartition(".")
         if other and not (other in EFFECTS and EFFECTS[other].joins(law)):
             return False
-        if cls.changes and own not in (EFFECTS[other] if other else law).parameters:
+        able = (EFFECTS[other] if other else law).parameters
+        if cls.changes and cls.changes != WHOLE and own not in able:
             return False
         parts = {*cls.acts_on, *(ACTS_ON[hook] for hook in cls.hooks() if hook in ACTS_ON)}
         return all(law.has(part) for part in parts)

@@ -54,6 +54,9 @@ PARTS = ("yield", "sign", "bristle", "viscous", "spring", "command")
     command   something depends on the command; found from `command`
 """
 
+WHOLE = "force"
+"""What an effect changes that changes each parameter in which the force of a law is linear."""
+
 SIGNALS = ("x", "v", "a", "V")
 """Signals that a state may begin with."""
 

@@ -78,6 +78,44 @@ def test_what_depends_on_a_label_is_tried_with_its_size_and_no_other_label():
     assert "N per psi of pressure; the model's value of it is that at 100 psi." in text
 
 
+def _whole(factor):
+    return {name: factor * LAW[name] for name in ("f_c", "f_v", "c_0", "k", "f_0")}
+
+
+def test_a_label_that_scales_the_whole_force_is_one_dependence():
+    known = prepared(with_pressure(lambda p: _whole(1.0 + 0.004 * (p - 100.0))))
+    one = dependences(known)[0]
+    assert one.name == "force_by_pressure_psi"
+    assert flaw_of(one.name, one.text) == ""
+    with defined({one.name: one.text}):
+        (start,) = initial_guesses(one.name, known.before.model, known.problem)
+        trial = judge(refine(start, known.problem), known.problem, known.held_out)
+        assert trial.z == pytest.approx(1.0, abs=0.05)
+        slope = trial.model.value(f"{one.name}.slope") * 100.0
+        middle = trial.model.value(f"{one.name}.middle")
+        assert slope / (1.0 + 0.004 * (middle - 100.0)) == pytest.approx(0.4, rel=0.2)
+        run, values = known.held_out.runs[0], dict(trial.model.values)
+        values |= {f"{one.name}.pressure_psi": run.labels["pressure_psi"]}
+        motion = (run.x[9], run.v[9], run.a[9], run.V[9], DT)
+        force = DamperForces("tanh", [one.name]).force(*([x] * 2 for x in motion[:4]), DT, values)
+        own = DamperModel("tanh", values, [one.name]).force(*motion, 0.0, 0.0, False)
+        assert own == pytest.approx(force[0], rel=1e-12)
+        text = EFFECTS[one.name].in_words(EFFECTS[one.name].values_of({"slope": 0.004}))
+    assert "by one factor, rises by 0.4 % per psi of pressure" in text
+
+
+def test_a_word_that_scales_the_whole_force_has_a_share_for_each_step():
+    oils = ("new", "old", "new", "old", "old", "new", "new", "old")
+    runs = [made(k, {"oil": o}, **_whole(1.0 + 0.3 * (o == "old"))) for k, o in enumerate(oils)]
+    one = dependences(prepared(runs))[0]
+    assert (one.name, flaw_of(one.name, one.text)) == ("force_by_oil", "")
+    with defined({one.name: one.text}):
+        values = EFFECTS[one.name].values_of({"oil": 2.0, "step[1]": 0.0, "step[2]": 0.3})
+        assert "differs from that at oil new by +30 % at oil old" in EFFECTS[one.name].in_words(
+            values
+        )
+
+
 def test_a_bend_of_the_command_may_depend_on_a_label():
     runs = with_pressure(lambda p: {"bend": 0.3 + 0.1 * (p - 100.0) / 50.0})
     found = dependences(prepared(runs, law="tanh[quadratic]"))
