@@ -500,6 +500,7 @@ def _base_units(unit: Unit) -> str:
     return _name(dict(zip(DIMENSIONS, unit.dimension)))
 
 
+@cache  # titles of files ask for the same words again and again
 def _nearest(symbol: str) -> str:
     prefixed = [prefix + unit for unit in _PREFIXABLE for prefix in ("", "k", "m", "c", "u")]
     known = {name.lower(): name for name in (*prefixed, *_COMMON, *_PLAIN)}

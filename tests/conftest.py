@@ -12,6 +12,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+# The processes that tests start, hundreds of them, read what they import from bytecode, as does the
+# next run; so it is written before anything large is imported.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 import studies
 from hypothesis import settings
 from toys import Maker, build_toys
@@ -26,12 +32,6 @@ _AHEAD = pytest.StashKey["subprocess.Popen[bytes]"]()
 # HYPOTHESIS_PROFILE=default looks further.
 settings.register_profile("steady", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
-
-# The processes that tests start, hundreds of them, read what they import from bytecode, beside the
-# checkout. The workers of a run inherit the folder.
-_BYTECODE = "" if "PYTHONPYCACHEPREFIX" in os.environ else tempfile.mkdtemp(prefix="bristle-pyc-")
-os.environ.setdefault("PYTHONPYCACHEPREFIX", _BYTECODE)
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Workers of a run are more than cores: threads of BLAS beside them wait for each other, at work.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -63,7 +63,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     config = session.config
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
     if whole and config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
-        _make_bytecode()
+        if not any(Path(__file__).parent.glob("__pycache__/test_units.*pytest*")):
+            _make_bytecode()
         script = Path(__file__).with_name("compile_ahead.py")
         state = str(Path(os.environ[studies.FOLDER]) / "state")
         path = os.pathsep.join([str(script.parents[1]), os.environ.get("PYTHONPATH", "")])
@@ -134,7 +135,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
     Some of these FMUs are broken on purpose, and some were left as they answered Fatal.
     """
-    for folder in filter(None, (_BYTECODE, _UNPACKED, _STUDIES)):
+    for folder in filter(None, (_UNPACKED, _STUDIES)):
         shutil.rmtree(folder, ignore_errors=True)
     if _STATUS in config.stash:
         sys.stdout.flush()

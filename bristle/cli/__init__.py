@@ -74,7 +74,7 @@ def build_parser(only: str = "") -> Parser:
 
     Parameters
     ----------
-    only : the command whose options are wanted: the modules of the others stay unread; "" for all
+    only : the command that is wanted: the modules of the others stay unread; "" for all
     """
     parser = Parser(
         prog="bristle",
@@ -90,7 +90,6 @@ def build_parser(only: str = "") -> Parser:
             continue
         name = found.name.strip("_").replace("_", "-")
         if only and name != only:
-            commands.add_parser(name)
             continue
         module = importlib.import_module(f"{__name__}.{found.name}")
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
