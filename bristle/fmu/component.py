@@ -11,7 +11,7 @@ from ..component import source
 from ..physics.drive import VOLTAGE, declared_for, states_for, text_for, unit_for
 from ..physics.effect import Effect, effects_of
 from ..physics.generate import Functions, Owner, Sets
-from ..physics.motion_file import read_two_column
+from ..physics.motion_file import ANY_HEADER, read_two_column
 from ..physics.parameter import Parameter
 from ..physics.signals import KINDS, PARAMETERS, read_steps
 from .slave import STEPPING, Slave
@@ -99,12 +99,12 @@ class SampleFile(NamedTuple):
 class Played(NamedTuple):
     """What samples of a signal are read from: a CSV, or TIME:VALUE pairs; None: never from that.
 
-    The CSV's header is `header`; None: `time [s]` and any other.
+    The CSV's header is `header`, as `motion_file` has them.
     """
 
     file: Optional[SampleFile]  # noqa: UP045 (read by Python 3.9)
     pairs: Optional[SampleFile]  # noqa: UP045
-    header: Optional[str]  # noqa: UP045
+    header: str
 
 
 _show = source.output
@@ -258,15 +258,15 @@ def _span(indices: list[int]) -> tuple[int, int]:
 class SourceSlave(ComponentSlave):
     """A component whose outputs depend on time alone.
 
-    Its samples come from a CSV that `file_of` names, whose header is `header` (None: `time [s]` and
-    any other), or from TIME:VALUE pairs in `pairs_of`.
+    Its samples come from a CSV that `file_of` names, whose header is `header`, or from TIME:VALUE
+    pairs in `pairs_of`.
     """
 
     icon = "source"
     functions: ClassVar[Any] = source
     file_of: ClassVar[Optional[SampleFile]] = None  # noqa: UP045 (read by Python 3.9)
     pairs_of: ClassVar[Optional[SampleFile]] = None  # noqa: UP045
-    header: ClassVar[Optional[str]] = None  # noqa: UP045
+    header: str = ANY_HEADER
     signal: Optional[tuple[list[float], list[float]]] = None  # noqa: UP045
     """Times [s] and values that are played in place of a file."""
 
@@ -331,7 +331,8 @@ class SignalSlave(SourceSlave):
             text = parameter.text if own else parameter.text + ", in the unit of the input"
             self.add_parameter(name, parameter.value, own, text, parameter.bounds)
         self.add_parameter("steps", "0:0", None, "TIME:VALUE pairs of the kind steps")
-        text = "two-column CSV of the kind csv, its header `time [s],NAME [UNIT]`"
+        self.header = ANY_HEADER.replace("UNIT", unit or "UNIT")
+        text = f"two-column CSV of the kind csv, its header `{self.header}`"
         self.add_parameter("file", self.baked.get("samples", ""), None, text)
 
     def bake(self) -> list[float]:

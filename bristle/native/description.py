@@ -285,8 +285,8 @@ def _words(slave: ComponentSlave, index: int) -> str:
 
 def _signal(one: Played, names: dict[str, int]) -> str:
     """Return from what the samples of a signal are read."""
-    header = quoted(one.header) if one.header else "0"
-    return f"    {{{_choice(one.file, names)}, {_choice(one.pairs, names)}, {header}}},\n"
+    choices = f"{_choice(one.file, names)}, {_choice(one.pairs, names)}"
+    return f"    {{{choices}, {quoted(one.header)}}},\n"
 
 
 def _choice(reading: SampleFile | None, names: dict[str, int]) -> str:

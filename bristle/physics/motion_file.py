@@ -14,6 +14,9 @@ from math import isfinite
 from ..errors import PhysicsError
 
 HEADER = "time [s],acceleration [m/s2]"
+ANY_HEADER = "time [s],NAME [UNIT]"
+"""That of a signal, where NAME stands for any; so does UNIT, and a unit in its place for none else.
+"""
 LARGEST = 64 * 1024**2
 """Largest file that is read [bytes]: about two million samples."""
 GAP = 1.5
@@ -86,7 +89,7 @@ def interpolate(t: float, times: Sequence[float], values: Sequence[float]) -> fl
 
 
 def read_two_column(
-    path: str | os.PathLike[str], header: str | None = HEADER
+    path: str | os.PathLike[str], header: str = HEADER
 ) -> tuple[list[float], list[float]]:
     """Return times and values of a two-column CSV.
 
@@ -94,8 +97,8 @@ def read_two_column(
     ----------
     path : path
         The file.
-    header : str or None
-        What its header must be; None takes `time [s]` and any second column.
+    header : str
+        What its header must be; see `ANY_HEADER`.
 
     Returns
     -------
@@ -110,9 +113,7 @@ def read_two_column(
     return parse_two_column(read_text(path), os.fspath(path), header)
 
 
-def parse_two_column(
-    text: str, name: str, header: str | None = HEADER
-) -> tuple[list[float], list[float]]:
+def parse_two_column(text: str, name: str, header: str = HEADER) -> tuple[list[float], list[float]]:
     """Return times and values of the text of a two-column CSV, as `read_two_column` does."""
     lines, times, values = [], [], []
     found = ""
@@ -131,9 +132,7 @@ def parse_two_column(
         times.append(number(fields[0], name, line))
         values.append(number(fields[1], name, line))
     if not found:
-        raise PhysicsError(
-            f'{name}: the file holds no samples. It begins with "{header or HEADER}".'
-        )
+        raise PhysicsError(f'{name}: the file holds no samples. It begins with "{header}".')
     check_times(times, lines, name)
     return times, values
 
@@ -294,13 +293,13 @@ def _columns(row: str) -> list[str]:
     return [column.strip() for column in row.split(",")]
 
 
-def _check_header(name: str, line: int, row: str, header: str | None) -> None:
-    found = _columns(row)
-    right = (
-        len(found) == 2 and found[0] == "time [s]" if header is None else found == _columns(header)
-    )
-    if not right:
+def _check_header(name: str, line: int, row: str, header: str) -> None:
+    found, wanted = _columns(row), _columns(header)
+    if len(found) == 2 and wanted[1][:5] == "NAME ":
+        unit = wanted[1][5:]
+        if unit == "[UNIT]" or "[" not in found[1] or found[1].endswith(unit):
+            wanted[1] = found[1]
+    if found != wanted:
         raise PhysicsError(
-            f'{name}, line {line}: the header is "{shortened(row)}". '
-            f'It must be "{header or "time [s],NAME [UNIT]"}".'
+            f'{name}, line {line}: the header is "{shortened(row)}". It must be "{header}".'
         )

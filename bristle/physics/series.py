@@ -192,6 +192,12 @@ def damping_share(setup: Setup, balance: Balance, speed: float, z: Row) -> float
 
     By the trapezoidal rule what is stiff against the fluid and the mass swings from substep to
     substep: where it does, it settles within the one. All that is softer keeps the rule.
+
+    Parameters
+    ----------
+    setup, balance : Setup, Balance by the trapezoidal rule
+    speed : of the series mass at the end of the substep by that rule [m/s]
+    z : (k,) state, kept
     """
     now, begin, push, apart, was, share = balance
     if (begin - was) * (now.v - speed) >= 0.0:

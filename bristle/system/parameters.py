@@ -20,7 +20,7 @@ from ..fmu.description import Variable
 from ..physics.building import ROUNDING, Building
 from ..physics.effect import EFFECTS
 from ..physics.forms import TABLE_FORM
-from ..physics.motion_file import read_text, read_two_column, rows
+from ..physics.motion_file import ANY_HEADER, read_text, read_two_column, rows
 from ..physics.signals import KINDS, PARAMETERS, STEPS, TAKEN, read_steps
 from ..units import Measure, alike
 from .library import damper_of, law_of
@@ -78,14 +78,15 @@ def _check_csv(part: Part, folder: Path, document: Document) -> None:
         return
     file = existing_file(str(value), folder, path, where, document)
     if file:
+        like = part.variables.get("offset")
+        wanted = like.measure if like else None
         try:
-            read_two_column(file, header=None)
+            read_two_column(file, ANY_HEADER.replace("UNIT", wanted.name if wanted else "UNIT"))
         except PhysicsError as error:
             document.error(path, f"{where}: {error}")
             return
         title = next(rows(read_text(file)))[1].partition(",")[2].strip()
-        unit, like = column(1, title).unit, part.variables.get("offset")
-        wanted = like.measure if like else None
+        unit = column(1, title).unit
         if unit and wanted is None:
             part.played = Measure(unit.name)
         elif unit and wanted and wanted.unit and not alike(unit, wanted.unit):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bristle.errors import PhysicsError
 from bristle.physics import motion_file
-from bristle.physics.motion_file import HEADER, Motion, interpolate, read_two_column
+from bristle.physics.motion_file import ANY_HEADER, HEADER, Motion, interpolate, read_two_column
 
 Write = Callable[..., Path]
 
@@ -40,7 +40,10 @@ def test_reads_samples_past_comments_blank_lines_and_windows_line_ends(write: Wr
 
 def test_another_second_column_only_where_it_is_asked_for(write: Write) -> None:
     path = write(samples((0, 1), (1, 2), header="time [s],F [N]"))
-    assert read_two_column(path, header=None) == ([0.0, 1.0], [1.0, 2.0])
+    for header in (ANY_HEADER, "time [s],NAME [N]"):
+        assert read_two_column(path, header) == ([0.0, 1.0], [1.0, 2.0])
+    with pytest.raises(PhysicsError, match=r'line 1.*F \[N\]".* must be "time \[s\],NAME \[kN\]"'):
+        read_two_column(path, "time [s],NAME [kN]")
     with pytest.raises(PhysicsError, match=r'line 1.*"time \[s\],F \[N\]".*acceleration \[m/s2\]'):
         read_two_column(path)
 

@@ -145,17 +145,28 @@ def test_a_path_without_a_file_is_refused_in_the_same_words(tmp_path: Path) -> N
         pair.end()
 
 
-@pytest.mark.parametrize("component", ["SignalSource", "PrescribedMotion"])
-def test_a_file_of_its_own_is_played(component: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("component", "unit"), [("SignalSource", "kN"), ("PrescribedMotion", "m")])
+def test_a_file_of_its_own_is_played(component: str, unit: str, tmp_path: Path) -> None:
     file = tmp_path / "signal.csv"
     rows = "".join(f"{0.01 * k!r},{math.sin(k)!r}\n" for k in range(40))
-    file.write_text("# by hand\n\ntime [s],anything [kN]\n" + rows)
+    file.write_text(f"# by hand\n\ntime [s],anything [{unit}]\n{rows}")
     pair = both(component, kind="csv", file=str(file))
     pair.begin()
     assert pair.largest_difference() == 0.0
     for time in (0.0, 0.25):  # its samples end between
         pair.step(time, 0.25)
         assert pair.largest_difference() == 0.0
+    pair.end()
+
+
+def test_a_file_in_another_unit_is_refused_in_the_same_words(tmp_path: Path) -> None:
+    file = tmp_path / "signal.csv"
+    file.write_text("time [s],x [mm]\n0,0\n1,5\n")
+    pair = both("PrescribedMotion", kind="csv", file=str(file))
+    pair.begin()
+    mine, other = pair.said()
+    assert mine == other
+    assert 'line 1: the header is "time [s],x [mm]". It must be "time [s],NAME [m]".' in mine[0]
     pair.end()
 
 

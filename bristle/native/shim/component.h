@@ -47,7 +47,7 @@ typedef struct {
 /* A signal that is played. */
 typedef struct {
     Choice file, pairs; /* what its samples are read from */
-    const char *header; /* which a file must have; NULL: `time [s]` and another */
+    const char *header; /* which a file must have; NAME and UNIT stand for any */
 } Signal;
 
 typedef struct {

@@ -64,15 +64,18 @@ int samples_keep(Samples *samples, double time, double value, long line) {
 static int has_header(const char *at, const char *end, const char *wanted) {
     const char *comma = memchr(at, ',', (size_t)(end - at));
     if (!comma || memchr(comma + 1, ',', (size_t)(end - comma - 1))) return 0;
-    const char *right = wanted ? strchr(wanted, ',') : 0, *stop = comma, *begin = comma + 1;
-    const char *first = wanted ? wanted : "time [s]";
-    size_t count = right ? (size_t)(right - wanted) : strlen(first);
+    const char *right = strchr(wanted, ',') + 1, *stop = comma, *begin = comma + 1;
+    size_t count = (size_t)(right - 1 - wanted);
     trim(&at, &stop);
-    if ((size_t)(stop - at) != count || memcmp(at, first, count) != 0) return 0;
-    if (!right) return 1;
+    if ((size_t)(stop - at) != count || memcmp(at, wanted, count) != 0) return 0;
     trim(&begin, &end);
-    return (size_t)(end - begin) == strlen(right + 1) &&
-           memcmp(begin, right + 1, (size_t)(end - begin)) == 0;
+    int any = strncmp(right, "NAME ", 5) == 0;
+    if (any) right += 5;
+    if (any && (strcmp(right, "[UNIT]") == 0 || !memchr(begin, '[', (size_t)(end - begin))))
+        return 1;
+    count = strlen(right);
+    if (any && (size_t)(end - begin) > count) begin = end - count;
+    return (size_t)(end - begin) == count && memcmp(begin, right, count) == 0;
 }
 
 static int read_field(const char *at, const char *end, const char *name, long line, double *value,
@@ -138,14 +141,14 @@ static int read_lines(const char *content, size_t size, const char *name, const 
         text_add(wrong, "the header is \"");
         add_short(wrong, begin, end);
         text_add(wrong, "\". It must be \"");
-        text_add(wrong, header ? header : "time [s],NAME [UNIT]");
+        text_add(wrong, header);
         text_add(wrong, "\".");
         return 0;
     }
     if (found) return 1;
     text_add(wrong, name);
     text_add(wrong, ": the file holds no samples. It begins with \"");
-    text_add(wrong, header ? header : "time [s],acceleration [m/s2]");
+    text_add(wrong, header);
     text_add(wrong, "\".");
     return 0;
 }

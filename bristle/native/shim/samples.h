@@ -18,7 +18,7 @@ static inline int is_space(char letter) { return letter == ' ' || (letter >= 9 &
 int samples_keep(Samples *samples, double time, double value, long line); /* 0: out of memory */
 void samples_free(Samples *samples);
 
-/* Read a CSV; `header` is what it must have, NULL: `time [s]` and any second column.
+/* Read a CSV; `header` is what it must have, NAME and UNIT in it stand for any.
    0: `wrong` says what is wrong with it. */
 int read_two_column(const char *path, const char *header, Samples *samples, Text *wrong);
 
