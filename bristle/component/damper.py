@@ -268,6 +268,8 @@ def outside(x: float, v: float, V: float, c: Constants) -> float:
         the stroke, of the speed, of the largest command.
     """
     low, high, speed, least, most = c.range[0], c.range[1], c.range[2], c.range[3], c.range[4]
+    if low <= x <= high and abs(v) <= speed and least <= V <= most:
+        return 0.0
     moved = beyond(x, low, high, half_way(low, high, c.stroke))
     fast = beyond(abs(v), 0.0, speed, speed)
     return max(moved, fast, beyond(V, least, most, larger_end(least, most, c.v_max)))
@@ -385,7 +387,7 @@ def step(
     outputs[FORCE], outputs[FRICTION] = force, friction
     outputs[DISSIPATED_ENERGY], outputs[STROKE_RATIO] = energy, abs(x1) / c.stroke
     outputs[OUTSIDE] = outside(x1, v1, V1, c)
-    if c.setup.active and not c.linear:  # an effect may know the energy: above, that of before
+    if c.setup.heats and not c.linear:  # above, an effect has known the energy of before
         return output(clock[0] + dt, now, c, new_state, outputs, work)
     return SATURATED if now[VOLTAGE] != V1 else 0
 

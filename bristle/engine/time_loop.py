@@ -500,9 +500,10 @@ def gather_forces(b: Any, s: Any, values: Any) -> None:
 
 def damper_constants(d: Any) -> damper.Constants:
     """Return what a damper's functions compute with."""
+    # Over a step that is linear nothing asks whether an effect knows the energy.
     setup = Setup(
         d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active,
-        d.lags,
+        d.lags, False,
     )  # fmt: skip
     none = d.p[:0]  # no parameter follows an input here
     return DamperConstants(

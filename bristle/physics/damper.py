@@ -54,9 +54,9 @@ BAKED_ROWS = 8
 """How many rows `bake` gives; a component's own come behind them."""
 
 _CODE, _OWN_STATES, _EXACT, _SIGNED, _LAGS, _STATES = range(6)
-_ADVANCES, _JOINT, _FRICTION, _WORKS = range(4)
+_ADVANCES, _JOINT, _FRICTION, _WORKS, _HEATS, _TRAITS = range(6)
 
-_LAW, _N_MOVING, _ADVANCING, _N_OWN, _SIGNS, _ACTIVE, _LAGGING, _SERIES = range(8)
+_LAW, _N_MOVING, _ADVANCING, _N_OWN, _SIGNS, _ACTIVE, _LAGGING, _HEATED, _SERIES = range(9)
 _OF_SETUP, _P, _ON, _MOVING = range(4)
 
 STORE_ROWS = 4
@@ -136,9 +136,10 @@ def bake(law: str, names: Sequence[str], slots: Slots) -> list[list[float]]:
     """Return the rows that say where a damper's values belong.
 
     They are: numbers of the law; the defaults of `p`; pairs of a value's index and its slot in `p`;
-    such pairs for `z`; the index of each effect's switch, -1 where it has none; four traits of
-    each effect (its states advance, it is in series, it is friction, it is at work over a run);
-    pairs of an effect and the slot of a state that moves by its rate; pairs of `changes_of`.
+    such pairs for `z`; the index of each effect's switch, -1 where it has none; five traits of
+    each effect (its states advance, it is in series, it is friction, it is at work over a run, it
+    knows the energy); pairs of an effect and the slot of a state that moves by its rate; pairs of
+    `changes_of`.
 
     Parameters
     ----------
@@ -157,10 +158,11 @@ def bake(law: str, names: Sequence[str], slots: Slots) -> list[list[float]]:
         for slot in places
     ]
     into_z = [(at[name], slot) for name, slot in state_places(law, slots).items() if name in at]
-    traits = [
-        ("advance" in effect.hooks(), bool(effect.joint), is_friction(effect), not effect.changes)
-        for effect in slots.effects
-    ]
+    traits = []
+    for effect in slots.effects:
+        series, friction = bool(effect.joint), is_friction(effect)
+        works, heats = not effect.changes, "energy" in effect.needs
+        traits.append(("advance" in effect.hooks(), series, friction, works, heats))
     moving = [
         (k, slots.states[f"{effect.name}.{state}"])
         for k, effect in enumerate(slots.effects)
@@ -262,18 +264,20 @@ def switch(values: Row, baked: Row, store: Row) -> int:
     """
     switches, traits = row(baked, SWITCHES), row(baked, TRAITS)
     at, on = place(store, _OF_SETUP), open_row(store, _ON, len(switches))
-    store[at + _ACTIVE], store[at + _ADVANCING] = 0.0, 0.0
+    store[at + _ACTIVE] = store[at + _ADVANCING] = store[at + _HEATED] = 0.0
     store[at + _SIGNS] = row(baked, NUMBERS)[_SIGNED]
     series, bit, code = 0, 1, -1
     for k in range(len(switches)):
         given = int(switches[k])
         store[on + k] = 1.0 if given >= 0 and values[given] != 0.0 else 0.0
-        joint = traits[4 * k + _JOINT] != 0.0
-        if store[on + k] != 0.0 and traits[4 * k + _WORKS] != 0.0:
+        joint = traits[_TRAITS * k + _JOINT] != 0.0
+        if store[on + k] != 0.0 and traits[_TRAITS * k + _WORKS] != 0.0:
             store[at + _ACTIVE] = 1.0
-            if traits[4 * k + _ADVANCES] != 0.0:
+            if traits[_TRAITS * k + _ADVANCES] != 0.0:
                 store[at + _ADVANCING] = 1.0
-            if traits[4 * k + _FRICTION] != 0.0:
+            if traits[_TRAITS * k + _HEATS] != 0.0:
+                store[at + _HEATED] = 1.0
+            if traits[_TRAITS * k + _FRICTION] != 0.0:
                 store[at + _SIGNS] = 1.0
             if joint:
                 series += 1
@@ -320,6 +324,7 @@ def setup_from(store: Row) -> Setup:
         int(store[at + _LAW]), row(store, _P), row(store, _ON), row(store, _MOVING),
         int(store[at + _N_MOVING]), store[at + _ADVANCING] != 0.0, int(store[at + _N_OWN]),
         store[at + _SIGNS] != 0.0, store[at + _ACTIVE] != 0.0, store[at + _LAGGING] != 0.0,
+        store[at + _HEATED] != 0.0,
     )  # fmt: skip
 
 

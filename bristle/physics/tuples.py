@@ -113,7 +113,8 @@ class Setup(NamedTuple):
     `moving` lists the slots of the states that move by `rate`, `n_moving` says how many; `advances`
     whether an effect moves its states by `advance`; `n_own` how many states, the first ones, the
     law itself moves by `advance`; `signed` whether its friction jumps with direction; `active`
-    whether more than the law is at work; `lags` whether the command lags by a state of the law.
+    whether more than the law is at work; `lags` whether the command lags by a state of the law;
+    `heats` whether an effect knows the energy.
     """
 
     law: int
@@ -126,3 +127,4 @@ class Setup(NamedTuple):
     signed: bool
     active: bool
     lags: bool
+    heats: bool

@@ -36,6 +36,7 @@ from ..identification.problem import (
     shown_force,
 )
 from ..identification.rig import DAMPER, Rig, at_site
+from ..identification.search import in_threads
 from ..model.model import Model
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
@@ -116,7 +117,7 @@ def export_study(study: Study, out: Path | None = None, build: Build = build) ->
         then = command("identify", study.folder)
         notes.append(f"Warning: nothing was fitted: these are the law's own values. First:  {then}")
     held = _held_out(study, model, runs, notes)
-    step = step_for(held) if held else None
+    step = step_for(held, held.fed) if held else None
     with writing(folder, StudyError):
         folder.mkdir(parents=True, exist_ok=True)
         fmu = build(_damper(study, model, runs, notes, step), folder)
@@ -390,8 +391,8 @@ class HeldOut(NamedTuple):
     """The damper of a model and the runs that it is held against.
 
     `runs` have all their samples; `fed` is what the damper is given of each; `zero` [N] that of the
-    load cell; `raw` the measured columns that a user would feed, by input, where the fit's serve
-    for an input that was not measured; None where no motion of the damper was.
+    load cell; `raw` is `fed` with the measured columns that a user would feed, but for inputs that
+    were not measured; empty where the motion of the damper was not.
     """
 
     damper: Model
@@ -400,7 +401,7 @@ class HeldOut(NamedTuple):
     runs: Sequence[Run]
     fed: Sequence[Fed]
     zero: float
-    raw: Sequence[dict[str, Array] | None]
+    raw: Sequence[Fed]
     training: bool
 
     def force(self, moments: Moments, fed: Fed) -> Array:
@@ -412,12 +413,24 @@ class HeldOut(NamedTuple):
         run = self.runs[k]
         return self.problem.shown(self.model, run, self.fed[k], force) + self.zero
 
-    def told(self, samples: Sequence[int] | None = None) -> ForceError:
-        """Return the error of the model on the runs, or on the first `samples` of each."""
+    def error(
+        self, fed: Sequence[Fed], step: float = 0.0, samples: Sequence[int] | None = None
+    ) -> ForceError:
+        """Return the error of the model on the runs, or on the first `samples` of each.
+
+        Parameters
+        ----------
+        fed : what the damper is given, `fed` or `raw`
+        step : s, of an FMU in FMPy, which shows the force of a step before; 0 for the model's own
+        samples : how many of each run, None for all
+        """
         found = []
-        for k, run in enumerate(self.runs):
-            force = self.shown(k, self.force(self.fed[k].moments, self.fed[k]))
-            found.append(error_on(*_first(run, force, samples[k] if samples else len(run.force))))
+        for k, (run, given) in enumerate(zip(self.runs, fed, strict=True)):
+            force = self.force(*_dense(given, n := _steps_per_moment(given, step)))
+            if step:
+                force = np.concatenate([force[:1], force[:-1]])[::n]
+            end = samples[k] if samples else len(run.force)
+            found.append(error_on(*_first(run, self.shown(k, force), end)))
         return pooled(found)
 
 
@@ -446,30 +459,28 @@ def held_out(damper: Model, model: Model, rig: Rig, measured: Sequence[Measureme
         values = {**fitted.values, **problem.carrying(fitted, run)}
         fed.append(problem.fed(replace(fitted, values=values), run))
     by_name = {one.name: one for one in measured}
-    raw = [_raw(by_name.get(run.name), run) for run in runs]
-    return HeldOut(damper, problem, fitted, runs, fed, zero, raw, training)
+    pairs = zip(runs, fed, strict=True)
+    raw = [_raw(by_name.get(run.name), run, one) for run, one in pairs]
+    known = [one for one in raw if one is not None]
+    whole = known if len(known) == len(raw) else ()
+    return HeldOut(damper, problem, fitted, runs, fed, zero, whole, training)
 
 
-def step_for(held: HeldOut) -> float:
-    """Return the longest step [s] at which FMPy gives the error that is told.
+def step_for(held: HeldOut, fed: Sequence[Fed]) -> float:
+    """Return the longest step [s] at which FMPy gives the error that the model has.
 
     It is that of the moments that are closest, as runs may have rates of their own, or a whole
-    fraction of it, `FINEST` at the shortest. What FMPy shows is the force of a step before, which
-    the damper's own functions give as well.
+    fraction of it, `FINEST` at the shortest.
+
+    Parameters
+    ----------
+    held : the runs
+    fed : what the damper is given of each
     """
-    told, n = held.told(), 1
-    dt = min(fed.moments.dt for fed in held.fed)
-    while dt / n >= 2.0 * FINEST:
-        late = []
-        for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
-            steps = _steps_per_moment(fed, dt / n)
-            force = held.force(*_dense(fed, steps))
-            force = np.concatenate([force[:1], force[:-1]])[::steps]
-            late.append(error_on(run, held.shown(k, force)))
-        if agree(pooled(late), told, 0.5):
-            break
-        n *= 2
-    return dt / n
+    told, step = held.error(fed), min(one.moments.dt for one in fed)
+    while step >= 2.0 * FINEST and not agree(held.error(fed, step), told, 0.5):
+        step *= 0.5
+    return step
 
 
 def agree(one: ForceError, other: ForceError, share: float = 1.0) -> bool:
@@ -529,52 +540,55 @@ def prove(held: HeldOut, fmu: Path, step: float) -> Proof:
         If the FMU fails on its way.
     """
     few, many = MOST
-    proof = _proof(held, fmu, step, few)
-    if proof.part == 1.0 or proof.agrees or proof.why:
-        return proof
-    return _proof(held, fmu, step, many)
+    part = _part(held, step, few)
+    if agree(held.error(held.fed, step, part), held.error(held.fed, samples=part), 0.5):
+        proof = _proof(held, fmu, step, part)
+        if proof.part == 1.0 or proof.agrees or proof.why:
+            return proof
+    return _proof(held, fmu, step, _part(held, step, many))
 
 
-def _proof(held: HeldOut, fmu: Path, step: float, most: int) -> Proof:
-    """Return the proof by an FMU that makes so many steps at the most."""
-    lengths = [len(run.force) for run in held.runs]
-    of_moment = [_steps_per_moment(fed, step) for fed in held.fed]
-    parts = [run.finer.parts if run.finer else 1 for run in held.runs]
-    of_sample = [n * m for n, m in zip(of_moment, parts, strict=True)]
-    part = min(1.0, most / sum(n * m for n, m in zip(lengths, of_sample, strict=True)))
-    samples = [max(2, int(part * n)) if part < 1.0 else n for n in lengths]
-    told = held.told()
-    own: list[ForceError] = []
-    raw: list[ForceError] = []
+def _part(held: HeldOut, step: float, most: int) -> list[int]:
+    """Return how many samples of each run an FMU passes in so many steps at the most."""
+    pairs = list(zip(held.runs, held.fed, strict=True))
+    steps = sum(len(run.force) * _steps_per_sample(run, fed, step) for run, fed in pairs)
+    part = min(1.0, most / steps)
+    return [max(2, int(part * len(run.force))) for run in held.runs]
+
+
+def _proof(held: HeldOut, fmu: Path, step: float, samples: Sequence[int]) -> Proof:
+    """Return the proof by an FMU that passes so many samples of each run."""
+    told = held.error(held.fed)
+    jobs = [(held.fed, step, k) for k in range(len(held.runs))]
+    if held.raw:
+        # Where noise is most of the error, longer steps give the same one.
+        jobs += [(held.raw, step_for(held, held.raw), k) for k in range(len(held.runs))]
+
+    def run_fmu(job: tuple[Sequence[Fed], float, int]) -> ForceError:
+        feds, longest, k = job
+        run, fed = held.runs[k], feds[k]
+        end = (samples[k] - 1) * _steps_per_sample(run, fed, longest) + 1
+        dense = _dense_inputs(held.damper, run, fed, longest)
+        inputs = {name: _begin(y[:end]) for name, (_, y) in dense.items()}
+        values = start_values(held.damper, held.fed[k], run)
+        n = _steps_per_moment(fed, longest)
+        whole = (fed.moments.dt / n,)
+        stepping = SteppingJob(str(fmu.resolve()), values, tuple(inputs), ("force",), whole)
+        force = step_through(stepping, [inputs], TIMEOUT)[0]["force"][::n]
+        missing = len(fed.moments.x) - len(force)  # which the last one stands in for
+        shown = held.shown(k, np.append(force, np.full(missing, force[-1])))
+        return error_on(*_first(run, shown, samples[k]))
+
     try:
-        for k, (run, fed) in enumerate(zip(held.runs, held.fed, strict=True)):
-            dense = _dense_inputs(held.damper, run, fed, step)
-            inputs = {name: y for name, (_, y) in dense.items()}
-            per = of_sample[k]
-            end = (samples[k] - 1) * per + 1
-            passes = [{name: _begin(y[:end]) for name, y in inputs.items()}]
-            columns = held.raw[k]
-            if columns is not None:
-                passes.append(
-                    {n: _begin(_between(columns.get(n), y, per)[:end]) for n, y in inputs.items()}
-                )
-            values = start_values(held.damper, fed, run)
-            names, job = tuple(inputs), (fed.moments.dt / of_moment[k],) * len(passes)
-            found = step_through(
-                SteppingJob(str(fmu.resolve()), dict(values), names, ("force",), job),
-                passes,
-                TIMEOUT,
-            )
-            for errors, rows in zip((own, raw), found, strict=False):
-                force = rows["force"][:: of_moment[k]]
-                missing = len(fed.moments.x) - len(force)  # which the last one stands in for
-                shown = held.shown(k, np.append(force, np.full(missing, force[-1])))
-                errors.append(error_on(*_first(run, shown, samples[k])))
+        errors = in_threads(run_fmu, jobs)
     except FmuError as error:  # such as a library for another platform
         return Proof(told, step, training=held.training, why=str(error))
+    own, raw = errors[: len(held.runs)], errors[len(held.runs) :]
+    lengths = [len(run.force) for run in held.runs]
+    part = 1.0 if [*samples] == lengths else sum(samples) / sum(lengths)
     return Proof(
-        told, step, held.told(samples) if part < 1.0 else told, pooled(own),
-        pooled(raw) if len(raw) == len(own) else None, part, held.training,
+        told, step, held.error(held.fed, samples=samples) if part < 1.0 else told, pooled(own),
+        pooled(raw) if raw else None, part, held.training,
     )  # fmt: skip
 
 
@@ -648,7 +662,11 @@ def _inputs(damper: Model, run: Run, fed: Fed) -> dict[str, tuple[str, Array]]:
 
 def _steps_per_moment(fed: Fed, step: float) -> int:
     """Return in how many steps an FMU passes from one moment of a run to the next: none longer."""
-    return math.ceil(fed.moments.dt / step - 1e-6)
+    return math.ceil(fed.moments.dt / step - 1e-6) if step else 1
+
+
+def _steps_per_sample(run: Run, fed: Fed, step: float) -> int:
+    return _steps_per_moment(fed, step) * (run.finer.parts if run.finer else 1)
 
 
 def _dense_inputs(damper: Model, run: Run, fed: Fed, step: float) -> dict[str, tuple[str, Array]]:
@@ -687,14 +705,6 @@ def _begin(values: Array) -> Array:
     return np.concatenate([values[:1], values[:-1]])
 
 
-def _between(column: Array | None, fitted: Array, per: int) -> Array:
-    """Return a measured column at the moments of an FMU; the fit's where it was not measured."""
-    if column is None:
-        return fitted
-    places = np.arange(len(fitted)) / per
-    return np.interp(places, np.arange(len(column)), column)
-
-
 def _first(run: Run, force: Array, samples: int) -> tuple[Run, Array]:
     """Return the first samples of a run and of a force."""
     return (
@@ -702,16 +712,21 @@ def _first(run: Run, force: Array, samples: int) -> tuple[Run, Array]:
     )
 
 
-def _raw(measured: Measurement | None, run: Run) -> dict[str, Array] | None:
-    """Return the columns as measured that an FMU takes: what the host of one has, without a fit."""
+def _raw(measured: Measurement | None, run: Run, fed: Fed) -> Fed | None:
+    """Return what a damper is given with the columns as measured: what a host has without a fit."""
     if measured is None or not (measured.has("displacement") or measured.has("velocity")):
         return None
-    out = {name: measured[name] for name in ("displacement", "velocity") if measured.has(name)}
-    if "velocity" not in out:
-        out["velocity"] = np.gradient(out["displacement"], measured.step)
-    if measured.has(run.drive):
-        out[run.drive] = measured[run.drive]
-    return out
+    columns = {"x": "displacement", "v": "velocity", "V": run.drive}
+    found = {name: measured[one] for name, one in columns.items() if measured.has(one)}
+    if "v" not in found:
+        found["v"] = np.gradient(found["x"], measured.step)
+    known, at = fed.moments, np.arange(len(run.x))
+    places = np.arange(len(known.x)) / (run.finer.parts if run.finer else 1)
+    x, v, V = (
+        np.interp(places, at, found[name]) if name in found else getattr(known, name)
+        for name in columns
+    )
+    return fed._replace(moments=known._replace(x=x, v=v, V=V))
 
 
 def _table(path: Path, columns: Mapping[str, NDArray[np.floating[Any]]]) -> Path:

@@ -41,7 +41,7 @@ class SteppingJob:
     """
 
     fmu: str
-    values: dict[str, Value]
+    values: Mapping[str, Value]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     steps: tuple[float, ...]
