@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -42,6 +42,24 @@ SLOW = 0.3
 from equilibrium: storeys hardly deflect there, so that it needs their stiffness only roughly."""
 
 
+class LevelMotion(NamedTuple):
+    """The smoothed motion of one level, in SI.
+
+    `state` (n, 3) displacement, velocity, acceleration and `std` (3,) their errors; `jerk` the
+    intensity of the motion and `added` (n,) that of its jumps; `r` (3,) the variances of the
+    channels and `have` (3,) which there are; `forced` (n, 3) what was taken off before and put
+    back.
+    """
+
+    state: Array
+    std: Array
+    jerk: float
+    added: Array
+    r: Array
+    have: Flags
+    forced: Array
+
+
 class Load(NamedTuple):
     """A device beside the one that is identified: its `force` (n,) [N] as measured, its `noise`."""
 
@@ -69,14 +87,14 @@ def deflected(building: Building, a: Array, loads: Sequence[Load]) -> Array:
 
 
 def anchored(
-    levels: list[dict[str, Any]],
+    levels: list[LevelMotion],
     errors: list[Array],
     springs: Array,
     dt: float,
     corner: float,
     apart: set[int],
     names: Sequence[str],
-) -> tuple[list[dict[str, Any]], list[Array]]:
+) -> tuple[list[LevelMotion], list[Array]]:
     """Return levels and draws of their errors, with slow displacements from those measured.
 
     Parameters
@@ -92,7 +110,7 @@ def anchored(
     RecordError
         If a displacement was not measured that only levels beyond such a storey could give.
     """
-    able = [i for i, level in enumerate(levels) if level["have"][0]]
+    able = [i for i, level in enumerate(levels) if level.have[0]]
     levels, errors = list(levels), list(errors)
     if not able or len(able) == len(levels):
         return levels, errors
@@ -103,7 +121,7 @@ def anchored(
         return np.asarray(own + sosfiltfilt(low, other - own, axis=-1))
 
     for i, level in enumerate(levels):
-        if level["have"][0]:
+        if level.have[0]:
             continue
         beside = [k for k in able if not apart & set(range(min(i, k) + 1, max(i, k) + 1))]
         if not beside:
@@ -112,15 +130,15 @@ def anchored(
                 "between was not measured. Measure that displacement, or the force."
             )
         near = min(beside, key=lambda k: abs(k - i))
-        state, std, error = level["state"].copy(), level["std"].copy(), errors[i].copy()
-        there = levels[near]["state"][:, 0] + springs[i] - springs[near]
+        state, std, error = level.state.copy(), level.std.copy(), errors[i].copy()
+        there = levels[near].state[:, 0] + springs[i] - springs[near]
         state[:, 0] = joined(state[:, 0], there)
         if len(error):
             error[:, :, 0] = joined(error[:, :, 0], errors[near][:, :, 0])
         # White noise of a velocity, integrated: its power above a corner f is r dt/(2 pi^2 f).
-        drift = np.sqrt(level["r"][1] * dt / (2.0 * np.pi**2 * corner))
-        std[0] = np.hypot(min(std[0], drift), levels[near]["std"][0])
-        levels[i], errors[i] = {**level, "state": state, "std": std}, error
+        drift = np.sqrt(level.r[1] * dt / (2.0 * np.pi**2 * corner))
+        std[0] = np.hypot(min(std[0], drift), levels[near].std[0])
+        levels[i], errors[i] = level._replace(state=state, std=std), error
     return levels, errors
 
 
@@ -140,12 +158,9 @@ PULSE = 1001
 
 def smoothed_level(
     m: Measurement, name: str, looser: float, forced: Array | float = 0.0, least: float = 0.0
-) -> dict[str, Any]:
+) -> LevelMotion:
     """Return the smoothed motion of one level by name, in SI.
 
-    `state` (n, 3) displacement, velocity, acceleration and `std` (3,) their errors; `r` (3,) the
-    variances of the channels and `have` (3,) which there are; `jerk` the intensity of the motion
-    and `added` (n,) that of its jumps; `forced` (n, 3) what was taken off before and put back.
     What was not measured of one channel the others tell, and the motion about it. Without an
     accelerometer the part of the acceleration that measured forces and the ground make, `forced`
     (n,) [m/s2], is as fast as they are: no smoother shall take that for noise. It is taken off
@@ -185,10 +200,7 @@ def smoothed_level(
     kalman_smooth(_samples(y, r, have, dt, seen), jerk + added, out)
     std = np.sqrt(np.maximum(out.cov, 0.0))
     state = out.state + path
-    return {
-        "state": state, "std": std, "jerk": jerk, "added": added, "r": r, "have": have,
-        "forced": path,
-    }  # fmt: skip
+    return LevelMotion(state, std, jerk, added, r, have, path)
 
 
 def _samples(y: Array, r: Array, have: Flags, dt: float, seen: Flags | None = None) -> Samples:
@@ -246,7 +258,7 @@ def _likeliest(
     return float(10.0**found.x)
 
 
-def level_draws(n: int, level: dict[str, Any], dt: float, draws: int, seed: int) -> Array:
+def level_draws(n: int, level: LevelMotion, dt: float, draws: int, seed: int) -> Array:
     """Return draws (d, n, 3) of the smoother's error at the jerk and the noise of a run.
 
     Parameters
@@ -258,10 +270,10 @@ def level_draws(n: int, level: dict[str, Any], dt: float, draws: int, seed: int)
     seed : of the draws
     """
     generator = np.random.default_rng(seed)
-    jerk, r, have = level["jerk"], level["r"], level["have"]
+    jerk, r, have = level.jerk, level.r, level.have
     lead = min(200, n)
     total = n + 2 * lead
-    each = jerk + np.pad(level["added"], lead)
+    each = jerk + np.pad(level.added, lead)
     out = np.zeros((draws, n, 3))
     smoothed = room(total)
     for d in range(draws):
@@ -273,8 +285,8 @@ def level_draws(n: int, level: dict[str, Any], dt: float, draws: int, seed: int)
 
 
 def corrected(
-    level: dict[str, Any], dt: float, draws: int, seed: int, sudden: bool = False
-) -> tuple[dict[str, Any], Array]:
+    level: LevelMotion, dt: float, draws: int, seed: int, sudden: bool = False
+) -> tuple[LevelMotion, Array]:
     """Return a level that has no accelerometer with what moves of its acceleration, and its error.
 
     Draws of the error are those of the whole way: the motion that was found counts as true, the
@@ -294,11 +306,11 @@ def corrected(
     seed : of the draws
     sudden : whether forces on the level make its acceleration jump
     """
-    state, r, have = level["state"] - level["forced"], level["r"], level["have"]
+    state, r, have = level.state - level.forced, level.r, level.have
     n = len(state)
     if not draws:
         return level, np.zeros((0, n, 3))
-    jerk, out = np.full(n, level["jerk"]), room(n)
+    jerk, out = np.full(n, level.jerk), room(n)
 
     def smoothed(y: Array) -> Array:
         kalman_smooth(_samples(y, r, have, dt), jerk, out)
@@ -310,7 +322,7 @@ def corrected(
     if sudden:
         error = state - smoothed(state) - passed  # smoothing is linear
         # When between two samples a measured force changed nobody knows.
-        forced = level["forced"][:, 2]
+        forced = level.forced[:, 2]
         late = np.diff(forced, append=forced[-1]) * generator.uniform(-0.5, 0.5, (draws, n))
         error[:, :, 2] = convolve1d(late, shown_pulse(level, dt), mode="nearest") - passed[:, :, 2]
     else:
@@ -322,10 +334,10 @@ def corrected(
     error[1::2] -= 2.0 * error.mean(axis=0)
     edge = min(EDGE, n // 4)
     std = np.sqrt(np.mean(error[:, edge : n - edge] ** 2, axis=(0, 1)))
-    return {**level, "state": state + level["forced"], "std": std}, error
+    return level._replace(state=state + level.forced, std=std), error
 
 
-def shown_pulse(level: dict[str, Any], dt: float) -> Array:
+def shown_pulse(level: LevelMotion, dt: float) -> Array:
     """Return what a level's smoother shows of a pulse of its acceleration (2 k + 1,), its sum 1.
 
     Parameters
@@ -333,12 +345,12 @@ def shown_pulse(level: dict[str, Any], dt: float) -> Array:
     level : the smoothed motion of one level, see `corrected`
     dt : step [s]
     """
-    n = min(PULSE, len(level["state"]))
+    n = min(PULSE, len(level.state))
     after = (np.arange(n) - n // 2) * dt
     pulse = np.column_stack([np.maximum(after, 0.0), np.heaviside(after, 0.5), np.zeros(n)])
     out = room(n)
-    samples = _samples(pulse * level["have"], level["r"], level["have"], dt)
-    kalman_smooth(samples, np.full(n, level["jerk"]), out)
+    samples = _samples(pulse * level.have, level.r, level.have, dt)
+    kalman_smooth(samples, np.full(n, level.jerk), out)
     shown = out.state[:, 2]
     k = int(np.max(np.abs(np.flatnonzero(np.abs(shown) > 1e-3 * shown.max()) - n // 2)))
     shown = shown[n // 2 - k : n // 2 + k + 1]
@@ -409,13 +421,11 @@ def measured_across(
         None
         if one is None
         else DeviceMotion(
-            one["state"][:, 0],
-            one["state"][:, 1],
-            one["std"],
+            one.state[:, 0], one.state[:, 1], one.std,
             level_draws(len(run.time), one, run.step, draws, seed),
         )
         for one, run in zip(smoothed, runs, strict=True)
-    ]
+    ]  # fmt: skip
 
 
 def _difference(run: Measurement, lower: str, upper: str) -> Measurement | None:
@@ -652,7 +662,7 @@ def responses(
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
         for i, one in enumerate(levels):
-            if not one["have"][2] and (first or i not in ends):
+            if not one.have[2] and (first or i not in ends):
                 levels[i], error = corrected(one, m.step, draws, seed + i, i == 0)
                 errors.append(error)
             else:
@@ -663,7 +673,7 @@ def responses(
             found, device=device, others=_loads(m, building, device), across=own,
             known=_known(m, building, device) if reasons else None,
             known_but={why: _known(m, building, device, why) for why in reasons},
-            pulse=shown_pulse(levels[0], m.step) if first and not levels[0]["have"][2] else None,
+            pulse=shown_pulse(levels[0], m.step) if first and not levels[0].have[2] else None,
         )  # fmt: skip
         out.append(_anchored(found, m, building, levels, errors))
     return out
@@ -671,7 +681,7 @@ def responses(
 
 def _smoothed(
     m: Measurement, building: Building, device: Device, looser: float
-) -> list[dict[str, Any]]:
+) -> list[LevelMotion]:
     """Return the smoothed motion of all levels of a run, see `smoothed_level`.
 
     A displacement alone may be likeliest under far less jerk than its level has: one without an
@@ -680,7 +690,7 @@ def _smoothed(
     forced = dict(zip(building.levels(), _forced(m, building, device), strict=True))
     shown = {one for one in forced if m.has(f"{one}_acceleration_absolute")}
     found = {one: smoothed_level(m, one, looser, forced[one]) for one in forced if one in shown}
-    least = min((level["jerk"] for level in found.values()), default=0.0)
+    least = min((level.jerk for level in found.values()), default=0.0)
     for one in forced:
         if one not in shown:
             found[one] = smoothed_level(m, one, looser, forced[one], least)
@@ -727,7 +737,7 @@ def _loads(m: Measurement, building: Building, device: Device) -> tuple[Load, ..
 
 def _anchored(
     found: Response, m: Measurement, building: Building,
-    levels: list[dict[str, Any]], errors: list[Array],
+    levels: list[LevelMotion], errors: list[Array],
 ) -> Response:  # fmt: skip
     """Return a response whose slow motion is held by the forces, where a level hides its own.
 
@@ -743,11 +753,12 @@ def _anchored(
         {i for i in range(1, building.size) if found.hides(i)},
         [f"{m.name}: {level}_displacement" for level in building.levels()],
     )  # fmt: skip
-    return _with_motion(found, levels, errors)
+    x, v, std, drawn = _stacked(levels, errors, found.a.shape[1])
+    return replace(found, x=x, v=v, std=std, draws=drawn)
 
 
 def _accelerations(
-    m: Measurement, building: Building, levels: list[dict[str, Any]]
+    m: Measurement, building: Building, levels: list[LevelMotion]
 ) -> tuple[Array, Array]:
     """Return the absolute acceleration (levels, n) [m/s2] and its noise (levels,).
 
@@ -758,43 +769,35 @@ def _accelerations(
     for name, level in zip(building.levels(), levels, strict=True):
         channel = f"{name}_acceleration_absolute"
         own = m.has(channel)
-        a.append(m[channel] if own else level["state"][:, 2] + ground)
-        noise.append(m.noise.get(channel, 0.0) if own else float(level["std"][2]))
+        a.append(m[channel] if own else level.state[:, 2] + ground)
+        noise.append(m.noise.get(channel, 0.0) if own else float(level.std[2]))
     return np.array(a), np.array(noise)
 
 
-def _with_motion(response: Response, levels: list[dict[str, Any]], errors: list[Array]) -> Response:
-    """Return a response with the motion of its levels."""
-    n = response.a.shape[1]
-    return replace(
-        response,
-        x=np.array([level["state"][:, 0] for level in levels]),
-        v=np.array([level["state"][:, 1] for level in levels]),
-        std=np.array([level["std"] for level in levels]),
-        draws=np.array([error[:, :n] for error in errors]),
-    )
+def _stacked(levels: list[LevelMotion], errors: list[Array], n: int) -> tuple[Array, ...]:
+    """Return x, v (levels, n), std (levels, 3) and draws (levels, d, n, 3) of the levels."""
+    x, v = (np.array([level.state[:, k] for level in levels]) for k in (0, 1))
+    std = np.array([level.std for level in levels])
+    return x, v, std, np.array([error[:, :n] for error in errors])
 
 
 def _response(
-    m: Measurement, levels: list[dict[str, Any]], errors: list[Array], absolute: tuple[Array, Array]
+    m: Measurement, levels: list[LevelMotion], errors: list[Array], absolute: tuple[Array, Array]
 ) -> Response:
     """Return a measurement as a response; `absolute` are accelerations and their noise."""
     n = len(m.time)
     a, noise_a = absolute
-    own = [level["have"][2] for level in levels]
+    own = [level.have[2] for level in levels]
+    x, v, std, draws = _stacked(levels, errors, n)
     drive = m.drive
     V, left = np.zeros(n), 0.0
     if drive:
         V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step)
     return Response(
-        m.name, m.step,
-        np.array([level["state"][:, 0] for level in levels]),
-        np.array([level["state"][:, 1] for level in levels]),
-        a, m["ground_acceleration"], m["force"] if m.has("force") else None, V, noise_a,
-        m.noise.get("force", 0.0), m.noise.get("ground_acceleration", 0.0), np.array(own),
-        np.array([level["std"] for level in levels]),
-        np.array([error[:, :n] for error in errors]), left, drive, m.labels, m.extra,
-        finer=m.finer, untold=untold(m, m.channels),
+        m.name, m.step, x, v, a, m["ground_acceleration"],
+        m["force"] if m.has("force") else None, V, noise_a, m.noise.get("force", 0.0),
+        m.noise.get("ground_acceleration", 0.0), np.array(own), std, draws, left, drive, m.labels,
+        m.extra, finer=m.finer, untold=untold(m, m.channels),
     )  # fmt: skip
 
 
