@@ -50,13 +50,9 @@ def load_cell(
         The finding, then the training and held-out responses with the force corrected. None where
         no delay and no gain explains the layer better than its own effects do.
     """
-    best: tuple[float, float, float, SiteDiagnosis] | None = None
-    for what in ("delay", "gain"):
-        found = _search_cell(what, train, holdout, building, level)
-        if best is None or found[0] < best[0]:
-            best = found
-    assert best is not None
-    z_1, delay, gain, finding = best
+    both = [_search_cell(what, train, holdout, building, level) for what in ("delay", "gain")]
+    finding, (delay, gain) = min(both, key=lambda found: found[0].z_after)
+    z_1 = finding.z_after
     own = min((trial.z for trial in layer.trials), default=np.inf)
     share = SITE.explained(layer.z_before, z_1)
     if z_1 >= own or 1.0 - z_1 / layer.z_before < SITE.gain:
@@ -66,34 +62,33 @@ def load_cell(
     if not delay and abs(gain - 1.0) <= SITE.mass_doubt:
         return None  # masses that are not known better would do the same
     name = instrument_of("force", "delay") if delay else FORCE_GAIN
-    right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))
+    right = [[corrected(r, delay, gain) for r in part] for part in (train, holdout)]
     faulty = replace(
         finding, site="force", kind="effect", effects=(name,), z_before=layer.z_before, share=share,
         coordinate=f"{delay:.3g} s" if delay else f"{gain:.4g}", noise_known=layer.noise_known,
     )  # fmt: skip
-    return faulty, right  # type: ignore[return-value]
+    return faulty, (right[0], right[1])
 
 
 def _search_cell(
     what: str, train: list[Response], holdout: list[Response], building: Building, level: int
-) -> tuple[float, float, float, SiteDiagnosis]:
-    """Return z on held-out runs, delay [s], gain and finding of the best delay or gain."""
+) -> tuple[SiteDiagnosis, tuple[float, float]]:
+    """Return the finding of the best delay or gain, and that delay [s] and gain."""
+
+    def cell(value: float) -> tuple[float, float]:
+        return (value, 1.0) if what == "delay" else (0.0, value)
 
     def problem(value: float, part: list[Response]) -> StructureProblem:
-        delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
-        right = [corrected(r, delay, gain) for r in part]
-        return line_problem(right, building, level)
+        return line_problem([corrected(r, *cell(value)) for r in part], building, level)
 
     law = law_of_part("layer" if building.isolated and not level else "storey1").name
 
     def cost(value: float) -> float:
         return fit_line(problem(value, train), law).cost
 
+    grid = np.array([0.6, 0.8, 0.9, 1.1, 1.25, 1.6])
     if what == "delay":
-        dt = train[0].dt
-        grid = dt * np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-    else:
-        grid = np.array([0.6, 0.8, 0.9, 1.1, 1.25, 1.6])
+        grid = train[0].dt * np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
     costs = [cost(value) for value in grid]
     k = int(np.argmin(costs))
     low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
@@ -104,9 +99,8 @@ def _search_cell(
     base = fit_line(own, law)
     after = judge(base.model, own, other)
     least = detectable(other, other.expectation(base.model), SITE)
-    finding = SiteDiagnosis("force", "none", (), 0.0, after.z, 0.0, least, "", base.model)
-    delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
-    return after.z, delay, gain, finding
+    found = SiteDiagnosis("force", "none", (), 0.0, after.z, 0.0, least, "", base.model)
+    return found, cell(value)
 
 
 # What a late load cell does to the force: a low-pass with its corner, or a delay.
