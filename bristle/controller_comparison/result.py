@@ -12,7 +12,7 @@ import numpy as np
 
 from ..campaign.campaign import Statistic
 from ..core.files import writing
-from ..core.text import quantity
+from ..core.text import percent, quantity
 from ..errors import not_usable
 from ..view import Viewable
 from .runs import CaseRunner, Reached, Spread
@@ -288,7 +288,7 @@ def _gap(found: ControllerComparison, first: str) -> list[str]:
     text = f"The limit, with the motion known, lies {beside(lowest, 'the best constant voltage')}"
     text += " on average" if len(found.motions) > 1 else ""
     if share > 0.0:
-        text += f"; {first} closes {100.0 * share:.0f} % of that gap"
+        text += f"; {first} closes {percent(share, 0)} of that gap"
     unsure = [motion for motion, one in found.limits.items() if not one.sure]
     texts = [f"{text}."]
     if unsure:

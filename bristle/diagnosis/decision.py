@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..comparison.names import effect_name
-from ..core.text import joined, plain
+from ..core.text import joined, percent, plain
 from ..errors import StudyError
 from ..identification.building_sites import StructureProblem
 from ..identification.error import held_out_apart
@@ -151,10 +151,9 @@ def as_noise(before: Trial, ranked: Sequence[Trial]) -> Decision:
 
 def unexplained(before: Trial, rule: DecisionRule) -> str:
     """Return the sentence that no effect gains enough."""
-    least = f"{100.0 * rule.gain:.0f} %"
     return (
         f"The error on held-out runs is {before.z:.2f} {NOISE}; no effect of the library lowers "
-        f"it by {least}."
+        f"it by {percent(rule.gain, 0)}."
     )
 
 
@@ -162,7 +161,7 @@ def in_part(name: str, best: Trial, explained: float) -> str:
     """Return the sentence that the best effect explains too little."""
     return (
         f"The best effect of the library, {effect_name(name)}, explains only "
-        f"{100.0 * explained:.0f} % of what is missing: with it the error is {best.z:.2f} {NOISE}."
+        f"{percent(explained, 0)} of what is missing: with it the error is {best.z:.2f} {NOISE}."
     )
 
 
@@ -177,7 +176,7 @@ def gained(name: str, before: Trial, best: Trial, explained: float) -> str:
     """
     return (
         f"With {effect_name(name)} the error on held-out runs falls from {before.z:.2f} to "
-        f"{best.z:.2f} {NOISE}: it explains {100.0 * explained:.0f} % of the error beyond noise."
+        f"{best.z:.2f} {NOISE}: it explains {percent(explained, 0)} of the error beyond noise."
     )
 
 

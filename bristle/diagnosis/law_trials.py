@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..core.progress import Count
-from ..core.text import short_z
+from ..core.text import percent, short_z
 from ..identification.error import ForceError, force_error
 from ..identification.fit import Search, refine
 from ..identification.problem import Problem, steady, suited, without
@@ -156,7 +156,7 @@ class OtherLaw:
         )
         return (
             f"{lead}, the law {plain}{bent} leaves {short_z(self.z)} {NOISE}: {FORM_ALONE} "
-            f"{100.0 * self.share:.0f} % of {rest}."
+            f"{percent(self.share, 0)} of {rest}."
         )
 
     def as_dict(self) -> dict[str, Any]:

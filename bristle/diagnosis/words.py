@@ -11,7 +11,7 @@ from typing import Any
 
 from ..comparison.names import effect_name, effect_names, name_of, site_name
 from ..comparison.words import capitalised
-from ..core.text import joined, quantity, short_z
+from ..core.text import joined, percent, quantity, short_z
 from ..identification.error import ForceError
 from ..identification.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
@@ -200,23 +200,19 @@ def _sites(sites: Sequence[str]) -> str:
 def _gains(verdict: Verdict) -> list[str]:
     """Return what known effects gain, where none of them explains what is missing."""
     rows = verdict.get("gains") or []
-    alone = [row for row in rows if len(row["effects"]) == 1]
-    out = []
-    if alone:
-        first, *others = alone
-        texts = [f"{effect_name(first['effects'][0])} by {100.0 * first['gain']:.0f} %"]
-        texts += [
-            f"{effect_name(row['effects'][0])} by {100.0 * row['gain']:.0f} %" for row in others
-        ]
-        each = ", each added alone" if others else ""
-        out.append(f"What lowers the error most: {joined(texts)}{each}.")
-    out += [
+    texts = [
+        f"{effect_name(row['effects'][0])} by {percent(row['gain'], 0)}"
+        for row in rows
+        if len(row["effects"]) == 1
+    ]
+    each = ", each added alone" if len(texts) > 1 else ""
+    out = [f"What lowers the error most: {joined(texts)}{each}."] if texts else []
+    return out + [
         f"{capitalised(effect_names(row['effects']))} together lower it by "
-        f"{100.0 * row['gain']:.0f} %."
+        f"{percent(row['gain'], 0)}."
         for row in rows
         if len(row["effects"]) > 1
     ]
-    return out
 
 
 def _one_of(effects: Sequence[str]) -> str:

@@ -155,7 +155,7 @@ class LearnedClosure(Viewable):
         falls = self.falls or [one.headline[1] for one in errors if one is not None]
         fall = " to ".join(map(percent, falls))
         lives = [(words, part) for words, part in self.lives_on if part >= LIVES][:TOLD]
-        inputs = ", ".join(f"{words} ({100.0 * part:.0f} %)" for words, part in lives)
+        inputs = ", ".join(f"{words} ({percent(part, 0)})" for words, part in lives)
         return [
             f"{self.name} is a closure: a network of {len(self.closure.out)} units for what the "
             "model misses and no formula serves. It is no effect of physics, and the verdict stays "
@@ -818,7 +818,7 @@ class Nearest:
 
     def sentence(self, drive: str) -> str:
         """Return what is said of it; `drive` is the command's channel."""
-        share, name = f"{100.0 * self.explains:.0f} %", effect_name(self.effect)
+        share, name = percent(self.explains, 0), effect_name(self.effect)
         if self.explains < NEAR:
             return (
                 f"No effect of the library is near: the nearest, {name}, explains {share} of what "

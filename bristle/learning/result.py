@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..comparison.names import site_name
-from ..core.text import plain, quantity, with_interval
+from ..core.text import percent, plain, quantity, with_interval
 from ..view import Viewable
 from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
 from .curve import Curve
@@ -58,7 +58,7 @@ class LearnedEffect(Viewable):
         if best is not None:
             out.append(
                 f"The curve is nearly {in_words(best, curve)} "
-                f"({100.0 * best.left:.0f} % of its variation remains)."
+                f"({percent(best.left, 0)} of its variation remains)."
             )
             if self.closed is not None:
                 out.append(
@@ -77,7 +77,7 @@ class LearnedEffect(Viewable):
         elif self.forms:
             near = nearest_of(self.forms)
             text = f": the nearest, {in_words(near, curve)}, leaves " if near else ""
-            text += f"{100.0 * near.left:.0f} % of its variation" if near else ""
+            text += f"{percent(near.left, 0)} of its variation" if near else ""
             out.append(f"No formula follows the curve{text}.")
         return [*out, *self._line()]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..comparison.names import site_name
 from ..core.arrays import Array
-from ..core.text import scale, short_z
+from ..core.text import percent, scale, short_z
 from ..view.blocks import Block, Table, Text, View, view_of
 from ..view.style import BLUE, GREY, PALE, VERMILION, Page, look, png, ramp
 from .closed_forms import Closed, ClosedForm, in_words, name_of, nearest_of
@@ -45,7 +45,7 @@ def learned_view(found: LearnedEffect) -> View:
 def closure_view(found: LearnedClosure) -> View:
     """Return the view of a closure: what it is, what it lives on, where it is not supported."""
     title, *rest = found.sentences()
-    rows = [[words, f"{100.0 * part:.0f} %"] for words, part in found.lives_on]
+    rows = [[words, percent(part, 0)] for words, part in found.lives_on]
     table = [Table(("input", "goes without it"), rows, (1,))] if rows else []
     file = [] if found.file is None else [Text(f"File: {found.file}.")]
     return View(title, (*map(Text, rest), *file), tuple(table))

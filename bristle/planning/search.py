@@ -13,7 +13,7 @@ from scipy.stats import qmc
 
 from ..core.arrays import Array
 from ..core.progress import Count, tell
-from ..core.text import quantity
+from ..core.text import percent, quantity
 from ..data.noise import white_noise
 from ..errors import StudyError
 from ..identification.problem import Run
@@ -151,7 +151,7 @@ class Planner:
             kept += f" and an acceleration of {quantity(rig.acceleration, 'm/s2')}"
         return (
             f"no test stays within the limits: {kept} allow {quantity(most, 'm')} from "
-            f"{rig.usable_band[0]:.3g} Hz on, less than {100.0 * LEAST:.0f} % of the stroke of "
+            f"{rig.usable_band[0]:.3g} Hz on, less than {percent(LEAST, 0)} of the stroke of "
             f"{quantity(rig.stroke, 'm')}. More of these, a lower band or a smaller stroke is "
             "needed."
         )

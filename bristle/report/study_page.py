@@ -240,7 +240,7 @@ def _caption(told: dict[str, Any]) -> str:
 def _rows(told: dict[str, Any]) -> list[list[str]]:
     """Return name, formula and remaining share of the closed forms nearest to a curve."""
     return [
-        [str(one["name"]), f"g = {one['formula']}", f"{100.0 * float(one['left']):.0f} %"]
+        [str(one["name"]), f"g = {one['formula']}", percent(float(one["left"]), 0)]
         for one in told["forms"]
     ]
 

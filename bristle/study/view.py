@@ -656,7 +656,7 @@ def completed_view(study: Study, done: Completed, verdict: Mapping[str, Any]) ->
     first, *rest = view.blocks  # the error
     then = []
     if done.promise <= PAYS:
-        gain = f"a network: error {100.0 * (1.0 - done.promise):.0f} % lower, on training runs"
+        gain = f"a network: error {percent(1.0 - done.promise, 0)} lower, on training runs"
         then = [Next(command("learn", study.folder, "--closure"), gain)]
     shown = [table] if is_identified(study.model()) else []
     return view._replace(blocks=(first, *learned, *rest, *shown, *then))
@@ -817,5 +817,5 @@ def _gaining(verdict: Mapping[str, Any], folder: Path) -> Next:
     if not gains:
         return Next(command("compare", folder), "shows where the error is")
     best = max(gains, key=lambda row: row["gain"])
-    why = f"error {100.0 * best['gain']:.0f} % lower, {NOT_PROVEN}"
+    why = f"error {percent(best['gain'], 0)} lower, {NOT_PROVEN}"
     return Next(command("add", folder, *best["effects"]), why)
