@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from functools import wraps
 from math import inf
 from types import SimpleNamespace
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from scipy.special import fdtrc, stdtrit
@@ -400,7 +400,7 @@ def _text(
         parts = _arrhenius_text(word, float(sizes[0]) / now, line, what)
     else:
         parts = _line_text(word, unit, float(sizes[0]), line, what, (label.name, told, per))
-    formula, given, fields, parameters, value, words, imports = parts
+    formula, value, words = parts.formula, parts.value, parts.words
     if name == WHOLE and "exp(" not in value:
         change = value.removeprefix("q.value + ")
         value = f"q.value * max(1.0 + {change}, 0.0)"
@@ -414,8 +414,8 @@ def _text(
         formula = f"{formula}, never below {least}"
     lines = [
         f'"""The {in_docstring(about)}, by the label {label.name} of the runs."""',
-        "", *imports, "",
-        *given,
+        "", *parts.imports, "",
+        *parts.constants,
         "",
         f"class {''.join(one.capitalize() for one in effect.split('_'))}(Effect):",
         f'    """The {in_docstring(about)} depends on {label_name(label.name)}.',
@@ -436,9 +436,9 @@ def _text(
         '    source = "Learned from runs: what each of them asks of the parameter, by its label"',
         f"    expect = {literal(f'an error that goes with {label.name} from run to run')}",
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
-        *fields,
+        *parts.fields,
         f"    labels = {{{literal(word)}: {literal(label.name)}}}",
-        *parameters,
+        "    parameters = {", *parts.parameters, "    }", *parts.tables,
         "",
         "    @staticmethod",
         "    def changed(q, z, p):",
@@ -456,10 +456,20 @@ def _now(model: Model, name: str) -> float:
     return 1.0 if name == WHOLE else model.value(name)
 
 
-_Parts = tuple[str, list[str], list[str], list[str], str, list[str], list[str]]
-"""Formula, constants, class data, parameters, the value, the words' lines, and imports."""
-
 _IMPORT = "from bristle.physics.effect import Effect, Parameter"
+
+
+class _Parts(NamedTuple):
+    """What the file of a dependence has of its form: lines, but for formula and value."""
+
+    formula: str
+    value: str
+    fields: list[str]
+    parameters: list[str]
+    words: list[str]
+    imports: Sequence[str] = (_IMPORT,)
+    constants: Sequence[str] = ()
+    tables: Sequence[str] = ()
 
 
 def _line_text(
@@ -474,23 +484,20 @@ def _line_text(
     shown = f" {per}" if label_si and not warm else " °C" if warm else ""
     of_what = f" of {label_name(name)}" if label_si else ""
     size = f"{{abs(p.slope):.3g}} {unit}" if unit != "1" else "{abs(p.slope):.3g}"
-    return (
-        f"value + slope ({word} - middle)", [],
+    return _Parts(
+        f"value + slope ({word} - middle)",
+        f"q.value + p.slope * (p.{word} - p.middle)",
         ['    amount = "slope"', f'    assumed = ({literal(word)}, "middle")',
          f'    label_means = {{"middle": {literal(name)}}}'],
         [
-            "    parameters = {",
             f'        "slope": {_declared(slope, of, f"change with each {per}")},',
             *_label_parameters(word, own, values, middle),
-            "    }",
         ],
-        f"q.value + p.slope * (p.{word} - p.middle)",
         [
             '        way = "rises" if p.slope >= 0.0 else "falls"',
             f'        return f"{_braced(what)} {{way}} by {size} per {per}{_braced(of_what)}; "\\',
             f'            f"the model\'s value of it is that at {{p.middle:.4g}}{shown}."',
         ],
-        [_IMPORT],
     )  # fmt: skip
 
 
@@ -498,18 +505,16 @@ def _arrhenius_text(word: str, share: float, line: tuple[float, Array], what: st
     """Return the parts of the file of a parameter that follows a temperature by Arrhenius' law."""
     middle, values = line
     size = -share * (middle + ZERO_C) ** 2
-    return (
-        f"value exp(B (1/{word} - 1/middle)), temperatures in K", [],
+    return _Parts(
+        f"value exp(B (1/{word} - 1/middle)), temperatures in K",
+        f"q.value * exp(min(max(p.B * (1.0 / (p.{word} + {ZERO_C}) "
+        f"- 1.0 / (p.middle + {ZERO_C})), -3.0), 3.0))",
         ['    amount = "B"', f'    assumed = ({literal(word)}, "middle")',
          f'    label_means = {{"middle": "{TEMPERATURE}"}}'],
         [
-            "    parameters = {",
             f'        "B": {_declared(size, "K", "activation energy over the gas constant")},',
             *_label_parameters(word, "degC", values, middle, (-200.0, 1000.0)),
-            "    }",
         ],
-        f"q.value * exp(min(max(p.B * (1.0 / (p.{word} + {ZERO_C}) "
-        f"- 1.0 / (p.middle + {ZERO_C})), -3.0), 3.0))",
         [
             f"        share = 100.0 * p.B / (p.middle + {ZERO_C}) ** 2",
             '        way = "falls" if p.B >= 0.0 else "rises"',
@@ -517,7 +522,7 @@ def _arrhenius_text(word: str, share: float, line: tuple[float, Array], what: st
             '            "by the law of Arrhenius; the model\'s value of it is that at "\\',
             '            f"{p.middle:.4g} °C."',
         ],
-        ["from math import exp", "", _IMPORT],
+        ("from math import exp", "", _IMPORT),
     )  # fmt: skip
 
 
@@ -540,25 +545,25 @@ def _steps_text(label: LabelOfRuns, word: str, unit: str, sizes: Array, what: st
     ]  # fmt: skip
     pairs = [f"{level:g} {text}" for level, text in zip(levels, texts, strict=True)]
     told = "" if label.is_number else f": {', '.join(pairs)}"
-    return (
+    return _Parts(
         f"value + step({word})",
-        [f"LEVELS = ({', '.join(repr(one) for one in levels)})",
-         f'"""Of the label: {in_docstring(", ".join(texts))}."""', ""],
+        f"q.value + interpolate(p.{word}, LEVELS, p.step)",
         [f'    assumed = ({literal(word)}, "step[1]")', *named],
         [
-            "    parameters = {",
             f'        "{word}": Parameter({levels[1]!r}, "1", {_span(np.array(levels))}, '
             f"{literal(f'of the run{told}')}),",
-            "    }",
+        ],
+        [f'        return f"{_braced(what)} differs from that at {_braced(texts[0])} by '
+         f'{joined(shown)}."'],
+        (f"{_IMPORT}, Table, interpolate",),
+        (f"LEVELS = ({', '.join(repr(one) for one in levels)})",
+         f'"""Of the label: {in_docstring(", ".join(texts))}."""', ""),
+        (
             "    tables = {",
             f'        "step": Table(LEVELS, ({values}), "{unit}", ({-most:.6g}, {most:.6g}),',
             f"            {literal(f'change with {label_name(label.name)} from {texts[0]}')}),",
             "    }",
-        ],
-        f"q.value + interpolate(p.{word}, LEVELS, p.step)",
-        [f'        return f"{_braced(what)} differs from that at {_braced(texts[0])} by '
-         f'{joined(shown)}."'],
-        [f"{_IMPORT}, Table, interpolate"],
+        ),
     )  # fmt: skip
 
 
