@@ -241,12 +241,17 @@ def dependences(prepared: Prepared, *, with_motion: bool = False) -> list[Depend
     return sorted(found, key=lambda one: -one.gain)[:MOST]
 
 
+def _called(parameter: str, label: LabelOfRuns) -> str:
+    """Return the name of the effect that changes a parameter by a label."""
+    return f"{parameter.replace('.', '_')}_by_{as_word(label.name)}"
+
+
 def _dependence(
     fits: RunwiseFit, j: int, label: LabelOfRuns, train: Problem, model: Model, bent: float
 ) -> Dependence | None:
     """Return how a parameter depends on a label; None where it does not, or hardly."""
     name = fits.names[j]
-    effect = f"{name.replace('.', '_')}_by_{as_word(label.name)}"
+    effect = _called(name, label)
     asked, told = fits.apart(j)
     if told.sum() < FEWEST or not effect.isidentifier() or effect in EFFECTS:
         return None
@@ -319,7 +324,7 @@ def promising(problem: Problem, model: Model) -> list[Dependence]:
         ]
         gain, size, j = max(gains, key=lambda one: one[0])
         name = fits.names[j]
-        effect = f"{name.replace('.', '_')}_by_{as_word(label.name)}"
+        effect = _called(name, label)
         same = effect not in model.effects and effect in EFFECTS and EFFECTS[effect].changes == name
         if gain < WORTH or not size.any() or not effect.isidentifier():
             continue

@@ -435,10 +435,9 @@ def identify_study(
     model = _of_law(model or present, law)
     compile_ahead(model.law, model.effects)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    task = FitTask(cutoff, 0 if begin else starts, begin=begin or {}, command=command)
     # Before is what the study had: at its defaults another law would be nobody's model.
-    other = present.law != model.law
-    task = replace(task, laws=all_of_them, present=present if other else None)
+    before = present if present.law != model.law else None
+    task = FitTask(cutoff, 0 if begin else starts, before, begin or {}, command, all_of_them)
     found = identify_model(study, model, task)
     if not write:
         return found
