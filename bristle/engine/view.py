@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 _TOP = re.compile(r"(?P<component>.*)\.floor(?P<floor>\d+)_acceleration_absolute")
 SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
 """Units in SI, with the factor to those that are shown."""
+MEASURED = Feed("measured.value")
+"""The force as it was measured: a signal of this name that is played beside the model's."""
 _MOTIONS = {"displacement": "m", "velocity": "m/s"}
 """What a damper feels, and its unit."""
 _MOST_HISTORIES = 5
@@ -205,7 +207,7 @@ class _DrawnRun:
             name = f"{component}.floor{floor}_acceleration_absolute"
             ground = self.feeds.get(f"{component}.ground_acceleration", NOTHING)
             what = f"Absolute acceleration of floor {floor}{of}"
-            made.append(partial(self.history, name, what, ground=ground))
+            made.append(partial(self.history, name, what, behind=ground))
             base = f"{component}.base_displacement"
             drift = base if base in self.frame else f"{component}.drift1"
             what = "Base drift" if drift == base else "Drift of the first storey"
@@ -215,6 +217,9 @@ class _DrawnRun:
         if not tops:
             moved = [name for name in self.reals() if name.endswith(".displacement")]
             made += [partial(self.history, name, f"Displacement, {name[:-13]}") for name in moved]
+        forces = [name for name in self.reals() if name.endswith(".force")]
+        if MEASURED.output in self.frame and len(forces) == 1:
+            made.append(partial(self.history, forces[0], "Force", behind=MEASURED))
         driven = (n for n in self.reals() if n.endswith(".voltage") and self._moves(n))
         made += [partial(self.history, name, f"Voltage, {name[:-8]}") for name in driven]
         return [make() for make in made[:_MOST_HISTORIES]]
@@ -225,18 +230,19 @@ class _DrawnRun:
         return feeds_of(self.made.get("scenario", ""))
 
     def history(
-        self, name: str, title: str, *, stroke: bool = False, ground: Feed = NOTHING
+        self, name: str, title: str, *, stroke: bool = False, behind: Feed = NOTHING
     ) -> Draw:
-        """Return what draws one output over time, its peak marked, over that of the ground."""
-        self.shown.update((name, ground.output))
+        """Return what draws one output over time, its peak marked, over another one."""
+        self.shown.update((name, behind.output))
 
         def draw(axes: Axes) -> None:
             time = self.frame.index.to_numpy()
             values, unit = self._shown(name)
             axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)
-            if ground.output in self.frame:
-                axes.plot(time, self._given(ground), color="#9a9a9a", linewidth=0.8)
-                axes.set_title("grey: ground", loc="right", fontsize=8.5, color=GREY)
+            if behind.output in self.frame:
+                axes.plot(time, self._given(behind), color="#9a9a9a", linewidth=0.8)
+                what = "measured" if behind == MEASURED else "ground"
+                axes.set_title(f"grey: {what}", loc="right", fontsize=8.5, color=GREY)
             axes.plot(time, values, color=BLUE, linewidth=0.9)
             axes.set_title(title + _bracketed(unit))
             axes.margins(x=0.0, y=0.2)
@@ -320,7 +326,12 @@ class _DrawnRun:
                 axes.plot(across, force, color=thin, linewidth=0.6, label=name)
                 if cycle:
                     axes.plot(across[cycle], force[cycle], color=colour, lw=1.5, label=damper)
-                    axes.set_title("thick: the largest cycle", loc="right", fontsize=8, color=GREY)
+                    told = "thick: the largest cycle"
+                    if MEASURED.output in self.frame and len(pairs) == 1:
+                        measured = self._given(MEASURED)[cycle]
+                        axes.plot(across[cycle], measured, color=VERMILION, lw=0.9)
+                        told = "one cycle; red: measured"
+                    axes.set_title(told, loc="right", fontsize=8, color=GREY)
                 axes.set_xlabel(motion + _bracketed(unit))
                 axes.set_title(f"Damper force{_bracketed(force_unit)} over {motion}")
                 if len(pairs) == 1:

@@ -81,6 +81,22 @@ def test_a_damper_adds_its_loops_and_the_share_of_its_stroke() -> None:
     assert any(note.endswith("19 % of the damper's stroke") for note in notes(frame))
 
 
+def test_the_measured_force_is_laid_behind_that_of_the_model() -> None:
+    columns = {"rod.displacement": SINE, "rod.velocity": np.gradient(SINE, 0.01)}
+    columns |= {"damper.force": 5.0 * SINE, "measured.value": 4.0 * SINE}
+    wires = "".join(f'"damper.{of}" = "rod.{of}"\n' for of in ("displacement", "velocity"))
+    axes = draw_run(a_run(columns, UNITS, wires)).figure.axes
+    assert [one.get_title(loc="left") for one in axes[1:3]] == [
+        "Force [N]", "Damper force [N] over displacement"
+    ]  # fmt: skip
+    said = [one.get_title(loc="right") for one in axes[1:]]
+    assert said == ["grey: measured", *["one cycle; red: measured"] * 2]
+    assert {line.get_ydata()[15] for line in axes[1].lines[1:3]} == {4.0 * SINE[15], 5.0 * SINE[15]}
+    for one in axes[2:]:
+        model, measured = (line.get_ydata() for line in one.lines[-3:-1])
+        np.testing.assert_allclose(measured, 0.8 * model)
+
+
 def test_a_voltage_is_drawn_only_if_it_varies() -> None:
     columns = {**BUILDING, "a.voltage": np.full(200, 4.0), "b.voltage": 4.0 + SINE}
     assert [title for title in titles(a_run(columns, UNITS)) if "Voltage" in title] == [
