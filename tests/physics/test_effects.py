@@ -106,10 +106,10 @@ def test_coil_lag_delays_the_force_and_nothing_else() -> None:
 
 
 def remanent_loop(
-    width: float, dt: float = 0.002, turn: float = 1.0
+    width: float, dt: float = 0.002, turn: float = 1.0, hold: float = 0.0
 ) -> dict[str, list[tuple[float, float]]]:
     """Return (V, force) while the voltage rises from 0 to 8 V and while it falls, at 0.1 m/s."""
-    bench = Bench("bingham", on("remanence", width=width, turn=turn), ["remanence"])
+    bench = Bench("bingham", on("remanence", width=width, turn=turn, hold=hold), ["remanence"])
     bench.last = (0.0, 0.1, 0.0)
     branches: dict[str, list[tuple[float, float]]] = {"up": [], "down": []}
     for branch, voltages in (
@@ -157,6 +157,16 @@ def test_remanence_turns_as_a_play_or_jumps_as_a_relay() -> None:
     half = remanent_loop(0.5, turn=0.5)["down"]
     assert half[3][1] == pytest.approx(felt(7.7 + 0.5 - (0.5 - 0.3) / 0.5), rel=1e-9)
     assert half[8][1] == pytest.approx(felt(7.2 + 0.5), rel=1e-9)
+    # Three times as wide: 3 V back, from branch to branch, where the play takes 1 V.
+    wide = remanent_loop(0.5, turn=3.0)["down"]
+    assert wide[15][1] == pytest.approx(felt(6.5), rel=1e-9)
+    assert wide[30][1] == pytest.approx(felt(5.0 + 0.5), rel=1e-9)
+    assert wide[40][1] == pytest.approx(felt(4.0 + 0.5), rel=1e-9)
+    # The same way back, four fifths of it on the branch that it comes from.
+    kept = remanent_loop(0.5, turn=3.0, hold=0.8)["down"]
+    assert kept[24][1] == pytest.approx(felt(5.6 - 0.5), rel=1e-9)
+    assert kept[27][1] == pytest.approx(felt(5.3), rel=1e-9)
+    assert kept[40][1] == pytest.approx(felt(4.0 + 0.5), rel=1e-9)
 
 
 def test_remanence_without_width_is_none() -> None:
