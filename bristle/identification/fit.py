@@ -93,7 +93,7 @@ class Search:
     def run(self, sweeps: int, tolerance: float = 1e-4) -> tuple[Model, Descent]:
         """Search from the model's own values."""
         found = descend(
-            self.residuals, self.start, self.low, self.high, sweeps, tolerance, self.rough
+            self.residuals, self.start, self.low, self.high, sweeps, tolerance, self.jacobian
         )
         return self.at(found.theta), found
 

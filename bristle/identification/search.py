@@ -115,7 +115,7 @@ def descend(
     high: Array,
     sweeps: int = 20,
     tolerance: float = 1e-4,
-    rough: bool = False,
+    slopes: Callable[[Array, Array], Array] | None = None,
 ) -> Descent:
     """Minimise the mean robust loss of `residuals` from `theta` within bounds.
 
@@ -126,7 +126,7 @@ def descend(
     low, high : (p,) bounds
     sweeps : most Jacobians
     tolerance : relative decrease of the cost below which the search ends
-    rough : whether events such as impacts make the residuals jump; see `jacobian`
+    slopes : theta (p,) and the residuals (n,) there to their derivatives (n, p); else by `jacobian`
 
     Notes
     -----
@@ -138,11 +138,12 @@ def descend(
     theta = np.clip(theta, low, high)
     r = residuals(theta)
     judged = max(1, int(np.count_nonzero(r)))
+    slopes = slopes or (lambda theta, r: jacobian(residuals, theta, r, low, high))
     cost = float(np.sum(loss(r))) / judged
     if not len(theta):
         return Descent(theta, cost, np.zeros((0, 0)), 0)
     damping, small, sweep, secants = 1e-3, 0, 1, 0
-    J = jacobian(residuals, theta, r, low, high, rough)
+    J = slopes(theta, r)
     while True:
         normal, gradient = weighed(J, r)
         tried = _try(
@@ -164,7 +165,7 @@ def descend(
             theta, r, cost = tried.theta, tried.r, tried.cost
         if small == 2 or (not tried.moved and not secants) or sweep >= sweeps:
             return Descent(theta, cost, normal, sweep)
-        J, secants, sweep = jacobian(residuals, theta, r, low, high, rough), 0, sweep + 1
+        J, secants, sweep = slopes(theta, r), 0, sweep + 1
 
 
 @dataclass(frozen=True)
