@@ -35,9 +35,9 @@ from .unproven import unproven
 LEFT = 0.5
 """Share of the error on held-out runs that a step leaves at most for a verdict to be made anew."""
 
-MOST_SPENT = 2600e6
-"""Steps of dampers' forces, see `Effort`, that all verdicts and steps may take together: some
-five minutes. A verdict is made anew where twice what the first one took is left."""
+MOST_SPENT = 700e6
+"""Steps of dampers' forces, see `Effort`, that all verdicts and steps may take together: about
+three minutes. A verdict is made anew where twice what the first one took is left."""
 
 NOT_COMPARED = "Further effects were not compared, because the search had taken long enough."
 

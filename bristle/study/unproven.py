@@ -33,7 +33,7 @@ FOLDS = 3
 TRIED = 3
 """Laws, then effects, those that fit the training runs best, that folds compare at each step."""
 
-MOST_SPENT = 300e6
+MOST_SPENT = 150e6
 """Steps of dampers' forces, see `Effort`, from which on nothing further is compared."""
 
 TOGETHER = 2
